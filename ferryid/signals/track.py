@@ -1,0 +1,93 @@
+"""The tables between a recording and a fit: aligned signals, then smoothed motion with its forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Track:
+    """All signals of one recording on one uniform grid, in SI units, NED world frame and FRD body frame.
+
+    Attributes
+    ----------
+    log
+        Name of the log.
+    t
+        Time [s] since the first row, uniform, shape (n,).
+    t0_ns
+        Absolute time of the first row [ns].
+    rate_hz
+        Rows per second.
+    columns
+        Canonical signal name to values, shape (n,), NaN where nothing was measured. Names and units: see
+        `ferryid.vessel.signal_map`.
+    valid
+        True where position or velocity and every actuator were measured: no gap is bridged, shape (n,).
+    repairs
+        Counted repairs and findings, as sentences with numbers, for `inspect` and the report.
+    """
+
+    log: str
+    t: Floats
+    t0_ns: int
+    rate_hz: float
+    columns: Mapping[str, Floats]
+    valid: Flags
+    repairs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Smoothed motion and forces of one log, ready for regression. All arrays share the first axis, n rows.
+
+    Attributes
+    ----------
+    log
+        Name of the log.
+    t
+        Time [s] since the log's first row.
+    rate_hz
+        Rows per second.
+    eta
+        Position north, east [m] and heading [rad, unwrapped], NED, shape (n, 3); NaN where not measured.
+    nu
+        Smoothed surge, sway [m/s] and yaw rate [rad/s] over ground, FRD at the body origin, shape (n, 3).
+    nu_dot
+        Time derivative of `nu` [m/s², m/s², rad/s²], shape (n, 3).
+    tau
+        Applied actuator force from feedback [N, N, N·m], FRD, shape (n, 3), smoothed with the same window.
+    tau_d
+        Commanded force, same shape and frame, or None when the log has none.
+    wind
+        True wind [m/s] north, east, where the air goes to, shape (n, 2), or None.
+    current
+        Current [m/s] north, east, where the water goes to, shape (n, 2), or None.
+    valid
+        True for rows whose whole smoothing window lies inside measured data.
+    raw_nu
+        Unsmoothed velocities, shape (n, 3).
+    repairs
+        Sentences carried on from the track, and those of smoothing.
+    """
+
+    log: str
+    t: Floats
+    rate_hz: float
+    eta: Floats
+    nu: Floats
+    nu_dot: Floats
+    tau: Floats
+    valid: Flags
+    raw_nu: Floats
+    tau_d: Floats | None = None
+    wind: Floats | None = None
+    current: Floats | None = None
+    repairs: tuple[str, ...] = field(default=())

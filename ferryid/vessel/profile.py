@@ -1,0 +1,136 @@
+"""The vessel profile: hull, actuators, wind areas and where the signals live in a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.ingest.log import TableLayout
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hull:
+    """Three-degree-of-freedom hull in SNAME notation, SI units, FRD body frame.
+
+    Attributes
+    ----------
+    length_m, beam_m, draught_m
+        Main dimensions [m], NaN where not stated.
+    mass_kg
+        Rigid-body mass [kg].
+    inertia_z
+        Rigid-body moment of inertia in yaw about the body origin [kg·m²].
+    x_g_m
+        Centre of gravity forward of the body origin [m].
+    M
+        Total mass matrix M_RB + M_A, shape (3, 3) [kg, kg·m, kg·m²]. Rigid-body mass alone where no hull model is known.
+    D
+        Damping coefficients by SNAME name (``"X_u"``, ``"X_|u|u"``, ``"Y_vvv"`` ...), negative where they damp; empty
+        where no hull model is known.
+    """
+
+    length_m: float
+    beam_m: float
+    draught_m: float
+    mass_kg: float
+    inertia_z: float
+    x_g_m: float
+    M: Floats
+    D: Mapping[str, float]
+
+    @property
+    def has_model(self) -> bool:
+        """True where damping coefficients are known, not rigid-body mass alone."""
+        return bool(self.D)
+
+
+@dataclass(frozen=True)
+class ThrustCurve:
+    """Force of one propeller [N] over its speed; `kind` is ``polynomial``, ``table`` or ``quadratic``.
+
+    ``input_unit`` is ``rpm`` or ``rps``; `valid` is the range of the input outside which it is clipped, and counted.
+    """
+
+    kind: str
+    input_unit: str
+    valid: tuple[float, float]
+    coefficients: tuple[float, ...] = ()
+    table: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    ahead: float = 0.0
+    astern: float = 0.0
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """One actuator at `position_m` (x forward, y starboard of the body origin) [m].
+
+    `kind`: ``azimuth``, ``propeller``, ``propeller_rudder``, ``tunnel`` or ``force``. `angle_rad` is the fixed direction
+    of a ``propeller`` or ``force`` (0 ahead, π/2 starboard). `count` units driven as one act at `position_m`.
+    """
+
+    name: str
+    kind: str
+    position_m: tuple[float, float]
+    thrust: ThrustCurve | None = None
+    angle_rad: float = 0.0
+    count: int = 1
+    rudder: Mapping[str, float] = field(default_factory=dict)
+    inflow: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class WindAreas:
+    """Wind load parameters of Blendermann's form (thesis Table 4.2); areas [m²], lengths [m]."""
+
+    frontal_m2: float
+    lateral_m2: float
+    length_m: float
+    S_L_m: float
+    CD_t: float
+    CD_l_AF: float
+    delta: float
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One entry of the signal map: the fields of one topic that give one canonical quantity.
+
+    `quantity` is the key in the file (``position``, ``heading``, ``velocity``, ``yaw_rate``, ``wind`` or
+    ``<actuator>.<speed|angle|rudder|force|thrust>`` with ``.command`` appended for orders); `line` is its line there.
+    """
+
+    quantity: str
+    topic: str
+    fields: tuple[str, ...]
+    unit: str
+    frame: str = ""
+    sign: float = 1.0
+    offset: float = 0.0
+    options: Mapping[str, str] = field(default_factory=dict)
+    required: bool = True
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A vessel and where its signals live in a log; read from one TOML file by `ferryid.vessel.load_profile`.
+
+    `text` is the TOML source, which a model file embeds; `sha256` is its hash.
+    """
+
+    name: str
+    title: str
+    source: str
+    hull: Hull
+    actuators: tuple[Actuator, ...]
+    wind: WindAreas | None
+    signals: tuple[Signal, ...]
+    table: TableLayout | None
+    path: str
+    text: str
+    sha256: str
