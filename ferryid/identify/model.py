@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid import __version__
+from ferryid.errors import FerryIdError
+from ferryid.vessel import parse_profile
+
 Floats = NDArray[np.float64]
+
+SCHEMA = "ferryid.model/1"
+AXES = ("surge", "sway", "yaw")
 
 
 @dataclass(frozen=True)
@@ -74,3 +81,102 @@ class Model:
     training: tuple[Mapping[str, Any], ...]
     scores: Mapping[str, Any]
     accepted: bool
+
+
+def to_json(model: Model) -> dict[str, Any]:
+    """Return the model as the plain object that a model file holds."""
+    coefficients: dict[str, Any] = {}
+    for j, axis in enumerate(AXES):
+        rows = {
+            term: _interval(model.theta[k, j], model.low[k, j], model.high[k, j], model.units[k][j])
+            for k, term in enumerate(model.terms)
+        }
+        unit = "N·m" if axis == "yaw" else "N"
+        rows["1"] = _interval(model.intercept[j], model.intercept_low[j], model.intercept_high[j], unit)
+        coefficients[axis] = rows
+    base = parse_profile(model.profile_text, model.name).hull
+    return {
+        "schema": SCHEMA,
+        "name": model.name,
+        "version": model.version,
+        "created": model.created,
+        "ferryid_version": model.ferryid_version,
+        "accepted": model.accepted,
+        "settings": dict(model.settings),
+        "base": {
+            "scale": dict(model.scale),
+            "M": {"value": base.M.tolist(), "unit": "kg, kg·m, kg·m²"},
+            "D": dict(base.D),
+        },
+        "terms": list(model.terms),
+        "coefficients": coefficients,
+        "covariance": {axis: model.covariance[j].tolist() for j, axis in enumerate(AXES)},
+        "ranges": {key: list(value) for key, value in model.ranges.items()},
+        "training": [dict(log) for log in model.training],
+        "scores": dict(model.scores),
+        "profile": model.profile_text,
+    }
+
+
+def _interval(value: float, low: float, high: float, unit: str) -> dict[str, Any]:
+    return {"value": float(value), "low": float(low), "high": float(high), "unit": unit}
+
+
+def from_json(data: Mapping[str, Any], where: str) -> Model:
+    """Build a model from the object of a model file.
+
+    Raises
+    ------
+    FerryIdError
+        When it is not a model file, is from a newer schema (says which version to install), or lacks a part.
+    """
+    schema = str(data.get("schema", ""))
+    kind, _, number = schema.partition("/")
+    if kind != "ferryid.model" or not number.isdigit():
+        raise FerryIdError(
+            f'{where}: not a ferryid model, its schema is "{schema or "missing"}". '
+            "Fix: give a model file written by ferryid fit"
+        )
+    if int(number) > int(SCHEMA.partition("/")[2]):
+        raise FerryIdError(
+            f"{where}: written by ferryid {data.get('ferryid_version', '?')} in the newer form {schema}, "
+            f"this is ferryid {__version__} and reads {SCHEMA}. "
+            f"Fix: pip install 'ferryid>={data.get('ferryid_version', '')}'"
+        )
+    try:
+        terms = tuple(str(term) for term in data["terms"])
+        rows = [data["coefficients"][axis] for axis in AXES]
+
+        def column(part: str) -> Floats:
+            return np.array([[row[term][part] for row in rows] for term in terms], dtype=float).reshape(-1, 3)
+
+        def constant(part: str) -> Floats:
+            return np.array([row["1"][part] for row in rows], dtype=float)
+
+        return Model(
+            name=str(data["name"]),
+            version=int(data["version"]),
+            created=str(data["created"]),
+            ferryid_version=str(data["ferryid_version"]),
+            profile_text=str(data["profile"]),
+            scale={key: float(value) for key, value in data["base"]["scale"].items()},
+            settings=dict(data["settings"]),
+            terms=terms,
+            units=tuple((rows[0][t]["unit"], rows[1][t]["unit"], rows[2][t]["unit"]) for t in terms),
+            theta=column("value"),
+            intercept=constant("value"),
+            low=column("low"),
+            high=column("high"),
+            intercept_low=constant("low"),
+            intercept_high=constant("high"),
+            covariance=np.array([data["covariance"][axis] for axis in AXES], dtype=float),
+            ranges={key: (float(low), float(high)) for key, (low, high) in data["ranges"].items()},
+            training=tuple(data["training"]),
+            scores=dict(data["scores"]),
+            accepted=bool(data["accepted"]),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FerryIdError(
+            f"{where}: a part of the model file is missing or wrong ({type(error).__name__}: {error}). "
+            "Fix: fit again, or restore the file from a backup"
+        ) from error

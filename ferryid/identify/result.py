@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.model import Model
+from ferryid.identify.model import AXES, Model
 from ferryid.signals.track import Motion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-AXES = ("surge", "sway", "yaw")
+
+__all__ = ["AXES", "ComponentCurve", "Excitation", "FitResult", "FreeRun", "LogFit", "Verdict"]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,48 @@
+# Needs python3 (3.11 or newer), make and a package index; everything else is installed, pinned, into .venv.
+PYTHON ?= python3
+VENV ?= .venv
+BIN = $(VENV)/bin
+DEMO ?= ferryid-out
+
+.PHONY: test demo bench real fixtures wheel-check lint clean
+
+test: $(VENV)/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/pytest -n 2
+
+demo: $(VENV)/installed
+	$(BIN)/ferryid simulate twelve-corner --out $(DEMO)/twelve-corner.mcap --overwrite
+	$(BIN)/ferryid fit $(DEMO)/twelve-corner.mcap --vessel milliampere --delta 0.4 --sigma 0.4 --out $(DEMO)
+
+bench: $(VENV)/installed $(VENV)/bench-installed
+	$(BIN)/python -m tests.bench
+
+# Fits on the real recordings, where they lie in ../shared/data; writes reports/real.
+real: $(VENV)/installed
+	$(BIN)/python -m tests.real
+
+fixtures: $(VENV)/installed
+	$(BIN)/python -m fixtures
+
+# Builds the wheel and uses it in an environment that holds nothing else.
+wheel-check: $(VENV)/installed
+	rm -rf build dist $(VENV)/wheel
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
+	$(PYTHON) -m venv $(VENV)/wheel
+	$(VENV)/wheel/bin/pip install --quiet --constraint constraints.txt dist/*.whl
+	cd $(VENV)/wheel && bin/ferryid --version && bin/ferryid simulate four-corner --out four.bag --overwrite \
+	  && bin/ferryid fit four.bag --vessel milliampere --out out && bin/ferryid models --out out
+
+$(VENV)/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test]'
+	touch $@
+
+$(VENV)/bench-installed: $(VENV)/installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt '.[bench]' --editable .
+	touch $@
+
+clean:
+	rm -rf $(VENV) build dist ferryid-out

@@ -1,0 +1,15 @@
+"""ferryid ingest."""
+
+from __future__ import annotations
+
+from ferryid.cli.options import OUT, Json, Logs, Out, Verify, Vessel
+from ferryid.cli.output import emit, progress
+
+
+def command(logs: Logs, vessel: Vessel, out: Out = OUT, verify: Verify = False, json: Json = None) -> None:
+    """Read logs into Parquet tables with SNAME column names, SI units and provenance."""
+    from ferryid.signals.ingest import ingest, render_ingest
+    from ferryid.vessel import load_profile
+
+    result = ingest(logs, load_profile(vessel), out, verify=verify, progress=progress)
+    emit(result, render_ingest(result), json)

@@ -1,0 +1,24 @@
+"""ferryid inspect."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ferryid.cli.options import Json, MaybeVessel, Verify
+from ferryid.cli.output import emit
+
+
+def command(
+    log: Annotated[str, typer.Argument(help="A bag, MCAP file, table or folder.")],
+    vessel: MaybeVessel = None,
+    verify: Verify = False,
+    json: Json = None,
+) -> None:
+    """Show topics, types, counts, rates, gaps, clocks, and the signals that a vessel profile finds."""
+    from ferryid.signals.inspect import inspect, render_inspect
+    from ferryid.vessel import load_profile
+
+    result = inspect(log, load_profile(vessel) if vessel else None, verify=verify)
+    emit(result, render_inspect(result), json)

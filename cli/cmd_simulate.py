@@ -1,0 +1,35 @@
+"""ferryid simulate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ferryid.cli.options import Json
+from ferryid.cli.output import emit
+
+
+def command(
+    scenario: Annotated[str, typer.Argument(help="Name of a bundled scenario, or the path of a TOML file.")] = "",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Log to write: .mcap, .bag (ROS1), or a folder (ROS2).")
+    ] = None,
+    storage: Annotated[str, typer.Option(help="Storage of a ROS2 folder: sqlite3 or mcap.")] = "sqlite3",
+    truth: Annotated[Path | None, typer.Option(help="Write the true states to this Parquet file as well.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the noise, instead of the scenario's.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing log.")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="List the bundled scenarios.")] = False,
+    json: Json = None,
+) -> None:
+    """Simulate a trial and write a log like a recording."""
+    from ferryid.simulate import render_simulation, run_scenario, scenario_list
+
+    if list_:
+        typer.echo(scenario_list())
+        return
+    if not scenario or out is None:
+        raise typer.BadParameter("give a scenario and --out LOG, or --list")
+    result = run_scenario(scenario, out, storage=storage, truth=truth, seed=seed, overwrite=overwrite)
+    emit(result, render_simulation(result), json)

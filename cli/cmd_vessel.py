@@ -1,0 +1,47 @@
+"""ferryid vessel."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ferryid.cli.options import Json
+from ferryid.cli.output import emit
+
+app = typer.Typer(help="Check, show and list vessel profiles.", no_args_is_help=True)
+File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name of a bundled one.")]
+
+
+@app.command()
+def check(file: File, json: Json = None) -> None:
+    """Explain every fault of a profile with its line."""
+    from ferryid.vessel import check_profile
+
+    faults = check_profile(file)
+    result = {
+        "schema": "ferryid.vessel-check/1",
+        "file": file,
+        "faults": [{"line": fault.line, "message": fault.message} for fault in faults],
+    }
+    lines = [f"{file}:{fault.line}: {fault.message}" for fault in faults]
+    emit(result, "\n".join(lines) if lines else f"{file}: no faults", json)
+    if faults:
+        raise typer.Exit(2)
+
+
+@app.command()
+def show(file: File) -> None:
+    """Show hull, actuators and signal map of a profile."""
+    from ferryid.vessel import describe, load_profile
+
+    typer.echo(describe(load_profile(file)))
+
+
+@app.command("list")
+def list_() -> None:
+    """List the bundled profiles."""
+    from ferryid.vessel import bundled, load_profile
+
+    for name in bundled():
+        typer.echo(f"{name:<18} {load_profile(name).title}")

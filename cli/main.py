@@ -1,0 +1,74 @@
+"""The application, its error boundary and its exit codes."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+import traceback
+
+import typer
+
+import ferryid
+import ferryid.cli
+from ferryid.errors import FerryIdError
+
+app = typer.Typer(
+    name="ferryid",
+    help="Turn a recorded sea trial into a better vessel model, and say honestly whether to trust it.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"ferryid {ferryid.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
+) -> None:
+    pass
+
+
+def _add_commands() -> None:
+    """Add every module ``cmd_<name>`` of this package: its function ``command``, or its group ``app``."""
+    for module_info in pkgutil.iter_modules(ferryid.cli.__path__, "ferryid.cli."):
+        name = module_info.name.rpartition(".")[2].removeprefix("cmd_")
+        if not module_info.name.endswith(f".cmd_{name}"):
+            continue
+        module = importlib.import_module(module_info.name)
+        if hasattr(module, "app"):
+            app.add_typer(module.app, name=name)
+        else:
+            app.command(name)(module.command)
+
+
+_add_commands()
+
+
+def main() -> None:
+    """Run the command line.
+
+    Exit codes: 0 done, 1 a bug of ours, 2 unusable input, 3 model not accepted, 130 interrupted.
+    """
+    try:
+        app()
+    except FerryIdError as error:
+        sys.stderr.write(f"ferryid: {error}\n")
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.stderr.write("ferryid: interrupted, nothing half-written was left\n")
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader of our output (head, less) has gone: nothing to say and nobody to say it to.
+        sys.stderr.close()
+        sys.exit(0)
+    except Exception:  # noqa: BLE001 - the last boundary: what arrives here is a bug and is shown as one
+        traceback.print_exc()
+        sys.stderr.write(f"ferryid {ferryid.__version__}: this is a bug of ferryid. Please report it with these lines\n")
+        sys.exit(1)

@@ -1,0 +1,29 @@
+"""Printing: results to standard output, progress to standard error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import typer
+
+
+def emit(result: Mapping[str, Any], text: str, json: str | None) -> None:
+    """Print `text`, or with ``--json -`` the JSON object instead; with ``--json FILE`` write the object there as well."""
+    from ferryid.files import dump_json, write_text
+
+    if json == "-":
+        typer.echo(dump_json(dict(result)), nl=False)
+        return
+    if json is not None:
+        write_text(Path(json), dump_json(dict(result)))
+    typer.echo(text)
+
+
+def progress(stage: str) -> None:
+    """Show the present stage on a terminal, nothing when piped; an empty stage clears the line."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"\r\033[K{stage}")
+        sys.stderr.flush()
