@@ -26,6 +26,12 @@ def command(
 
     profile = load_profile(vessel) if vessel else None
     result = compare(
-        load(model_a, out), load(model_b, out), on or [], out, profile=profile, window_s=window, progress=progress
+        load(model_a, out),
+        load(model_b, out),
+        on or [],
+        out,
+        profile=profile,
+        window_s=window,
+        progress=progress,
     )
     emit(result, render_comparison(result), json)

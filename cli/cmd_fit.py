@@ -15,18 +15,24 @@ def command(
     vessel: Vessel,
     name: Annotated[str, typer.Option(help="Name of the model in the store; the vessel's if left out.")] = "",
     basis: Annotated[str, typer.Option(help="Basis functions: modulus or thesis.")] = "modulus",
-    structure: Annotated[str, typer.Option(help="coupled: every term in every axis; decoupled: as in the 3-DOF model.")] = "coupled",
+    structure: Annotated[
+        str, typer.Option(help="coupled: every term in every axis; decoupled: as in the 3-DOF model.")
+    ] = "coupled",
     components: Annotated[str, typer.Option(help="Number of SIMPLS components, or auto.")] = "auto",
     window: Annotated[float, typer.Option(help="Smoothing window [s].")] = 1.0,
     smoother: Annotated[str, typer.Option(help="square, savgol or kalman.")] = "square",
     residual: Annotated[str, typer.Option(help="Lack-of-fit residual: measured, commanded or parallel.")] = "measured",
     split: Annotated[str, typer.Option(help="blocks, logs, or every-kth as in the thesis.")] = "blocks",
-    rate: Annotated[float | None, typer.Option(help="Rate of the uniform grid [Hz]; the navigation's if left out.")] = None,
+    rate: Annotated[
+        float | None, typer.Option(help="Rate of the uniform grid [Hz]; the navigation's if left out.")
+    ] = None,
     delta: Annotated[float, typer.Option(help="Factor on the base model's M and C.")] = 1.0,
     sigma: Annotated[float, typer.Option(help="Factor on the base model's D.")] = 1.0,
     zeta: Annotated[float, typer.Option(help="Factor on the base model's force.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
-    require_accept: Annotated[bool, typer.Option("--require-accept", help="Exit with 3 if the model is not accepted.")] = False,
+    require_accept: Annotated[
+        bool, typer.Option("--require-accept", help="Exit with 3 if the model is not accepted.")
+    ] = False,
     verify: Verify = False,
     out: Out = OUT,
     json: Json = None,

@@ -70,5 +70,7 @@ def main() -> None:
         sys.exit(0)
     except Exception:  # noqa: BLE001 - the last boundary: what arrives here is a bug and is shown as one
         traceback.print_exc()
-        sys.stderr.write(f"ferryid {ferryid.__version__}: this is a bug of ferryid. Please report it with these lines\n")
+        sys.stderr.write(
+            f"ferryid {ferryid.__version__}: this is a bug of ferryid. Please report it with these lines\n"
+        )
         sys.exit(1)

@@ -11,7 +11,7 @@ import typer
 
 
 def emit(result: Mapping[str, Any], text: str, json: str | None) -> None:
-    """Print `text`, or with ``--json -`` the JSON object instead; with ``--json FILE`` write the object there as well."""
+    """Print `text`, or with ``--json -`` the JSON object instead; with ``--json FILE`` also write the object there."""
     from ferryid.files import dump_json, write_text
 
     if json == "-":

@@ -36,7 +36,7 @@ class Model:
     scale
         ``{"delta": 1.0, "sigma": 1.0, "zeta": 1.0}`` factors on the base model's M and C, D, and tau (4.2)-(4.5).
     settings
-        The fit's settings as plain values: basis, structure, components, window_s, smoother, split, residual, rate_hz, ...
+        The fit's settings as plain values: basis, structure, components, window_s, smoother, split, residual, ...
     terms
         Basis function names, K of them.
     units

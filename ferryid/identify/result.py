@@ -62,8 +62,8 @@ class Excitation:
     singular_values
         Of the standardised basis, descending, shape (K,).
     ranges
-        ``{"u": (low, high), "v": ..., "r": ..., "u_dot": ..., "v_dot": ..., "r_dot": ..., "U": ...}`` in SI, from the 0.5 %
-        and 99.5 % quantiles of the training rows.
+        ``{"u": (low, high), "v": ..., "r": ..., "u_dot": ..., "v_dot": ..., "r_dot": ..., "U": ...}`` in SI, from the
+        0.5 % and 99.5 % quantiles of the training rows.
     heading_coverage
         Fraction of twelve 30° heading sectors with at least 1 % of the rows, 0..1; NaN without heading.
     undetermined

@@ -68,7 +68,9 @@ class FitSettings:
         text = str(self.components)
         if text != "auto":
             if not text.isdigit() or int(text) < 1:
-                raise FerryIdError(f"--components: {text!r} is not a number of components. Fix: give 1 or more, or auto")
+                raise FerryIdError(
+                    f"--components: {text!r} is not a number of components. Fix: give 1 or more, or auto"
+                )
             object.__setattr__(self, "components", int(text))
         if not 0.0 <= self.window_s <= 60.0:
             raise FerryIdError(f"--window: {self.window_s} s is no smoothing window. Fix: give 0 to 60 s, 1.0 is usual")

@@ -159,8 +159,8 @@ class Format:
     name
         Short name for messages: ``"ROS1 bag"``.
     matches
-        ``matches(path, head)`` tells from the path (a file or a folder) and its first 64 bytes (empty for a folder) whether
-        this format takes it.
+        ``matches(path, head)`` tells from the path (a file or a folder) and its first 64 bytes (empty for a folder)
+        whether this format takes it.
     open
         ``open(path, layout)`` returns a Reader, or raises FerryIdError.
     order

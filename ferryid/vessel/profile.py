@@ -28,7 +28,7 @@ class Hull:
     x_g_m
         Centre of gravity forward of the body origin [m].
     M
-        Total mass matrix M_RB + M_A, shape (3, 3) [kg, kg·m, kg·m²]. Rigid-body mass alone where no hull model is known.
+        Total mass matrix M_RB + M_A, shape (3, 3) [kg, kg·m, kg·m²]. Rigid-body mass alone where no model is known.
     D
         Damping coefficients by SNAME name (``"X_u"``, ``"X_|u|u"``, ``"Y_vvv"`` ...), negative where they damp; empty
         where no hull model is known.
@@ -69,8 +69,8 @@ class ThrustCurve:
 class Actuator:
     """One actuator at `position_m` (x forward, y starboard of the body origin) [m].
 
-    `kind`: ``azimuth``, ``propeller``, ``propeller_rudder``, ``tunnel`` or ``force``. `angle_rad` is the fixed direction
-    of a ``propeller`` or ``force`` (0 ahead, π/2 starboard). `count` units driven as one act at `position_m`.
+    `kind`: ``azimuth``, ``propeller``, ``propeller_rudder``, ``tunnel`` or ``force``. `angle_rad` is the fixed
+    direction of a ``propeller`` or ``force`` (0 ahead, π/2 starboard). `count` units driven as one act at `position_m`.
     """
 
     name: str

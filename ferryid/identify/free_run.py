@@ -1,0 +1,186 @@
+"""Free-run prediction: a model integrated with the measured forces, against what the vessel did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.identify.result import FreeRun
+from ferryid.signals.track import Motion
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+ForceModel = Callable[[Floats, Floats, Floats, Floats | None, Floats | None], Floats]
+"""``force(nu_dot (s, 3), nu (s, 3), psi (s,), wind (s, 2), current (s, 2)) -> tau (s, 3)``, linear in ``nu_dot``."""
+
+HORIZONS_S = (5.0, 10.0, 20.0, 30.0, 60.0)
+MAX_STARTS = 60
+STEP_S = 0.2
+
+
+def free_run(
+    force: ForceModel,
+    motions: Sequence[Motion],
+    rows: Sequence[Flags],
+    horizons_s: Sequence[float] = HORIZONS_S,
+) -> FreeRun:
+    """Predict position and velocity from many starting points and compare them with the measurement.
+
+    From each start the model takes the measured state once, and after it only the measured actuator force (and wind
+    and current where they are measured), integrated with Runge-Kutta 4. A wind or current that
+    was not measured is part of the error.
+
+    Parameters
+    ----------
+    force
+        Inverse dynamics of the model.
+    motions, rows
+        Logs, and for each the rows on which the run may be judged, shape (n,); runs stay within unbroken stretches.
+    horizons_s
+        Horizons [s] at which the error is taken.
+
+    Returns
+    -------
+    FreeRun
+        Root-mean-square errors over all starts; NaN at horizons that no stretch is long enough for.
+    """
+    horizons = np.asarray(horizons_s, dtype=float)
+    errors: list[Floats] = []
+    longest: tuple[int, dict[str, Floats]] = (0, {})
+    diverged = 0
+    mass = _mass(force, motions[0])
+    if mass is None:
+        return _without(horizons, "the model's effective mass matrix is not positive definite: it cannot be run free")
+    for motion, allowed in zip(motions, rows, strict=True):
+        starts, ends = _starting_points(motion, allowed, float(horizons[0]), float(horizons[-1]))
+        if starts.size == 0:
+            continue
+        path, stride = _integrate(force, mass, motion, starts, float(horizons[-1]))
+        error = _errors(path, stride, motion, starts, ends, horizons)
+        reached = (starts + np.round(horizons[:, None] * motion.rate_hz).astype(int)) < ends
+        diverged += int(np.any(reached.T & np.isnan(error[:, :, 2]), axis=1).sum())
+        errors.append(error)
+        length = min(int(horizons[-1] * motion.rate_hz), int((ends - starts).max()) - 1)
+        if length > longest[0]:
+            best = int(np.argmax(ends - starts))
+            longest = (length, _example(path[best], stride, motion, int(starts[best]), length))
+    if not errors:
+        return _without(horizons, f"no unbroken held-out stretch of {horizons[0]:g} s")
+    every = np.concatenate(errors)
+    counts = np.sum(np.isfinite(every[:, :, 2]), axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rms = np.sqrt(np.nansum(every**2, axis=0) / counts[:, None])
+    blind = np.all(np.isnan(every[:, :, 0]), axis=0)
+    rms[blind, 0] = np.nan
+    note = f"{diverged} of {len(every)} runs diverged and are left out of the means" if diverged else ""
+    return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note)
+
+
+def _mass(force: ForceModel, motion: Motion) -> Floats | None:
+    """Return the effective mass matrix, the derivative of the force by the acceleration, if it can be inverted."""
+    at_rest = np.zeros((4, 3))
+    nu_dot = np.vstack([np.zeros(3), np.eye(3)])
+    still = np.zeros((4, 2))
+    tau = force(
+        nu_dot,
+        at_rest,
+        np.zeros(4),
+        still if motion.wind is not None else None,
+        still if motion.current is not None else None,
+    )
+    mass: Floats = (tau[1:] - tau[0]).T
+    positive = bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0))
+    return mass if positive else None
+
+
+def _starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[NDArray, NDArray]:
+    """Return start rows and the end of the unbroken stretch that each lies in."""
+    good = allowed & motion.valid & np.isfinite(motion.nu).all(axis=1) & np.isfinite(motion.tau).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
+    spacing = max(1, round(max(shortest_s, good.sum() / motion.rate_hz / MAX_STARTS) * motion.rate_hz))
+    needed = round(shortest_s * motion.rate_hz) + 1
+    starts, ends = [], []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        # The first starts of a stretch see the longest horizons; the stride keeps the starts apart.
+        for start in range(int(first), int(last) - needed + 1, spacing):
+            starts.append(start)
+            ends.append(int(last))
+    return np.array(starts, dtype=int), np.array(ends, dtype=int)
+
+
+def _integrate(
+    force: ForceModel, mass: Floats, motion: Motion, starts: NDArray, horizon_s: float
+) -> tuple[Floats, int]:
+    """Return states (starts, steps + 1, 6) of position, heading, velocity, and the rows per step."""
+    stride = max(1, int(STEP_S * motion.rate_hz))
+    substeps = max(1, int(np.ceil(1.0 / (STEP_S * motion.rate_hz))))
+    dt = stride / motion.rate_hz / substeps
+    steps = int(np.ceil(horizon_s * motion.rate_hz / stride))
+    last = len(motion.t) - 1
+    inverse = np.linalg.inv(mass)
+    limit = 10.0 * np.nanmax(np.abs(motion.nu), axis=0) + 1e-3
+
+    position = np.where(np.isfinite(motion.eta[starts]), motion.eta[starts], 0.0)
+    state = np.hstack([position, motion.nu[starts]])
+    path = np.empty((len(starts), steps + 1, 6))
+    path[:, 0] = state
+
+    def derivative(at: Floats, rows: NDArray, following: NDArray, part: float) -> Floats:
+        psi, nu = at[:, 2], at[:, 3:]
+        tau = _between(motion.tau, rows, following, part)
+        wind = None if motion.wind is None else _between(motion.wind, rows, following, part)
+        current = None if motion.current is None else _between(motion.current, rows, following, part)
+        rest = force(np.zeros_like(nu), nu, psi, wind, current)
+        c, s = np.cos(psi), np.sin(psi)
+        eta_dot = np.column_stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1], nu[:, 2]])
+        return np.hstack([eta_dot, (tau - rest) @ inverse.T])
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(steps):
+            rows = np.minimum(starts + k * stride, last)
+            following = np.minimum(rows + stride, last)
+            for i in range(substeps):
+                a, b = i / substeps, (i + 1) / substeps
+                k1 = derivative(state, rows, following, a)
+                k2 = derivative(state + dt / 2 * k1, rows, following, (a + b) / 2)
+                k3 = derivative(state + dt / 2 * k2, rows, following, (a + b) / 2)
+                k4 = derivative(state + dt * k3, rows, following, b)
+                state = state + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            state[np.any(np.abs(state[:, 3:]) > limit, axis=1)] = np.nan
+            path[:, k + 1] = state
+    return path, stride
+
+
+def _between(values: Floats, rows: NDArray, following: NDArray, part: float) -> Floats:
+    result: Floats = (1.0 - part) * values[rows] + part * values[following]
+    return result
+
+
+def _errors(path: Floats, stride: int, motion: Motion, starts: NDArray, ends: NDArray, horizons: Floats) -> Floats:
+    """Return |error| of position, heading, speed and yaw rate, shape (starts, horizons, 4)."""
+    error = np.full((len(starts), len(horizons), 4), np.nan)
+    for h, horizon in enumerate(horizons):
+        step = round(horizon * motion.rate_hz / stride)
+        rows = starts + step * stride
+        inside = rows < ends
+        at, now = rows[inside], path[inside, step]
+        error[inside, h, 0] = np.hypot(*(now[:, :2] - motion.eta[at, :2]).T)
+        turned = now[:, 2] - motion.eta[at, 2]
+        error[inside, h, 1] = np.abs((turned + np.pi) % (2 * np.pi) - np.pi)
+        error[inside, h, 2] = np.hypot(*(now[:, 3:5] - motion.nu[at, :2]).T)
+        error[inside, h, 3] = np.abs(now[:, 5] - motion.nu[at, 2])
+    return error
+
+
+def _example(path: Floats, stride: int, motion: Motion, start: int, length: int) -> dict[str, Floats]:
+    steps = np.arange(length // stride + 1)
+    rows = start + steps * stride
+    return {"t": motion.t[rows], "measured": motion.nu[rows], "predicted": path[steps, 3:]}
+
+
+def _without(horizons: Floats, note: str) -> FreeRun:
+    nothing = np.full(len(horizons), np.nan)
+    return FreeRun(horizons, nothing, nothing, nothing, nothing, 0, {}, note)
