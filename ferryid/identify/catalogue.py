@@ -1,0 +1,74 @@
+"""The stored models as a list, and one model as text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ferryid.identify.model import AXES, Model, to_json
+from ferryid.identify.store import stored_models
+
+
+def listing(out: Path) -> dict[str, Any]:
+    """Return all stored models for ``ferryid models``."""
+    return {
+        "schema": "ferryid.models/1",
+        "models": [
+            {
+                "name": stored.model.name,
+                "version": stored.model.version,
+                "current": stored.current,
+                "accepted": stored.model.accepted,
+                "created": stored.model.created,
+                "normalised_mse": stored.model.scores.get("normalised_mse"),
+                "logs": [str(log["name"]) for log in stored.model.training],
+                "path": str(stored.path),
+            }
+            for stored in stored_models(out)
+        ],
+    }
+
+
+def render_listing(result: dict[str, Any], out: Path) -> str:
+    """Return the list as text."""
+    if not result["models"]:
+        return f"no models under {out}. Make one with: ferryid fit LOG --vessel PROFILE --out {out}"
+    lines = [f"  {'model':<28}{'verdict':<12}{'MSE/base':>9}  {'created':<22}trained on"]
+    for model in result["models"]:
+        mark = "*" if model["current"] else " "
+        score = model["normalised_mse"]
+        lines.append(
+            f"{mark} {model['name'] + '@' + str(model['version']):<28}"
+            f"{'accepted' if model['accepted'] else 'rejected':<12}"
+            f"{'-' if score is None else format(score, '9.3f'):>9}  {model['created']:<22}{', '.join(model['logs'])}"
+        )
+    return "\n".join([*lines, "* current"])
+
+
+def render_model(model: Model) -> str:
+    """Return one model as text: verdict, scores, and coefficients with their intervals."""
+    data = to_json(model)
+    settings = model.settings
+    lines = [
+        f"{model.name}@{model.version}  {'accepted' if model.accepted else 'REJECTED'}  {model.created}",
+        f"basis {settings.get('basis')}, {settings.get('structure')}, {settings.get('components')} components, "
+        f"window {settings.get('window_s')} s",
+        f"trained on {', '.join(str(log['name']) for log in model.training)}",
+        f"validation force MSE over the base model's: {_number(model.scores.get('normalised_mse'))} ("
+        + ", ".join(f"{axis} {_number(model.scores.get('per_axis', {}).get(axis))}" for axis in AXES)
+        + ")",
+        "",
+        f"{'term':<14}{'axis':<7}{'value':>13}{'low':>13}{'high':>13}  unit",
+    ]
+    for axis in AXES:
+        for term, entry in data["coefficients"][axis].items():
+            if entry["value"] == 0.0 and entry["low"] == 0.0 and entry["high"] == 0.0:
+                continue
+            lines.append(
+                f"{term:<14}{axis:<7}{entry['value']:>13.5g}{entry['low']:>13.5g}{entry['high']:>13.5g}  {entry['unit']}"
+            )
+    return "\n".join(lines)
+
+
+def _number(value: Any) -> str:
+    return "-" if value is None else f"{value:.3f}"

@@ -1,0 +1,94 @@
+"""What remains in a residual, and which minutes to look at: small computations that only figures need."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.identify.result import LogFit
+
+Floats = NDArray[np.float64]
+POINTS = 900
+
+
+def envelope(t: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Thin a series to at most `POINTS` bins, keeping the least and greatest of each so that no peak is lost."""
+    if len(t) <= 2 * POINTS:
+        return t, values
+    bins = np.array_split(np.arange(len(t)), POINTS)
+    keep: list[int] = []
+    for rows in bins:
+        part = values[rows]
+        if np.isfinite(part).all():
+            keep.extend(sorted({int(rows[np.argmin(part)]), int(rows[np.argmax(part)])}))
+        else:
+            # A bin that touches a gap keeps one missing point, so that the line breaks there.
+            keep.append(int(rows[np.argmax(~np.isfinite(part))]))
+    return t[keep], values[keep]
+
+
+def _stretch(log: LogFit, name: str, j: int) -> Floats:
+    """Return the residual over the longest unbroken valid stretch of a log."""
+    residual = log.motion.tau[:, j] - getattr(log, name)[:, j]
+    good = log.motion.valid & np.isfinite(residual)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
+    if edges.size == 0:
+        return np.empty(0)
+    lengths = edges[1::2] - edges[::2]
+    best = int(np.argmax(lengths))
+    values: Floats = residual[edges[2 * best] : edges[2 * best + 1]]
+    return values
+
+
+def spectrum(log: LogFit, name: str, j: int) -> tuple[Floats, Floats]:
+    """Return frequency [Hz] and Welch's one-sided power spectral density of a residual."""
+    from scipy.signal import welch
+
+    values = _stretch(log, name, j)
+    if values.size < 16:
+        return np.empty(0), np.empty(0)
+    frequency, density = welch(values, fs=log.motion.rate_hz, nperseg=min(values.size, int(51.2 * log.motion.rate_hz)))
+    return frequency, density
+
+
+def autocorrelation(log: LogFit, name: str, j: int, longest_s: float = 30.0) -> tuple[Floats, Floats, int]:
+    """Return lag [s], autocorrelation coefficient, and the number of samples."""
+    values = _stretch(log, name, j)
+    count = values.size
+    lags = min(count // 3, int(longest_s * log.motion.rate_hz))
+    if lags < 2:
+        return np.empty(0), np.empty(0), count
+    centred = values - values.mean()
+    power = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
+    covariance = np.fft.irfft(power)[: lags + 1]
+    if covariance[0] <= 0:
+        return np.empty(0), np.empty(0), count
+    return np.arange(lags + 1) / log.motion.rate_hz, covariance / covariance[0], count
+
+
+def worst_and_best_minute(log: LogFit, length_s: float = 60.0) -> tuple[float, float] | None:
+    """Return the start times [s] of the minutes with the largest and smallest error of the new model.
+
+    The error is the squared residual over the variance of the measured force, averaged over the axes; validation rows are
+    preferred, and a minute counts when four fifths of it can be judged.
+    """
+    motion = log.motion
+    width = round(length_s * motion.rate_hz)
+    if len(motion.t) < 2 * width:
+        return None
+    allowed = motion.valid & np.isfinite(motion.tau).all(axis=1) & np.isfinite(log.tau_model).all(axis=1)
+    scale = np.var(motion.tau[allowed], axis=0)
+    error = np.where(allowed[:, None], (motion.tau - log.tau_model) ** 2 / np.where(scale > 0, scale, 1.0), 0.0)
+    total = np.concatenate([[0.0], np.cumsum(error.mean(axis=1))])
+    count = np.concatenate([[0], np.cumsum(allowed)])
+    judged = np.concatenate([[0], np.cumsum(log.validation & allowed)])
+    starts = np.arange(0, len(motion.t) - width, max(1, width // 6))
+    rows = count[starts + width] - count[starts]
+    seen = judged[starts + width] - judged[starts]
+    enough = (rows >= 0.8 * width) & ((seen >= 0.5 * width) if (seen >= 0.5 * width).any() else True)
+    if not enough.any():
+        return None
+    mean = (total[starts + width] - total[starts]) / np.maximum(rows, 1)
+    candidates = starts[enough]
+    ordered = candidates[np.argsort(mean[enough], kind="stable")]
+    return float(motion.t[ordered[-1]]), float(motion.t[ordered[0]])
