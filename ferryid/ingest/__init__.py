@@ -1,1 +1,136 @@
-"""ingest."""
+"""Reading logs: `open_log` finds the format of a recording and returns its Reader."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+from pathlib import Path
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest import formats
+from ferryid.ingest.log import Format, Reader, TableLayout
+
+__all__ = ["open_log", "supported_formats"]
+
+HEAD_BYTES = 64
+PART_SUFFIXES = (".bag", ".bag.active", ".mcap", ".mcap.zstd", ".db3", ".db3.zstd")
+
+
+@cache
+def supported_formats() -> tuple[Format, ...]:
+    """Return every format in `ferryid.ingest.formats`, in the order in which they are asked."""
+    names = sorted(module.name for module in pkgutil.iter_modules(formats.__path__))
+    modules = [importlib.import_module(f"{formats.__name__}.{name}") for name in names]
+    found: list[Format] = [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
+    return tuple(sorted(found, key=lambda entry: entry.order))
+
+
+def open_log(path: str | Path, layout: TableLayout | None = None) -> Reader:
+    """Open a recording of any supported format without decoding a message.
+
+    Parameters
+    ----------
+    path
+        A file, a folder, or the parts of one recording joined by ``+`` (``"a_0.bag+a_1.bag"``). A folder that no
+        format takes as a whole is one recording made of the bags in it.
+    layout
+        How to read a table, for logs that are text, CSV or Parquet; other formats ignore it.
+
+    Raises
+    ------
+    FerryIdError
+        For a path that is missing, empty, unreadable or of no supported format.
+    """
+    whole = Path(path)
+    if not whole.exists() and "+" in str(path):
+        return _open_parts(str(path), _existing_parts(str(path)), layout)
+    if not whole.exists():
+        raise FerryIdError(f"{path}: no such file or folder, a log was to be read. Fix: check the path")
+    if whole.is_dir():
+        return _open_folder(whole, layout)
+    return _open_file(whole, layout)
+
+
+def _existing_parts(text: str) -> list[Path]:
+    """Split a joined path at those ``+`` that leave paths which all exist (a folder's name may hold one too)."""
+    pieces = text.split("+")
+    for count in range(1, len(pieces) + 1):
+        head = Path("+".join(pieces[:count]))
+        if not head.exists():
+            continue
+        if count == len(pieces):
+            return [head]
+        tail = _existing_parts("+".join(pieces[count:]))
+        if tail:
+            return [head, *tail]
+    return []
+
+
+def _open_parts(text: str, parts: list[Path], layout: TableLayout | None) -> Reader:
+    if not parts:
+        missing = [piece for piece in text.split("+") if not Path(piece).exists()]
+        raise FerryIdError(
+            f"{text}: no such file, and as parts joined by + it lacks {', '.join(missing)}. "
+            "Fix: check the path of every part"
+        )
+    from ferryid.ingest.join import join
+
+    return join([open_log(part, layout) for part in parts])
+
+
+def _open_folder(folder: Path, layout: TableLayout | None) -> Reader:
+    for entry in supported_formats():
+        if entry.matches(folder, b""):
+            return _opened(entry, folder, layout)
+    parts = sorted(file for file in folder.iterdir() if file.is_file() and file.name.endswith(PART_SUFFIXES))
+    if not parts:
+        inside = sorted(file.name for file in folder.iterdir())
+        found = (
+            f"{len(inside)} entries ({', '.join(inside[:3])}{', …' if len(inside) > 3 else ''})"
+            if inside
+            else "nothing"
+        )
+        raise FerryIdError(
+            f"{folder}: the folder holds no log, found {found}. Fix: name the log itself; {_supported_sentence()}"
+        )
+    if len(parts) == 1:
+        return _open_file(parts[0], layout)
+    from ferryid.ingest.join import join
+
+    return join([_open_file(part, layout) for part in parts])
+
+
+def _open_file(path: Path, layout: TableLayout | None) -> Reader:
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+    except OSError as error:
+        raise FerryIdError(
+            f"{path}: the log cannot be read, {error.strerror or error}. Fix: check the file's permissions"
+        ) from error
+    if not head:
+        raise FerryIdError(
+            f"{path}: the file is empty, a log was expected, found 0 bytes. Fix: copy it from the recorder again"
+        )
+    for entry in supported_formats():
+        if entry.matches(path, head):
+            return _opened(entry, path, layout)
+    raise FerryIdError(
+        f"{path}: not a log of a supported format, found a file that begins with {head[:12]!r}. "
+        f"Fix: give a log; {_supported_sentence()}"
+    )
+
+
+def _opened(entry: Format, path: Path, layout: TableLayout | None) -> Reader:
+    try:
+        reader: Reader = entry.open(path, layout)
+    except OSError as error:
+        raise FerryIdError(
+            f"{path}: the {entry.name} cannot be read, {error.strerror or error}. Fix: check its permissions"
+        ) from error
+    return reader
+
+
+def _supported_sentence() -> str:
+    return "supported are " + ", ".join(entry.name for entry in supported_formats())

@@ -1,0 +1,109 @@
+"""Several files of one recording as one log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.ingest.log import Loss, Reader, Series, Topic
+
+
+def join(parts: Sequence[Reader]) -> Reader:
+    """Return one Reader over the readers of all parts of a recording.
+
+    Parameters
+    ----------
+    parts
+        Opened logs, in any order. Topics are merged by name; losses keep the name of their file.
+    """
+    return JoinedReader(tuple(parts))
+
+
+class JoinedReader:
+    """The parts of one recording, read one after another and concatenated in order of start time."""
+
+    def __init__(self, parts: tuple[Reader, ...]) -> None:
+        self._parts = tuple(sorted(parts, key=_start_ns))
+        self.paths: tuple[Path, ...] = tuple(path for part in self._parts for path in part.paths)
+        self.topics: tuple[Topic, ...] = _merged(self._parts)
+        self.losses: tuple[Loss, ...] = tuple(loss for part in self._parts for loss in part.losses)
+
+    def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
+        """Decode the wanted fields of the wanted topics in every part.
+
+        Raises
+        ------
+        FerryIdError
+            For a topic or field that no part has, or a topic whose type differs between the parts.
+        """
+        where = " + ".join(str(path) for path in self.paths)
+        known = {topic.name: topic for topic in self.topics}
+        for name in wanted:
+            if name not in known:
+                raise FerryIdError(
+                    f"{where}: no topic {name}, found {len(known)} others in the parts. "
+                    f"Fix: name one of them.{did_you_mean(name, known)}"
+                )
+            types = {topic.type for part in self._parts for topic in part.topics if topic.name == name}
+            if len(types) > 1:
+                raise FerryIdError(
+                    f"{where}: topic {name} cannot be read as one, found the types {', '.join(sorted(types))} "
+                    "in different parts. Fix: read the parts as separate logs"
+                )
+        pieces: dict[str, list[Series]] = {name: [] for name in wanted}
+        for part in self._parts:
+            here = {topic.name for topic in part.topics}
+            found = part.read({name: paths for name, paths in wanted.items() if name in here}, verify=verify)
+            for name, series in found.items():
+                pieces[name].append(series)
+        self.losses = tuple(loss for part in self._parts for loss in part.losses)
+        return {name: concatenate(series) for name, series in pieces.items()}
+
+
+def concatenate(pieces: Sequence[Series]) -> Series:
+    """Put series of one topic and the same columns behind one another."""
+    if len(pieces) == 1:
+        return pieces[0]
+    stamps = [piece.stamp_ns for piece in pieces if piece.stamp_ns is not None]
+    return Series(
+        topic=pieces[0].topic,
+        receive_ns=np.concatenate([piece.receive_ns for piece in pieces]),
+        # A stamp of only some parts would leave the others without a time, so it counts only where all have one.
+        stamp_ns=np.concatenate(stamps) if len(stamps) == len(pieces) else None,
+        columns={path: np.concatenate([piece.columns[path] for piece in pieces]) for path in pieces[0].columns},
+    )
+
+
+def _start_ns(part: Reader) -> tuple[int, str]:
+    starts = [topic.start_ns for topic in part.topics if topic.start_ns is not None]
+    # A part without messages says nothing of when it was recorded: last, by name.
+    return min(starts) if starts else 2**63 - 1, str(part.paths[0])
+
+
+def _merged(parts: Sequence[Reader]) -> tuple[Topic, ...]:
+    merged: dict[str, Topic] = {}
+    for part in parts:
+        for topic in part.topics:
+            have = merged.get(topic.name)
+            merged[topic.name] = topic if have is None else _both(have, topic)
+    return tuple(merged.values())
+
+
+def _both(first: Topic, second: Topic) -> Topic:
+    starts = [time for time in (first.start_ns, second.start_ns) if time is not None]
+    ends = [time for time in (first.end_ns, second.end_ns) if time is not None]
+    notes = [first.note] + [second.note] * (second.note != first.note)
+    if second.type != first.type:
+        notes.append(f"another part has {second.type}")
+    return replace(
+        first,
+        count=first.count + second.count,
+        start_ns=min(starts, default=None),
+        end_ns=max(ends, default=None),
+        fields=first.fields or second.fields,
+        note="; ".join(note for note in notes if note),
+    )
