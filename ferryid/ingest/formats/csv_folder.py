@@ -1,0 +1,55 @@
+"""A folder of CSV files, one topic per file: its name is "/" and the path inside the folder without the suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest.log import Format, Loss, TableLayout
+from ferryid.ingest.table_text import TextSheet, open_text
+from ferryid.ingest.tables import TableReader
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """CSV files of the folder and of folders in it, hidden ones left out, in a fixed order."""
+    found = (path for path in folder.rglob("*") if path.suffix.lower() == ".csv" and path.is_file())
+    return iter(
+        sorted(p for p in found if not any(part.startswith(".") for part in p.relative_to(folder).parts))
+    )
+
+
+def _matches(path: Path, head: bytes) -> bool:
+    return path.is_dir() and next(_files(path), None) is not None
+
+
+def _open(path: Path, layout: TableLayout | None) -> TableReader:
+    sheets: list[TextSheet] = []
+    losses: list[Loss] = []
+    for file in _files(path):
+        topic = "/" + file.relative_to(path).with_suffix("").as_posix()
+        try:
+            sheets.append(_sheet(file, layout, topic))
+        except FerryIdError as error:
+            # One unreadable file must not cost the others; it is shown as a loss, and a profile that needs it is refused.
+            losses.append(Loss(file=str(file), what=str(error).removeprefix(f"{file}: "), topic=topic))
+    if not sheets:
+        raise FerryIdError(
+            f"{path}: none of the {len(losses)} CSV files in this folder is a table with a time column; "
+            f"{losses[0].file}: {losses[0].what}"
+        )
+    return TableReader(sheets, losses)
+
+
+def _sheet(file: Path, layout: TableLayout | None, topic: str) -> TextSheet:
+    """Open one file; stamp columns that a layout names need not be in every file of a folder."""
+    if layout is None or not layout.stamp:
+        return open_text(file, layout, topic)
+    try:
+        return open_text(file, layout, topic)
+    except FerryIdError:
+        return open_text(file, replace(layout, stamp=()), topic)
+
+
+FORMAT = Format(name="folder of CSV files", matches=_matches, open=_open, order=80)

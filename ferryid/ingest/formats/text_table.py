@@ -1,0 +1,20 @@
+"""One text table, comma, semicolon, tab or blank separated: one topic named ``table``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ferryid.ingest.log import Format, TableLayout
+from ferryid.ingest.table_text import SUFFIXES, looks_like_text, open_text
+from ferryid.ingest.tables import TableReader
+
+
+def _matches(path: Path, head: bytes) -> bool:
+    return path.is_file() and path.suffix.lower() in SUFFIXES and looks_like_text(head)
+
+
+def _open(path: Path, layout: TableLayout | None) -> TableReader:
+    return TableReader([open_text(path, layout)])
+
+
+FORMAT = Format(name="CSV or text table", matches=_matches, open=_open, order=80)

@@ -1,0 +1,475 @@
+"""Text tables: separator, header row and columns found or taken from a layout, rows parsed by pyarrow."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import mmap
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest.log import Loss, TableLayout, Topic
+from ferryid.ingest.table_time import TimePlan, guess_stamp, guess_time, looks_like_datetime
+from ferryid.ingest.tables import Rows, column_from_arrow, numbers_from_text, plan_time, to_ns, unique_names
+
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab", ".prn", ".log", ".out")
+_HEAD_BYTES = 1 << 16
+_SAMPLE_LINES = 400
+_COMMA_NUMBER = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
+_WORDS = {"true", "false", "nan", "inf", "-inf", "null", "none", ""}
+_BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+
+
+@dataclass(frozen=True)
+class TextSheet:
+    """One text table; `first_row` counts the lines before the first row of data, its header included."""
+
+    path: Path
+    topic: Topic
+    time: TimePlan
+    names: tuple[str, ...]
+    separator: str
+    decimal: str
+    first_row: int
+    encoding: str
+
+    def load(self, names: Sequence[str]) -> Rows:
+        """Parse the named columns of every row that has the right number of fields."""
+        return _load(self, tuple(names))
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Where the rows of a text start, how their fields are separated, and what the header calls them."""
+
+    separator: str
+    decimal: str
+    first_row: int
+    names: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+
+
+def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> TextSheet:
+    """Find out how a text table is laid out, from its first 64 KiB and the profile's ``[table]`` where there is one.
+
+    Raises
+    ------
+    FerryIdError
+        For an empty file, a header without rows, text that is no table, or a layout that does not fit.
+    """
+    size = path.stat().st_size
+    if size == 0:
+        raise FerryIdError(f"{path}: the file is empty (0 bytes). Fix: copy or record the log again")
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+        file.seek(max(0, size - _HEAD_BYTES))
+        tail = file.read()
+    text, encoding, told = _decode(path, head, layout)
+    lines = text.splitlines()
+    if size > len(head) and lines:
+        lines.pop()  # very likely cut in the middle
+    shape = _stated(path, lines, layout) if layout is not None else _guessed(path, lines)
+    names, renamed = unique_names(shape.names)
+    notes = [*told, *shape.notes, renamed]
+    sample = {name: [row[place].strip() for row in shape.rows] for place, name in enumerate(names)}
+    plan = plan_time(str(path), names, layout) if layout is not None else None
+    if plan is None:
+        plan = guess_time(
+            {
+                name: [v.replace(",", ".") if shape.decimal == "," else v for v in values]
+                for name, values in sample.items()
+            }
+        )
+        if plan is None:
+            raise FerryIdError(
+                f"{path}: no column of this table looks like a time, found {', '.join(names[:12])}. "
+                "Fix: name the time column as time under [table] in the profile"
+            )
+        notes.append(plan.note)
+    elif not plan.stamp and guess_stamp(names):
+        notes.append(f'the profile maps no stamp, though column "{guess_stamp(names)[0]}" looks like one')
+    if not plan.stamp:
+        notes.append("receive times only: no stamp columns")
+    fields = {name: _type_of(sample[name], shape.decimal) for name in names}
+    start, end = _span(shape, names, plan, tail, encoding)
+    lines_in_file = _count_lines(path, size)
+    described = Topic(
+        name=topic,
+        type="table",
+        encoding="table",
+        count=max(0, lines_in_file - shape.first_row),
+        start_ns=start,
+        end_ns=end,
+        fields=fields,
+        note="; ".join(note for note in notes if note),
+    )
+    return TextSheet(path, described, plan, names, shape.separator, shape.decimal, shape.first_row, encoding)
+
+
+def looks_like_text(head: bytes) -> bool:
+    """Return True where the first bytes of a file are text (a byte-order mark counts)."""
+    if any(head.startswith(bom) for bom, _ in _BOMS):
+        return True
+    return b"\0" not in head and not any(byte < 9 or 13 < byte < 32 for byte in head)
+
+
+def _decode(path: Path, head: bytes, layout: TableLayout | None) -> tuple[str, str, list[str]]:
+    """Text of the head, the encoding that fits, and what to tell of it."""
+    marked = next((name for bom, name in _BOMS if head.startswith(bom)), None)
+    if marked is None and b"\0" in head:
+        raise FerryIdError(
+            f"{path}: this is binary data, not a text table. Fix: pass a log in one of the known formats"
+        )
+    wanted = marked or (layout.encoding if layout is not None else "utf-8")
+    try:
+        decoder = codecs.getincrementaldecoder(wanted)(errors="strict")
+        return decoder.decode(head), wanted, ["byte-order mark skipped"] if marked else []
+    except LookupError as error:
+        raise FerryIdError(
+            f'{path}: the profile\'s [table] names the encoding "{wanted}", which does not exist. '
+            'Fix: use "utf-8", "cp1252" or another name that Python knows'
+        ) from error
+    except UnicodeDecodeError:
+        return head.decode("cp1252", errors="replace"), "cp1252", [f"not {wanted} text: read as cp1252"]
+
+
+def _split(line: str, separator: str) -> tuple[str, ...]:
+    if separator == "whitespace":
+        return tuple(line.split())
+    if '"' not in line:
+        return tuple(line.split(separator))
+    return tuple(next(csv.reader([line], delimiter=separator), ()))
+
+
+def _is_value(text: str, decimal: str) -> bool:
+    bare = text.strip()
+    if bare.lower() in _WORDS or looks_like_datetime(bare):
+        return True
+    return _is_number(bare, decimal)
+
+
+def _is_number(text: str, decimal: str) -> bool:
+    try:
+        float(text.replace(",", ".") if decimal == "," and _COMMA_NUMBER.match(text) else text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_row(fields: Sequence[str], decimal: str) -> bool:
+    """At least half of the fields are values, and one is a number or a time."""
+    if len(fields) < 2:
+        return False
+    values = sum(_is_value(field, decimal) for field in fields)
+    filled = any(
+        field.strip() and (_is_number(field.strip(), decimal) or looks_like_datetime(field))
+        for field in fields
+    )
+    return filled and values * 2 >= len(fields)
+
+
+def _decimal_of(rows: Sequence[Sequence[str]], separator: str) -> str:
+    """A comma where numbers are written with commas and none with points."""
+    if separator == ",":
+        return "."
+    cells = [cell for row in rows for cell in row]
+    commas = sum(_COMMA_NUMBER.match(cell) is not None for cell in cells)
+    points = sum("." in cell and _is_number(cell, ".") for cell in cells)
+    return "," if commas > points else "."
+
+
+def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
+    """Guess the separator as the one that splits most lines into rows of one length."""
+    best: tuple[int, int, str, str, int] | None = None
+    sample = [line for line in lines[:_SAMPLE_LINES]]
+    for separator in (",", ";", "\t", "whitespace"):
+        split = [_split(line, separator) for line in sample]
+        decimal = _decimal_of(split, separator)
+        rows = [place for place, fields in enumerate(split) if _is_row(fields, decimal)]
+        if not rows:
+            continue
+        width, count = Counter(len(split[place]) for place in rows).most_common(1)[0]
+        first = next(place for place in rows if len(split[place]) == width)
+        rank = (count, width, separator, decimal, first)
+        if best is None or rank[:2] > best[:2]:
+            best = rank
+    filled = [line for line in sample if line.strip()]
+    if best is None or best[0] * 10 < 6 * (len([line for line in sample[best[4] :] if line.strip()])):
+        if len(filled) == 1 and any(len(_split(filled[0], separator)) > 1 for separator in (",", ";", "\t")):
+            raise FerryIdError(
+                f"{path}: the table holds a header and no rows. Fix: record or export the log again"
+            )
+        raise FerryIdError(
+            f"{path}: this text is not a table of numbers, found {_quoted(filled[0] if filled else '')}. "
+            "Fix: pass a log, or describe the table under [table] in the profile (separator, skip_rows, columns)"
+        )
+    _, width, separator, decimal, first = best
+    header = first
+    while header > 0 and len(_split(lines[header - 1], separator)) == width:
+        header -= 1
+    notes = []
+    if header < first:
+        names = _split(lines[header], separator)
+        if first - header > 1:
+            notes.append(
+                f"{first - header - 1} line(s) between the column names and the first row skipped (units?)"
+            )
+    elif first > 0 and (header_names := _names_for(lines[first - 1], separator, width)) is not None:
+        names, header = header_names, first - 1
+    else:
+        names = tuple(f"column {place}" for place in range(1, width + 1))
+        notes.append("no header row: columns are named by their place")
+    if header > 0:
+        notes.append(f"{header} line(s) before the table skipped")
+    rows = tuple(_rows(lines[first:], separator, width))
+    shown = {"\t": "a tab", "whitespace": "white space"}.get(separator, f'"{separator}"')
+    if separator != ",":
+        notes.append(f"columns separated by {shown}")
+    if decimal == ",":
+        notes.append("decimal comma")
+    return _Shape(separator, decimal, first, names, rows, tuple(notes))
+
+
+def _names_for(line: str, separator: str, width: int) -> tuple[str, ...] | None:
+    """Column names from a header line that lacks the name of a trailing, empty column; None if it is no header."""
+    names = _split(line, separator)
+    if (
+        separator != "whitespace"
+        and len(names) == width - 1
+        and not any(_is_number(n, ".") for n in names if n)
+    ):
+        return (*names, "")
+    return None
+
+
+def _stated(path: Path, lines: Sequence[str], layout: TableLayout) -> _Shape:
+    """Follow a layout to the letter."""
+    separator = {"tab": "\t", "\\t": "\t", "space": "whitespace"}.get(layout.separator, layout.separator)
+    if separator != "whitespace" and len(separator) != 1:
+        raise FerryIdError(
+            f'{path}: the profile\'s [table] names the separator "{layout.separator}". '
+            'Fix: use ",", ";", a tab or "whitespace"'
+        )
+    body = list(lines[layout.skip_rows :])
+    first = layout.skip_rows
+    if layout.columns:
+        names: tuple[str, ...] = tuple(layout.columns)
+    else:
+        while body and not body[0].strip():
+            body.pop(0)
+            first += 1
+        names = _split(body.pop(0), separator) if body else ()
+        first += 1
+    filled = [line for line in body if line.strip()]
+    if not filled:
+        what = (
+            "a header and no rows"
+            if names and not layout.columns
+            else f"no rows after {layout.skip_rows} lines"
+        )
+        raise FerryIdError(
+            f"{path}: the table holds {what}. Fix: record or export the log again, or correct skip_rows"
+        )
+    split = [_split(line, separator) for line in filled[:_SAMPLE_LINES]]
+    width = Counter(len(fields) for fields in split).most_common(1)[0][0]
+    if width == len(names) + 1 and not layout.columns and all(f[-1] == "" for f in split if len(f) == width):
+        names = (*names, "")
+    if width != len(names):
+        raise FerryIdError(
+            f"{path}: {len(names)} column names but {width} fields in the rows, first {_quoted(filled[0])}. "
+            "Fix: correct columns, separator or skip_rows under [table] in the profile"
+        )
+    rows = tuple(fields for fields in split if len(fields) == width)
+    decimal = _decimal_of(rows, separator)
+    return _Shape(separator, decimal, first, names, rows, ("decimal comma",) if decimal == "," else ())
+
+
+def _rows(lines: Sequence[str], separator: str, width: int) -> list[tuple[str, ...]]:
+    split = (_split(line, separator) for line in lines[:_SAMPLE_LINES])
+    return [fields for fields in split if len(fields) == width]
+
+
+def _type_of(values: Sequence[str], decimal: str) -> str:
+    """Primitive type by a sample of the values."""
+    filled = [value for value in values if value]
+    if not filled:
+        return "float64"
+    if all(value.lower() in ("true", "false") for value in filled):
+        return "bool"
+    if all(re.fullmatch(r"[+-]?\d{1,18}", value) for value in filled):
+        return "int64"
+    numbers = sum(_is_number(value, decimal) for value in filled)
+    return "float64" if numbers * 2 >= len(filled) else "string"
+
+
+def _span(
+    shape: _Shape, names: tuple[str, ...], plan: TimePlan, tail: bytes, encoding: str
+) -> tuple[int | None, int | None]:
+    """Time of the first and last row [ns] as far as they can be read from the ends of the file."""
+    place = names.index(plan.column)
+    text = tail.decode("utf-16-le" if encoding == "utf-16" else encoding, errors="replace")
+    last = [
+        row
+        for row in (_split(line, shape.separator) for line in text.splitlines()[1:])
+        if len(row) == len(names)
+    ]
+    cells = np.array([row[place].strip() for row in (*shape.rows[:1], *last[-1:])], dtype=object)
+    values = cells if plan.unit == "datetime" else numbers_from_text(cells, shape.decimal)[0]
+    times, good, _ = to_ns(values, plan.unit)
+    if not good.any():
+        return None, None
+    return int(times[good][0]), int(times[good][-1])
+
+
+def _count_lines(path: Path, size: int) -> int:
+    """Lines with something on them; a last line without an end counts."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as whole:
+        count, place, ended = 0, 0, True
+        while place < size:
+            block = whole[place : place + (1 << 24)]
+            count += block.count(b"\n")
+            place += len(block)
+            ended = block.endswith((b"\n", b"\n\0"))
+        return count + (not ended)
+
+
+def _load(sheet: TextSheet, names: tuple[str, ...]) -> Rows:
+    import pyarrow as pa
+    import pyarrow.csv as arrow_csv
+
+    wrong: list[tuple[int | None, int, str]] = []
+
+    def skip(row: Any) -> str:
+        wrong.append((row.number, row.actual_columns, row.text))
+        return "skip"
+
+    source, delimiter, cut = _source(sheet)
+    texts = {sheet.time.column: pa.string()} if sheet.time.unit == "datetime" else {}
+    try:
+        table = arrow_csv.read_csv(
+            source,
+            read_options=arrow_csv.ReadOptions(
+                column_names=list(sheet.names), use_threads=False, block_size=1 << 22
+            ),
+            parse_options=arrow_csv.ParseOptions(delimiter=delimiter, invalid_row_handler=skip),
+            convert_options=arrow_csv.ConvertOptions(
+                include_columns=list(names),
+                column_types=texts,
+                decimal_point=sheet.decimal,
+                strings_can_be_null=True,
+                null_values=["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "-nan", "-NaN"],
+            ),
+        )
+    except pa.ArrowInvalid as error:
+        raise FerryIdError(
+            f"{sheet.path}: the rows cannot be parsed ({str(error).splitlines()[0]}). "
+            "Fix: correct separator, encoding or skip_rows under [table] in the profile"
+        ) from error
+    losses: list[Loss] = []
+    columns = {}
+    for name in names:
+        values = column_from_arrow(table.column(name))
+        if values.dtype.kind == "O" and name not in texts:
+            values, unreadable = numbers_from_text(values, sheet.decimal)
+            if unreadable:
+                what = f'{unreadable} cells of column "{name}" are not numbers and count as missing'
+                losses.append(Loss(str(sheet.path), what, sheet.topic.name))
+        columns[name] = values
+    losses += _wrong_rows(sheet, wrong, cut)
+    return Rows(columns, tuple(losses))
+
+
+def _wrong_rows(sheet: TextSheet, wrong: list[tuple[int | None, int, str]], cut: bool) -> list[Loss]:
+    """Losses for rows with the wrong number of fields; a last row cut in mid-line is told apart."""
+    losses = []
+    if (
+        cut
+        and wrong
+        and wrong[-1][0] is not None
+        and len(wrong[-1][2]) > 0
+        and wrong[-1][1] < len(sheet.names)
+    ):
+        text = wrong.pop()[2]
+        what = f"the file ends in the middle of a row ({_quoted(text)}): the last row was left out"
+        losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=1))
+    if wrong:
+        number, fields, text = wrong[0]
+        line = "" if number is None else f" near line {number + sheet.first_row}"
+        what = (
+            f"{len(wrong)} rows without {len(sheet.names)} fields were left out "
+            f"(the first{line} has {fields}: {_quoted(text)})"
+        )
+        losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=len(wrong)))
+    return losses
+
+
+def _source(sheet: TextSheet) -> tuple[Any, str, bool]:
+    """The rows as UTF-8 with a one-character separator, that character, and whether the last line lacks its end."""
+    import pyarrow as pa
+
+    plain = sheet.encoding.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig", "ascii")
+    if plain:
+        buffer = pa.memory_map(str(sheet.path)).read_buffer()
+    else:
+        data = sheet.path.read_bytes()
+        buffer = pa.py_buffer(data.decode(sheet.encoding, errors="replace").encode())
+    raw = np.frombuffer(buffer, dtype=np.uint8)
+    start = _after_lines(raw, sheet.first_row)
+    cut = len(raw) > 0 and raw[-1] not in (10, 13)
+    if sheet.separator != "whitespace":
+        return pa.BufferReader(buffer.slice(start)), sheet.separator, cut
+    return pa.BufferReader(pa.py_buffer(_single_tabs(raw[start:]))), "\t", cut
+
+
+def _after_lines(raw: np.ndarray[Any, np.dtype[np.uint8]], lines: int) -> int:
+    """Place of the first byte after so many lines."""
+    place = 0
+    for _ in range(lines):
+        ends = np.flatnonzero(raw[place : place + (1 << 20)] == 10)
+        if len(ends) == 0:
+            return len(raw)
+        place += int(ends[0]) + 1
+    return place
+
+
+def _single_tabs(raw: np.ndarray[Any, np.dtype[np.uint8]]) -> bytes:
+    """Replace every run of blanks by one tab, none at the ends of a line."""
+    blank = (raw == 32) | (raw == 9)
+    end = (raw == 10) | (raw == 13)
+    after = np.empty(len(raw), dtype=bool)  # the next byte is a blank or ends the line
+    after[:-1] = blank[1:] | end[1:]
+    after[-1:] = True
+    first = np.empty(len(raw), dtype=bool)  # a line starts here
+    first[:1] = True
+    first[1:] = end[:-1]
+    # Of each run the last blank stays, unless nothing but blanks comes before it on its line.
+    keep = ~blank | ~after
+    leading = blank & first
+    if leading.any():
+        starts = np.flatnonzero(first)
+        solid = np.flatnonzero(~blank)
+        following = np.searchsorted(solid, starts)
+        stops = np.where(
+            following < len(solid), solid[np.minimum(following, max(len(solid) - 1, 0))], len(raw)
+        )
+        edges = np.zeros(len(raw) + 1, dtype=np.int64)
+        np.add.at(edges, starts, 1)
+        np.add.at(edges, stops, -1)
+        keep &= np.cumsum(edges[:-1]) == 0
+        keep |= ~blank
+    tabbed = np.where(blank, np.uint8(9), raw)
+    return bytes(tabbed[keep].tobytes())
+
+
+def _quoted(text: str) -> str:
+    """A line of the file in quotes, cut to 60 characters."""
+    bare = " ".join(text.split())
+    return f'"{bare[:57]}..."' if len(bare) > 60 else f'"{bare}"'

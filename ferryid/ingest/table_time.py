@@ -1,0 +1,256 @@
+"""Times of a table: seconds to nanoseconds as numbers, dates and times as text, and guessing which column it is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.ingest.log import Column, Nanoseconds
+
+UNIT_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
+_DATETIME = re.compile(
+    r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T]\d{2}:\d{2}:\d{2}([.,]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$"
+)
+_TIME_NAME = re.compile(
+    r"%?(rosbag|log|gps|unix|epoch|utc|receive|recv|elapsed|rec)?[ _.]*"
+    r"(t|tvec|time|timestamp|stamp|times|date|datetime|date[ _]?time|utc)(?:[ _.]*(\d|abs|rel|utc))?$"
+)
+_UNIT_WORD = re.compile(
+    r"(?: *[\[(] *|[ _.]+)(s|sec|secs|seconds?|ms|msec|millis|us|usec|micros|ns|nsec|nanos) *[\])]?$"
+)
+_UNIT_OF_WORD = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("ms", "msec", "millis"), "ms"),
+    **dict.fromkeys(("us", "usec", "micros"), "us"),
+    **dict.fromkeys(("ns", "nsec", "nanos"), "ns"),
+}
+_STAMP_SECONDS = re.compile(r"(.*stamp.*?)([._ ]?)(secs?|seconds)$")
+
+
+@dataclass(frozen=True)
+class TimePlan:
+    """Which columns of a table are its times.
+
+    `column` is in `unit` (``"s"``, ``"ms"``, ``"us"``, ``"ns"`` or ``"datetime"``); `stamp` holds no column, one in `unit`, or two
+    that are seconds and nanoseconds. `note` tells what was guessed, empty where a profile states it.
+    """
+
+    column: str
+    unit: str
+    stamp: tuple[str, ...] = ()
+    note: str = ""
+
+
+def looks_like_datetime(text: str) -> bool:
+    """Return True for ``2025/04/11 11:15:45.313`` and its ISO 8601 kin, year first."""
+    return _DATETIME.match(text) is not None
+
+
+def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
+    """Guess the time column from names and a sample of the rows, None where nothing looks like one.
+
+    Parameters
+    ----------
+    sample
+        Column name to its first values as text.
+    """
+    for name, values in sample.items():
+        bare, word = _without_unit(name)
+        if not _TIME_NAME.match(bare):
+            continue
+        if values and all(looks_like_datetime(value) for value in values):
+            return _plan(sample, name, "datetime", "date and time")
+        numbers = _rising(values, strict=False)
+        if numbers is not None:
+            unit = _UNIT_OF_WORD.get(word) or _unit_of_size(numbers)
+            return _plan(sample, name, unit, unit)
+    for name, values in sample.items():
+        if values and all(looks_like_datetime(value) for value in values):
+            return _plan(sample, name, "datetime", "date and time")
+    name = next(iter(sample), "")
+    numbers = _rising(sample.get(name, ()), strict=True)
+    # A row counter also rises: an unnamed first column of whole numbers from 0 or 1 in steps of one is no time.
+    if numbers is None or (np.all(np.diff(numbers) == 1.0) and numbers[0] in (0.0, 1.0)):
+        return None
+    return _plan(
+        sample, name, _unit_of_size(numbers), _unit_of_size(numbers) + ", the first column and rising"
+    )
+
+
+def guess_stamp(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns of a sender's stamp in seconds and nanoseconds, or ``()``."""
+    present = set(names)
+    for name in names:
+        found = _STAMP_SECONDS.match(name)
+        if found is None:
+            continue
+        stem, joint = found.group(1), found.group(2)
+        for ending in ("nsecs", "nsec", "nanosec", "nanosecs", "nanoseconds"):
+            if stem + joint + ending in present:
+                return (name, stem + joint + ending)
+    return ()
+
+
+def numbers_to_ns(values: Column, unit: str) -> tuple[Nanoseconds, NDArray[np.bool_]]:
+    """Convert numeric times to whole nanoseconds.
+
+    Returns
+    -------
+    tuple
+        Times [ns], shape (n,), 0 where unreadable, and a mask that is True where a time was readable.
+    """
+    scale = UNIT_NS[unit]
+    if values.dtype.kind in "iu":
+        return values.astype(np.int64) * np.int64(scale), np.ones(len(values), dtype=bool)
+    seconds = values.astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        good = np.abs(seconds) < 9.2e18 / scale
+    whole = np.floor(np.where(good, seconds, 0.0))
+    # Whole and fractional part apart: 1.7e9 s times 1e9 in one float would round to 256 ns twice.
+    part = np.rint((np.where(good, seconds, 0.0) - whole) * scale)
+    return whole.astype(np.int64) * np.int64(scale) + part.astype(np.int64), good
+
+
+def stamps_to_ns(seconds: Column, nanoseconds: Column) -> tuple[Nanoseconds, NDArray[np.bool_]]:
+    """Join columns of whole seconds and of nanoseconds; same returns as `numbers_to_ns`."""
+    whole, good = numbers_to_ns(seconds, "s")
+    part, also = numbers_to_ns(nanoseconds, "ns")
+    return np.where(good & also, whole + part, 0), good & also
+
+
+def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_], str]:
+    """Parse dates and times, year first, without losing nanoseconds; no zone is taken as UTC.
+
+    Some exporters write the fraction as an unpadded count of nanoseconds (``45.81833647`` for 45.081833647 s). Where fractions differ in
+    length, both readings are tried and the one with fewer steps back in time is kept.
+
+    Returns
+    -------
+    tuple
+        Times [ns], shape (n,), 0 where unreadable; a mask, True where readable; a sentence on a repair, or an empty string.
+    """
+    rows = len(texts)
+    width = max((len(text) for text in texts), default=0)
+    if rows == 0 or width < 19:
+        return np.zeros(rows, dtype=np.int64), np.zeros(rows, dtype=bool), ""
+    # Characters outside ASCII become "?", which no field of a date accepts.
+    raw = np.array([text.strip().encode("ascii", "replace") for text in texts], dtype=f"S{width}")
+    code = raw.view(np.uint8).reshape(rows, width).astype(np.int16)
+    digit = code - ord("0")
+    is_digit = (digit >= 0) & (digit <= 9)
+
+    def number(first: int, count: int) -> NDArray[np.int64]:
+        value = np.zeros(rows, dtype=np.int64)
+        for place in range(first, first + count):
+            value = value * 10 + digit[:, place]
+        return value
+
+    wanted_digits = [0, 1, 2, 3, 5, 6, 8, 9, 11, 12, 14, 15, 17, 18]
+    good = is_digit[:, wanted_digits].all(axis=1)
+    good &= np.isin(code[:, 4], [ord(c) for c in "-/."]) & (code[:, 4] == code[:, 7])
+    good &= np.isin(code[:, 10], [ord(c) for c in " T"])
+    good &= (code[:, 13] == ord(":")) & (code[:, 16] == ord(":"))
+    month, day = number(5, 2), number(8, 2)
+    hour, minute, second = number(11, 2), number(14, 2), number(17, 2)
+    good &= (
+        (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31) & (hour < 24) & (minute < 60) & (second <= 60)
+    )
+    months = (np.where(good, number(0, 4), 1970) - 1970) * 12 + np.where(good, month, 1) - 1
+    first_day = months.astype("datetime64[M]").astype("datetime64[D]")
+    days = first_day.astype(np.int64) + np.where(good, day, 1) - 1
+    good &= (days.astype("datetime64[D]").astype("datetime64[M]").astype(np.int64)) == months
+    base = ((days * 24 + hour) * 60 + minute) * 60 + second
+
+    # The fraction: digits after a point at place 19, as long as they last.
+    fraction = np.zeros(rows, dtype=np.int64)
+    length = np.zeros(rows, dtype=np.int64)
+    running = np.isin(code[:, 19], [ord("."), ord(",")]) if width > 19 else np.zeros(rows, dtype=bool)
+    pointed = running.copy()
+    for place in range(20, width):
+        running &= is_digit[:, place]
+        keep = running & (length < 9)
+        fraction = np.where(keep, fraction * 10 + digit[:, place], fraction)
+        length += running
+    offset_s = _zone_offset_s(texts, good, 19 + pointed + length, raw)
+    length = np.minimum(length, 9)
+    base = np.where(good, base - offset_s, 0)
+    padded = base * 1_000_000_000 + fraction * 10 ** (9 - length)
+    longest = int(length[good].max(initial=0))
+    short = good & pointed & (length < longest)
+    note = ""
+    if longest in (3, 6, 9) and short.any():
+        counted = base * 1_000_000_000 + fraction * 10 ** (9 - longest)
+        if np.sum(np.diff(counted[good]) < 0) < np.sum(np.diff(padded[good]) < 0):
+            note = (
+                f"{int(short.sum())} of {rows} times have a fraction without its leading zeros "
+                f"(an unpadded count of {'milli' if longest == 3 else 'micro' if longest == 6 else 'nano'}seconds): read as such"
+            )
+            padded = counted
+    return np.where(good, padded, 0), good, note
+
+
+def _zone_offset_s(
+    texts: Sequence[str], good: NDArray[np.bool_], end: NDArray[np.int64], raw: Column
+) -> NDArray[np.int64]:
+    """Offset of each text's zone [s]; marks texts with anything else after the seconds as unreadable."""
+    lengths = np.char.str_len(raw)
+    offsets = np.zeros(len(texts), dtype=np.int64)
+    tails: dict[bytes, int | None] = {b"": 0, b"Z": 0}
+    for row in np.flatnonzero(good & (lengths > end)):
+        tail = bytes(raw[row])[end[row] :].strip()
+        if tail not in tails:
+            found = re.fullmatch(rb"([+-])(\d{2}):?(\d{2})", tail)
+            tails[tail] = (
+                None
+                if found is None
+                else (1 if found[1] == b"+" else -1) * (int(found[2]) * 3600 + int(found[3]) * 60)
+            )
+        value = tails[tail]
+        if value is None:
+            good[row] = False
+        else:
+            offsets[row] = value
+    return offsets
+
+
+def _without_unit(name: str) -> tuple[str, str]:
+    lowered = name.strip().lower()
+    found = _UNIT_WORD.search(lowered)
+    if found is None or found.start() == 0:
+        return lowered, ""
+    return lowered[: found.start()].rstrip(" _."), found.group(1)
+
+
+def _rising(values: Sequence[str], *, strict: bool) -> NDArray[np.float64] | None:
+    """The values as numbers if they rise, else None."""
+    try:
+        numbers = np.array([float(value) for value in values])
+    except ValueError:
+        return None
+    if len(numbers) == 0 or not np.isfinite(numbers).all():
+        return None
+    steps = np.diff(numbers)
+    if strict:
+        return numbers if len(steps) and bool((steps > 0).all()) else None
+    return numbers if len(steps) == 0 or float(np.mean(steps >= 0)) > 0.8 else None
+
+
+def _unit_of_size(numbers: NDArray[np.float64]) -> str:
+    """Unit of a time by its size: an epoch of this century tells, anything smaller is taken as seconds."""
+    size = float(np.abs(numbers).max(initial=0.0))
+    for unit, scale in (("ns", 1e9), ("us", 1e6), ("ms", 1e3)):
+        if size > 5e8 * scale:
+            return unit
+    return "s"
+
+
+def _plan(sample: Mapping[str, Sequence[str]], column: str, unit: str, says: str) -> TimePlan:
+    stamp = guess_stamp(tuple(sample))
+    note = f'time guessed: column "{column}" ({says})'
+    if stamp:
+        note += f', stamp in "{stamp[0]}" + "{stamp[1]}"'
+    return TimePlan(column, unit, stamp, note)

@@ -1,0 +1,285 @@
+"""What every table format shares: the reader, times of the rows, and losses counted in one way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.ingest.log import Column, Loss, Series, TableLayout, Topic
+from ferryid.ingest.table_time import TimePlan, datetimes_to_ns, numbers_to_ns, stamps_to_ns
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Columns of one table as they were parsed, with what was lost and repaired on the way."""
+
+    columns: Mapping[str, Column]
+    losses: tuple[Loss, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+class Sheet(Protocol):
+    """One table of one file: what it holds is known, its rows are parsed by `load` only."""
+
+    @property
+    def path(self) -> Path: ...
+
+    @property
+    def topic(self) -> Topic: ...
+
+    @property
+    def time(self) -> TimePlan: ...
+
+    def load(self, names: Sequence[str]) -> Rows:
+        """Parse the named columns and no others, every row that can be parsed."""
+        ...
+
+
+class TableReader:
+    """Reader of one or several tables, each a topic (see `ferryid.ingest.log.Reader`)."""
+
+    def __init__(self, sheets: Sequence[Sheet], losses: Sequence[Loss] = ()) -> None:
+        self._sheets = {sheet.topic.name: sheet for sheet in sheets}
+        self.paths = tuple(sheet.path for sheet in sheets)
+        self.topics = tuple(sheet.topic for sheet in sheets)
+        self.losses = tuple(losses)
+
+    def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
+        """Parse the wanted columns of the wanted tables; see `ferryid.ingest.log.Reader.read`.
+
+        Every row of a text file is parsed anyway and Parquet checks its pages, so that `verify` adds nothing.
+        """
+        series: dict[str, Series] = {}
+        losses: list[Loss] = []
+        notes: dict[str, str] = {}
+        for name, fields in wanted.items():
+            if name not in self._sheets:
+                raise FerryIdError(
+                    f'{self.paths[0]}: there is no topic "{name}" in this table.{did_you_mean(name, self._sheets)} '
+                    f"Fix: use one of {_listed(self._sheets)}"
+                )
+            sheet = self._sheets[name]
+            for field in fields:
+                if field not in sheet.topic.fields:
+                    raise FerryIdError(
+                        f'{sheet.path}: there is no column "{field}".{did_you_mean(field, sheet.topic.fields)} '
+                        f"Fix: use one of {_listed(sheet.topic.fields)}"
+                    )
+            one, lost, repaired = _series(sheet, tuple(fields))
+            series[name] = one
+            losses += lost
+            notes[name] = "; ".join(part for part in (sheet.topic.note, *repaired) if part)
+        known = {(loss.file, loss.what, loss.topic) for loss in self.losses}
+        self.losses += tuple(loss for loss in losses if (loss.file, loss.what, loss.topic) not in known)
+        self.topics = tuple(
+            replace(topic, note=notes[topic.name], count=len(series[topic.name].receive_ns))
+            if topic.name in notes
+            else topic
+            for topic in self.topics
+        )
+        return series
+
+
+def _series(sheet: Sheet, fields: tuple[str, ...]) -> tuple[Series, list[Loss], tuple[str, ...]]:
+    plan, topic = sheet.time, sheet.topic.name
+    names = tuple(dict.fromkeys((plan.column, *plan.stamp, *fields)))
+    rows = sheet.load(names)
+    losses, notes = list(rows.losses), list(rows.notes)
+    time_ns, good, note = to_ns(rows.columns[plan.column], plan.unit)
+    if note:
+        notes.append(note)
+    if not good.any():
+        found = rows.columns[plan.column]
+        shown = f'"{found[0]}"' if len(found) else "no row"
+        raise FerryIdError(
+            f'{sheet.path}: no row has a readable time in column "{plan.column}" ({plan.unit}), found {shown}. '
+            "Fix: name the time column and its time_unit under [table] in the profile; dates are read year first"
+        )
+    stamp_ns = None
+    if plan.stamp:
+        if len(plan.stamp) == 2:
+            stamp_ns, stamped = stamps_to_ns(rows.columns[plan.stamp[0]], rows.columns[plan.stamp[1]])
+        else:
+            stamp_ns, stamped, note = to_ns(rows.columns[plan.stamp[0]], plan.unit)
+            if note:
+                notes.append(note)
+        if (unreadable := int(np.sum(~stamped))) > 0:
+            notes.append(f"{unreadable} stamps are not readable and count as zero")
+    columns = {field: rows.columns[field] for field in fields}
+    if not good.all():
+        losses.append(_untimed(sheet, topic, time_ns, good))
+        time_ns = time_ns[good]
+        stamp_ns = None if stamp_ns is None else stamp_ns[good]
+        columns = {field: values[good] for field, values in columns.items()}
+    return Series(topic, time_ns, stamp_ns, columns), losses, tuple(notes)
+
+
+def to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Mask, str]:
+    """Convert a time column of numbers or of text to nanoseconds: times, readable mask, sentence on a repair."""
+    if values.dtype.kind == "M":
+        good = ~np.isnat(values)
+        return np.where(good, values.astype("datetime64[ns]").astype(np.int64), 0), good, ""
+    if unit == "datetime":
+        if values.dtype.kind != "O":
+            return np.zeros(len(values), dtype=np.int64), np.zeros(len(values), dtype=bool), ""
+        return datetimes_to_ns(values.tolist())
+    if values.dtype.kind not in "iuf":
+        return np.zeros(len(values), dtype=np.int64), np.zeros(len(values), dtype=bool), ""
+    return *numbers_to_ns(values, unit), ""
+
+
+def _untimed(sheet: Sheet, topic: str, time_ns: NDArray[np.int64], good: Mask) -> Loss:
+    """Rows without a readable time, with the readable times around them."""
+    bad = np.flatnonzero(~good)
+    before, after = np.flatnonzero(good[: bad[0]]), np.flatnonzero(good[bad[-1] :])
+    return Loss(
+        file=str(sheet.path),
+        what=f'{len(bad)} rows without a readable time in column "{sheet.time.column}" were left out',
+        topic=topic,
+        messages=len(bad),
+        start_ns=int(time_ns[before[-1]]) if len(before) else None,
+        end_ns=int(time_ns[bad[-1] + after[0]]) if len(after) else None,
+    )
+
+
+def plan_time(
+    where: str, names: Sequence[str], layout: TableLayout, *, typed: bool = False
+) -> TimePlan | None:
+    """Take the time columns that a layout names, None where it leaves the time to be guessed.
+
+    Parameters
+    ----------
+    where
+        File name for the message.
+    names
+        Columns of the table.
+    layout
+        The profile's ``[table]``.
+    typed
+        True for a table whose time column may carry its own type (Parquet), so that the unit is only a default.
+
+    Raises
+    ------
+    FerryIdError
+        For a time or stamp column that the table does not have.
+    """
+    if not layout.time:
+        return None
+    for name in (layout.time, *layout.stamp):
+        if name not in names:
+            raise FerryIdError(
+                f'{where}: the profile\'s [table] wants the column "{name}" for the time, found {_listed(names)}.'
+                f"{did_you_mean(name, names)} Fix: correct time, stamp, columns, separator or skip_rows under [table]"
+            )
+    return TimePlan(layout.time, layout.time_unit, layout.stamp)
+
+
+def unique_names(names: Sequence[str]) -> tuple[tuple[str, ...], str]:
+    """Name nameless columns after their place, and number repeated names; the sentence tells which, or is empty."""
+    taken: set[str] = set()
+    result: list[str] = []
+    renamed: list[str] = []
+    for place, raw in enumerate(names, start=1):
+        name = raw.strip() or f"column {place}"
+        if name in taken:
+            number = 2
+            while f"{name} ({number})" in taken:
+                number += 1
+            renamed.append(f'"{name} ({number})"')
+            name = f"{name} ({number})"
+        taken.add(name)
+        result.append(name)
+    note = f"repeated column names are numbered: {', '.join(renamed)}" if renamed else ""
+    return tuple(result), note
+
+
+def column_from_arrow(chunked: Any) -> Column:
+    """Copy a pyarrow column to NumPy without importing pandas, which pyarrow's own ``to_numpy`` does.
+
+    Integers and booleans with missing cells become floats with NaN; text and anything else becomes objects, "" where missing.
+    """
+    import pyarrow as pa
+
+    kind = chunked.type
+    if pa.types.is_timestamp(kind):
+        whole = _buffer_values(chunked.cast(pa.timestamp("ns", kind.tz)), np.dtype(np.int64)).view(
+            "datetime64[ns]"
+        )
+        return _with_missing(chunked, whole, np.datetime64("NaT", "ns"))
+    if pa.types.is_floating(kind):
+        numbers = _buffer_values(chunked.cast(pa.float64()), np.dtype(np.float64))
+        return _with_missing(chunked, numbers, np.nan)
+    if pa.types.is_integer(kind):
+        if chunked.null_count:
+            return _with_missing(
+                chunked, _buffer_values(chunked.cast(pa.float64(), safe=False), np.dtype("f8")), np.nan
+            )
+        return _buffer_values(chunked, np.dtype(str(kind)))
+    if pa.types.is_boolean(kind) or pa.types.is_null(kind):
+        if chunked.null_count == 0:
+            return np.array(chunked.to_pylist(), dtype=bool)
+        return np.array(
+            [np.nan if value is None else float(value) for value in chunked.to_pylist()], dtype=np.float64
+        )
+    texts = np.empty(len(chunked), dtype=object)
+    texts[:] = ["" if value is None else str(value) for value in chunked.to_pylist()]
+    return texts
+
+
+def _buffer_values(chunked: Any, dtype: np.dtype[Any]) -> Column:
+    parts = [
+        np.frombuffer(chunk.buffers()[1], dtype=dtype, count=len(chunk), offset=chunk.offset * dtype.itemsize)
+        for chunk in chunked.chunks
+        if len(chunk)
+    ]
+    return np.concatenate(parts) if parts else np.empty(0, dtype=dtype)
+
+
+def _with_missing(chunked: Any, values: Column, missing: Any) -> Column:
+    if chunked.null_count == 0:
+        return values
+    filled = values.copy()
+    filled[np.array(chunked.is_null().to_pylist(), dtype=bool)] = missing
+    return filled
+
+
+def numbers_from_text(texts: Column, decimal: str) -> tuple[Column, int]:
+    """Turn a text column into numbers where most of it is numbers, and count the cells that are not.
+
+    Returns
+    -------
+    tuple
+        The numbers with NaN for unreadable cells, and their count; or the texts unchanged and 0 where fewer than half are numbers.
+    """
+    numbers = np.full(len(texts), np.nan)
+    unreadable = empty = 0
+    for row, text in enumerate(texts):
+        bare = text.strip()
+        if decimal == ",":
+            bare = bare.replace(",", ".")
+        if not bare:
+            empty += 1
+            continue
+        try:
+            numbers[row] = float(bare)
+        except ValueError:
+            unreadable += 1
+    filled = len(texts) - empty
+    if filled == 0 or unreadable * 2 > filled:
+        return texts, 0
+    return numbers, unreadable
+
+
+def _listed(names: Sequence[str] | Mapping[str, object]) -> str:
+    """The first names of a list in quotes, and how many more there are."""
+    shown = [f'"{name}"' for name in list(names)[:12]]
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
