@@ -39,7 +39,7 @@ def command(
 ) -> None:
     """Fit a model to one or more logs, validate it, store it and write a report."""
     from ferryid.identify.settings import FitSettings
-    from ferryid.report import fit_and_report
+    from ferryid.report.fit_report import fit_and_report
     from ferryid.vessel import load_profile
 
     settings = FitSettings(

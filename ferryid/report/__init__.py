@@ -1,1 +1,1 @@
-"""report."""
+"""Reports: the only place that draws."""

@@ -1,0 +1,139 @@
+"""From logs to a stored model and its report: what ``ferryid fit`` does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ferryid.files import dump_json, replacing
+from ferryid.identify.fit import fit, quiet
+from ferryid.identify.result import AXES, FitResult
+from ferryid.identify.scores import free_run_plain
+from ferryid.identify.settings import FitSettings
+from ferryid.identify.store import Stored, save
+from ferryid.report.page import headline, render
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a fit leaves: the stored model, the report, and the same as JSON and as text for a terminal."""
+
+    stored: Stored
+    report: Path
+    json: dict[str, Any]
+    text: str
+
+    @property
+    def accepted(self) -> bool:
+        """Verdict of the fit."""
+        return self.stored.model.accepted
+
+
+def fit_and_report(
+    logs: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    out: Path,
+    *,
+    name: str = "",
+    verify: bool = False,
+    progress: Callable[[str], None] = quiet,
+) -> Outcome:
+    """Fit a model to logs, store it under `out`, and write its report.
+
+    Parameters
+    ----------
+    logs
+        Paths; parts of one recording joined by ``+``.
+    profile
+        The vessel.
+    settings
+        How to fit.
+    out
+        Output folder: ``logs``, ``models`` and ``reports`` are made in it.
+    name
+        Name of the model; the profile's where empty.
+    verify
+        Check every checksum of the logs.
+    progress
+        Called with the name of each stage, and with an empty string at the end.
+
+    Raises
+    ------
+    FerryIdError
+        For unusable input or an output folder that cannot be written; nothing half-written is left.
+    """
+    result = fit(logs, profile, settings, out, name=name, verify=verify, progress=progress)
+    progress("writing the report")
+    stored = save(result.model, out)
+    result = replace(result, model=stored.model)
+    folder = out / "reports" / f"{stored.model.name}-v{stored.model.version}"
+    plain = as_json(result, stored, folder / "report.html")
+    with replacing(folder) as temporary:
+        temporary.mkdir()
+        (temporary / "report.html").write_text(render(result), encoding="utf-8")
+        (temporary / "fit.json").write_text(dump_json(plain), encoding="utf-8")
+    progress("")
+    return Outcome(stored, folder / "report.html", plain, as_text(result, stored, folder / "report.html"))
+
+
+def as_json(result: FitResult, stored: Stored, report: Path) -> dict[str, Any]:
+    """Return the result of a fit in the form of schema ``ferryid.fit/1``."""
+    model = result.model
+    return {
+        "schema": "ferryid.fit/1",
+        "model": {
+            "name": model.name,
+            "version": model.version,
+            "path": str(stored.path),
+            "current": stored.current,
+            "accepted": model.accepted,
+        },
+        "headline": headline(result),
+        "reasons": list(result.verdict.reasons),
+        "warnings": list(result.warnings),
+        "scores": dict(model.scores),
+        "settings": {**model.settings, **model.scale},
+        "free_run": {
+            "base": free_run_plain(result.free_run_base),
+            "model": free_run_plain(result.free_run_model),
+        },
+        "components": {
+            "chosen": result.curve.chosen,
+            "training": result.curve.training.tolist(),
+            "validation": result.curve.validation.tolist(),
+        },
+        "excitation": {
+            "singular_values": result.excitation.singular_values.tolist(),
+            "heading_coverage": result.excitation.heading_coverage,
+            "undetermined": dict(result.excitation.undetermined),
+            "ranges": {name: list(span) for name, span in result.excitation.ranges.items()},
+        },
+        "logs": [{"name": log.motion.log, **log.data_quality} for log in result.logs],
+        "report": str(report),
+    }
+
+
+def as_text(result: FitResult, stored: Stored, report: Path) -> str:
+    """Return the verdict for a terminal."""
+    model, scores = result.model, result.model.scores
+    lines = [headline(result), *(f"  {reason}" for reason in result.verdict.reasons), ""]
+    lines.append(f"{'on validation rows':<28}" + "".join(f"{axis:>12}" for axis in AXES))
+    for label, part in (("base", "base"), ("new", "model")):
+        lines.append(
+            f"{'rms force error, ' + label:<28}" + "".join(f"{scores['mse'][part][axis] ** 0.5:>12.3g}" for axis in AXES)
+        )
+    lines.append(f"{'R², new':<28}" + "".join(f"{_number(scores['r2']['model'][axis]):>12}" for axis in AXES))
+    lines.append("")
+    lines.extend(f"warning: {warning}" for warning in result.warnings)
+    state = "current" if stored.current else ("stored" if model.accepted else "stored, marked as rejected")
+    lines.append(f"model   {stored.path} ({model.name}@{model.version}, {state})")
+    lines.append(f"report  {report}")
+    return "\n".join(lines)
+
+
+def _number(value: float) -> str:
+    return f"{value:.3f}"

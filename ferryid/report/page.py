@@ -1,0 +1,240 @@
+"""The fit report as one HTML page that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment
+
+from ferryid.identify.result import AXES, FitResult, LogFit
+from ferryid.report import figures
+from ferryid.report.structure import worst_and_best_minute
+from ferryid.vessel import parse_profile
+
+MAX_LOGS = 6
+"""Logs whose forces are drawn; the page stays below ten megabytes and readable."""
+
+RANGE_UNITS = {"u": "m/s", "v": "m/s", "r": "rad/s", "u_dot": "m/s²", "v_dot": "m/s²", "r_dot": "rad/s²", "U": "m/s"}
+
+
+def render(result: FitResult) -> str:
+    """Return the report of a fit as HTML; the drawings are inside."""
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    source = files("ferryid.report").joinpath("templates", "fit.html").read_text(encoding="utf-8")
+    return environment.from_string(source).render(_context(result))
+
+
+def headline(result: FitResult) -> str:
+    """Return the verdict in one sentence."""
+    change = result.verdict.normalised_mse - 1.0
+    if not np.isfinite(change):
+        told = "its force error could not be compared with the base model's"
+    else:
+        word = "less" if change < 0 else "more"
+        told = f"{abs(change):.0%} {word} force error than the base model on data it did not see"
+    if result.verdict.accepted:
+        return f"Accepted: {told}."
+    return f"Not accepted: {told}."
+
+
+def _context(result: FitResult) -> dict[str, Any]:
+    model, verdict = result.model, result.verdict
+    drawn = result.logs[:MAX_LOGS]
+    left = [log.motion.log for log in result.logs[MAX_LOGS:]]
+    return {
+        "title": parse_profile(model.profile_text, model.name).title,
+        "name": model.name,
+        "version": model.version,
+        "accepted": verdict.accepted,
+        "verdict_word": "accepted" if verdict.accepted else "not accepted",
+        "headline": headline(result),
+        "reasons": verdict.reasons,
+        "warnings": result.warnings,
+        "axes": AXES,
+        "score_rows": _score_rows(model.scores),
+        "split_note": " ".join(model.scores.get("split_notes", ())),
+        "logs": [{"name": log.motion.log, "figures": _force_figures(log)} for log in drawn],
+        "omitted": f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
+        "free_run_notes": [
+            f"{who}: {run.note}."
+            for who, run in (("Base model", result.free_run_base), ("New model", result.free_run_model))
+            if run.note
+        ],
+        "free_run_figures": _free_run_figures(result),
+        "residual_figures": [
+            {
+                "svg": figures.residual_spectrum(drawn),
+                "caption": "Power spectral density of measured minus estimated force. A peak at some tenths of a hertz "
+                "is mostly waves; what stays at the lowest frequencies is wind, current or a wrong model.",
+            },
+            {
+                "svg": figures.residual_autocorrelation(drawn),
+                "caption": "Autocorrelation of the same residual. White noise would stay inside the dashed band; a slow "
+                "decay says that something with a memory was left out, and that neighbouring samples are no independent "
+                "evidence.",
+            },
+        ],
+        "model_figures": [
+            {
+                "svg": figures.components(result.curve),
+                "caption": "Force error over the base model's (orange line at 1) against the number of SIMPLS components.",
+            },
+            {
+                "svg": figures.coefficient_intervals(model.terms, model.theta, model.low, model.high),
+                "caption": "Coefficients of the correction, each over half the width of its own 95 % block-bootstrap "
+                "interval. Grey ones are not told apart from zero.",
+            },
+        ],
+        "coefficients": _coefficients(result),
+        "excitation_lines": _excitation_lines(result),
+        "undetermined": sorted(result.excitation.undetermined.items()),
+        "excitation_figure": figures.excitation(result.excitation, drawn),
+        "track_figure": figures.track(result.logs),
+        "ranges": [
+            {"name": name, "low": f"{low:.4g}", "high": f"{high:.4g}", "unit": RANGE_UNITS.get(name, "")}
+            for name, (low, high) in model.ranges.items()
+        ],
+        "quality": [_quality(log) for log in result.logs],
+        "provenance": _provenance(result),
+    }
+
+
+def _score_rows(scores: Mapping[str, Any]) -> list[dict[str, Any]]:
+    def row(name: str, values: Mapping[str, float], pattern: str, mean: str = "") -> dict[str, Any]:
+        return {"name": name, "values": [_text(values.get(axis), pattern) for axis in AXES], "mean": mean}
+
+    mse, r2 = scores["mse"], scores["r2"]
+    return [
+        row("MSE over the base model's", scores["per_axis"], ".3f", _text(scores["normalised_mse"], ".3f")),
+        row("root-mean-square error, base [N, N, N·m]", {a: mse["base"][a] ** 0.5 for a in AXES}, ".3g"),
+        row("root-mean-square error, new [N, N, N·m]", {a: mse["model"][a] ** 0.5 for a in AXES}, ".3g"),
+        row("R², base", r2["base"], ".3f"),
+        row("R², new", r2["model"], ".3f"),
+    ]
+
+
+def _force_figures(log: LogFit) -> list[dict[str, str]]:
+    shown = [
+        {
+            "svg": figures.forces(log),
+            "caption": "Applied force as measured at the actuators, and as each model estimates it from the motion. "
+            "Shaded: validation, which the new model did not see.",
+        }
+    ]
+    minutes = worst_and_best_minute(log)
+    if minutes is not None:
+        for start, word in zip(minutes, ("worst", "best"), strict=True):
+            shown.append(
+                {
+                    "svg": figures.forces(log, start, start + 60.0),
+                    "caption": f"The {word} minute of the new model, from {start:.0f} s.",
+                }
+            )
+    return shown
+
+
+def _free_run_figures(result: FitResult) -> list[dict[str, str]]:
+    base, new = result.free_run_base, result.free_run_model
+    shown = []
+    if base.starts or new.starts:
+        shown.append(
+            {
+                "svg": figures.free_run_errors(base, new),
+                "caption": f"Root-mean-square error of {max(base.starts, new.starts)} runs on validation rows: each takes "
+                "the measured state once and then only the measured actuator forces.",
+            }
+        )
+    if base.example or new.example:
+        shown.append(
+            {"svg": figures.free_run_example(base, new), "caption": "One of these runs, over the longest stretch there is."}
+        )
+    return shown
+
+
+def _coefficients(result: FitResult) -> list[dict[str, Any]]:
+    model = result.model
+    rows = []
+    for k, term in enumerate((*model.terms, "1 (constant)")):
+        constant = k == len(model.terms)
+        cells = []
+        for j, axis in enumerate(AXES):
+            value, low, high = (
+                (model.intercept[j], model.intercept_low[j], model.intercept_high[j])
+                if constant
+                else (model.theta[k, j], model.low[k, j], model.high[k, j])
+            )
+            unit = ("N·m" if axis == "yaw" else "N") if constant else model.units[k][j]
+            cells.append(
+                {
+                    "value": f"{value:.4g}",
+                    "low": f"{low:.4g}",
+                    "high": f"{high:.4g}",
+                    "unit": unit,
+                    "faint": bool(low <= 0.0 <= high),
+                }
+            )
+        rows.append({"term": term, "cells": cells})
+    return rows
+
+
+def _excitation_lines(result: FitResult) -> list[str]:
+    excitation = result.excitation
+    values = excitation.singular_values
+    lines = []
+    if values.size and values[0] > 0:
+        weak = int(np.sum(values < 1e-3 * values[0]))
+        lines.append(
+            f"{len(values)} basis terms; the weakest combination is excited {values[-1] / values[0]:.1e} times as much "
+            f"as the strongest, and {weak} are below a thousandth."
+        )
+    if np.isfinite(excitation.heading_coverage):
+        lines.append(f"Headings cover {excitation.heading_coverage:.0%} of twelve 30° sectors.")
+    best = np.argsort(excitation.vip)[::-1][:5]
+    names = ", ".join(f"{result.model.terms[k]} ({excitation.vip[k]:.1f})" for k in best)
+    lines.append(f"Terms that matter most (variable importance in projection): {names}.")
+    return lines
+
+
+def _quality(log: LogFit) -> dict[str, Any]:
+    quality: Mapping[str, Any] = log.data_quality
+    streams = []
+    for topic, stream in quality["streams"].items():
+        clock = stream["clock"]
+        streams.append(
+            {
+                "topic": topic,
+                "values": [
+                    clock["count"],
+                    _text(clock["rate_hz"], ".2f"),
+                    clock["source"],
+                    _text(clock["offset_s"], ".4f"),
+                    _text(clock["drift_ppm"], ".1f"),
+                    _text(clock["jitter_s"], ".2f", 1e3),
+                    len(clock["gaps"]),
+                    clock["out_of_order"],
+                    clock["duplicates"],
+                ],
+            }
+        )
+    return {"name": log.motion.log, "remarks": quality["remarks"], "streams": streams}
+
+
+def _provenance(result: FitResult) -> list[dict[str, str]]:
+    model = result.model
+    rows = [
+        ("model", f"{model.name}@{model.version}, ferryid {model.ferryid_version}, {model.created}"),
+        ("settings", ", ".join(f"{key} = {value}" for key, value in model.settings.items())),
+        ("base model scaled by", ", ".join(f"{key} = {value:g}" for key, value in model.scale.items())),
+    ]
+    for log in model.training:
+        rows.append(
+            (f"log {log['name']}", f"{', '.join(log['files'])}; {log['seconds']:.0f} s, {log['rows']} rows; {log['sha256']}")
+        )
+    return [{"name": name, "value": value} for name, value in rows]
+
+
+def _text(value: float | None, pattern: str, factor: float = 1.0) -> str:
+    return "–" if value is None or not np.isfinite(value) else format(value * factor, pattern)
