@@ -170,8 +170,7 @@ def _is_row(fields: Sequence[str], decimal: str) -> bool:
         return False
     values = sum(_is_value(field, decimal) for field in fields)
     filled = any(
-        field.strip() and (_is_number(field.strip(), decimal) or looks_like_datetime(field))
-        for field in fields
+        field.strip() and (_is_number(field.strip(), decimal) or looks_like_datetime(field)) for field in fields
     )
     return filled and values * 2 >= len(fields)
 
@@ -189,7 +188,7 @@ def _decimal_of(rows: Sequence[Sequence[str]], separator: str) -> str:
 def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     """Guess the separator as the one that splits most lines into rows of one length."""
     best: tuple[int, int, str, str, int] | None = None
-    sample = [line for line in lines[:_SAMPLE_LINES]]
+    sample = list(lines[:_SAMPLE_LINES])
     for separator in (",", ";", "\t", "whitespace"):
         split = [_split(line, separator) for line in sample]
         decimal = _decimal_of(split, separator)
@@ -204,9 +203,7 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     filled = [line for line in sample if line.strip()]
     if best is None or best[0] * 10 < 6 * (len([line for line in sample[best[4] :] if line.strip()])):
         if len(filled) == 1 and any(len(_split(filled[0], separator)) > 1 for separator in (",", ";", "\t")):
-            raise FerryIdError(
-                f"{path}: the table holds a header and no rows. Fix: record or export the log again"
-            )
+            raise FerryIdError(f"{path}: the table holds a header and no rows. Fix: record or export the log again")
         raise FerryIdError(
             f"{path}: this text is not a table of numbers, found {_quoted(filled[0] if filled else '')}. "
             "Fix: pass a log, or describe the table under [table] in the profile (separator, skip_rows, columns)"
@@ -219,9 +216,7 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     if header < first:
         names = _split(lines[header], separator)
         if first - header > 1:
-            notes.append(
-                f"{first - header - 1} line(s) between the column names and the first row skipped (units?)"
-            )
+            notes.append(f"{first - header - 1} line(s) between the column names and the first row skipped (units?)")
     elif first > 0 and (header_names := _names_for(lines[first - 1], separator, width)) is not None:
         names, header = header_names, first - 1
     else:
@@ -229,23 +224,19 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
         notes.append("no header row: columns are named by their place")
     if header > 0:
         notes.append(f"{header} line(s) before the table skipped")
-    rows = tuple(_rows(lines[first:], separator, width))
+    filled_rows = tuple(_rows(lines[first:], separator, width))
     shown = {"\t": "a tab", "whitespace": "white space"}.get(separator, f'"{separator}"')
     if separator != ",":
         notes.append(f"columns separated by {shown}")
     if decimal == ",":
         notes.append("decimal comma")
-    return _Shape(separator, decimal, first, names, rows, tuple(notes))
+    return _Shape(separator, decimal, first, names, filled_rows, tuple(notes))
 
 
 def _names_for(line: str, separator: str, width: int) -> tuple[str, ...] | None:
     """Column names from a header line that lacks the name of a trailing, empty column; None if it is no header."""
     names = _split(line, separator)
-    if (
-        separator != "whitespace"
-        and len(names) == width - 1
-        and not any(_is_number(n, ".") for n in names if n)
-    ):
+    if separator != "whitespace" and len(names) == width - 1 and not any(_is_number(n, ".") for n in names if n):
         return (*names, "")
     return None
 
@@ -270,14 +261,8 @@ def _stated(path: Path, lines: Sequence[str], layout: TableLayout) -> _Shape:
         first += 1
     filled = [line for line in body if line.strip()]
     if not filled:
-        what = (
-            "a header and no rows"
-            if names and not layout.columns
-            else f"no rows after {layout.skip_rows} lines"
-        )
-        raise FerryIdError(
-            f"{path}: the table holds {what}. Fix: record or export the log again, or correct skip_rows"
-        )
+        what = "a header and no rows" if names and not layout.columns else f"no rows after {layout.skip_rows} lines"
+        raise FerryIdError(f"{path}: the table holds {what}. Fix: record or export the log again, or correct skip_rows")
     split = [_split(line, separator) for line in filled[:_SAMPLE_LINES]]
     width = Counter(len(fields) for fields in split).most_common(1)[0][0]
     if width == len(names) + 1 and not layout.columns and all(f[-1] == "" for f in split if len(f) == width):
@@ -316,11 +301,7 @@ def _span(
     """Time of the first and last row [ns] as far as they can be read from the ends of the file."""
     place = names.index(plan.column)
     text = tail.decode("utf-16-le" if encoding == "utf-16" else encoding, errors="replace")
-    last = [
-        row
-        for row in (_split(line, shape.separator) for line in text.splitlines()[1:])
-        if len(row) == len(names)
-    ]
+    last = [row for row in (_split(line, shape.separator) for line in text.splitlines()[1:]) if len(row) == len(names)]
     cells = np.array([row[place].strip() for row in (*shape.rows[:1], *last[-1:])], dtype=object)
     values = cells if plan.unit == "datetime" else numbers_from_text(cells, shape.decimal)[0]
     times, good, _ = to_ns(values, plan.unit)
@@ -356,9 +337,7 @@ def _load(sheet: TextSheet, names: tuple[str, ...]) -> Rows:
     try:
         table = arrow_csv.read_csv(
             source,
-            read_options=arrow_csv.ReadOptions(
-                column_names=list(sheet.names), use_threads=False, block_size=1 << 22
-            ),
+            read_options=arrow_csv.ReadOptions(column_names=list(sheet.names), use_threads=False, block_size=1 << 22),
             parse_options=arrow_csv.ParseOptions(delimiter=delimiter, invalid_row_handler=skip),
             convert_options=arrow_csv.ConvertOptions(
                 include_columns=list(names),
@@ -390,13 +369,7 @@ def _load(sheet: TextSheet, names: tuple[str, ...]) -> Rows:
 def _wrong_rows(sheet: TextSheet, wrong: list[tuple[int | None, int, str]], cut: bool) -> list[Loss]:
     """Losses for rows with the wrong number of fields; a last row cut in mid-line is told apart."""
     losses = []
-    if (
-        cut
-        and wrong
-        and wrong[-1][0] is not None
-        and len(wrong[-1][2]) > 0
-        and wrong[-1][1] < len(sheet.names)
-    ):
+    if cut and wrong and wrong[-1][0] is not None and len(wrong[-1][2]) > 0 and wrong[-1][1] < len(sheet.names):
         text = wrong.pop()[2]
         what = f"the file ends in the middle of a row ({_quoted(text)}): the last row was left out"
         losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=1))
@@ -457,9 +430,7 @@ def _single_tabs(raw: np.ndarray[Any, np.dtype[np.uint8]]) -> bytes:
         starts = np.flatnonzero(first)
         solid = np.flatnonzero(~blank)
         following = np.searchsorted(solid, starts)
-        stops = np.where(
-            following < len(solid), solid[np.minimum(following, max(len(solid) - 1, 0))], len(raw)
-        )
+        stops = np.where(following < len(solid), solid[np.minimum(following, max(len(solid) - 1, 0))], len(raw))
         edges = np.zeros(len(raw) + 1, dtype=np.int64)
         np.add.at(edges, starts, 1)
         np.add.at(edges, stops, -1)

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from ferryid.ingest.log import Column, Nanoseconds
 
+_PREFIX = {3: "milli", 6: "micro", 9: "nano"}
 UNIT_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
-_DATETIME = re.compile(
-    r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T]\d{2}:\d{2}:\d{2}([.,]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$"
-)
+_DATETIME = re.compile(r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T]\d{2}:\d{2}:\d{2}([.,]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$")
 _TIME_NAME = re.compile(
     r"%?(rosbag|log|gps|unix|epoch|utc|receive|recv|elapsed|rec)?[ _.]*"
     r"(t|tvec|time|timestamp|stamp|times|date|datetime|date[ _]?time|utc)(?:[ _.]*(\d|abs|rel|utc))?$"
@@ -35,8 +34,8 @@ _STAMP_SECONDS = re.compile(r"(.*stamp.*?)([._ ]?)(secs?|seconds)$")
 class TimePlan:
     """Which columns of a table are its times.
 
-    `column` is in `unit` (``"s"``, ``"ms"``, ``"us"``, ``"ns"`` or ``"datetime"``); `stamp` holds no column, one in `unit`, or two
-    that are seconds and nanoseconds. `note` tells what was guessed, empty where a profile states it.
+    `column` is in `unit` (``"s"``, ``"ms"``, ``"us"``, ``"ns"`` or ``"datetime"``); `stamp` holds no column, one in
+    `unit`, or two that are seconds and nanoseconds. `note` tells what was guessed, empty where a profile states it.
     """
 
     column: str
@@ -76,9 +75,7 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
     # A row counter also rises: an unnamed first column of whole numbers from 0 or 1 in steps of one is no time.
     if numbers is None or (np.all(np.diff(numbers) == 1.0) and numbers[0] in (0.0, 1.0)):
         return None
-    return _plan(
-        sample, name, _unit_of_size(numbers), _unit_of_size(numbers) + ", the first column and rising"
-    )
+    return _plan(sample, name, _unit_of_size(numbers), _unit_of_size(numbers) + ", the first column and rising")
 
 
 def guess_stamp(names: Sequence[str]) -> tuple[str, ...]:
@@ -125,13 +122,14 @@ def stamps_to_ns(seconds: Column, nanoseconds: Column) -> tuple[Nanoseconds, NDA
 def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_], str]:
     """Parse dates and times, year first, without losing nanoseconds; no zone is taken as UTC.
 
-    Some exporters write the fraction as an unpadded count of nanoseconds (``45.81833647`` for 45.081833647 s). Where fractions differ in
-    length, both readings are tried and the one with fewer steps back in time is kept.
+    Some exporters write the fraction as an unpadded count of nanoseconds (``45.81833647`` for 45.081833647 s). Where
+    fractions differ in length, both readings are tried and the one with fewer steps back in time is kept.
 
     Returns
     -------
     tuple
-        Times [ns], shape (n,), 0 where unreadable; a mask, True where readable; a sentence on a repair, or an empty string.
+        Times [ns], shape (n,), 0 where unreadable; a mask, True where readable; a sentence on a
+        repair, or an empty string.
     """
     rows = len(texts)
     width = max((len(text) for text in texts), default=0)
@@ -156,9 +154,7 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
     good &= (code[:, 13] == ord(":")) & (code[:, 16] == ord(":"))
     month, day = number(5, 2), number(8, 2)
     hour, minute, second = number(11, 2), number(14, 2), number(17, 2)
-    good &= (
-        (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31) & (hour < 24) & (minute < 60) & (second <= 60)
-    )
+    good &= (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31) & (hour < 24) & (minute < 60) & (second <= 60)
     months = (np.where(good, number(0, 4), 1970) - 1970) * 12 + np.where(good, month, 1) - 1
     first_day = months.astype("datetime64[M]").astype("datetime64[D]")
     days = first_day.astype(np.int64) + np.where(good, day, 1) - 1
@@ -187,7 +183,7 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
         if np.sum(np.diff(counted[good]) < 0) < np.sum(np.diff(padded[good]) < 0):
             note = (
                 f"{int(short.sum())} of {rows} times have a fraction without its leading zeros "
-                f"(an unpadded count of {'milli' if longest == 3 else 'micro' if longest == 6 else 'nano'}seconds): read as such"
+                f"(an unpadded count of {_PREFIX[longest]}seconds): read as such"
             )
             padded = counted
     return np.where(good, padded, 0), good, note
@@ -205,9 +201,7 @@ def _zone_offset_s(
         if tail not in tails:
             found = re.fullmatch(rb"([+-])(\d{2}):?(\d{2})", tail)
             tails[tail] = (
-                None
-                if found is None
-                else (1 if found[1] == b"+" else -1) * (int(found[2]) * 3600 + int(found[3]) * 60)
+                None if found is None else (1 if found[1] == b"+" else -1) * (int(found[2]) * 3600 + int(found[3]) * 60)
             )
         value = tails[tail]
         if value is None:

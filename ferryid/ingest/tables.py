@@ -150,9 +150,7 @@ def _untimed(sheet: Sheet, topic: str, time_ns: NDArray[np.int64], good: Mask) -
     )
 
 
-def plan_time(
-    where: str, names: Sequence[str], layout: TableLayout, *, typed: bool = False
-) -> TimePlan | None:
+def plan_time(where: str, names: Sequence[str], layout: TableLayout, *, typed: bool = False) -> TimePlan | None:
     """Take the time columns that a layout names, None where it leaves the time to be guessed.
 
     Parameters
@@ -204,15 +202,14 @@ def unique_names(names: Sequence[str]) -> tuple[tuple[str, ...], str]:
 def column_from_arrow(chunked: Any) -> Column:
     """Copy a pyarrow column to NumPy without importing pandas, which pyarrow's own ``to_numpy`` does.
 
-    Integers and booleans with missing cells become floats with NaN; text and anything else becomes objects, "" where missing.
+    Integers and booleans with missing cells become floats with NaN; text and anything else becomes objects, "" where
+    missing.
     """
     import pyarrow as pa
 
     kind = chunked.type
     if pa.types.is_timestamp(kind):
-        whole = _buffer_values(chunked.cast(pa.timestamp("ns", kind.tz)), np.dtype(np.int64)).view(
-            "datetime64[ns]"
-        )
+        whole = _buffer_values(chunked.cast(pa.timestamp("ns", kind.tz)), np.dtype(np.int64)).view("datetime64[ns]")
         return _with_missing(chunked, whole, np.datetime64("NaT", "ns"))
     if pa.types.is_floating(kind):
         numbers = _buffer_values(chunked.cast(pa.float64()), np.dtype(np.float64))
@@ -226,9 +223,7 @@ def column_from_arrow(chunked: Any) -> Column:
     if pa.types.is_boolean(kind) or pa.types.is_null(kind):
         if chunked.null_count == 0:
             return np.array(chunked.to_pylist(), dtype=bool)
-        return np.array(
-            [np.nan if value is None else float(value) for value in chunked.to_pylist()], dtype=np.float64
-        )
+        return np.array([np.nan if value is None else float(value) for value in chunked.to_pylist()], dtype=np.float64)
     texts = np.empty(len(chunked), dtype=object)
     texts[:] = ["" if value is None else str(value) for value in chunked.to_pylist()]
     return texts
@@ -257,7 +252,8 @@ def numbers_from_text(texts: Column, decimal: str) -> tuple[Column, int]:
     Returns
     -------
     tuple
-        The numbers with NaN for unreadable cells, and their count; or the texts unchanged and 0 where fewer than half are numbers.
+        The numbers with NaN for unreadable cells, and their count; or the texts unchanged and 0 where fewer than half
+        are numbers.
     """
     numbers = np.full(len(texts), np.nan)
     unreadable = empty = 0

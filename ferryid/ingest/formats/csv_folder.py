@@ -15,9 +15,7 @@ from ferryid.ingest.tables import TableReader
 def _files(folder: Path) -> Iterator[Path]:
     """CSV files of the folder and of folders in it, hidden ones left out, in a fixed order."""
     found = (path for path in folder.rglob("*") if path.suffix.lower() == ".csv" and path.is_file())
-    return iter(
-        sorted(p for p in found if not any(part.startswith(".") for part in p.relative_to(folder).parts))
-    )
+    return iter(sorted(p for p in found if not any(part.startswith(".") for part in p.relative_to(folder).parts)))
 
 
 def _matches(path: Path, head: bytes) -> bool:
@@ -32,7 +30,7 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
         try:
             sheets.append(_sheet(file, layout, topic))
         except FerryIdError as error:
-            # One unreadable file must not cost the others; it is shown as a loss, and a profile that needs it is refused.
+            # One unreadable file must not cost the others: it is shown as a loss.
             losses.append(Loss(file=str(file), what=str(error).removeprefix(f"{file}: "), topic=topic))
     if not sheets:
         raise FerryIdError(

@@ -69,9 +69,7 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
     fields = {field.name: kind for field in schema if (kind := _kind(field.type))}
     count = file.metadata.num_rows
     if count == 0:
-        raise FerryIdError(
-            f"{path}: the table holds columns and no rows. Fix: record or export the log again"
-        )
+        raise FerryIdError(f"{path}: the table holds columns and no rows. Fix: record or export the log again")
     notes = []
     plan = plan_time(str(path), tuple(fields), layout) if layout is not None else None
     if plan is None:

@@ -1,0 +1,451 @@
+"""Which clock a topic is put on, and everything that is wrong with it: offset, drift, jitter, resets, order, gaps.
+
+A message carries up to two times: when the recorder received it, and the sender's stamp. The stamp is free of transport
+jitter and therefore preferred wherever it behaves like a clock. All topics of one log end up on one time base, the
+recorder's: stamps whose clock is off by more than a second (never set, another time zone) are shifted onto it as a
+whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.ingest.log import Nanoseconds, Series
+
+Rows = NDArray[np.int64]
+
+_SECOND = 1_000_000_000
+_CONSTANT_OFFSET_NS = _SECOND
+"""Offsets below this are latency and kept; above, the sender's clock was set differently."""
+_STEP_NS = _SECOND
+"""Receive and stamp must advance alike within this from one message to the next, else a clock may have been set."""
+_CORRECTED_DRIFT_NS = 50_000_000
+_LARGEST_CLOCK_DRIFT_PPM = 500.0
+"""Quartz drifts by less; beyond it the stamps run on simulated time or the log was replayed at another speed."""
+_GAP_PERIODS = 3.0
+_SHORTEST_GAP_NS = 200_000_000
+_BLOCKS = 64
+_BLOCK_SAMPLES = 256
+_QUARTER_HOUR_NS = 900 * _SECOND
+
+
+@dataclass(frozen=True)
+class ClockReport:
+    """What was found and done about the time of one topic.
+
+    Attributes
+    ----------
+    source
+        ``"stamp"`` or ``"receive"``: the clock that the rows are on.
+    count
+        Rows kept.
+    rate_hz
+        Rows per second outside gaps; NaN for fewer than two rows.
+    offset_s
+        Median of receive time minus stamp [s]; NaN without stamps.
+    drift_ppm
+        How much faster the recorder's clock runs than the stamps [ppm]; NaN where it cannot be told.
+    jitter_s
+        Robust standard deviation of receive time minus stamp about its line, or without stamps of the period [s].
+    resets
+        Times that either clock was set: lasting steps of receive time against stamp, or of time backwards.
+    out_of_order
+        Rows that came after a later one; sorted into place.
+    duplicates
+        Rows with the time of an earlier row; left out.
+    dropped
+        Rows left out in all: duplicates, and stretches on the far side of a reset of the only clock.
+    replaced
+        Rows whose stamp was zero or in the future and was replaced by receive time less the median offset.
+    shift_s
+        What was added to the stamps to bring them to the recorder's time base [s].
+    gaps
+        Start and end [ns] of every stretch without rows, longer than three periods and 0.2 s.
+    notes
+        Sentences for the user.
+    """
+
+    source: str
+    count: int
+    rate_hz: float
+    offset_s: float
+    drift_ppm: float
+    jitter_s: float
+    resets: int
+    out_of_order: int
+    duplicates: int
+    dropped: int = 0
+    replaced: int = 0
+    shift_s: float = 0.0
+    gaps: tuple[tuple[int, int], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report for JSON: tuples as lists, NaN as None."""
+        plain = asdict(self)
+        for name in ("rate_hz", "offset_s", "drift_ppm", "jitter_s"):
+            if not np.isfinite(plain[name]):
+                plain[name] = None
+        plain["gaps"] = [list(gap) for gap in self.gaps]
+        plain["notes"] = list(self.notes)
+        return plain
+
+    @staticmethod
+    def from_dict(plain: Mapping[str, Any]) -> ClockReport:
+        """Build a report from `to_dict`'s output."""
+        values = dict(plain)
+        for name in ("rate_hz", "offset_s", "drift_ppm", "jitter_s"):
+            values[name] = float("nan") if values[name] is None else float(values[name])
+        values["gaps"] = tuple((int(start), int(end)) for start, end in values["gaps"])
+        values["notes"] = tuple(values["notes"])
+        return ClockReport(**values)
+
+
+def repair(receive_ns: Nanoseconds, stamp_ns: Nanoseconds | None) -> tuple[Nanoseconds, Rows, ClockReport]:
+    """Choose the clock of one topic and put its rows in order on the recorder's time base.
+
+    Parameters
+    ----------
+    receive_ns
+        Receive time of every row [ns], shape (n,), in the file's order.
+    stamp_ns
+        Sender's stamp [ns], shape (n,), or None for a type without a header.
+
+    Returns
+    -------
+    tuple
+        Strictly rising times [ns], shape (m,); the indices of the rows kept, in that order, shape (m,); the report.
+    """
+    time_ns, rows, report = _one_topic(receive_ns, stamp_ns)
+    return _shifted(time_ns, rows, report, _base_shift(report.offset_s))
+
+
+def repair_all(series: Mapping[str, Series]) -> dict[str, tuple[Nanoseconds, Rows, ClockReport]]:
+    """Repair all topics of one log such that stamps of one sender stay as far apart as they were.
+
+    Topics whose clock offsets lie within a second of one another come from one sender's clock: all are shifted by the
+    smallest of their offsets, which holds the least latency. Otherwise as `repair`, per topic.
+    """
+    found = {topic: _one_topic(one.receive_ns, one.stamp_ns) for topic, one in series.items()}
+    stamped = sorted(
+        (report.offset_s, topic)
+        for topic, (_, _, report) in found.items()
+        if report.source == "stamp" and _base_shift(report.offset_s) != 0
+    )
+    shifts = dict.fromkeys(found, 0)
+    first = float("nan")
+    for offset_s, topic in stamped:
+        if not offset_s - first < _CONSTANT_OFFSET_NS * 1e-9:
+            first = offset_s
+        shifts[topic] = _base_shift(first)
+    return {topic: _shifted(*found[topic], shifts[topic]) for topic in found}
+
+
+def _base_shift(offset_s: float) -> int:
+    """Shift [ns] that brings stamps with this median offset to the recorder's time base, 0 for plain latency."""
+    if not np.isfinite(offset_s):
+        return 0
+    offset = round(offset_s * _SECOND)
+    if abs(offset) <= _CONSTANT_OFFSET_NS:
+        return 0
+    zone = round(offset / _QUARTER_HOUR_NS) * _QUARTER_HOUR_NS
+    # Two clocks that are right but written in different time zones: what remains is latency, and is kept.
+    return zone if zone != 0 and 0 <= offset - zone < _SECOND // 2 else offset
+
+
+def _shifted(
+    time_ns: Nanoseconds, rows: Rows, report: ClockReport, shift_ns: int
+) -> tuple[Nanoseconds, Rows, ClockReport]:
+    if report.source != "stamp" or shift_ns == 0:
+        return time_ns, rows, report
+    zone = " (a time zone?)" if shift_ns % _QUARTER_HOUR_NS == 0 else ""
+    side = "behind" if shift_ns > 0 else "ahead of"
+    note = f"the sender's clock is {_span_text(abs(shift_ns))} {side} the recorder's{zone}: stamps are shifted onto the latter"
+    gaps = tuple((start + shift_ns, end + shift_ns) for start, end in report.gaps)
+    return (
+        time_ns + np.int64(shift_ns),
+        rows,
+        replace(report, shift_s=shift_ns / _SECOND, gaps=gaps, notes=(*report.notes, note)),
+    )
+
+
+def _span_text(nanoseconds: int) -> str:
+    seconds = nanoseconds / _SECOND
+    if seconds < 600:
+        return f"{seconds:.3f} s"
+    if seconds < 172_800:
+        return f"{seconds / 3600:.4g} h"
+    return f"{seconds / 86_400:.6g} days"
+
+
+def _one_topic(receive_ns: Nanoseconds, stamp_ns: Nanoseconds | None) -> tuple[Nanoseconds, Rows, ClockReport]:
+    """Repair one topic, its stamps not yet shifted to the recorder's base."""
+    receive = np.ascontiguousarray(receive_ns, dtype=np.int64)
+    if stamp_ns is None:
+        return _ordered(receive, "receive", ("no header: receive times are used",), drop_far_side=True)
+    stamp = np.ascontiguousarray(stamp_ns, dtype=np.int64)
+    reason, notes, stamp, facts = _judge(receive, stamp)
+    if reason:
+        return _ordered(receive, "receive", (f"{reason}: receive times are used", *notes), facts, drop_far_side=True)
+    return _ordered(stamp, "stamp", notes, facts)
+
+
+@dataclass(frozen=True)
+class _Facts:
+    """What the comparison of both clocks gave."""
+
+    offset_s: float = float("nan")
+    drift_ppm: float = float("nan")
+    jitter_s: float = float("nan")
+    resets: int = 0
+    replaced: int = 0
+
+
+def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ...], Nanoseconds, _Facts]:
+    """Compare both clocks: why stamps cannot be used (or ""), notes, repaired stamps, facts."""
+    count = len(stamp)
+    if count == 0:
+        return "", (), stamp, _Facts()
+    unset = stamp <= 0
+    zeros = int(np.count_nonzero(unset))
+    if zeros == count and not (count > 1 and stamp.max() == 0 and stamp.min() < 0):
+        return "all stamps are zero", (), stamp, _Facts()
+    if zeros * 100 > count and zeros > 1:
+        return f"{zeros} of {count} stamps are zero", (), stamp, _Facts()
+    notes: list[str] = []
+    steps = np.diff(stamp)
+    repeated = int(np.count_nonzero(steps == 0))
+    if count > 2 and repeated == count - 1:
+        return "all stamps are the same", (), stamp, _Facts()
+    if repeated * 5 > count:
+        return f"{repeated} of {count} stamps repeat the one before", (), stamp, _Facts()
+    latency = receive - stamp
+    usual = _median(latency[~unset] if zeros else latency)
+    replaced = 0
+    # A stamp in the future by itself is no late message (which would be old): the sender wrote nonsense.
+    strange = unset | _alone_in_future(latency)
+    if strange.any():
+        replaced = int(np.count_nonzero(strange))
+        if replaced * 100 > max(count, 200):
+            return f"{replaced} of {count} stamps make no sense", (), stamp, _Facts()
+        stamp = np.where(strange, receive - usual, stamp)
+        latency = np.where(strange, usual, latency)
+        notes.append(f"{replaced} senseless stamps replaced by receive time less the usual latency")
+    # Receive time and stamp advance alike unless a message was held up or a clock was set.
+    jumps = np.flatnonzero(np.abs(np.diff(latency)) > _STEP_NS)
+    if len(jumps) * 10 > count:
+        return (
+            "stamps and receive times have nothing in common",
+            tuple(notes),
+            stamp,
+            _Facts(replaced=replaced),
+        )
+    sets = _lasting_steps(latency, jumps)
+    if sets:
+        facts = _Facts(usual / _SECOND, float("nan"), float("nan"), len(sets), replaced)
+        by_sender = sum(_is_senders(receive, stamp, place) for place in sets)
+        where = f"{sets[0] + 1} of {count}"
+        if by_sender:
+            reason = f"the sender's clock was set {by_sender} time(s) during the recording, first at row {where}"
+            return reason, tuple(notes), stamp, facts
+        notes.append(
+            f"the recorder's clock was set {len(sets)} time(s) during the recording, first at row {where}: stamps are "
+            "used, topics without stamps may be off"
+        )
+        return "", tuple(notes), stamp, facts
+    places, middles, spread = _blocks(stamp, latency)
+    slope = _theil_sen(places, middles)
+    jitter = spread / _SECOND
+    facts = _Facts(usual / _SECOND, slope * 1e6, jitter, 0, replaced)
+    drifted = slope * float(stamp.max() - stamp.min()) if np.isfinite(slope) else 0.0
+    if abs(drifted) > _CORRECTED_DRIFT_NS:
+        if abs(slope) * 1e6 > _LARGEST_CLOCK_DRIFT_PPM:
+            notes.append(
+                f"stamps advance {1 / (1 + slope):.4g} times as fast as the recorder's clock (simulated time, or "
+                "a replay?): stamps are used as they are"
+            )
+        else:
+            stamp = stamp + np.rint(slope * (stamp - stamp[0])).astype(np.int64)
+            notes.append(
+                f"the sender's clock drifts by {slope * 1e6:.1f} ppm, {drifted / _SECOND:.3f} s in all: taken out"
+            )
+    if -_CONSTANT_OFFSET_NS <= usual < -1_000_000:
+        notes.append(f"stamps are {-usual / _SECOND:.3f} s later than receipt: the sender's clock is ahead; kept")
+    return "", tuple(notes), stamp, facts
+
+
+def _ordered(
+    times: Nanoseconds,
+    source: str,
+    notes: tuple[str, ...],
+    facts: _Facts | None = None,
+    *,
+    drop_far_side: bool = False,
+) -> tuple[Nanoseconds, Rows, ClockReport]:
+    """Sort the rows, leave out repeated times, find gaps, and write the report."""
+    facts = facts or _Facts()
+    told = list(notes)
+    count = len(times)
+    rows = np.arange(count, dtype=np.int64)
+    resets, far = facts.resets, 0
+    steps = np.diff(times)
+    lowest = int(steps.min(initial=1))
+    if lowest < -_STEP_NS and drop_far_side:
+        start, stop, backward = _longest_stretch(times)
+        if stop - start < count:
+            resets += backward
+            far = count - (stop - start)
+            told.append(
+                f"time jumps back {backward} time(s), the clock was set or several runs follow one another: only the "
+                f"longest stretch of {stop - start} rows is used, {far} rows are left out"
+            )
+            rows, times = rows[start:stop], times[start:stop]
+            steps = np.diff(times)
+            lowest = int(steps.min(initial=1))
+    out_of_order = duplicates = 0
+    if lowest < 0:
+        out_of_order = int(np.count_nonzero(times < np.maximum.accumulate(times)))
+        order = np.argsort(times, kind="stable")
+        rows, times = rows[order], times[order]
+        steps = np.diff(times)
+        lowest = int(steps.min(initial=1))
+    if lowest == 0:
+        fresh = np.concatenate(([True], steps > 0))
+        duplicates = len(times) - int(np.count_nonzero(fresh))
+        rows, times = rows[fresh], times[fresh]
+        steps = np.diff(times)
+    gaps, period, varies = _gaps(times, steps)
+    silent = sum(end - start for start, end in gaps)
+    spoken = len(times) - 1 - len(gaps)
+    span = int(times[-1] - times[0]) - silent if len(times) > 1 else 0
+    if varies:
+        told.append("the period varies: gaps are counted against the longer of its periods")
+    jitter = facts.jitter_s
+    if not np.isfinite(jitter) and len(steps) > 1:
+        sample = _sample(steps)
+        jitter = 1.4826 * float(np.median(np.abs(sample - period))) / _SECOND
+    report = ClockReport(
+        source=source,
+        count=len(times),
+        rate_hz=spoken / (span / _SECOND) if span > 0 and spoken > 0 else float("nan"),
+        offset_s=facts.offset_s,
+        drift_ppm=facts.drift_ppm,
+        jitter_s=jitter,
+        resets=resets,
+        out_of_order=out_of_order,
+        duplicates=duplicates,
+        dropped=count - len(times),
+        replaced=facts.replaced,
+        gaps=gaps,
+        notes=tuple(told),
+    )
+    return times, rows, report
+
+
+def _gaps(times: Nanoseconds, steps: Nanoseconds) -> tuple[tuple[tuple[int, int], ...], float, bool]:
+    """Stretches without rows, the usual period [ns], and whether the period varies too much to be one."""
+    if len(steps) == 0:
+        return (), float("nan"), False
+    sample = _sample(steps)
+    period = float(np.median(sample))
+    limit = max(_GAP_PERIODS * period, _SHORTEST_GAP_NS)
+    varies = bool(np.mean(sample > limit) > 0.05)
+    if varies:
+        limit = max(_GAP_PERIODS * float(np.quantile(sample, 0.95)), _SHORTEST_GAP_NS)
+    places = np.flatnonzero(steps > limit)
+    return tuple((int(times[place]), int(times[place + 1])) for place in places), period, varies
+
+
+def _sample(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """At most 16384 values, in runs spread over the whole array."""
+    most = _BLOCKS * _BLOCK_SAMPLES
+    if len(values) <= most:
+        return values
+    starts = np.linspace(0, len(values) - _BLOCK_SAMPLES, _BLOCKS).astype(np.int64)
+    sampled: NDArray[np.int64] = values[starts[:, None] + np.arange(_BLOCK_SAMPLES)].reshape(-1)
+    return sampled
+
+
+def _median(values: Nanoseconds) -> int:
+    """Median to the nanosecond, which floats cannot hold at 1.7e18."""
+    sample = _sample(values)
+    middle = (len(sample) - 1) // 2
+    return int(np.partition(sample, middle)[middle])
+
+
+def _alone_in_future(latency: Nanoseconds) -> NDArray[np.bool_]:
+    """Rows whose latency falls by more than a second and comes back with the next row."""
+    alone = np.zeros(len(latency), dtype=bool)
+    if len(latency) < 3:
+        return alone
+    change = np.diff(latency)
+    if int(change.min()) >= -_STEP_NS:
+        return alone
+    alone[1:-1] = (change[:-1] < -_STEP_NS) & (change[1:] > _STEP_NS)
+    # A held-up message before a normal one also falls and may rise again: only below the usual is it the future.
+    return alone & (latency < _median(latency) - _STEP_NS)
+
+
+def _lasting_steps(latency: Nanoseconds, jumps: NDArray[np.intp]) -> list[int]:
+    """Of the places where the latency jumps, those where it stays: medians of the stretches on both sides differ."""
+    edges = [0, *(int(place) + 1 for place in jumps), len(latency)]
+    stretches = [(a, b) for a, b in pairwise(edges) if b - a >= 3]
+    lasting = []
+    for (start, middle), (after, end) in pairwise(stretches):
+        if abs(_median(latency[after:end]) - _median(latency[start:middle])) > _STEP_NS // 2:
+            lasting.append(after - 1)
+    return lasting
+
+
+def _is_senders(receive: Nanoseconds, stamp: Nanoseconds, place: int) -> bool:
+    """True where at this step the stamp departs from the usual period by more than the receive time does."""
+    period = _median(np.diff(stamp))
+    by_stamp = abs(int(stamp[place + 1] - stamp[place]) - period)
+    by_receive = abs(int(receive[place + 1] - receive[place]) - period)
+    return by_stamp >= by_receive
+
+
+def _blocks(stamp: Nanoseconds, latency: Nanoseconds) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Medians of stamp and latency [ns, from the first] in up to 64 blocks, and the latency's spread in blocks [ns]."""
+    count = len(stamp)
+    blocks = min(_BLOCKS, max(1, count // 8))
+    edges = np.linspace(0, count, blocks + 1).astype(np.int64)
+    places, middles, spreads = np.empty(blocks), np.empty(blocks), np.empty(blocks)
+    base = int(latency[0])
+    for number, (start, end) in enumerate(pairwise(edges)):
+        stride = max(1, int(end - start) // _BLOCK_SAMPLES)
+        values = (latency[start:end:stride] - base).astype(np.float64)
+        middles[number] = np.median(values)
+        spreads[number] = np.median(np.abs(values - middles[number]))
+        places[number] = float(stamp[(start + end) // 2] - stamp[0])
+    return places, middles, 1.4826 * float(np.median(spreads))
+
+
+def _theil_sen(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Median of the slopes between all pairs of points; NaN for fewer than four points."""
+    if len(x) < 4:
+        return float("nan")
+    first, second = np.triu_indices(len(x), 1)
+    run = x[second] - x[first]
+    apart = run != 0
+    return float(np.median((y[second] - y[first])[apart] / run[apart])) if apart.any() else float("nan")
+
+
+def _longest_stretch(times: Nanoseconds) -> tuple[int, int, int]:
+    """Start and stop of the longest stretch without a lasting jump back, and how many such jumps there are."""
+    backward = np.flatnonzero(np.diff(times) < -_STEP_NS)
+    highest = np.maximum.accumulate(times)
+    # A jump back lasts unless later rows soon rise past what came before; a single late row does so at once.
+    lasting = [int(p) + 1 for p in backward if int(np.max(times[p + 1 : p + 4])) < int(highest[p])]
+    if not lasting:
+        return 0, len(times), 0
+    edges = [0, *lasting, len(times)]
+    lengths = np.diff(edges)
+    best = int(np.argmax(lengths))
+    return edges[best], edges[best + 1], len(lasting)
