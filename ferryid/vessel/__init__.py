@@ -1,1 +1,25 @@
-"""vessel."""
+"""The vessel: its profile, hull, thrusters and wind areas, and where its signals live in a log."""
+
+from ferryid.vessel.describe import describe
+from ferryid.vessel.faults import Fault
+from ferryid.vessel.load import bundled, check_profile, load_profile, parse_profile
+from ferryid.vessel.resolve import resolve, resolve_notes
+from ferryid.vessel.signal_map import Selection, convert, select, survey
+from ferryid.vessel.thrusters import actuator_columns, applied_force
+
+__all__ = [
+    "Fault",
+    "Selection",
+    "actuator_columns",
+    "applied_force",
+    "bundled",
+    "check_profile",
+    "convert",
+    "describe",
+    "load_profile",
+    "parse_profile",
+    "resolve",
+    "resolve_notes",
+    "select",
+    "survey",
+]

@@ -51,9 +51,11 @@ class Hull:
 
 @dataclass(frozen=True)
 class ThrustCurve:
-    """Force of one propeller [N] over its speed; `kind` is ``polynomial``, ``table`` or ``quadratic``.
+    """Force of one propeller [N] over its speed; `kind` is ``polynomial``, ``table``, ``quadratic`` or ``open_water``.
 
     ``input_unit`` is ``rpm`` or ``rps``; `valid` is the range of the input outside which it is clipped, and counted.
+    `coefficients` start with that of the first power. `table` holds speeds and forces, or J and K_T for ``open_water``.
+    `ahead` and `astern` are N per (input unit)²; for ``open_water`` `astern` is K_T with the propeller reversed.
     """
 
     kind: str
@@ -102,6 +104,8 @@ class Signal:
 
     `quantity` is the key in the file (``position``, ``heading``, ``velocity``, ``yaw_rate``, ``wind`` or
     ``<actuator>.<speed|angle|rudder|force|thrust>`` with ``.command`` appended for orders); `line` is its line there.
+    A scalar is ``sign * value + offset`` in `unit`, and a propeller speed in ``%`` or ``fraction`` is of `full_rpm`.
+    `mount_m` is where an antenna or a log sits (x forward, y starboard of the body origin) [m].
     """
 
     quantity: str
@@ -114,6 +118,8 @@ class Signal:
     options: Mapping[str, str] = field(default_factory=dict)
     required: bool = True
     line: int = 0
+    full_rpm: float = 0.0
+    mount_m: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)

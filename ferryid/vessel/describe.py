@@ -1,0 +1,113 @@
+"""A vessel profile in words, for a person to check."""
+
+from __future__ import annotations
+
+import math
+
+from ferryid.vessel.profile import Actuator, Profile, Signal
+from ferryid.vessel.signal_map import canonical_columns
+
+
+def describe(profile: Profile) -> str:
+    """Return a plain-text page on a profile: hull, actuators, wind and signal map, with units."""
+    return "\n".join(
+        [*_heading(profile), *_hull(profile), *_actuators(profile), *_wind(profile), *_signals(profile)]
+    )
+
+
+def _heading(profile: Profile) -> list[str]:
+    return [f"{profile.name}: {profile.title}", f"Source: {profile.source}", f"File: {profile.path}", ""]
+
+
+def _hull(profile: Profile) -> list[str]:
+    hull = profile.hull
+    size = ", ".join(
+        f"{name} {value:g} m"
+        for name, value in (("length", hull.length_m), ("beam", hull.beam_m), ("draught", hull.draught_m))
+        if not math.isnan(value)
+    )
+    lines = [
+        f"Hull: {size}",
+        f"  mass {hull.mass_kg:g} kg, inertia in yaw {hull.inertia_z:g} kg·m², centre of gravity {hull.x_g_m:+g} m",
+        "  M = " + "; ".join(" ".join(f"{value:.6g}" for value in row) for row in hull.M.tolist()),
+    ]
+    if hull.has_model:
+        lines.append("  D: " + ", ".join(f"{term} {value:g}" for term, value in hull.D.items()))
+    else:
+        lines.append("  D: none known. The base model is mass alone.")
+    return [*lines, ""]
+
+
+def _actuators(profile: Profile) -> list[str]:
+    return ["Actuators:", *(f"  {_actuator(actuator)}" for actuator in profile.actuators), ""]
+
+
+def _actuator(actuator: Actuator) -> str:
+    x_m, y_m = actuator.position_m
+    text = f"{actuator.name}: {actuator.kind.replace('_', ' + ')} at ({x_m:g}, {y_m:g}) m"
+    if actuator.count > 1:
+        text += f", {actuator.count} driven as one"
+    if actuator.kind in ("propeller", "force") and actuator.angle_rad:
+        text += f", pushing towards {math.degrees(actuator.angle_rad):g} deg"
+    if actuator.thrust is not None:
+        low, high = actuator.thrust.valid
+        reach = f", {low:g} to {high:g} {actuator.thrust.input_unit}" if math.isfinite(low + high) else ""
+        text += f", thrust by {actuator.thrust.kind.replace('_', ' ')}{reach}"
+    if actuator.inflow:
+        text += ", " + ", ".join(
+            f"{key.removesuffix('_m')} {value:g}" for key, value in actuator.inflow.items()
+        )
+    if actuator.rudder:
+        text += f", rudder {actuator.rudder['area_m2']:g} m² at x = {actuator.rudder['x_m']:g} m"
+    return text
+
+
+def _wind(profile: Profile) -> list[str]:
+    areas = profile.wind
+    if areas is None:
+        return ["Wind areas: none given.", ""]
+    return [
+        f"Wind areas: frontal {areas.frontal_m2:g} m², lateral {areas.lateral_m2:g} m², length {areas.length_m:g} m, "
+        f"CD_t {areas.CD_t:g}, CD_l_AF {areas.CD_l_AF:g}, delta {areas.delta:g}, S_L {areas.S_L_m:g} m",
+        "",
+    ]
+
+
+def _signals(profile: Profile) -> list[str]:
+    rows = [
+        (
+            signal.quantity,
+            ", ".join(canonical_columns(signal)),
+            f"{signal.topic}: {', '.join(signal.fields)}",
+            _how(signal),
+        )
+        for signal in profile.signals
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in range(3)]
+    return [
+        "Signals:",
+        *(
+            "  " + "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[3]])
+            for row in rows
+        ),
+    ]
+
+
+def _how(signal: Signal) -> str:
+    parts = [signal.unit, signal.frame]
+    if signal.quantity == "wind" and signal.options:
+        parts += [
+            f"from {signal.options['direction_unit']} of {signal.options['reference']}",
+            f"{signal.options['air']} wind",
+        ]
+    if signal.sign < 0:
+        parts.append("sign reversed")
+    if signal.offset:
+        parts.append(f"offset {signal.offset:+g}")
+    if signal.full_rpm:
+        parts.append(f"of {signal.full_rpm:g} rpm")
+    if signal.mount_m != (0.0, 0.0):
+        parts.append(f"measured at ({signal.mount_m[0]:g}, {signal.mount_m[1]:g}) m")
+    if not signal.required:
+        parts.append("may be missing")
+    return ", ".join(part for part in parts if part)

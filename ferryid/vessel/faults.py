@@ -1,0 +1,215 @@
+"""Reading a profile's tables key by key, noting a fault with its line for whatever does not fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ferryid.errors import did_you_mean
+from ferryid.vessel.toml_lines import KeyPath, line_of
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of a profile: the line it stands on, what is wrong and how to put it right.
+
+    A `warning` does not keep the profile from being used.
+    """
+
+    line: int
+    message: str
+    warning: bool = False
+
+
+class TableReader:
+    """Take the keys of one TOML table by type, and report the keys that nobody took.
+
+    Parameters
+    ----------
+    data
+        The table.
+    path
+        Where it stands in the file.
+    lines
+        Lines of every key, from `key_lines`.
+    faults
+        Shared list to which faults are added.
+    """
+
+    def __init__(
+        self, data: Mapping[str, Any], path: KeyPath, lines: dict[KeyPath, int], faults: list[Fault]
+    ) -> None:
+        self.data = data
+        self.path = path
+        self._lines = lines
+        self._faults = faults
+        self._known: set[str] = set()
+
+    @property
+    def title(self) -> str:
+        """The table's name as a header of the file shows it."""
+        names = [str(part) for part in self.path if isinstance(part, str)]
+        return "[" + ".".join(f'"{name}"' if "." in name else name for name in names) + "]"
+
+    def line(self, key: str | None = None) -> int:
+        """Return the line of a key, or of the table itself."""
+        return line_of(self._lines, self.path if key is None else (*self.path, key))
+
+    def fault(self, message: str, key: str | None = None, *, warning: bool = False) -> None:
+        """Note a fault at `key`, or at the table's own line."""
+        self._faults.append(Fault(self.line(key), message, warning))
+
+    def has(self, key: str) -> bool:
+        """Tell whether the file gives `key`."""
+        self._known.add(key)
+        return key in self.data
+
+    def tables(self, key: str) -> list[TableReader]:
+        """Return the readers of an array of tables."""
+        value = self._take(key, required=False)
+        if value is None:
+            return []
+        if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
+            self.fault(f'"{key}" must be an array of tables. Fix: head each entry with [[{key}]]', key)
+            return []
+        return [
+            TableReader(entry, (*self.path, key, index), self._lines, self._faults)
+            for index, entry in enumerate(value)
+        ]
+
+    def table(self, key: str, *, required: bool = False, needs: str = "") -> TableReader | None:
+        """Return the reader of a table inside this one, or None."""
+        value = self._take(key, required=required, needs=needs)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            self.fault(f'"{key}" must be a table, found {_kind(value)}. Fix: {key} = {{ ... }}', key)
+            return None
+        return TableReader(value, (*self.path, key), self._lines, self._faults)
+
+    def text(
+        self, key: str, default: str = "", *, required: bool = False, options: Collection[str] = ()
+    ) -> str:
+        """Return a string, one of `options` where there are any."""
+        value = self._take(key, required=required)
+        if value is None:
+            return default
+        if not isinstance(value, str):
+            self.fault(f'"{key}" must be a string, found {_kind(value)}. Fix: put it in quotes', key)
+            return default
+        if options and value not in options:
+            hint = did_you_mean(value, options)
+            self.fault(
+                f'"{key}" cannot be "{value}".{hint} Fix: use one of {", ".join(sorted(options))}', key
+            )
+            return default
+        return value
+
+    def texts(self, key: str, count: int | None = None, *, required: bool = False) -> tuple[str, ...]:
+        """Return an array of strings, of `count` entries where that is given."""
+        value = self._take(key, required=required)
+        if value is None:
+            return ()
+        if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
+            self.fault(f'"{key}" must be an array of strings, found {_kind(value)}', key)
+            return ()
+        if count is not None and len(value) != count:
+            self.fault(f'"{key}" must name {count} fields, found {len(value)}', key)
+            return ()
+        return tuple(value)
+
+    def number(
+        self,
+        key: str,
+        default: float = math.nan,
+        *,
+        required: bool = False,
+        above: float = -math.inf,
+        at_least: float = -math.inf,
+        at_most: float = math.inf,
+        needs: str = "",
+    ) -> float:
+        """Return a finite number within its limits; the default where it is missing or does not fit."""
+        value = self._take(key, required=required, needs=needs)
+        if value is None:
+            return default
+        if not _is_number(value):
+            self.fault(f'"{key}" must be a number, found {_kind(value)}', key)
+            return default
+        if not math.isfinite(value) or value <= above or value < at_least or value > at_most:
+            limit = (
+                f"above {above:g}"
+                if math.isfinite(above)
+                else f"at least {at_least:g}"
+                if math.isfinite(at_least)
+                else "finite"
+            )
+            limit += f" and at most {at_most:g}" if math.isfinite(at_most) else ""
+            self.fault(f'"{key}" must be {limit}, found {value:g}', key)
+            return default
+        return float(value)
+
+    def numbers(self, key: str, count: int | None = None, *, required: bool = False) -> tuple[float, ...]:
+        """Return an array of finite numbers, of `count` entries where that is given."""
+        value = self._take(key, required=required)
+        if value is None:
+            return ()
+        if not isinstance(value, list) or not all(
+            _is_number(entry) and math.isfinite(entry) for entry in value
+        ):
+            self.fault(f'"{key}" must be an array of finite numbers, found {_kind(value)}', key)
+            return ()
+        if count is not None and len(value) != count:
+            self.fault(f'"{key}" must hold {count} numbers, found {len(value)}', key)
+            return ()
+        return tuple(float(entry) for entry in value)
+
+    def whole(self, key: str, default: int, *, at_least: int = 0) -> int:
+        """Return a whole number."""
+        value = self._take(key, required=False)
+        if value is None:
+            return default
+        if not isinstance(value, int) or isinstance(value, bool) or value < at_least:
+            self.fault(f'"{key}" must be a whole number of at least {at_least}, found {value!r}', key)
+            return default
+        return value
+
+    def flag(self, key: str, default: bool) -> bool:
+        """Return true or false."""
+        value = self._take(key, required=False)
+        if value is None:
+            return default
+        if not isinstance(value, bool):
+            self.fault(f'"{key}" must be true or false, found {_kind(value)}', key)
+            return default
+        return value
+
+    def close(self) -> None:
+        """Note every key that nothing asked for."""
+        for key in self.data:
+            if key not in self._known:
+                where = f"in {self.title}" if self.path else "at the top of the file"
+                hint = did_you_mean(key, self._known - set(self.data))
+                names = ", ".join(sorted(self._known))
+                self.fault(f'unknown key "{key}" {where}.{hint} Fix: use one of {names}', key)
+
+    def _take(self, key: str, *, required: bool, needs: str = "") -> Any:
+        self._known.add(key)
+        value = self.data.get(key)
+        if value is None and required:
+            where = f"{self.title} lacks" if self.path else "the file lacks"
+            self.fault(f'{where} "{key}"' + (f", {needs}" if needs else "") + f". Fix: add {key} = ...")
+        return value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _kind(value: object) -> str:
+    names = {bool: "true/false", str: "a string", int: "a number", float: "a number", dict: "a table"}
+    if isinstance(value, list):
+        return "an array of " + (", ".join(sorted({_kind(entry) for entry in value})) or "nothing")
+    return names.get(type(value), f"a {type(value).__name__}")

@@ -1,0 +1,152 @@
+"""The hull's equations of motion in three degrees of freedom, (2.3)-(2.14) in their corrected form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from ferryid.vessel.frames import to_body
+from ferryid.vessel.parse_hull import rigid_mass
+from ferryid.vessel.profile import Floats, Hull
+
+
+def coriolis(M: Floats, nu: Floats) -> Floats:
+    """Return the Coriolis and centripetal matrix of a mass matrix, shape (..., 3, 3); Fossen (2021), theorem 3.2.
+
+    ``[[0, 0, c13], [0, 0, c23], [-c13, -c23, 0]]`` with ``c13 = -m22 v - (m23 + m32)/2 r`` and ``c23 = m11 u``.
+
+    Parameters
+    ----------
+    M
+        Mass matrix, shape (3, 3).
+    nu
+        Surge, sway [m/s] and yaw rate [rad/s], shape (..., 3).
+    """
+    nu = np.asarray(nu, dtype=np.float64)
+    c13 = -M[1, 1] * nu[..., 1] - 0.5 * (M[1, 2] + M[2, 1]) * nu[..., 2]
+    c23 = M[0, 0] * nu[..., 0]
+    matrix = np.zeros((*nu.shape[:-1], 3, 3))
+    matrix[..., 0, 2], matrix[..., 1, 2] = c13, c23
+    matrix[..., 2, 0], matrix[..., 2, 1] = -c13, -c23
+    return matrix
+
+
+def damping(D: Mapping[str, float], nu_r: Floats) -> Floats:
+    """Return the damping matrix, shape (..., 3, 3); (2.14), with Y_vvv in d22 where it belongs.
+
+    Parameters
+    ----------
+    D
+        SNAME coefficients, negative where they damp; absent ones are zero.
+    nu_r
+        Velocities through the water, shape (..., 3).
+    """
+    nu_r = np.asarray(nu_r, dtype=np.float64)
+    u, v, r = nu_r[..., 0], nu_r[..., 1], nu_r[..., 2]
+    size_u, size_v, size_r = np.abs(u), np.abs(v), np.abs(r)
+    get = _zero_default(D)
+    matrix = np.zeros((*nu_r.shape[:-1], 3, 3))
+    matrix[..., 0, 0] = -get("X_u") - get("X_|u|u") * size_u - get("X_uuu") * u**2
+    matrix[..., 1, 1] = -get("Y_v") - get("Y_|v|v") * size_v - get("Y_|r|v") * size_r - get("Y_vvv") * v**2
+    matrix[..., 1, 2] = -get("Y_r") - get("Y_|v|r") * size_v - get("Y_|r|r") * size_r
+    matrix[..., 2, 1] = -get("N_v") - get("N_|v|v") * size_v - get("N_|r|v") * size_r
+    matrix[..., 2, 2] = -get("N_r") - get("N_|v|r") * size_v - get("N_|r|r") * size_r - get("N_rrr") * r**2
+    return matrix
+
+
+def current_in_body(current_ne: Floats, psi: Floats) -> Floats:
+    """Return ``nu_c = R^T [V_N, V_E, 0]``, shape (n, 3), of a current [m/s, where the water goes to], shape (n, 2)."""
+    current_ne = np.asarray(current_ne, dtype=np.float64)
+    surge, sway = to_body(current_ne[..., 0], current_ne[..., 1], np.asarray(psi, dtype=np.float64))
+    return np.stack([surge, sway, np.zeros_like(surge)], axis=-1)
+
+
+def inverse_dynamics(hull: Hull, nu_dot: Floats, nu: Floats, nu_c: Floats | None = None) -> Floats:
+    """Return the force that the motion takes, ``M nu_dot + C nu + D nu``, shape (n, 3) [N, N, N·m].
+
+    With a current, added mass and damping act on the velocity through the water ``nu_r = nu - nu_c`` and the rigid body on
+    `nu`; an irrotational, steady current turns with the body: ``nu_c_dot = [r v_c, -r u_c, 0]``. This is exact where
+    (2.19)-(2.20) is an approximation.
+
+    Parameters
+    ----------
+    hull
+        Hull.
+    nu_dot
+        Accelerations [m/s², m/s², rad/s²], shape (n, 3).
+    nu
+        Velocities over ground, shape (n, 3).
+    nu_c
+        Current in the body frame (see `current_in_body`), shape (n, 3), or None in still water.
+    """
+    nu_dot = np.asarray(nu_dot, dtype=np.float64)
+    nu = np.asarray(nu, dtype=np.float64)
+    if nu_c is None:
+        return nu_dot @ hull.M.T + _coriolis_force(hull.M, nu) + _damping_force(hull.D, nu)
+    rigid = rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z)
+    added = hull.M - rigid
+    nu_c = np.asarray(nu_c, dtype=np.float64)
+    nu_r = nu - nu_c
+    nu_r_dot = nu_dot - _current_rate(nu, nu_c)
+    return (
+        nu_dot @ rigid.T
+        + _coriolis_force(rigid, nu)
+        + nu_r_dot @ added.T
+        + _coriolis_force(added, nu_r)
+        + _damping_force(hull.D, nu_r)
+    )
+
+
+def forward(hull: Hull, nu: Floats, tau: Floats, nu_c: Floats | None = None) -> Floats:
+    """Return the acceleration `nu_dot` under a force, shape (n, 3): the inverse of `inverse_dynamics`.
+
+    Parameters
+    ----------
+    hull
+        Hull.
+    nu
+        Velocities over ground, shape (n, 3).
+    tau
+        All forces on the hull besides its own [N, N, N·m], shape (n, 3).
+    nu_c
+        Current in the body frame, shape (n, 3), or None.
+    """
+    nu = np.asarray(nu, dtype=np.float64)
+    still = inverse_dynamics(hull, np.zeros_like(nu), nu, nu_c)
+    # M_RB nu_dot + M_A (nu_dot - nu_c_dot) + ... = tau, so the whole mass acts on nu_dot.
+    return np.linalg.solve(hull.M, (np.asarray(tau, dtype=np.float64) - still).reshape(-1, 3).T).T.reshape(
+        nu.shape
+    )
+
+
+def _current_rate(nu: Floats, nu_c: Floats) -> Floats:
+    r = nu[..., 2]
+    return np.stack([r * nu_c[..., 1], -r * nu_c[..., 0], np.zeros_like(r)], axis=-1)
+
+
+def _coriolis_force(M: Floats, nu: Floats) -> Floats:
+    u, v, r = nu[..., 0], nu[..., 1], nu[..., 2]
+    c13 = -M[1, 1] * v - (0.5 * (M[1, 2] + M[2, 1])) * r
+    c23 = M[0, 0] * u
+    return np.stack([c13 * r, c23 * r, -c13 * u - c23 * v], axis=-1)
+
+
+def _damping_force(D: Mapping[str, float], nu_r: Floats) -> Floats:
+    if not D:
+        return np.zeros_like(nu_r)
+    u, v, r = nu_r[..., 0], nu_r[..., 1], nu_r[..., 2]
+    size_v, size_r = np.abs(v), np.abs(r)
+    get = _zero_default(D)
+    surge = (-get("X_u") - get("X_|u|u") * np.abs(u) - get("X_uuu") * u**2) * u
+    sway = (-get("Y_v") - get("Y_|v|v") * size_v - get("Y_|r|v") * size_r - get("Y_vvv") * v**2) * v + (
+        -get("Y_r") - get("Y_|v|r") * size_v - get("Y_|r|r") * size_r
+    ) * r
+    yaw = (-get("N_v") - get("N_|v|v") * size_v - get("N_|r|v") * size_r) * v + (
+        -get("N_r") - get("N_|v|r") * size_v - get("N_|r|r") * size_r - get("N_rrr") * r**2
+    ) * r
+    return np.stack([surge, sway, yaw], axis=-1)
+
+
+def _zero_default(D: Mapping[str, float]) -> Callable[[str], float]:
+    return lambda term: D.get(term, 0.0)

@@ -1,0 +1,163 @@
+"""The hull and the wind areas of a profile."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ferryid.vessel.faults import TableReader
+from ferryid.vessel.profile import Hull, WindAreas
+
+DAMPING_TERMS = (
+    "X_u",
+    "X_|u|u",
+    "X_uuu",
+    "Y_v",
+    "Y_|v|v",
+    "Y_|r|v",
+    "Y_vvv",
+    "Y_r",
+    "Y_|v|r",
+    "Y_|r|r",
+    "N_v",
+    "N_|v|v",
+    "N_|r|v",
+    "N_r",
+    "N_|v|r",
+    "N_|r|r",
+    "N_rrr",
+)
+"""SNAME damping coefficients of the hull model, thesis (2.14) in its corrected form."""
+
+_DIAGONAL = (
+    *("X_u", "X_|u|u", "X_uuu"),
+    *("Y_v", "Y_|v|v", "Y_|r|v", "Y_vvv"),
+    *("N_r", "N_|v|r", "N_|r|r", "N_rrr"),
+)
+
+
+def parse_hull(reader: TableReader | None) -> Hull | None:
+    """Read ``[hull]`` with its mass matrix and damping; None, with faults noted, where it cannot be used."""
+    if reader is None:
+        return None
+    length_m = reader.number("length_m", required=True, above=0.0)
+    beam_m = reader.number("beam_m", above=0.0)
+    draught_m = reader.number("draught_m", above=0.0)
+    mass_kg = reader.number("mass_kg", required=True, above=0.0)
+    x_g_m = reader.number("x_g_m", 0.0)
+    inertia_z = _inertia(reader, mass_kg, x_g_m)
+    rigid = rigid_mass(mass_kg, x_g_m, inertia_z)
+    total = _mass_matrix(reader.table("M"), rigid)
+    damping = _damping(reader.table("D"))
+    reader.close()
+    if not math.isnan(length_m) and abs(x_g_m) > length_m:
+        reader.fault(f'"x_g_m" = {x_g_m:g} lies outside a hull of {length_m:g} m', "x_g_m")
+    return Hull(length_m, beam_m, draught_m, mass_kg, inertia_z, x_g_m, total, damping)
+
+
+def rigid_mass(
+    mass_kg: float, x_g_m: float, inertia_z: float
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Return the rigid-body mass matrix about the body origin, shape (3, 3); Fossen (2021), section 3.3."""
+    return np.array(
+        [
+            [mass_kg, 0.0, 0.0],
+            [0.0, mass_kg, mass_kg * x_g_m],
+            [0.0, mass_kg * x_g_m, inertia_z],
+        ]
+    )
+
+
+def parse_wind(reader: TableReader | None) -> WindAreas | None:
+    """Read ``[wind]``."""
+    if reader is None:
+        return None
+    areas = WindAreas(
+        frontal_m2=reader.number("frontal_m2", required=True, above=0.0),
+        lateral_m2=reader.number("lateral_m2", required=True, above=0.0),
+        length_m=reader.number("length_m", required=True, above=0.0),
+        S_L_m=reader.number("S_L_m", 0.0),
+        CD_t=reader.number("CD_t", required=True, above=0.0),
+        CD_l_AF=reader.number("CD_l_AF", required=True, above=0.0),
+        delta=reader.number("delta", required=True, at_least=0.0, at_most=1.0),
+    )
+    reader.close()
+    return areas
+
+
+def _inertia(reader: TableReader, mass_kg: float, x_g_m: float) -> float:
+    """Take the moment of inertia about the body origin, given as such or as a radius of gyration about CG."""
+    given = reader.has("inertia_z")
+    radius_given = reader.has("k_zz_m")
+    inertia_z = reader.number("inertia_z", above=0.0)
+    k_zz_m = reader.number("k_zz_m", above=0.0)
+    if given and radius_given:
+        reader.fault('"inertia_z" and "k_zz_m" say the same thing. Fix: keep one of them', "k_zz_m")
+    if not given and not radius_given:
+        reader.fault(
+            "[hull] lacks a moment of inertia in yaw. Fix: add inertia_z (kg*m², about the body origin) or "
+            "k_zz_m (m, radius of gyration about the centre of gravity, typically a quarter of the length)"
+        )
+    if radius_given:
+        return mass_kg * (k_zz_m**2 + x_g_m**2)
+    if inertia_z <= mass_kg * x_g_m**2:
+        reader.fault(
+            f'"inertia_z" = {inertia_z:g} is about the body origin and must exceed mass_kg·x_g_m² = '
+            f"{mass_kg * x_g_m**2:g}",
+            "inertia_z",
+        )
+    return inertia_z
+
+
+def _mass_matrix(
+    reader: TableReader | None, rigid: np.ndarray[tuple[int, int], np.dtype[np.float64]]
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    if reader is None:
+        return rigid
+    m11, m22, m33 = (reader.number(key, required=True, above=0.0) for key in ("m11", "m22", "m33"))
+    m23, m32 = (reader.number(key, 0.0) for key in ("m23", "m32"))
+    reader.close()
+    total = np.array([[m11, 0.0, 0.0], [0.0, m22, m23], [0.0, m32, m33]])
+    if not np.all(np.isfinite(total)):
+        return rigid
+    smallest = float(np.linalg.eigvalsh(0.5 * (total + total.T))[0])
+    if smallest <= 0.0:
+        reader.fault(
+            f"the mass matrix is not positive definite (its symmetric part has the eigenvalue {smallest:g}), so a "
+            "force would accelerate the vessel backwards. Fix: check m22·m33 > ((m23 + m32)/2)²"
+        )
+    for index, key in enumerate(("m11", "m22", "m33")):
+        if np.isfinite(rigid[index, index]) and total[index, index] < rigid[index, index]:
+            reader.fault(
+                f'"{key}" = {total[index, index]:g} is less than the rigid body\'s {rigid[index, index]:g}: the added '
+                "mass would be negative. Fix: M is the total, rigid body plus added mass",
+                key,
+                warning=True,
+            )
+    return total
+
+
+def _damping(reader: TableReader | None) -> dict[str, float]:
+    if reader is None:
+        return {}
+    terms = {term: reader.number(term) for term in DAMPING_TERMS if reader.has(term)}
+    reader.close()
+    terms = {term: value for term, value in terms.items() if not math.isnan(value)}
+    for term in _DIAGONAL:
+        if terms.get(term, 0.0) > 0.0:
+            reader.fault(
+                f'"{term}" = {terms[term]:g} is positive and feeds energy into the motion: SNAME coefficients of '
+                "damping are negative. Fix: change its sign unless that is meant",
+                term,
+                warning=True,
+            )
+    sway, yaw = -terms.get("Y_v", 0.0), -terms.get("N_r", 0.0)
+    cross = -0.5 * (terms.get("Y_r", 0.0) + terms.get("N_v", 0.0))
+    if sway >= 0.0 and yaw >= 0.0 and sway * yaw < cross**2:
+        reader.fault(
+            "the linear damping of sway and yaw is not dissipative: ((Y_r + N_v)/2)² exceeds Y_v·N_r, so some slow motion "
+            "gains energy. Fix: check the signs and units of Y_r and N_v",
+            warning=True,
+        )
+    return terms

@@ -1,0 +1,276 @@
+"""The signal map of a profile: which fields give which quantity, in what unit, with what sign, in what frame."""
+
+from __future__ import annotations
+
+from ferryid.errors import did_you_mean
+from ferryid.vessel.faults import Fault, TableReader
+from ferryid.vessel.profile import Actuator, Signal
+from ferryid.vessel.thrusters import needed_roles
+from ferryid.vessel.units import unit_fault
+
+BODY_FRAMES = ("FRD", "FLU")
+WORLD_FRAMES = ("NED", "ENU")
+VESSEL_QUANTITIES = (
+    *("position", "heading", "velocity", "yaw_rate", "roll", "pitch"),
+    *("wind", "current", "tau_d"),
+)
+ROLE_KINDS = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force": "force", "thrust": "force"}
+_OPTIONAL = ("wind", "current", "tau_d", "roll", "pitch")
+
+
+def parse_signals(
+    reader: TableReader | None, actuators: tuple[Actuator, ...], faults: list[Fault]
+) -> tuple[Signal, ...]:
+    """Read every ``[signals.<quantity>]``, noting faults, and check that the map is complete and free of contradictions."""
+    if reader is None:
+        return ()
+    by_name = {actuator.name: actuator for actuator in actuators}
+    before = len(faults)
+    signals: list[Signal] = []
+    for quantity in reader.data:
+        table = reader.table(quantity)
+        if table is None:
+            continue
+        if quantity in VESSEL_QUANTITIES:
+            signal = _vessel_signal(quantity, table)
+        else:
+            signal = _actuator_signal(quantity, table, by_name)
+        if signal is not None:
+            signals.append(signal)
+    if len(faults) == before:
+        _check_complete(reader, signals, actuators)
+    return tuple(signals)
+
+
+def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
+    topic = table.text("topic", required=True)
+    options: dict[str, str] = {}
+    sign, offset = 1.0, 0.0
+    mount_m = (0.0, 0.0)
+    frame = ""
+    if quantity == "wind" and not table.has("fields"):
+        fields, unit = _wind_fields(table, options)
+        sign, offset = _sign(table), table.number("offset", 0.0)
+    elif quantity == "heading" and table.has("quaternion"):
+        fields, unit = table.texts("quaternion", 4), "quaternion"
+        frame = _frame(table, WORLD_FRAMES, "heading")
+        offset = _degrees_offset(table)
+    elif quantity in ("heading", "yaw_rate", "roll", "pitch"):
+        fields = (table.text("field", required=True),)
+        kind = "rate" if quantity == "yaw_rate" else "angle"
+        unit = _unit(table, kind)
+        frames = {"heading": WORLD_FRAMES, "yaw_rate": (*BODY_FRAMES, *WORLD_FRAMES)}.get(
+            quantity, BODY_FRAMES
+        )
+        frame = _frame(table, frames, quantity)
+        sign, offset = _sign(table), table.number("offset", 0.0)
+    elif quantity == "position":
+        fields = table.texts("fields", 2, required=True)
+        frame = _frame(table, (*WORLD_FRAMES, "geodetic"), quantity)
+        unit = _unit(table, "angle" if frame == "geodetic" else "length")
+        mount_m = _mount(table)
+    elif quantity == "tau_d":
+        fields = table.texts("fields", 3, required=True)
+        frame = _frame(table, BODY_FRAMES, quantity)
+        unit = _unit(table, "force")
+        options["moment_unit"] = _unit(table, "moment", "moment_unit", default="N*m")
+    else:
+        fields = table.texts("fields", 2, required=True)
+        frames = (*BODY_FRAMES, *WORLD_FRAMES) if quantity == "velocity" else WORLD_FRAMES
+        frame = _frame(table, frames, quantity)
+        unit = _unit(table, "speed")
+        if quantity == "velocity":
+            mount_m = _mount(table)
+    required = table.flag("required", quantity not in _OPTIONAL)
+    table.close()
+    return Signal(
+        quantity=quantity,
+        topic=topic,
+        fields=fields,
+        unit=unit,
+        frame=frame,
+        sign=sign,
+        offset=offset,
+        options=options,
+        required=required,
+        line=table.line(),
+        mount_m=mount_m,
+    )
+
+
+def _wind_fields(table: TableReader, options: dict[str, str]) -> tuple[tuple[str, ...], str]:
+    fields = (table.text("speed", required=True), table.text("direction", required=True))
+    unit = _unit(table, "speed")
+    options["direction_unit"] = _unit(table, "angle", "direction_unit")
+    options["reference"] = table.text("reference", required=True, options=("bow", "north"))
+    options["air"] = table.text("air", required=True, options=("apparent", "true"))
+    return fields, unit
+
+
+def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Actuator]) -> Signal | None:
+    name, _, rest = quantity.partition(".")
+    role = rest.removesuffix(".command")
+    if name in actuators and not rest:
+        table.fault(
+            f'[signals.{name}] must say which signal of {name} it is. Fix: write [signals."{name}.speed"], '
+            "with the quotes"
+        )
+        return None
+    if name not in actuators and not rest:
+        options = (*VESSEL_QUANTITIES, *(f"{actuator}.speed" for actuator in actuators))
+        table.fault(
+            f'unknown signal "{quantity}".{did_you_mean(quantity, options)} Fix: use one of '
+            f"{', '.join(VESSEL_QUANTITIES)}, or <actuator>.<{'|'.join(ROLE_KINDS)}>"
+        )
+        return None
+    if name not in actuators:
+        table.fault(
+            f'signal "{quantity}" is for an actuator "{name}" that the file does not list.'
+            f'{did_you_mean(name, actuators)} Fix: add [[actuator]] with name = "{name}", or correct the name'
+        )
+        return None
+    kind = actuators[name].kind
+    usable = [option for roles in needed_roles(actuators[name]) for option in roles]
+    if role not in usable:
+        table.fault(
+            f'"{role}" is no signal of {name}, which is of kind "{kind}".{did_you_mean(role, usable)} Fix: use one of '
+            f'{", ".join(usable)}, each with ".command" for the order'
+        )
+        return None
+    topic = table.text("topic", required=True)
+    fields = (table.text("field", required=True),)
+    full_rpm = 0.0
+    if role == "speed" and table.data.get("unit") in ("%", "fraction"):
+        unit = table.text("unit")
+        full_rpm = table.number("full_rpm", required=True, above=0.0, needs="the speed at full throttle")
+    else:
+        unit = _unit(table, ROLE_KINDS[role])
+    sign, offset = _sign(table), table.number("offset", 0.0)
+    required = table.flag("required", not quantity.endswith(".command"))
+    table.close()
+    return Signal(
+        quantity=quantity,
+        topic=topic,
+        fields=fields,
+        unit=unit,
+        sign=sign,
+        offset=offset,
+        required=required,
+        line=table.line(),
+        full_rpm=full_rpm,
+    )
+
+
+def _unit(table: TableReader, kind: str, key: str = "unit", *, default: str = "") -> str:
+    unit = table.text(key, default, required=not default)
+    if unit and (fault := unit_fault(unit, kind)):
+        table.fault(fault, key)
+    return unit
+
+
+def _frame(table: TableReader, frames: tuple[str, ...], quantity: str) -> str:
+    frame = table.text("frame")
+    meanings = {
+        "NED": "x north, y east, heading clockwise from north",
+        "ENU": "x east, y north, heading anticlockwise from east",
+        "FRD": "x forward, y starboard, turning to starboard positive",
+        "FLU": "x forward, y port, turning to port positive",
+        "geodetic": "latitude, longitude",
+    }
+    usable = ", ".join(f'"{name}" ({meanings[name]})' for name in frames)
+    if not frame:
+        if "frame" not in table.data:
+            table.fault(
+                f'{table.title} lacks "frame", so its signs are not known. Fix: add frame = one of {usable}'
+            )
+        return ""
+    if frame not in frames:
+        why = f'frame "{frame}" is not one that {quantity} can be in'
+        if frame in BODY_FRAMES and quantity in ("heading", "position"):
+            why = f'{quantity} in the body frame "{frame}" is always zero: it is measured in the world'
+        table.fault(f"{why}.{did_you_mean(frame, frames)} Fix: use one of {usable}", "frame")
+        return ""
+    return frame
+
+
+def _sign(table: TableReader) -> float:
+    sign = table.number("sign", 1.0)
+    if abs(sign) != 1.0:
+        table.fault(f'"sign" must be 1 or -1, found {sign:g}. Fix: a scale belongs into the unit', "sign")
+        return 1.0
+    return sign
+
+
+def _degrees_offset(table: TableReader) -> float:
+    """Take the offset of a heading from a quaternion [deg]."""
+    return table.number("offset_deg", 0.0, at_least=-360.0, at_most=360.0)
+
+
+def _mount(table: TableReader) -> tuple[float, float]:
+    place = table.numbers("mount_m", 2)
+    return (place[0], place[1]) if place else (0.0, 0.0)
+
+
+def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple[Actuator, ...]) -> None:
+    """Note what the map lacks as a whole, and frames that contradict each other."""
+    mapped = {signal.quantity: signal for signal in signals}
+    if "velocity" not in mapped and not {"position", "heading"} <= set(mapped):
+        reader.fault(
+            "no surge and sway velocity can be had. Fix: map [signals.velocity], or both [signals.position] and "
+            "[signals.heading]"
+        )
+    if "yaw_rate" not in mapped and "heading" not in mapped:
+        reader.fault("no yaw rate can be had. Fix: map [signals.yaw_rate] or [signals.heading]")
+    velocity = mapped.get("velocity")
+    if velocity is not None and velocity.frame in WORLD_FRAMES and "heading" not in mapped:
+        reader.fault(
+            f"velocity is in the world frame {velocity.frame}, and without a heading it cannot be turned into surge and "
+            'sway. Fix: map [signals.heading], or give frame = "FRD" if it is in the body frame',
+            "velocity",
+        )
+    wind = mapped.get("wind")
+    if wind is not None and wind.options.get("reference") == "bow" and "heading" not in mapped:
+        reader.fault(
+            "the wind direction is relative to the bow, and without a heading it cannot be turned to north. "
+            "Fix: map [signals.heading]",
+            "wind",
+        )
+    rate = mapped.get("yaw_rate")
+    if (
+        velocity is not None
+        and rate is not None
+        and velocity.topic == rate.topic != "table"
+        and velocity.frame in BODY_FRAMES
+        and rate.frame in BODY_FRAMES
+        and rate.frame != velocity.frame
+    ):
+        reader.fault(
+            f"velocity is {velocity.frame} and yaw_rate {rate.frame} in the same message {rate.topic}: one message has one "
+            f"body frame. Fix: give both the same frame (and sign = -1 where the sender errs)",
+            "yaw_rate",
+        )
+    for actuator in actuators:
+        _check_actuator(reader, mapped, actuator)
+
+
+def _check_actuator(reader: TableReader, mapped: dict[str, Signal], actuator: Actuator) -> None:
+    for roles in needed_roles(actuator):
+        names = [f"{actuator.name}.{role}{order}" for role in roles for order in ("", ".command")]
+        given = [name for name in names if name in mapped]
+        if not given:
+            reader.fault(
+                f'{actuator.name} is of kind "{actuator.kind}" and has no {" or ".join(roles)} signal. '
+                f'Fix: map [signals."{actuator.name}.{roles[0]}"], or its ".command" where there is no feedback'
+            )
+        by_speed = [name for name in given if f"{actuator.name}.speed" in name]
+        if by_speed and actuator.thrust is None:
+            reader.fault(
+                f"{actuator.name} has a speed signal but no thrust curve. Fix: add thrust = {{ ... }} to the actuator",
+                by_speed[0],
+            )
+        open_water = actuator.thrust is not None and actuator.thrust.kind == "open_water"
+        if by_speed and open_water and "diameter_m" not in actuator.inflow:
+            reader.fault(
+                f'{actuator.name} has an open-water curve but no "diameter_m". Fix: add diameter_m = ...',
+                by_speed[0],
+            )

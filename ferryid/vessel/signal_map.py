@@ -1,0 +1,326 @@
+"""Finding a profile's signals in a log, and turning their fields into canonical columns in SI units.
+
+Canonical columns: ``x, y`` [m, NED]; ``psi`` [rad]; ``phi, theta`` [rad]; ``u, v`` [m/s, FRD, over ground]; ``r`` [rad/s];
+``vel_N, vel_E`` [m/s]; ``wind_speed`` [m/s], ``wind_from`` [rad, clockwise]; ``wind_N, wind_E`` [m/s, where the air goes to];
+``current_N, current_E`` [m/s, where the water goes to]; for an actuator NAME ``n_NAME`` [rpm], ``alpha_NAME`` [rad],
+``delta_NAME`` [rad], ``F_NAME`` [N]; orders with ``_cmd`` after the prefix (``n_cmd_NAME``); ``X_d, Y_d`` [N], ``N_d`` [N·m].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.ingest.log import Series, Topic
+from ferryid.vessel.frames import heading_from_enu, local_north_east, yaw_of_quaternion
+from ferryid.vessel.profile import Floats, Profile, Signal
+from ferryid.vessel.thrusters import ROLE_PREFIX, needed_roles
+from ferryid.vessel.units import factor
+
+_TEXT_TYPES = frozenset({"string", "wstring", "str", "object", "large_string", "utf8", "datetime"})
+_SIMPLE = {
+    "position": ("x", "y"),
+    "heading": ("psi",),
+    "yaw_rate": ("r",),
+    "roll": ("phi",),
+    "pitch": ("theta",),
+    "current": ("current_N", "current_E"),
+    "tau_d": ("X_d", "Y_d", "N_d"),
+}
+_ROLE_KIND = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force": "force", "thrust": "force"}
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which of a profile's signals a log holds.
+
+    Attributes
+    ----------
+    wanted
+        Topic name, as the log writes it, to the field paths to decode.
+    found
+        Canonical column to ``"topic: field"``.
+    missing
+        Quantity to the reason why the log does not give it.
+    notes
+        Sentences on what stands in for what.
+    """
+
+    wanted: dict[str, tuple[str, ...]]
+    found: dict[str, str]
+    missing: dict[str, str]
+    notes: tuple[str, ...] = field(default=())
+
+
+def canonical_columns(signal: Signal) -> tuple[str, ...]:
+    """Return the names of the columns that `convert` makes of a signal."""
+    if signal.quantity == "velocity":
+        return ("u", "v") if signal.frame in ("FRD", "FLU") else ("vel_N", "vel_E")
+    if signal.quantity == "wind":
+        return ("wind_N", "wind_E") if signal.frame else ("wind_speed", "wind_from")
+    if signal.quantity in _SIMPLE:
+        return _SIMPLE[signal.quantity]
+    name, _, rest = signal.quantity.partition(".")
+    prefix = ROLE_PREFIX[rest.removesuffix(".command")]
+    return (f"{prefix}_cmd_{name}" if rest.endswith(".command") else f"{prefix}_{name}",)
+
+
+def survey(profile: Profile, topics: Sequence[Topic]) -> Selection:
+    """Look for every signal of the profile in the topics of a log; nothing is raised for one that is missing."""
+    wanted: dict[str, list[str]] = {}
+    found: dict[str, str] = {}
+    missing: dict[str, str] = {}
+    for signal in profile.signals:
+        topic = _topic(signal.topic, topics)
+        reason = _fault(signal, topic, topics)
+        if topic is None or reason:
+            missing[signal.quantity] = reason
+            continue
+        paths = wanted.setdefault(topic.name, [])
+        paths.extend(path for path in signal.fields if path not in paths)
+        columns = canonical_columns(signal)
+        shown = signal.fields if len(columns) == len(signal.fields) else (", ".join(signal.fields),)
+        found.update({column: f"{topic.name}: {path}" for column, path in zip(columns, shown, strict=True)})
+    notes = tuple(
+        f"The {role} of {name} is taken from the order: the log has no feedback of it."
+        for name, role in _orders_instead(profile, missing)
+    )
+    return Selection({name: tuple(paths) for name, paths in wanted.items()}, found, missing, notes)
+
+
+def select(profile: Profile, topics: Sequence[Topic], where: str) -> Selection:
+    """Find the profile's signals in a log.
+
+    Parameters
+    ----------
+    profile
+        Vessel profile.
+    topics
+        Topics of the log.
+    where
+        The log's name for messages.
+
+    Raises
+    ------
+    FerryIdError
+        For a required signal that the log does not have. Feedback may be missing where the order is there.
+    """
+    selection = survey(profile, topics)
+    lacking = [
+        signal
+        for signal in profile.signals
+        if signal.required
+        and signal.quantity in selection.missing
+        and not _has_stand_in(profile, signal.quantity, selection.missing)
+    ]
+    lacking += [
+        signal
+        for signal in profile.signals
+        if signal.quantity in selection.missing
+        and signal not in lacking
+        and _leaves_actuator_dark(profile, signal.quantity, selection.missing)
+    ]
+    if lacking:
+        signal = lacking[0]
+        more = f" ({len(lacking) - 1} more required signals are missing)" if len(lacking) > 1 else ""
+        raise FerryIdError(
+            f"{where}: {signal.quantity} is needed by the profile {profile.name} ({profile.path}:{signal.line}), "
+            f"{selection.missing[signal.quantity]}{more}. Fix: correct the signal map, or set required = false where the "
+            "signal can be missed"
+        )
+    return selection
+
+
+def convert(profile: Profile, series: Series) -> dict[str, Floats]:
+    """Turn the fields of one topic into canonical columns in SI units; frames that need another signal come later.
+
+    Parameters
+    ----------
+    profile
+        Vessel profile.
+    series
+        Decoded fields of one topic, n messages.
+
+    Returns
+    -------
+    dict
+        Canonical column to values, shape (n,), new arrays.
+
+    Raises
+    ------
+    FerryIdError
+        For a field that is not numeric, and for latitudes beyond ±90°.
+    """
+    columns: dict[str, Floats] = {}
+    for signal in profile.signals:
+        if _bare(signal.topic) != _bare(series.topic) or not set(signal.fields) <= set(series.columns):
+            continue
+        values = [_numeric(series, path, signal) for path in signal.fields]
+        columns.update(zip(canonical_columns(signal), _convert(signal, values, series.topic), strict=True))
+    return columns
+
+
+def _convert(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
+    quantity = signal.quantity
+    if quantity == "position":
+        return _position(signal, values, topic)
+    if quantity in ("velocity", "current") or (quantity == "wind" and signal.frame):
+        return _turned([value * factor(signal.unit, "speed") for value in values], signal.frame)
+    if quantity == "heading":
+        return [_heading(signal, values)]
+    if quantity == "wind":
+        direction = _scalar(signal, values[1], factor(signal.options["direction_unit"], "angle"))
+        return [values[0] * factor(signal.unit, "speed"), direction]
+    if quantity == "tau_d":
+        force = factor(signal.unit, "force")
+        moment = factor(signal.options["moment_unit"], "moment")
+        flip = -1.0 if signal.frame == "FLU" else 1.0
+        return [values[0] * force, values[1] * (force * flip), values[2] * (moment * flip)]
+    if quantity == "yaw_rate":
+        rate = _scalar(signal, values[0], factor(signal.unit, "rate"))
+        return [-rate if signal.frame in ("FLU", "ENU") else rate]
+    if quantity in ("roll", "pitch"):
+        angle = _scalar(signal, values[0], factor(signal.unit, "angle"))
+        return [-angle if quantity == "pitch" and signal.frame == "FLU" else angle]
+    role = quantity.partition(".")[2].removesuffix(".command")
+    if signal.full_rpm:
+        return [_scalar(signal, values[0], factor(signal.unit, "fraction") * signal.full_rpm)]
+    return [_scalar(signal, values[0], factor(signal.unit, _ROLE_KIND[role]))]
+
+
+def _scalar(signal: Signal, values: Floats, scale: float) -> Floats:
+    return (signal.sign * values + signal.offset) * scale
+
+
+def _turned(values: list[Floats], frame: str) -> list[Floats]:
+    """Return a vector in NED or FRD order and signs."""
+    if frame == "ENU":
+        return [values[1], values[0]]
+    if frame == "FLU":
+        return [values[0], -values[1]]
+    return values
+
+
+def _position(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
+    if signal.frame != "geodetic":
+        return _turned([value * factor(signal.unit, "length") for value in values], signal.frame)
+    latitude, longitude = (value * factor(signal.unit, "angle") for value in values)
+    beyond = np.abs(latitude) > 0.5 * math.pi
+    if np.any(beyond):
+        raise FerryIdError(
+            f"{topic}: position needs a latitude within ±90 deg, found "
+            f"{math.degrees(float(latitude[np.argmax(beyond)])):g} deg in {signal.fields[0]}. Fix: give the latitude first "
+            "in fields, and its unit"
+        )
+    return list(local_north_east(latitude, longitude))
+
+
+def _heading(signal: Signal, values: list[Floats]) -> Floats:
+    if signal.unit == "quaternion":
+        yaw = yaw_of_quaternion(*values) + math.radians(signal.offset)
+    else:
+        yaw = _scalar(signal, values[0], factor(signal.unit, "angle"))
+    return heading_from_enu(yaw) if signal.frame == "ENU" else yaw
+
+
+def _numeric(series: Series, path: str, signal: Signal) -> Floats:
+    column = np.asarray(series.columns[path])
+    if column.dtype.kind not in "fiub":
+        sample = str(column[0]) if column.size else ""
+        raise FerryIdError(
+            f"{series.topic}: {signal.quantity} needs numbers, found text in {path} ({sample[:40]!r}). "
+            f"Fix: name a numeric field on line {signal.line} of the vessel profile"
+        )
+    return column.astype(np.float64)
+
+
+def _bare(topic: str) -> str:
+    return topic.strip("/")
+
+
+def _topic(name: str, topics: Sequence[Topic]) -> Topic | None:
+    for topic in topics:
+        if topic.name == name:
+            return topic
+    for topic in topics:
+        if _bare(topic.name) == _bare(name):
+            return topic
+    return None
+
+
+def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic]) -> str:
+    """Say why a signal cannot be read, or return an empty string."""
+    if topic is None:
+        names = [candidate.name for candidate in topics]
+        listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+        return f'found no topic "{signal.topic}" (there is {listed or "none"}).{did_you_mean(signal.topic, names)}'.rstrip()
+    if topic.count == 0:
+        return f"found {topic.name} without a single message"
+    for path in signal.fields:
+        kind = _field_type(path, topic.fields)
+        if kind is None:
+            fields = list(topic.fields)
+            listed = ", ".join(fields[:6]) + (", ..." if len(fields) > 6 else "")
+            return (
+                f'found no field "{path}" in {topic.name} (it has {listed or "no readable definition"}).'
+                f"{did_you_mean(path, fields)}"
+            )
+        if kind in _TEXT_TYPES:
+            return f'found text ("{kind}") in the field {path} of {topic.name}, where a number is needed'
+    return ""
+
+
+def _field_type(path: str, fields: Mapping[str, str]) -> str | None:
+    if path in fields:
+        return fields[path]
+    if path.endswith("]") and "[" in path:
+        name, _, index = path[:-1].rpartition("[")
+        if not index.isdigit():
+            return None
+        if f"{name}[]" in fields:
+            return fields[f"{name}[]"]
+        for known, kind in fields.items():
+            if known.startswith(f"{name}[") and known[len(name) + 1 : -1].isdigit():
+                return kind if int(index) < int(known[len(name) + 1 : -1]) else None
+    return None
+
+
+def _alternatives(profile: Profile, quantity: str) -> tuple[str, ...]:
+    """Return every mapped quantity that gives what `quantity` gives, or nothing for one of the vessel's own."""
+    name, _, rest = quantity.partition(".")
+    mapped = {signal.quantity for signal in profile.signals}
+    for actuator in profile.actuators:
+        if actuator.name != name:
+            continue
+        for roles in needed_roles(actuator):
+            if rest.removesuffix(".command") in roles:
+                names = (f"{name}.{role}{order}" for role in roles for order in ("", ".command"))
+                return tuple(known for known in names if known in mapped)
+    return ()
+
+
+def _has_stand_in(profile: Profile, quantity: str, missing: Mapping[str, str]) -> bool:
+    return any(other not in missing for other in _alternatives(profile, quantity))
+
+
+def _leaves_actuator_dark(profile: Profile, quantity: str, missing: Mapping[str, str]) -> bool:
+    others = _alternatives(profile, quantity)
+    return bool(others) and all(other in missing for other in others)
+
+
+def _orders_instead(profile: Profile, missing: Mapping[str, str]) -> list[tuple[str, str]]:
+    instead = []
+    for actuator in profile.actuators:
+        for roles in needed_roles(actuator):
+            mapped = _alternatives(profile, f"{actuator.name}.{roles[0]}") or _alternatives(
+                profile, f"{actuator.name}.{roles[-1]}"
+            )
+            here = [name for name in mapped if name not in missing]
+            if here and all(name.endswith(".command") for name in here):
+                role = here[0].partition(".")[2].removesuffix(".command")
+                instead.append((actuator.name, role))
+    return instead

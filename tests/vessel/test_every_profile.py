@@ -1,0 +1,30 @@
+"""Every bundled profile loads without a fault and states a unit for every signal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ferryid.vessel import bundled, check_profile, describe, load_profile
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_profile_is_free_of_faults(name: str) -> None:
+    assert check_profile(name) == []
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_profile_states_units_and_source(name: str) -> None:
+    profile = load_profile(name)
+    assert profile.name == name
+    assert len(profile.source) > 20
+    assert all(signal.unit for signal in profile.signals)
+    assert np.all(np.linalg.eigvalsh(0.5 * (profile.hull.M + profile.hull.M.T)) > 0.0)
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_description_names_every_part(name: str) -> None:
+    profile = load_profile(name)
+    text = describe(profile)
+    for part in (*profile.actuators, *profile.signals):
+        assert (part.name if hasattr(part, "name") else part.quantity) in text
