@@ -1,0 +1,83 @@
+"""What ``ferryid simulate`` does: run a scenario, write its log, and say what was written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.simulate.logs import write_log
+from ferryid.simulate.scenario import list_scenarios, load_scenario
+from ferryid.simulate.trial import simulate
+
+SCHEMA = "ferryid.simulate/1"
+
+
+def run_scenario(
+    scenario: str,
+    out: Path,
+    *,
+    storage: str = "sqlite3",
+    truth: Path | None = None,
+    seed: int | None = None,
+    overwrite: bool = False,
+) -> dict[str, Any]:
+    """Simulate a scenario, write its log and return what was written (``ferryid.simulate/1``).
+
+    Parameters
+    ----------
+    scenario
+        Name of a bundled scenario, or the path of a TOML file.
+    out, truth, storage, overwrite
+        As for `ferryid.simulate.write_log`.
+    seed
+        Takes the place of the scenario's own.
+    """
+    asked = load_scenario(scenario)
+    simulation = simulate(asked, seed)
+    write_log(simulation, out, truth, storage=storage, overwrite=overwrite)
+    control = simulation.control
+    error = simulation.truth.eta[:: len(simulation.truth.t) // len(control.t)] - control.eta_d
+    return {
+        "schema": SCHEMA,
+        "scenario": asked.name,
+        "title": asked.title,
+        "vessel": simulation.profile.name,
+        "seed": simulation.seed,
+        "duration_s": float(len(control.t) / asked.sensors.navigation_rate_hz),
+        "log": str(out),
+        "truth": None if truth is None else str(truth),
+        "topics": {stream.topic: len(stream.stamp_ns) for stream in simulation.streams},
+        "tracking_rms": {
+            "position_m": float(np.sqrt(np.mean(np.sum(error[:, :2] ** 2, axis=1)))),
+            "heading_deg": float(np.degrees(np.sqrt(np.mean(error[:, 2] ** 2)))),
+        },
+        "saturated_share": float(np.mean(control.saturated)),
+    }
+
+
+def render_simulation(result: Mapping[str, Any]) -> str:
+    """Return the result of `run_scenario` as lines for a person."""
+    lines = [
+        f"{result['title']}",
+        f"{result['duration_s']:.0f} s of {result['vessel']}, seed {result['seed']}, written to {result['log']}",
+    ]
+    if result["truth"] is not None:
+        lines.append(f"true states: {result['truth']}")
+    width = max(len(topic) for topic in result["topics"])
+    lines += [f"  {topic:<{width}}  {count:>7} messages" for topic, count in result["topics"].items()]
+    rms = result["tracking_rms"]
+    lines.append(
+        f"kept to its reference within {rms['position_m']:.2f} m and {rms['heading_deg']:.1f} deg (rms), "
+        f"thrust saturated {100.0 * result['saturated_share']:.1f} % of the time"
+    )
+    return "\n".join(lines)
+
+
+def scenario_list() -> str:
+    """Return the bundled scenarios, one per line with its title."""
+    scenarios = list_scenarios()
+    width = max(len(name) for name in scenarios)
+    return "\n".join(f"{name:<{width}}  {title}" for name, title in scenarios.items())
