@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import shutil
+import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -140,7 +141,7 @@ def _write_mcap(streams: list[Stream], path: Path) -> None:
         for when, index, stamp, data in _in_order(streams, 2):
             writer.add_message(channels[index], when, data, publish_time=stamp, sequence=counts[index])
             counts[index] += 1
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _write_ros1(streams: list[Stream], path: Path) -> None:
@@ -160,10 +161,15 @@ def _write_ros2(streams: list[Stream], folder: Path, storage: str) -> None:
     writer = Ros2Writer(folder, version=9, storage_plugin=plugin)
     if plugin is StoragePlugin.MCAP:
         writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        connections = [writer.add_connection(s.topic, s.type, typestore=store) for s in streams]
-        for when, index, _, data in _in_order(streams, 2):
-            writer.write(connections[index], when, data)
+    try:
+        with writer:
+            connections = [writer.add_connection(s.topic, s.type, typestore=store) for s in streams]
+            for when, index, _, data in _in_order(streams, 2):
+                writer.write(connections[index], when, data)
+    except sqlite3.Error as error:
+        raise FerryIdError(
+            f"{folder.name}: the database cannot be written, {error}. Fix: check the space on the disk"
+        ) from error
 
 
 def _write_truth(simulation: Simulation, path: Path) -> None:

@@ -286,9 +286,9 @@ def _path(top: TableReader) -> SetPoints:
 
 
 def _points(table: TableReader) -> tuple[Pose, ...]:
-    rows = table.data.get("points")
-    table.has("points")
-    good = isinstance(rows, list) and rows and all(isinstance(row, list) and len(row) == 3 for row in rows)
+    given = table.data.get("points") if table.has("points") else None
+    rows = given if isinstance(given, list) else []
+    good = bool(rows) and all(isinstance(row, list) and len(row) == 3 for row in rows)
     if not good or not all(type(value) in (int, float) and abs(value) < 1e5 for row in rows for value in row):
         table.fault(
             '"points" must hold [north_m, east_m, heading_deg] rows. Fix: points = [[10, 0, 0], [10, 5, 90]]',

@@ -65,9 +65,9 @@ class Link:
 
 
 LINKS = {
-    "/navigation/odometry": Link(0.0, 0.018, 0.002),
-    "/control/tau_d": Link(0.021, 0.001, 0.0004),
-    "command": Link(0.0215, 0.001, 0.0004),
+    "/navigation/odometry": Link(0.0, 0.012, 0.002),
+    "/control/tau_d": Link(0.0, 0.001, 0.0004),
+    "command": Link(0.0, 0.0015, 0.0004),
     "state": Link(0.011, 0.006, 0.0012),
     "/weather/wind": Link(0.037, 0.045, 0.006),
     "/imu/data": Link(0.004, 0.0025, 0.0005),
@@ -113,7 +113,7 @@ def apparent_wind(wind: Floats, psi: Floats, nu: Floats) -> tuple[Floats, Floats
     return np.hypot(u_rw, v_rw), np.arctan2(v_rw, u_rw)
 
 
-def _times(scenario: Scenario, seed: int, topic: str, link: Link, t: Floats) -> dict[str, Nanoseconds]:
+def _times(scenario: Scenario, seed: int, topic: str, link: Link, t: Floats) -> tuple[Nanoseconds, Nanoseconds]:
     """Stamp samples taken at `t` [s] and let them travel to the recorder, which is never out of order per topic.
 
     The recorder's clock is ahead of the senders' by the scenario's offset.
@@ -121,10 +121,7 @@ def _times(scenario: Scenario, seed: int, topic: str, link: Link, t: Floats) -> 
     stamp = scenario.start_ns + np.rint(t * 1e9).astype(np.int64)
     jitter = generator(seed, f"jitter {topic}").gamma(2.0, 0.5 * link.jitter_s, len(t))
     late = link.latency_s + jitter + scenario.sensors.clock_offset_ms * 1e-3
-    return {
-        "stamp_ns": stamp,
-        "receive_ns": np.maximum.accumulate(stamp + np.rint(late * 1e9).astype(np.int64)),
-    }
+    return stamp, np.maximum.accumulate(stamp + np.rint(late * 1e9).astype(np.int64))
 
 
 def _sample_times(truth: Truth, rate_hz: float, phase_s: float) -> Floats:
@@ -153,7 +150,7 @@ def _odometry(scenario: Scenario, seed: int, control: Control) -> Stream:
         topic,
         "nav_msgs/msg/Odometry",
         "ned",
-        **_times(scenario, seed, topic, LINKS[topic], control.t),
+        *_times(scenario, seed, topic, LINKS[topic], control.t),
         columns={
             "pose.pose.position.x": x,
             "pose.pose.position.y": y,
@@ -169,25 +166,23 @@ def _odometry(scenario: Scenario, seed: int, control: Control) -> Stream:
 
 def _tau_d(scenario: Scenario, seed: int, control: Control) -> Stream:
     topic = "/control/tau_d"
-    link = LINKS[topic]
     X, Y, N = control.tau_d.T
     return Stream(
         topic,
         "geometry_msgs/msg/WrenchStamped",
         "body",
-        **_times(scenario, seed, topic, link, control.t + link.phase_s),
+        *_times(scenario, seed, topic, LINKS[topic], control.t_order),
         columns={"wrench.force.x": X, "wrench.force.y": Y, "wrench.torque.z": N},
     )
 
 
 def _thruster_command(scenario: Scenario, seed: int, control: Control, index: int, name: str) -> Stream:
     topic = f"/{name}/command"
-    link = LINKS["command"]
     return Stream(
         topic,
         "ferry_msgs/msg/ThrusterState",
         name,
-        **_times(scenario, seed, topic, link, control.t + link.phase_s),
+        *_times(scenario, seed, topic, LINKS["command"], control.t_order),
         columns={"speed": control.speeds[:, index], "azimuth": _wrapped(control.angles[:, index])},
     )
 
@@ -204,7 +199,7 @@ def _thruster_state(scenario: Scenario, seed: int, truth: Truth, index: int, nam
         topic,
         "ferry_msgs/msg/ThrusterState",
         name,
-        **_times(scenario, seed, topic, link, t),
+        *_times(scenario, seed, topic, link, t),
         columns={"speed": speed, "azimuth": _wrapped(angle)},
     )
 
@@ -223,7 +218,7 @@ def _wind(scenario: Scenario, seed: int, truth: Truth) -> Stream:
         topic,
         "ferry_msgs/msg/Wind",
         "mast",
-        **_times(scenario, seed, topic, link, t),
+        *_times(scenario, seed, topic, link, t),
         columns={
             "speed": speed.astype(np.float32),
             "direction": np.mod(direction, 2.0 * pi).astype(np.float32),
@@ -245,7 +240,7 @@ def _imu(scenario: Scenario, seed: int, truth: Truth) -> Stream:
         topic,
         "sensor_msgs/msg/Imu",
         "imu",
-        **_times(scenario, seed, topic, link, t),
+        *_times(scenario, seed, topic, link, t),
         columns={
             "orientation.z": np.sin(0.5 * psi),
             "orientation.w": np.cos(0.5 * psi),
@@ -270,7 +265,7 @@ def _camera(scenario: Scenario, seed: int, truth: Truth) -> Stream:
         topic,
         "sensor_msgs/msg/CompressedImage",
         "camera",
-        **_times(scenario, seed, topic, link, t),
+        *_times(scenario, seed, topic, link, t),
         columns={},
         constants={"format": "jpeg"},
         blobs=tuple(b"\xff\xd8" + random.bytes(size) + b"\xff\xd9" for size in sizes),

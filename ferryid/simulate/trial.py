@@ -72,7 +72,9 @@ class Control:
     Attributes
     ----------
     t
-        Time [s], shape (m,).
+        Time of the measurement that each cycle acts on [s], shape (m,).
+    t_order
+        Time at which its orders reach the thrusters, one integration step later [s], shape (m,).
     measured
         Pose and velocities that it acted on (also what the log holds), shape (m, 6).
     eta_d, nu_d
@@ -86,6 +88,7 @@ class Control:
     """
 
     t: Floats
+    t_order: Floats
     measured: Floats
     eta_d: Floats
     nu_d: Floats
@@ -132,8 +135,9 @@ def simulate(scenario: Scenario, seed: int | None = None) -> Simulation:
 def run(scenario: Scenario, profile: Profile, seed: int) -> tuple[Truth, Control]:
     """Run the closed loop: controller, allocation, thrusters, hull.
 
-    Within a control cycle the thrusters follow their order exactly and do not depend on the hull, so that the
-    Runge-Kutta steps see their true force at each stage.
+    Within a step the thrusters follow their order exactly and do not depend on the hull, so that the Runge-Kutta
+    stages see their true force. An order takes effect one step after the measurement it answers, which stands for the
+    way from the sensors through the controller.
     """
     if not profile.hull.has_model:
         raise FerryIdError(
@@ -170,6 +174,7 @@ def run(scenario: Scenario, profile: Profile, seed: int) -> tuple[Truth, Control
         t = k * cycle
         seen = [value + error for value, error in zip(state, noise[k], strict=True)]
         controller.reference.advance(scenario.path.at(t), cycle)
+        acting = orders
         tau_d, ahead = controller.desired_force(
             (seen[0], seen[1], seen[2]), (seen[3], seen[4], seen[5]), cycle, saturated=saturated
         )
@@ -179,6 +184,7 @@ def run(scenario: Scenario, profile: Profile, seed: int) -> tuple[Truth, Control
         records.append(
             (
                 t,
+                t + h,
                 *seen,
                 *controller.reference.pose,
                 *nu_d,
@@ -196,8 +202,9 @@ def run(scenario: Scenario, profile: Profile, seed: int) -> tuple[Truth, Control
             wind = (north[i], east[i])
             slope = rates(p, areas, state, tau, wind, current)
             rows.append((t + j * h, *state, *slope[3:], *tau, *wind, fore.speed, aft.speed, fore.angle, aft.angle))
-            mid = _follow(fore, aft, orders, 0.5 * h)
-            tau = _follow(fore, aft, orders, 0.5 * h)
+            mid = _follow(fore, aft, acting, 0.5 * h)
+            tau = _follow(fore, aft, acting, 0.5 * h)
+            acting = orders
             winds = ((north[i + 1], east[i + 1]), (north[i + 2], east[i + 2]))
             state = advance(p, areas, state, slope, (mid, tau), winds, current, h)
     return _truth(np.asarray(rows), current), _control(np.asarray(records))
@@ -227,14 +234,15 @@ def _truth(rows: Floats, current: tuple[float, float]) -> Truth:
 def _control(records: Floats) -> Control:
     return Control(
         t=records[:, 0],
-        measured=records[:, 1:7],
-        eta_d=records[:, 7:10],
-        nu_d=records[:, 10:13],
-        tau_d=records[:, 13:16],
-        feedforward=records[:, 16:19],
-        speeds=records[:, 19:21],
-        angles=records[:, 21:23],
-        saturated=records[:, 23] > 0.0,
+        t_order=records[:, 1],
+        measured=records[:, 2:8],
+        eta_d=records[:, 8:11],
+        nu_d=records[:, 11:14],
+        tau_d=records[:, 14:17],
+        feedforward=records[:, 17:20],
+        speeds=records[:, 20:22],
+        angles=records[:, 22:24],
+        saturated=records[:, 24] > 0.0,
     )
 
 
@@ -302,6 +310,11 @@ def _thrusters(scenario: Scenario, profile: Profile) -> tuple[Azimuth, Azimuth]:
             raise FerryIdError(
                 f"{profile.name}: the simulator needs the thrust curve of {actuator.name}, found none. "
                 "Fix: add thrust = {...} to the actuator"
+            )
+        if actuator.thrust.kind == "open_water":
+            raise FerryIdError(
+                f"{profile.name}: the simulator's thrusters do not feel their inflow yet, found an open-water curve "
+                f"for {actuator.name}. Fix: give it a polynomial, a table or a quadratic"
             )
         made.append(
             Azimuth(
