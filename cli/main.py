@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 import sys
 import traceback
@@ -10,7 +11,6 @@ import traceback
 import typer
 
 import ferryid
-import ferryid.cli
 from ferryid.errors import FerryIdError
 
 app = typer.Typer(
@@ -37,7 +37,7 @@ def _options(
 
 def _add_commands() -> None:
     """Add every module ``cmd_<name>`` of this package: its function ``command``, or its group ``app``."""
-    for module_info in pkgutil.iter_modules(ferryid.cli.__path__, "ferryid.cli."):
+    for module_info in pkgutil.iter_modules([os.path.dirname(__file__)], "ferryid.cli."):
         name = module_info.name.rpartition(".")[2].removeprefix("cmd_")
         if not module_info.name.endswith(f".cmd_{name}"):
             continue

@@ -10,9 +10,18 @@ from numpy.typing import NDArray
 
 from ferryid.identify.model import AXES
 from ferryid.identify.result import FreeRun
+from ferryid.signals.track import Motion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+
+def usable(motion: Motion, *estimates: Floats) -> Flags:
+    """Return the rows on which force and every estimate are known, shape (n,)."""
+    rows: Flags = motion.valid & np.isfinite(motion.tau).all(axis=1)
+    for estimate in estimates:
+        rows = rows & np.isfinite(estimate).all(axis=1)
+    return rows
 
 
 def mean_square(tau: Floats, estimate: Floats, rows: Flags) -> Floats:

@@ -1,0 +1,82 @@
+"""The applied force as a model estimates it from motion: for fitting, judging and free runs alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError
+from ferryid.identify.basis import Basis, basis, relative_flow
+from ferryid.identify.model import Model
+from ferryid.identify.residual import base_force, force_of_motion
+from ferryid.signals.track import Motion
+from ferryid.vessel import parse_profile
+from ferryid.vessel.profile import Profile
+
+Floats = NDArray[np.float64]
+
+CHUNK_ROWS = 16384
+"""Rows of the basis held at a time, so that memory does not grow with the length of a log."""
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """``F_P = F_0 + theta' phi + intercept``, thesis (3.3), ready to be evaluated.
+
+    Without `basis` it is the base model alone.
+    """
+
+    profile: Profile
+    scale: Mapping[str, float]
+    basis: Basis | None = None
+    theta: Floats | None = None
+    intercept: Floats | None = None
+
+    def of(self, motion: Motion) -> Floats:
+        """Return the estimated applied force on every row of a motion [N, N, N·m], shape (n, 3)."""
+        tau = base_force(self.profile, motion, self.scale)
+        if self.basis is None or self.theta is None or self.intercept is None:
+            return tau
+        for low in range(0, len(tau), CHUNK_ROWS):
+            rows = slice(low, low + CHUNK_ROWS)
+            tau[rows] += self.basis.of(motion, rows) @ self.theta + self.intercept
+        return tau
+
+    def __call__(
+        self, nu_dot: Floats, nu: Floats, psi: Floats, wind: Floats | None, current: Floats | None
+    ) -> Floats:
+        """Return the force for given states, all with s rows; a `free_run.ForceModel`."""
+        tau = force_of_motion(self.profile, self.scale, nu_dot, nu, psi, wind=wind, current=current)
+        if self.basis is None or self.theta is None or self.intercept is None:
+            return tau
+        wind_rel = None if wind is None else relative_flow(nu, psi, wind)
+        current_rel = None if current is None else relative_flow(nu, psi, current)
+        values: Floats = tau + self.basis.evaluate(nu, nu_dot, wind_rel, current_rel) @ self.theta + self.intercept
+        return values
+
+
+def estimator(model: Model) -> Estimator:
+    """Return the estimator of a stored model.
+
+    Raises
+    ------
+    FerryIdError
+        When the model's terms are not those of its basis: the file was changed by hand, or by another version.
+    """
+    functions = basis(str(model.settings["basis"]), structure=str(model.settings["structure"]))
+    if functions.terms != model.terms:
+        raise FerryIdError(
+            f"model {model.name}@{model.version}: its terms are not those of the basis {functions.name}. "
+            "Fix: fit the model again with this version of ferryid"
+        )
+    return Estimator(
+        parse_profile(model.profile_text, model.name), model.scale, functions, model.theta, model.intercept
+    )
+
+
+def base_estimator(model: Model) -> Estimator:
+    """Return the estimator of the base model that a model was fitted on."""
+    return Estimator(parse_profile(model.profile_text, model.name), model.scale)

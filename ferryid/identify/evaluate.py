@@ -1,0 +1,142 @@
+"""Judge a stored model on other logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.identify.estimate import base_estimator, estimator
+from ferryid.identify.excitation import range_columns
+from ferryid.identify.free_run import free_run
+from ferryid.identify.model import AXES, Model
+from ferryid.identify.scores import force_scores, free_run_plain, outside_ranges, usable
+from ferryid.signals.prepare import prepare
+from ferryid.vessel import parse_profile
+from ferryid.vessel.profile import Profile
+
+OUTSIDE_WARNING = 0.05
+"""Share of rows outside a range of validity from which on a warning is given."""
+
+
+def evaluate(
+    model: Model,
+    logs: Sequence[str],
+    out: Path,
+    *,
+    profile: Profile | None = None,
+    window_s: float | None = None,
+    progress: Callable[[str], None],
+) -> dict[str, Any]:
+    """Compare a model's and its base model's force with the measured one, and run both free.
+
+    Parameters
+    ----------
+    model
+        The model.
+    logs
+        Paths; parts of one recording joined by ``+``.
+    out
+        Output folder, for the ingested tables.
+    profile
+        Signal map of the logs; the profile inside the model where None.
+    window_s
+        Smoothing window of the test data [s]; the model's own where None.
+
+    Returns
+    -------
+    dict
+        Schema ``ferryid.evaluate/1``.
+    """
+    profile = profile or parse_profile(model.profile_text, model.name)
+    window = float(model.settings["window_s"]) if window_s is None else window_s
+    new, base = estimator(model), base_estimator(model)
+    entries, parts = [], []
+    for path in logs:
+        progress(f"evaluating on {Path(path).name}")
+        prepared = prepare(path, profile, out, window_s=window, rate_hz=model.settings.get("rate_hz"))
+        motion = prepared.motion
+        tau_base, tau_model = base.of(motion), new.of(motion)
+        rows = usable(motion, tau_model)
+        parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))
+        outside = outside_ranges(range_columns(motion.nu[rows], motion.nu_dot[rows]), model.ranges)
+        entries.append(
+            {
+                "name": motion.log,
+                "sha256": prepared.recording.sha256,
+                "rows": int(rows.sum()),
+                "seconds": float(rows.sum() / motion.rate_hz),
+                **force_scores(motion.tau, tau_base, tau_model, rows),
+                "free_run": {
+                    "base": free_run_plain(free_run(base, [motion], [rows])),
+                    "model": free_run_plain(free_run(new, [motion], [rows])),
+                },
+                "outside": outside,
+                "warnings": _warnings(prepared.recording.sha256, model, outside),
+                "data_quality": prepared.quality,
+            }
+        )
+    progress("")
+    pooled = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+    return {
+        "schema": "ferryid.evaluate/1",
+        "model": {"name": model.name, "version": model.version, "accepted": model.accepted},
+        "window_s": window,
+        "logs": entries,
+        "pooled": force_scores(*pooled, np.ones(len(pooled[0]), dtype=bool)),
+    }
+
+
+def _warnings(sha256: str, model: Model, outside: dict[str, float]) -> list[str]:
+    warnings = []
+    if any(log["sha256"] == sha256 for log in model.training):
+        warnings.append("the model was trained on this log: its scores here are no evidence")
+    for name, share in outside.items():
+        if share > OUTSIDE_WARNING:
+            low, high = model.ranges[name]
+            warnings.append(
+                f"{share:.0%} of the rows have {name} outside the model's range of validity, {low:.3g} to {high:.3g}"
+            )
+    return warnings
+
+
+def render_evaluation(result: dict[str, Any]) -> str:
+    """Return an evaluation as text."""
+    head = result["model"]
+    lines = [f"{head['name']}@{head['version']}, test data smoothed with {result['window_s']:g} s", ""]
+    lines.append(f"{'':<34}" + "".join(f"{axis:>11}" for axis in AXES) + f"{'mean':>9}")
+    entries = [*result["logs"], {"name": "all logs", **result["pooled"]}] if len(result["logs"]) > 1 else result["logs"]
+    for entry in entries:
+        lines.append(entry["name"])
+        ratio = "".join(f"{_number(entry['per_axis'][axis]):>11}" for axis in AXES)
+        lines.append(f"{'  MSE over the base model' + chr(39) + 's':<34}{ratio}{_number(entry['normalised_mse']):>9}")
+        for label, part in (("base", "base"), ("model", "model")):
+            lines.append(
+                f"{'  rms error, ' + label + ' [N, N, N·m]':<34}"
+                + "".join(f"{entry['mse'][part][axis] ** 0.5:>11.3g}" for axis in AXES)
+            )
+        lines.append(f"{'  R², model':<34}" + "".join(f"{_number(entry['r2']['model'][axis]):>11}" for axis in AXES))
+        if "free_run" in entry:
+            lines.extend(_free_run_lines(entry["free_run"]))
+        lines.extend(f"  warning: {warning}" for warning in entry.get("warnings", ()))
+    return "\n".join(lines)
+
+
+def _free_run_lines(runs: dict[str, Any]) -> list[str]:
+    lines = []
+    horizons = runs["model"]["horizons_s"]
+    lines.append(f"{'  free run, horizon [s]':<34}" + "".join(f"{horizon:>11g}" for horizon in horizons))
+    for part in ("base", "model"):
+        run = runs[part]
+        for key, label, factor in (("position_m", "position [m]", 1.0), ("heading_rad", "heading [deg]", np.degrees(1.0))):
+            values = "".join(f"{_number(value, factor):>11}" for value in run[key])
+            lines.append(f"{'  ' + label + ', ' + part:<34}{values}")
+        if run["note"]:
+            lines.append(f"  {part}: {run['note']}")
+    return lines
+
+
+def _number(value: float | None, factor: float = 1.0) -> str:
+    return "-" if value is None or not np.isfinite(value) else f"{value * factor:.3f}"

@@ -1,0 +1,54 @@
+"""From a log on disk to smoothed motion: the first half of every command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ferryid.signals.align import align
+from ferryid.signals.recording import Recording, data_quality, record
+from ferryid.signals.smooth import smooth
+from ferryid.signals.track import Motion
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """One log, ready for regression, with what is known of its quality."""
+
+    recording: Recording
+    motion: Motion
+    quality: Mapping[str, Any]
+
+
+def prepare(
+    path: str,
+    profile: Profile,
+    out: Path,
+    *,
+    window_s: float,
+    smoother: str = "square",
+    rate_hz: float | None = None,
+    verify: bool = False,
+) -> Prepared:
+    """Ingest, align and smooth one log.
+
+    Parameters
+    ----------
+    path
+        A file or folder; parts of one recording joined by ``+``.
+    profile
+        Vessel and signal map.
+    out
+        Output folder, whose ``logs`` keep the ingested tables.
+    window_s, smoother, rate_hz
+        See `ferryid.signals.smooth` and `ferryid.signals.align`.
+    verify
+        Check every checksum.
+    """
+    recording = record(path, profile, out, verify=verify)
+    track = align(recording, profile, rate_hz)
+    motion = smooth(track, profile, window_s, smoother)
+    return Prepared(recording, motion, data_quality(recording, motion))
