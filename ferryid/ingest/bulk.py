@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -14,7 +15,11 @@ from rosbags.typesys.base import normalize_fieldname
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.layout import (
+    PRIMITIVES,
+    Layout,
+    LayoutError,
     Target,
+    Walk,
     leaf_fields,
     stamp_path,
     targets,
@@ -23,6 +28,15 @@ from ferryid.ingest.layout import (
 from ferryid.ingest.log import Column, Loss, Nanoseconds, Series
 
 __all__ = ["Decoder", "decoder_for", "leaf_fields"]
+
+# Rows gathered before columns are copied: few enough to stay in the cache, enough to hide the cost of a call.
+SCRATCH_ROWS = 2048
+SCRATCH_BYTES = 4 << 20
+FIRST_ROWS = 64
+# A type whose messages have more lengths or layouts than this gains nothing from bulk.
+MAX_GROUPS = 512
+MAX_LAYOUTS = 1024
+LITTLE_ENDIAN_CDR = int.from_bytes(b"\x00\x01", "little")
 
 
 class Decoder(Protocol):
@@ -120,8 +134,113 @@ class _Unpacker:
         return found
 
 
+class _Fixed:
+    """One layout, ready to be read from gathered messages: a structured dtype over their bytes."""
+
+    def __init__(self, layout: Layout, cdr: bool, wanted: Mapping[str, Target]) -> None:
+        spans: dict[str, tuple[str, int]] = {}
+        self._expected: dict[str, int] = {}
+        if cdr:
+            spans["encapsulation "] = "<u2", 0
+            self._expected["encapsulation "] = LITTLE_ENDIAN_CDR
+        for offset, value in layout.lengths:
+            spans[f"length {offset}"] = "<u4", offset
+            self._expected[f"length {offset}"] = value
+        for offset in layout.zeros:
+            spans[f"terminator {offset}"] = "u1", offset
+            self._expected[f"terminator {offset}"] = 0
+        for path, (offset, length) in layout.places.items():
+            primitive = wanted[path].primitive
+            if length:
+                spans[path] = f"V{length}" if primitive == "string" else PRIMITIVES[primitive], offset
+        self._dtype = np.dtype(
+            {
+                "names": list(spans),
+                "formats": [code for code, _ in spans.values()],
+                "offsets": [offset for _, offset in spans.values()],
+                "itemsize": layout.size,
+            }
+        )
+        self._wanted = wanted
+        self._places = layout.places
+
+    def mismatches(self, messages: NDArray[np.void]) -> NDArray[np.bool_] | None:
+        """Return which messages have another layout, shape (n,), or None when all have this one."""
+        records = messages.view(self._dtype)
+        wrong: NDArray[np.bool_] | None = None
+        for name, value in self._expected.items():
+            differs = records[name] != value
+            if differs.any():
+                wrong = differs if wrong is None else wrong | differs
+        return wrong
+
+    def copy(self, messages: NDArray[np.void], columns: Mapping[str, Column], rows: Any, picked: Any) -> list[int]:
+        """Copy the wanted fields of the picked messages into `rows` of the columns.
+
+        Returns
+        -------
+        list
+            Positions among the picked messages whose strings are not UTF-8.
+        """
+        records = messages.view(self._dtype)
+        undecoded: set[int] = set()
+        for path, target in self._wanted.items():
+            place = self._places.get(path)
+            if place is None:
+                columns[path][rows] = None if target.primitive == "string" else math.nan
+            elif target.primitive == "string":
+                values, faults = _texts(records[path][picked] if place[1] else None, columns[path][rows].shape[0])
+                columns[path][rows] = values
+                undecoded.update(faults)
+            elif target.primitive == "bool":
+                columns[path][rows] = records[path][picked] != 0
+            else:
+                columns[path][rows] = records[path][picked]
+        return sorted(undecoded)
+
+
+def _texts(raw: NDArray[np.void] | None, count: int) -> tuple[Column, list[int]]:
+    """Decode strings of one length; also return the positions of those that are not UTF-8."""
+    texts = np.full(count, "", dtype=object)
+    faults: list[int] = []
+    if raw is None:
+        return texts, faults
+    known: dict[bytes, str] = {}
+    for position, data in enumerate(raw.tolist()):
+        text = known.get(data)
+        if text is None:
+            try:
+                text = known[data] = data.decode()
+            except UnicodeDecodeError:
+                faults.append(position)
+                continue
+        texts[position] = text
+    return texts, faults
+
+
+@dataclass
+class _Group:
+    """Messages of one total size, gathered and waiting to be copied; `rows` are their places in the columns."""
+
+    size: int
+    messages: NDArray[np.void]
+    rows: NDArray[np.int64]
+    filled: int = 0
+    layouts: list[_Fixed] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, size: int, rows: int) -> _Group:
+        """Return an empty group for up to `rows` messages, fewer when they are large."""
+        rows = max(1, min(rows, SCRATCH_BYTES // size))
+        return cls(size, np.empty(rows, f"V{size}"), np.empty(rows, np.int64))
+
+
 class BulkDecoder:
-    """Decoder of one topic of ROS1 or CDR messages."""
+    """Decoder of one topic of ROS1 or CDR messages.
+
+    Messages are gathered by size into a scratch; when it is full every length field in it is compared with the known
+    layouts of that size, and the wanted fields are copied to their columns. What fits no layout goes to rosbags.
+    """
 
     def __init__(
         self,
@@ -133,35 +252,141 @@ class BulkDecoder:
         times: Sequence[Target],
         capacity: int,
     ) -> None:
-        every = {target.path: target for target in (*wanted, *times)}
+        self._targets = {target.path: target for target in (*wanted, *times)}
         self._cdr, self._typestore, self._msgtype, self._topic = cdr, typestore, msgtype, topic
         self._wanted, self._times = tuple(wanted), tuple(times)
-        self._targets = every
-        self._tree = tree(tuple(every.values()))
-        self._unpacker = _Unpacker(cdr, typestore, msgtype, tuple(every.values()))
+        self._tree = tree(tuple(self._targets.values()))
+        self._unpacker = _Unpacker(cdr, typestore, msgtype, tuple(self._targets.values()))
         self._capacity = max(int(capacity), 1)
         self._receive = np.empty(self._capacity, np.int64)
-        self._columns = {path: np.empty(self._capacity, target.dtype) for path, target in every.items()}
+        self._columns = {path: np.empty(self._capacity, target.dtype) for path, target in self._targets.items()}
         self._rows = 0
         self._bad: list[int] = []
+        self._groups: dict[int, _Group] = {}
+        self._layouts = 0
 
     def add(self, buffer: Any, starts: NDArray[np.int64], sizes: NDArray[np.int64], receive_ns: Nanoseconds) -> None:
-        """Take the messages that lie in `buffer` at `starts` with `sizes` [bytes]; the buffer is not kept."""
+        """Take the messages that lie in `buffer` at `starts` with `sizes` [bytes]; the buffer is not kept.
+
+        Parameters
+        ----------
+        buffer
+            Anything with the buffer interface.
+        starts, sizes
+            Non-negative, shape (n,). A message that ends behind the buffer counts as corrupt.
+        receive_ns
+            Receive times [ns], shape (n,).
+        """
         count = len(starts)
+        if count == 0:
+            return
         first = self._rows
         self._reserve(first + count)
         self._receive[first : first + count] = receive_ns
         self._rows += count
-        view = memoryview(buffer)
-        for row, (start, size) in enumerate(zip(starts.tolist(), sizes.tolist(), strict=True), first):
-            self._ordinary(row, bytes(view[start : start + size]))
+        size = int(sizes[0])
+        if (sizes == size).all():
+            self._gather(buffer, size, starts, np.arange(first, first + count))
+            return
+        order = np.argsort(sizes, kind="stable")
+        for picked in np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1):
+            self._gather(buffer, int(sizes[picked[0]]), starts[picked], first + picked)
+
+    def _gather(self, buffer: Any, size: int, starts: NDArray[np.int64], rows: NDArray[np.int64]) -> None:
+        group = self._groups.get(size)
+        if group is None:
+            if size == 0 or len(self._groups) >= MAX_GROUPS:
+                view = memoryview(buffer)
+                for row, start in zip(rows.tolist(), starts.tolist(), strict=True):
+                    self._ordinary(row, bytes(view[start : start + size]))
+                return
+            group = self._groups[size] = _Group.of(size, FIRST_ROWS)
+        inside = memoryview(buffer).nbytes - size
+        if (starts > inside).any():
+            self._bad.extend(rows[starts > inside].tolist())
+            rows, starts = rows[starts <= inside], starts[starts <= inside]
+            if not len(starts):
+                return
+        # Every window of this size over the buffer, overlapping: indexing it copies whole messages at memory speed.
+        windows = np.ndarray((inside + 1,), group.messages.dtype, buffer=buffer, strides=(1,))
+        taken = 0
+        while taken < len(starts):
+            part = min(len(starts) - taken, len(group.rows) - group.filled)
+            into = slice(group.filled, group.filled + part)
+            group.messages[into] = windows[starts[taken : taken + part]]
+            group.rows[into] = rows[taken : taken + part]
+            group.filled += part
+            taken += part
+            if group.filled == len(group.rows):
+                self._flush(group)
+                if len(group.rows) == FIRST_ROWS:
+                    larger = _Group.of(size, SCRATCH_ROWS)
+                    group.messages, group.rows = larger.messages, larger.rows
+
+    def _flush(self, group: _Group) -> None:
+        """Copy everything gathered in the group to the columns."""
+        messages, rows = group.messages[: group.filled], group.rows[: group.filled]
+        group.filled = 0
+        left = np.arange(len(rows))
+        known = 0
+        while len(left):
+            if known < len(group.layouts):
+                layout = group.layouts[known]
+            else:
+                fresh = self._layout_of(messages[left[0]].tobytes())
+                if fresh is None:
+                    self._ordinary(int(rows[left[0]]), messages[left[0]].tobytes())
+                    left = left[1:]
+                    continue
+                layout = fresh
+                group.layouts.append(layout)
+            known += 1
+            wrong = layout.mismatches(messages)
+            if wrong is None and len(left) == len(rows):
+                contiguous = rows[-1] - rows[0] == len(rows) - 1
+                where: Any = slice(int(rows[0]), int(rows[-1]) + 1) if contiguous else rows
+                fitting, left = left, left[:0]
+                faults = layout.copy(messages, self._columns, where, slice(None))
+            else:
+                fitting = left if wrong is None else left[~wrong[left]]
+                left = left[:0] if wrong is None else left[wrong[left]]
+                faults = layout.copy(messages, self._columns, rows[fitting], fitting)
+            self._bad.extend(int(rows[fitting[position]]) for position in faults)
+
+    def _layout_of(self, sample: bytes) -> _Fixed | None:
+        """Return the layout of a sample once rosbags gives the same values from it, None for rosbags alone."""
+        if self._layouts >= MAX_LAYOUTS:
+            return None
+        self._layouts += 1
+        try:
+            layout = Walk(self._typestore, sample, self._cdr, self._tree).run(self._msgtype)
+        except LayoutError:
+            return None
+        values = self._unpacker.values(sample)
+        if values is None:
+            return None
+        fixed = _Fixed(layout, self._cdr, self._targets)
+        message = np.frombuffer(sample, f"V{len(sample)}")
+        ours = {path: np.empty(1, target.dtype) for path, target in self._targets.items()}
+        theirs = {path: np.empty(1, target.dtype) for path, target in self._targets.items()}
+        fixed.copy(message, ours, slice(0, 1), slice(None))
+        self._fill(theirs, 0, values)
+        same = all(
+            np.array_equal(ours[path], theirs[path], equal_nan=target.dtype.kind == "f")
+            for path, target in self._targets.items()
+        )
+        return fixed if same else None
 
     def _ordinary(self, row: int, data: bytes) -> None:
         values = self._unpacker.values(data)
         if values is None:
             self._bad.append(row)
-            return
-        for path, column in self._columns.items():
+        else:
+            self._fill(self._columns, row, values)
+
+    @staticmethod
+    def _fill(columns: Mapping[str, Column], row: int, values: Mapping[str, Any]) -> None:
+        for path, column in columns.items():
             column[row] = values.get(path, None if column.dtype == object else math.nan)
 
     def _reserve(self, rows: int) -> None:
@@ -173,6 +398,7 @@ class BulkDecoder:
 
     def finish(self) -> Series:
         """Return the columns of every message that could be decoded, in the order in which they were added."""
+        self._flush_all()
         keep: Any = slice(0, self._rows)
         if self._bad:
             keep = np.delete(np.arange(self._rows), self._bad)
@@ -188,8 +414,14 @@ class BulkDecoder:
             columns={target.path: columns[target.path] for target in self._wanted},
         )
 
+    def _flush_all(self) -> None:
+        for group in self._groups.values():
+            if group.filled:
+                self._flush(group)
+
     def losses(self, file: str) -> tuple[Loss, ...]:
         """Return what was corrupt among the messages added so far, said of `file`."""
+        self._flush_all()
         if not self._bad:
             return ()
         times = self._receive[self._bad]
