@@ -1,0 +1,104 @@
+"""Whether a new model may replace the old one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.identify.result import AXES, Verdict
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+IMPROVEMENT = 0.05
+"""Fraction by which the mean normalised MSE must fall, thesis 3.2.4."""
+WORSENING = 0.05
+"""Fraction by which any one axis may get worse."""
+_NOTHING = 1e-9
+"""Root-mean-square error [N, N·m] that counts as none: rounding of forces of thousands of newtons is below it."""
+
+
+def squared_error(measured: Floats, estimated: Floats, rows: Flags) -> tuple[Floats, int]:
+    """Return the sum of squared force errors per axis and the number of rows, so that logs can be added up.
+
+    Parameters
+    ----------
+    measured, estimated
+        Applied force and its estimate [N, N, N·m], shape (n, 3).
+    rows
+        Rows to judge, shape (n,).
+    """
+    error = measured[rows] - estimated[rows]
+    return np.einsum("ij,ij->j", error, error), int(np.count_nonzero(rows))
+
+
+def accept(base_mse: Floats, model_mse: Floats) -> Verdict:
+    """Judge a model by its force error on validation rows against the base model's.
+
+    Accepted when the MSE of the estimated applied force, normalised per axis by the base model's and averaged over the
+    three axes, falls by 5 % or more, and no axis gets worse by more than 5 % (thesis 3.2.4). An axis on which
+    the base model makes no error at all has nothing to divide by: its ratio is 1 where the new model makes none
+    either, and infinite otherwise. An error that is not a finite number rejects the model.
+
+    Parameters
+    ----------
+    base_mse, model_mse
+        Validation MSE in surge, sway [N²] and yaw [N²·m²], shape (3,).
+
+    Returns
+    -------
+    Verdict
+        With one sentence for the mean and one for every axis that stands in the way or needs an explanation.
+    """
+    base, model = np.asarray(base_mse, dtype=float), np.asarray(model_mse, dtype=float)
+    ratios = np.full(3, np.nan)
+    reasons: list[str] = []
+    obstacles: list[str] = []
+    for i, axis in enumerate(AXES):
+        unit = "N·m" if axis == "yaw" else "N"
+        if not np.isfinite(base[i]) or not np.isfinite(model[i]):
+            which = "base" if not np.isfinite(base[i]) else "new"
+            obstacles.append(
+                f"Rejected: the {which} model's validation error in {axis} is not a finite number; "
+                "are there validation rows on which everything was measured?"
+            )
+            continue
+        if base[i] <= _NOTHING**2:
+            spotless = model[i] <= _NOTHING**2
+            ratios[i] = 1.0 if spotless else np.inf
+            if spotless:
+                reasons.append(f"In {axis} both models are without error, so that axis decides nothing.")
+            else:
+                obstacles.append(
+                    f"Rejected: in {axis} the base model makes no error and the new one "
+                    f"{np.sqrt(model[i]):.3g} {unit} RMS."
+                )
+            continue
+        ratios[i] = model[i] / base[i]
+        if ratios[i] > 1.0 + WORSENING:
+            obstacles.append(
+                f"Rejected: {axis} gets worse, {_change(ratios[i])} in MSE "
+                f"({np.sqrt(base[i]):.3g} to {np.sqrt(model[i]):.3g} {unit} RMS); "
+                f"{100 * WORSENING:.0f} % is allowed."
+            )
+    mean = float(np.mean(ratios))
+    if np.isfinite(mean):
+        enough = mean <= 1.0 - IMPROVEMENT
+        sentence = (
+            f"On held-out data the force error (MSE relative to the base model, mean of three axes) "
+            f"{'falls' if mean < 1.0 else 'does not fall'}: {_change(mean)}; "
+            f"surge {_change(ratios[0])}, sway {_change(ratios[1])}, yaw {_change(ratios[2])}."
+        )
+        if not enough:
+            obstacles.insert(0, f"Rejected: a fall of {100 * IMPROVEMENT:.0f} % or more is needed. {sentence}")
+        elif obstacles:
+            reasons.insert(0, sentence)
+        else:
+            reasons.insert(0, f"Accepted. {sentence}")
+    per_axis = {axis: float(ratio) for axis, ratio in zip(AXES, ratios, strict=True)}
+    return Verdict(not obstacles, mean, per_axis, (*obstacles, *reasons))
+
+
+def _change(ratio: float) -> str:
+    """Return a ratio as a signed change in per cent."""
+    return f"{100.0 * (ratio - 1.0):+.1f} %"

@@ -1,0 +1,397 @@
+"""Bases of the correction: the thesis's 21 functions, the same without duplicates, and those of wind and current."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.signals.track import Motion
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Unit = tuple[str, str, str]
+Rows = NDArray[np.bool_] | NDArray[np.int64] | slice
+
+STRUCTURES = ("coupled", "decoupled")
+
+_SURGE, _SWAY, _YAW = 0, 1, 2
+_EVERY_ROW = slice(None)
+
+
+@dataclass(frozen=True)
+class Term:
+    """One basis function, the product of its factors.
+
+    Attributes
+    ----------
+    name
+        Name in reports and model files.
+    factors
+        Names of the factors, keys of `DIMENSIONS`.
+    axes
+        Axes that the term belongs to in the decoupled structure: 0 surge, 1 sway, 2 yaw.
+    """
+
+    name: str
+    factors: tuple[str, ...]
+    axes: tuple[int, ...]
+
+    @property
+    def dimension(self) -> tuple[int, int, int]:
+        """Exponents of metre, second and radian."""
+        parts = [DIMENSIONS[factor] for factor in self.factors]
+        return sum(p[0] for p in parts), sum(p[1] for p in parts), sum(p[2] for p in parts)
+
+
+DIMENSIONS: Mapping[str, tuple[int, int, int]] = {
+    "u_dot": (1, -2, 0),
+    "v_dot": (1, -2, 0),
+    "r_dot": (0, -2, 1),
+    "u": (1, -1, 0),
+    "v": (1, -1, 0),
+    "r": (0, -1, 1),
+    "|u|": (1, -1, 0),
+    "|v|": (1, -1, 0),
+    "|r|": (0, -1, 1),
+    # Air (rw) and water (rc) relative to the hull: V, V cos(gamma), V sin(gamma) and the angle of attack as a number.
+    **{f"{name}_{flow}": (1, -1, 0) for flow in ("rw", "rc") for name in ("V", "cos", "sin", "2cos", "|cos|", "|sin|")},
+    **{f"gamma_{flow}": (0, 0, 0) for flow in ("rw", "rc")},
+}
+"""Exponents of metre, second and radian of every factor."""
+
+
+def _terms(*rows: tuple[str, str, tuple[int, ...]]) -> tuple[Term, ...]:
+    return tuple(Term(name, tuple(factors.split()), axes) for name, factors, axes in rows)
+
+
+_BOTH = (_SWAY, _YAW)
+_LINEAR = _terms(
+    ("u_dot", "u_dot", (_SURGE,)),
+    ("v_dot", "v_dot", _BOTH),
+    ("r_dot", "r_dot", _BOTH),
+    ("uv", "u v", (_YAW,)),
+    ("ur", "u r", _BOTH),
+    ("vr", "v r", (_SURGE,)),
+    ("rr", "r r", (_SURGE,)),
+    ("u", "u", (_SURGE,)),
+    ("v", "v", _BOTH),
+    ("r", "r", _BOTH),
+)
+_SIGNED = _terms(
+    ("sgn(u)u^2", "|u| u", (_SURGE,)),
+    ("sgn(v)v^2", "|v| v", _BOTH),
+    ("sgn(r)r^2", "|r| r", _BOTH),
+)
+_CUBIC = _terms(
+    ("u^3", "u u u", (_SURGE,)),
+    ("v^3", "v v v", _BOTH),
+    ("r^3", "r r r", _BOTH),
+)
+_MODULUS = _terms(
+    ("|u|u", "|u| u", (_SURGE,)),
+    ("|v|v", "|v| v", _BOTH),
+    ("|r|r", "|r| r", _BOTH),
+    ("|v|r", "|v| r", _BOTH),
+    ("|r|v", "|r| v", _BOTH),
+)
+
+BASES: Mapping[str, tuple[Term, ...]] = {
+    "thesis": _LINEAR + _SIGNED + _CUBIC + _MODULUS,
+    "modulus": _LINEAR + _CUBIC + _MODULUS,
+}
+"""Functions of motion alone. ``thesis`` is (3.4) in its order, with three pairs of identical columns."""
+
+WIND: Mapping[str, tuple[Term, ...]] = {
+    "thesis": _terms(
+        ("V_rw^2 cos(gamma_rw)", "V_rw cos_rw", (_SURGE,)),
+        ("V_rw^2 sin(gamma_rw)", "V_rw sin_rw", _BOTH),
+        ("V_rw^2 sin(2gamma_rw)", "2cos_rw sin_rw", (_YAW,)),
+    ),
+    "paper": _terms(
+        ("V_rw^2 cos(gamma_rw)", "V_rw cos_rw", (_SURGE,)),
+        ("V_rw^2 sin(gamma_rw)", "V_rw sin_rw", _BOTH),
+        ("V_rw^2 sin(gamma_rw)gamma_rw", "V_rw sin_rw gamma_rw", (_YAW,)),
+    ),
+}
+"""Functions of the apparent wind: thesis (3.6) and paper (18)."""
+
+CURRENT: Mapping[str, tuple[Term, ...]] = {
+    "thesis": _terms(
+        ("V_rc^2 cos(gamma_rc)|cos(gamma_rc)|", "|cos|_rc cos_rc", (_SURGE,)),
+        ("V_rc^2 sin(gamma_rc)|sin(gamma_rc)|", "|sin|_rc sin_rc", _BOTH),
+        ("V_rc^2 sin(gamma_rc)", "V_rc sin_rc", _BOTH),
+        ("V_rc^2 sin(2gamma_rc)", "2cos_rc sin_rc", (_YAW,)),
+    ),
+    "paper": _terms(
+        ("V_rc^2 cos(gamma_rc)", "V_rc cos_rc", (_SURGE,)),
+        ("V_rc^2 sin(gamma_rc)", "V_rc sin_rc", _BOTH),
+        ("V_rc^2 sin(gamma_rc)gamma_rc", "V_rc sin_rc gamma_rc", (_YAW,)),
+    ),
+}
+"""Functions of the velocity through the water: thesis (3.7) and paper (19)."""
+
+
+@dataclass(frozen=True)
+class Basis:
+    """K basis functions of one vessel's motion and, where measured, of wind and current.
+
+    Attributes
+    ----------
+    name
+        Name that `basis` takes: ``"modulus"``, ``"thesis+wind-paper"``.
+    structure
+        ``"coupled"`` or ``"decoupled"``.
+    functions
+        The functions in order.
+    mask
+        True where a term may act on an axis (surge, sway, yaw), shape (K, 3).
+    """
+
+    name: str
+    structure: str
+    functions: tuple[Term, ...]
+    mask: Flags
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the functions, K of them."""
+        return tuple(term.name for term in self.functions)
+
+    @property
+    def units(self) -> tuple[Unit, ...]:
+        """Units of the coefficients in surge, sway and yaw, K rows of three."""
+        return tuple(coefficient_units(term) for term in self.functions)
+
+    @property
+    def needs_wind(self) -> bool:
+        """True where a function depends on the apparent wind."""
+        return self._needs("rw")
+
+    @property
+    def needs_current(self) -> bool:
+        """True where a function depends on the velocity through the water."""
+        return self._needs("rc")
+
+    @property
+    def duplicates(self) -> dict[str, str]:
+        """Terms that are the same column as an earlier one, ``{"|u|u": "sgn(u)u^2", ...}``."""
+        first: dict[tuple[str, ...], str] = {}
+        same: dict[str, str] = {}
+        for term in self.functions:
+            key = tuple(sorted(term.factors))
+            if key in first:
+                same[term.name] = first[key]
+            first.setdefault(key, term.name)
+        return same
+
+    def _needs(self, flow: str) -> bool:
+        return any(factor.endswith(f"_{flow}") for term in self.functions for factor in term.factors)
+
+    def fill(
+        self,
+        out: Floats,
+        nu: Floats,
+        nu_dot: Floats,
+        wind_rel: Floats | None = None,
+        current_rel: Floats | None = None,
+    ) -> None:
+        """Write the functions into the rows of `out`, one function a row: the layout of cross-products.
+
+        Parameters
+        ----------
+        out
+            Shape (K, n), overwritten.
+        nu, nu_dot
+            Velocity [m/s, m/s, rad/s] and acceleration, FRD, shape (n, 3).
+        wind_rel, current_rel
+            Velocity of the hull relative to air and to water along its x and y axes [m/s], shape (n, 2).
+
+        Raises
+        ------
+        FerryIdError
+            Where a function needs a wind or current that is not given.
+        """
+        values = _factors(nu, nu_dot)
+        for flow, relative, what in (("rw", wind_rel, "wind"), ("rc", current_rel, "current")):
+            if self._needs(flow):
+                if relative is None:
+                    raise FerryIdError(
+                        f'basis "{self.name}": needs {what}, and there is none for these rows. '
+                        f"Fix: map {what} in the vessel profile, or use the basis without it"
+                    )
+                values.update(_flow_factors(relative, flow))
+        for row, term in zip(out, self.functions, strict=True):
+            first, *rest = term.factors
+            if not rest:
+                row[:] = values[first]
+                continue
+            np.multiply(values[first], values[rest[0]], out=row)
+            for factor in rest[1:]:
+                row *= values[factor]
+
+    def evaluate(
+        self,
+        nu: Floats,
+        nu_dot: Floats,
+        wind_rel: Floats | None = None,
+        current_rel: Floats | None = None,
+    ) -> Floats:
+        """Return the functions as a matrix with one row a sample, shape (n, K); arguments as in `fill`."""
+        out = np.empty((len(self.functions), len(nu)))
+        self.fill(out, nu, nu_dot, wind_rel, current_rel)
+        return out.T
+
+    def of(self, motion: Motion, rows: Rows = _EVERY_ROW) -> Floats:
+        """Return the functions for rows of a motion, shape (n, K); NaN where a needed measurement is missing.
+
+        Raises
+        ------
+        FerryIdError
+            Where a function needs a wind or current that the log does not have.
+        """
+        nu, psi = motion.nu[rows], motion.eta[rows, 2]
+        wind = None if motion.wind is None else relative_flow(nu, psi, motion.wind[rows])
+        current = None if motion.current is None else relative_flow(nu, psi, motion.current[rows])
+        return self.evaluate(nu, motion.nu_dot[rows], wind, current)
+
+
+def basis(
+    name: str,
+    *,
+    wind: str | None = None,
+    current: str | None = None,
+    structure: str = "coupled",
+) -> Basis:
+    """Return a named basis.
+
+    The intercept is not part of it: SIMPLS takes it from the means. Terms of wind and current exist only where
+    they were measured; thesis (3.4), (3.6), (3.7) and paper (16), (18), (19).
+
+    Parameters
+    ----------
+    name
+        ``"thesis"`` (21 functions, three pairs of them identical) or ``"modulus"`` (the same 18 without duplicates). A
+        name as in `Basis.name`, ``"modulus+wind-paper+current-thesis"``, sets wind and current too.
+    wind, current
+        ``"thesis"``, ``"paper"`` or None for no such functions.
+    structure
+        ``"coupled"``: every function may act on every axis. ``"decoupled"``: only on the axes on which it acts in the
+        three-degree-of-freedom model (2.3)-(2.14).
+
+    Raises
+    ------
+    FerryIdError
+        For a name or structure that does not exist, with the nearest that does.
+    """
+    head, *extensions = name.split("+")
+    forms = {"wind": wind, "current": current}
+    for extension in extensions:
+        kind, _, form = extension.partition("-")
+        if kind not in forms:
+            raise _unknown("basis extension", extension, [f"{k}-{f}" for k in forms for f in WIND])
+        forms[kind] = form
+    functions = _choose("basis", head, BASES)
+    for kind, table in (("wind", WIND), ("current", CURRENT)):
+        chosen = forms[kind]
+        if chosen is not None:
+            functions += _choose(f"{kind} basis", chosen, table)
+            head += f"+{kind}-{chosen}"
+    if structure not in STRUCTURES:
+        raise _unknown("structure", structure, STRUCTURES)
+    mask = np.ones((len(functions), 3), dtype=bool)
+    if structure == "decoupled":
+        for row, term in zip(mask, functions, strict=True):
+            row[:] = False
+            row[list(term.axes)] = True
+    mask.setflags(write=False)
+    return Basis(head, structure, functions, mask)
+
+
+def relative_flow(nu: Floats, psi: Floats, flow_ne: Floats) -> Floats:
+    """Return the hull's velocity relative to air or water along its x and y axes [m/s], shape (n, 2).
+
+    Parameters
+    ----------
+    nu
+        Velocity over ground, shape (n, 3).
+    psi
+        Heading [rad], shape (n,).
+    flow_ne
+        Where the air or water goes to, north and east [m/s], shape (n, 2).
+    """
+    c, s = np.cos(psi), np.sin(psi)
+    north, east = flow_ne[:, 0], flow_ne[:, 1]
+    return np.column_stack([nu[:, 0] - (c * north + s * east), nu[:, 1] - (c * east - s * north)])
+
+
+def _choose(what: str, name: str, table: Mapping[str, tuple[Term, ...]]) -> tuple[Term, ...]:
+    if name not in table:
+        raise _unknown(what, name, list(table))
+    return table[name]
+
+
+def _unknown(what: str, name: str, options: list[str] | tuple[str, ...]) -> FerryIdError:
+    return FerryIdError(
+        f'settings: there is no {what} called "{name}".{did_you_mean(name, options)} '
+        f"Fix: choose one of {', '.join(options)}"
+    )
+
+
+def _factors(nu: Floats, nu_dot: Floats) -> dict[str, Floats]:
+    # Contiguous copies: every factor is read several times, and a stride of three columns halves the speed.
+    u, v, r = np.ascontiguousarray(nu.T)
+    u_dot, v_dot, r_dot = np.ascontiguousarray(nu_dot.T)
+    return {
+        "u": u,
+        "v": v,
+        "r": r,
+        "|u|": np.abs(u),
+        "|v|": np.abs(v),
+        "|r|": np.abs(r),
+        "u_dot": u_dot,
+        "v_dot": v_dot,
+        "r_dot": r_dot,
+    }
+
+
+def _flow_factors(relative: Floats, flow: str) -> dict[str, Floats]:
+    """Return V, V cos(gamma), V sin(gamma) ... with gamma = -atan2(v, u), so that sin(gamma) = -v / V."""
+    along, across = np.ascontiguousarray(relative.T)
+    cos, sin = along, -across
+    values = {
+        "V": np.hypot(along, across),
+        "cos": cos,
+        "sin": sin,
+        "2cos": 2.0 * cos,
+        "|cos|": np.abs(cos),
+        "|sin|": np.abs(sin),
+        "gamma": -np.arctan2(across, along),
+    }
+    return {f"{name}_{flow}": value for name, value in values.items()}
+
+
+def coefficient_units(term: Term) -> Unit:
+    """Return the unit of a term's coefficient in surge, sway (force) and yaw (moment) as plain strings."""
+    metre, second, radian = term.dimension
+    if second == -2 and len(term.factors) == 1:
+        # Force over acceleration is inertia; radians are left out there, as in every table of added mass.
+        return ("kg", "kg", "kg·m") if radian == 0 else ("kg·m", "kg·m", "kg·m²")
+    force = _unit(-metre, -second, -radian)
+    return ("kg/s", "kg/s", "N·s") if force == "N·s/m" else (force, force, _unit(1 - metre, -second, -radian))
+
+
+def _unit(metre: int, second: int, radian: int) -> str:
+    exponents = [("m", metre), ("s", second), ("rad", radian)]
+    above = ["N", *(symbol + _POWER[power] for symbol, power in exponents if power > 0)]
+    below = [symbol + _POWER[-power] for symbol, power in exponents if power < 0]
+    top, bottom = "·".join(above), "·".join(below)
+    if not below:
+        return top
+    return f"{top}/({bottom})" if len(below) > 1 else f"{top}/{bottom}"
+
+
+_POWER = {1: "", 2: "²", 3: "³"}

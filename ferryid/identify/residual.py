@@ -1,0 +1,170 @@
+"""The lack-of-fit residual: measured force less the force that the base model holds the motion to need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.signals.track import Motion
+from ferryid.vessel.hull import current_in_body, inverse_dynamics
+from ferryid.vessel.profile import Hull, Profile
+from ferryid.vessel.wind import wind_force
+
+Floats = NDArray[np.float64]
+
+FORMS = ("measured", "commanded", "parallel")
+HORIZON_S = 1.0
+"""Length of the parallel simulation [s], centred on the row that it judges."""
+
+
+def base_force(profile: Profile, motion: Motion, scale: Mapping[str, float]) -> Floats:
+    """Return the applied force as the base model estimates it from the motion of a log [N, N, N·m], shape (n, 3).
+
+    See `force_of_motion`; wind and current take part where the log has them.
+    """
+    return force_of_motion(
+        profile, scale, motion.nu_dot, motion.nu, motion.eta[:, 2], wind=motion.wind, current=motion.current
+    )
+
+
+def force_of_motion(
+    profile: Profile,
+    scale: Mapping[str, float],
+    nu_dot: Floats,
+    nu: Floats,
+    psi: Floats,
+    *,
+    wind: Floats | None = None,
+    current: Floats | None = None,
+) -> Floats:
+    """Return ``(delta M* nu_dot + delta C*(nu) nu + sigma D*(nu) nu - tau_wind) / zeta``, (4.2)-(4.5).
+
+    This estimates the actuator force as it is measured: (4.5) puts the factor zeta on the measured force, and dividing
+    by it instead keeps base model, correction and validation error in the units of the measurement.
+
+    Parameters
+    ----------
+    profile
+        Vessel with hull and, if known, wind areas. Without areas the wind is left to the correction.
+    scale
+        ``{"delta": 1.0, "sigma": 1.0, "zeta": 1.0}``; a factor that is missing is 1.
+    nu_dot, nu
+        Acceleration and velocity over ground, FRD at the body origin, shape (n, 3).
+    psi
+        Heading [rad], shape (n,); used for wind and current only.
+    wind, current
+        Where air and water go to, north and east [m/s], shape (n, 2), or None. A current acts exactly, through the
+        relative velocity.
+
+    Returns
+    -------
+    ndarray
+        Surge and sway force [N] and yaw moment [N·m], shape (n, 3); NaN where an input is.
+    """
+    nu_c = None if current is None else current_in_body(current, psi)
+    tau = inverse_dynamics(scaled(profile.hull, scale), nu_dot, nu, nu_c)
+    if wind is not None and profile.wind is not None:
+        tau = tau - wind_force(profile.wind, wind, psi, nu)
+    return tau / float(scale.get("zeta", 1.0))
+
+
+def scaled(hull: Hull, scale: Mapping[str, float]) -> Hull:
+    """Return the hull with delta on its masses (M, and so C) and sigma on its damping, (4.2)-(4.4)."""
+    delta, sigma = float(scale.get("delta", 1.0)), float(scale.get("sigma", 1.0))
+    return replace(
+        hull,
+        mass_kg=delta * hull.mass_kg,
+        inertia_z=delta * hull.inertia_z,
+        M=delta * hull.M,
+        D={name: sigma * value for name, value in hull.D.items()},
+    )
+
+
+def residual(
+    profile: Profile,
+    motion: Motion,
+    scale: Mapping[str, float],
+    form: str = "measured",
+    *,
+    horizon_s: float = HORIZON_S,
+) -> Floats:
+    """Return the lack-of-fit residual [N, N, N·m], shape (n, 3).
+
+    Parameters
+    ----------
+    profile, scale
+        Base model, as in `force_of_motion`.
+    motion
+        Smoothed motion and forces of one log.
+    form
+        ``"measured"``: ``tau_mes - F_0``, thesis (3.1). ``"commanded"``: ``tau_d - F_0`` (Jervan 2020); actuator
+        dynamics become part of the correction. ``"parallel"`` (after Gale et al. 2017): the base model runs beside the
+        vessel under the same measured force, from the measured velocity half a horizon before each row to half
+        a horizon after it; the residual is the constant force that would account for the velocity by which they
+        part, ``M_0 (nu_simulated - nu_measured) / horizon_s``. It never forms an acceleration. As the horizon shrinks
+        it tends to ``"measured"``; over a longer one the base model's own damping takes a share of the error.
+    horizon_s
+        Horizon of ``"parallel"`` [s], rounded to an even number of rows.
+
+    Returns
+    -------
+    ndarray
+        NaN where a measurement is missing, or where the horizon leaves measured data.
+
+    Raises
+    ------
+    FerryIdError
+        For an unknown form, or ``"commanded"`` on a log without commanded force.
+    """
+    if form == "measured":
+        return motion.tau - base_force(profile, motion, scale)
+    if form == "commanded":
+        if motion.tau_d is None or not np.isfinite(motion.tau_d).any():
+            raise FerryIdError(
+                f"{motion.log}: the commanded residual needs tau_d, and the profile finds none in this log. "
+                'Fix: map [signals.tau_d], or use the residual "measured"'
+            )
+        return motion.tau_d - base_force(profile, motion, scale)
+    if form == "parallel":
+        return _parallel(profile, motion, scale, horizon_s)
+    raise FerryIdError(
+        f'settings: there is no residual called "{form}".{did_you_mean(form, FORMS)} '
+        f"Fix: choose one of {', '.join(FORMS)}"
+    )
+
+
+def _parallel(profile: Profile, motion: Motion, scale: Mapping[str, float], horizon_s: float) -> Floats:
+    half = max(1, round(horizon_s * motion.rate_hz / 2))
+    count = len(motion.t) - 2 * half
+    result = np.full_like(motion.nu, np.nan)
+    if count <= 0:
+        return result
+    mass = scaled(profile.hull, scale).M / float(scale.get("zeta", 1.0))
+    inverse = np.linalg.inv(mass)
+    dt = 1.0 / motion.rate_hz
+    still = np.zeros((count, 3))
+
+    def nu_dot(nu: Floats, first: int) -> Floats:
+        rows = slice(first, first + count)
+        wind = None if motion.wind is None else motion.wind[rows]
+        current = None if motion.current is None else motion.current[rows]
+        needed = force_of_motion(profile, scale, still, nu, motion.eta[rows, 2], wind=wind, current=current)
+        rate: Floats = (motion.tau[rows] - needed) @ inverse.T
+        return rate
+
+    # All runs go at once: line k of `nu` is the run that began at row k, and step i takes it from row k+i to k+i+1.
+    nu = motion.nu[:count]
+    with np.errstate(over="ignore", invalid="ignore"):
+        for step in range(2 * half):
+            # Heun's rule uses the measured forces at both ends and invents none in between.
+            before = nu_dot(nu, step)
+            after = nu_dot(nu + dt * before, step + 1)
+            nu = nu + dt / 2 * (before + after)
+        parted = nu - motion.nu[2 * half :]
+        result[half : half + count] = parted @ (mass / (2 * half * dt)).T
+    result[~np.isfinite(result)] = np.nan
+    return result

@@ -1,0 +1,275 @@
+"""Training and validation rows that share no smoothing window: blocks with a purge gap, whole logs, folds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.signals.track import Motion
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+KINDS = ("blocks", "logs", "every-kth")
+BLOCKS = 10
+EVERY = 4
+GUARD_S = 2.0
+"""Purged on top of one window, for disturbances that outlast it; pass `correlation_time` of a residual for better."""
+
+_VALIDATES_EVERY = 3
+_LEAST_PURGES = 4.0
+"""A block is at least this many purge gaps long, so that more rows are used than purged."""
+
+
+@dataclass(frozen=True)
+class Split:
+    """Which rows train and which validate; rows in neither are invalid or purged.
+
+    Attributes
+    ----------
+    kind
+        ``"blocks"``, ``"logs"``, ``"every-kth"`` or ``"fold <i> of <k>"``.
+    training, validation
+        One mask a log, shape (n,).
+    purge_s
+        Least time between a training row and a validation row [s]; 0 where none is kept.
+    notes
+        What a reader of the scores must know, as sentences with numbers.
+    """
+
+    kind: str
+    training: tuple[Flags, ...]
+    validation: tuple[Flags, ...]
+    purge_s: float
+    notes: tuple[str, ...] = ()
+
+
+def split(
+    motions: Sequence[Motion],
+    kind: str = "blocks",
+    *,
+    window_s: float,
+    guard_s: float = GUARD_S,
+    blocks: int = BLOCKS,
+    every: int = EVERY,
+    validate: Sequence[str] = (),
+) -> Split:
+    """Divide the valid rows of several logs into training and validation; the same input gives the same rows.
+
+    Parameters
+    ----------
+    motions
+        Logs; only rows that are `valid` are used.
+    kind
+        ``"blocks"``: each log is cut into contiguous blocks of equally many valid rows, and every third of them, from
+        the second on, validates (3 of 10). ``"logs"``: whole logs validate. ``"every-kth"``: every k-th valid row
+        validates (thesis 3.2.4); neighbours share the smoothing window, so that the score flatters.
+    window_s
+        Length of the smoothing window [s].
+    guard_s
+        Time [s] purged in addition to one window.
+    blocks
+        Number of blocks a log; fewer where blocks would be shorter than four purge gaps.
+    every
+        k of ``"every-kth"``, 2 or more.
+    validate
+        Names of the logs that validate in ``"logs"``; the last one where none is named.
+
+    Raises
+    ------
+    FerryIdError
+        For an unknown kind, a log too short to hold training and validation, or fewer than two logs for ``"logs"``.
+    """
+    if not motions:
+        raise FerryIdError("split: there is no log to divide, found none. Fix: give at least one log")
+    if kind == "blocks":
+        return _blocks(motions, window_s, guard_s, blocks)
+    if kind == "logs":
+        return _logs(motions, validate)
+    if kind == "every-kth":
+        return _every_kth(motions, every)
+    raise FerryIdError(
+        f'settings: there is no split called "{kind}".{did_you_mean(kind, KINDS)} Fix: choose one of {", ".join(KINDS)}'
+    )
+
+
+def folds(
+    motions: Sequence[Motion],
+    k: int = 5,
+    *,
+    window_s: float,
+    guard_s: float = GUARD_S,
+    rows: Sequence[Flags] | None = None,
+) -> Iterator[Split]:
+    """Yield k splits for cross-validation: contiguous k-th parts of every log validate in turn, purged as blocks are.
+
+    Parameters
+    ----------
+    motions, window_s, guard_s
+        As in `split`.
+    k
+        Number of folds, 2 or more.
+    rows
+        Rows to divide, one mask a log: the training rows of a `Split`, to leave its validation rows untouched. The
+        valid rows where None.
+
+    Raises
+    ------
+    FerryIdError
+        For a log too short for k folds.
+    """
+    if k < 2:
+        raise FerryIdError(
+            f"settings: cross-validation needs 2 folds or more, found {k}. Fix: give 2 or more, 5 is usual"
+        )
+    purge_s = [_purge_s(motion, window_s, guard_s) for motion in motions]
+    used = [motion.valid if rows is None else rows[i] & motion.valid for i, motion in enumerate(motions)]
+    numbers = [_number(mask, k) for mask in used]
+    for motion, mask, purge in zip(motions, used, purge_s, strict=True):
+        if np.count_nonzero(mask) / motion.rate_hz < 2.0 * k * purge:
+            raise _too_short(motion, mask, 2.0 * k * purge, f"{k} folds")
+    for fold in range(k):
+        masks = [
+            _purged(mask, number == fold, round(purge * motion.rate_hz))
+            for motion, mask, number, purge in zip(motions, used, numbers, purge_s, strict=True)
+        ]
+        training, validation = zip(*masks, strict=True)
+        yield Split(f"fold {fold + 1} of {k}", training, validation, min(purge_s))
+
+
+def correlation_time(values: Floats, valid: Flags, rate_hz: float, longest_s: float = 30.0) -> float:
+    """Return the time [s] after which the autocorrelation of a signal falls below 1/e, the longest of its columns.
+
+    Parameters
+    ----------
+    values
+        Residual, shape (n, c).
+    valid
+        Rows to use, shape (n,); pairs across a gap do not count.
+    rate_hz
+        Rows per second.
+    longest_s
+        Upper limit of the answer [s].
+
+    Returns
+    -------
+    float
+        0 where nothing varies.
+    """
+    most = min(round(longest_s * rate_hz), len(valid) - 1)
+    size = 1 << int(np.ceil(np.log2(max(2, len(valid) + most))))
+    mask = valid.astype(float)
+    pairs = np.fft.irfft(np.abs(np.fft.rfft(mask, size)) ** 2, size)[: most + 1]
+    longest = 0.0
+    for column in np.asarray(values, dtype=float).T:
+        mean = column[valid].mean() if valid.any() else 0.0
+        centred = np.where(valid, column - mean, 0.0)
+        products = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2, size)[: most + 1]
+        if not products[0] > 0.0:
+            continue
+        correlation = products / np.maximum(pairs, 1.0) * (pairs[0] / products[0])
+        below = np.flatnonzero((correlation < np.exp(-1.0)) & (pairs > 0.5))
+        longest = max(longest, (below[0] if below.size else most) / rate_hz)
+    return float(longest)
+
+
+def _purge_s(motion: Motion, window_s: float, guard_s: float) -> float:
+    # The derivative reaches one row further than the window on both sides.
+    return window_s + 2.0 / motion.rate_hz + guard_s
+
+
+def _number(used: Flags, parts: int) -> NDArray[np.int64]:
+    """Return which of `parts` contiguous parts of equally many used rows each row lies in, shape (n,)."""
+    before: NDArray[np.int64] = np.cumsum(used) - used
+    total = max(1, int(np.count_nonzero(used)))
+    number: NDArray[np.int64] = np.minimum(before * parts // total, parts - 1)
+    return number
+
+
+def _purged(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
+    """Return training and validation masks at least `purge` + 1 rows apart; the purge is taken from training."""
+    validation = used & validates
+    reach = np.concatenate([[0], np.cumsum(validation)])
+    rows = np.arange(len(used))
+    first, last = np.maximum(rows - purge, 0), np.minimum(rows + purge + 1, len(used))
+    near = reach[last] > reach[first]
+    return used & ~validates & ~near, validation
+
+
+def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: int) -> Split:
+    training, validation, notes, purges = [], [], [], []
+    for motion in motions:
+        purge_s = _purge_s(motion, window_s, guard_s)
+        seconds = np.count_nonzero(motion.valid) / motion.rate_hz
+        number = min(blocks, int(seconds / (_LEAST_PURGES * purge_s)))
+        if number < 3:
+            raise _too_short(
+                motion, motion.valid, 3 * _LEAST_PURGES * purge_s, "three blocks and the gaps between them"
+            )
+        part = _number(motion.valid, number)
+        train, check = _purged(motion.valid, part % _VALIDATES_EVERY == 1, round(purge_s * motion.rate_hz))
+        training.append(train)
+        validation.append(check)
+        purges.append(purge_s)
+        lost = np.count_nonzero(motion.valid & ~train & ~check) / motion.rate_hz
+        notes.append(
+            f"{motion.log}: {number} blocks of {seconds / number:.0f} s; "
+            f"{np.count_nonzero(train) / motion.rate_hz:.0f} s train, "
+            f"{np.count_nonzero(check) / motion.rate_hz:.0f} s validate, "
+            f"{lost:.0f} s purged in gaps of {purge_s:.1f} s."
+        )
+    return Split("blocks", tuple(training), tuple(validation), min(purges), tuple(notes))
+
+
+def _logs(motions: Sequence[Motion], validate: Sequence[str]) -> Split:
+    names = [motion.log for motion in motions]
+    if len(motions) < 2:
+        raise FerryIdError(
+            f"{names[0]}: a split by logs needs at least two, found one. Fix: give more logs, or use --split blocks"
+        )
+    for name in validate:
+        if name not in names:
+            raise FerryIdError(
+                f"settings: no log called {name!r} to validate on.{did_you_mean(name, names)} "
+                f"Fix: name one of {', '.join(names)}"
+            )
+    chosen = set(validate) or {names[-1]}
+    if chosen >= set(names):
+        raise FerryIdError(
+            f"settings: every log validates ({', '.join(names)}) and none is left to train. Fix: name fewer"
+        )
+    nothing = [np.zeros(len(motion.valid), dtype=bool) for motion in motions]
+    training = [none if motion.log in chosen else motion.valid for motion, none in zip(motions, nothing, strict=True)]
+    validation = [motion.valid if motion.log in chosen else none for motion, none in zip(motions, nothing, strict=True)]
+    note = f"Whole logs validate: {', '.join(sorted(chosen))}."
+    return Split("logs", tuple(training), tuple(validation), 0.0, (note,))
+
+
+def _every_kth(motions: Sequence[Motion], every: int) -> Split:
+    if every < 2:
+        raise FerryIdError(f"settings: every {every}. row cannot validate, found k = {every}. Fix: give 2 or more")
+    training, validation = [], []
+    for motion in motions:
+        if np.count_nonzero(motion.valid) < 2 * every:
+            raise _too_short(motion, motion.valid, 2 * every / motion.rate_hz, f"every {every}. row")
+        count = np.cumsum(motion.valid)
+        check = motion.valid & (count % every == 0)
+        training.append(motion.valid & ~check)
+        validation.append(check)
+    note = (
+        f"Every {every}. row validates, as in the thesis: neighbouring rows share the smoothing window, "
+        "so that this score is too good. Judge by blocks."
+    )
+    return Split("every-kth", tuple(training), tuple(validation), 0.0, (note,))
+
+
+def _too_short(motion: Motion, used: Flags, needed_s: float, what: str) -> FerryIdError:
+    seconds = np.count_nonzero(used) / motion.rate_hz
+    return FerryIdError(
+        f"{motion.log}: too short for {what}, found {seconds:.1f} s of usable rows and {needed_s:.1f} s are needed. "
+        "Fix: use a longer log, a shorter smoothing window, or several logs with --split logs"
+    )

@@ -1,0 +1,334 @@
+"""What is wrong with a signal: missing, held and wild samples, constants, and signals that contradict each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError
+from ferryid.signals.track import Track
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+NAVIGATION = ("x", "y", "psi", "phi", "theta", "u", "v", "r", "vel_N", "vel_E")
+WEATHER = ("wind_speed", "wind_from", "wind_N", "wind_E", "current_N", "current_E")
+_ACTUATOR = ("n_", "alpha_", "delta_", "F_")
+_ORDER = tuple(f"{prefix}cmd_" for prefix in _ACTUATOR)
+
+_SPIKE_NOISES = 8.0
+"""A spike stands out by this many robust standard deviations of the step from sample to sample."""
+_SPIKES_AT_MOST = 0.01
+"""With more spikes than this fraction of the samples, the signal is noisy rather than spiked, and is left alone."""
+_MEDIAN_OF = 50_000
+
+# Steps that no vessel takes from one sample to the next: at any interval, and per second of interval. Generous on
+# purpose: what is removed here must be wrong on a 1 m model and on a ferry.
+_IMPLAUSIBLE: Mapping[str, tuple[float, float]] = {
+    "x": (1.0, 15.0),
+    "y": (1.0, 15.0),
+    "psi": (0.15, 2.0),
+    "phi": (0.15, 2.0),
+    "theta": (0.15, 2.0),
+    "u": (0.3, 3.0),
+    "v": (0.3, 3.0),
+    "vel_N": (0.3, 3.0),
+    "vel_E": (0.3, 3.0),
+    "r": (0.1, 1.0),
+    "wind_speed": (10.0, 10.0),
+    "wind_N": (10.0, 10.0),
+    "wind_E": (10.0, 10.0),
+    "current_N": (0.5, 1.0),
+    "current_E": (0.5, 1.0),
+}
+_IMPLAUSIBLE_SHARE = 0.25
+"""For actuators, whose size is not known here: the share of the signal's own range."""
+
+
+@dataclass(frozen=True)
+class ColumnQuality:
+    """Findings on one column of one stream, at its native rate.
+
+    Attributes
+    ----------
+    name
+        Canonical name.
+    count
+        Number of samples.
+    missing
+        Samples that are NaN or infinite.
+    spikes
+        Single samples that were removed as implausible.
+    jumps
+        Implausible steps that were kept: not single, or too many.
+    held
+        Samples that repeat the one before, in a signal that otherwise changes; 0 for actuators, which may rest.
+    longest_held_s
+        Longest run of repeated samples [s].
+    constant
+        True where all samples are equal.
+    """
+
+    name: str
+    count: int
+    missing: int = 0
+    spikes: int = 0
+    jumps: int = 0
+    held: int = 0
+    longest_held_s: float = 0.0
+    constant: bool = False
+
+    def sentences(self) -> tuple[str, ...]:
+        """Return the findings as sentences with numbers; empty for a clean column."""
+        name, of = self.name, f"of {self.count} samples"
+        said = []
+        if self.missing:
+            said.append(f"{name}: {self.missing} {of} are missing (NaN); short ones are interpolated.")
+        if self.spikes:
+            said.append(f"{name}: {self.spikes} {of} are single implausible spikes; removed and interpolated.")
+        if self.jumps:
+            said.append(f"{name}: {self.jumps} implausible steps were found and kept.")
+        if self.held:
+            share = self.held / max(1, self.count)
+            which = (
+                "most samples repeat the one before: it is updated slower than it is recorded" if share > 0.5 else ""
+            )
+            said.append(
+                f"{name}: {self.held} {of} repeat the one before, at most for {self.longest_held_s:.2f} s"
+                + (f"; {which}." if which else ".")
+            )
+        if self.constant and self.count > 1:
+            said.append(f"{name}: never changes.")
+        return tuple(said)
+
+
+def is_order(name: str) -> bool:
+    """True for a commanded value, which holds until the next one and may jump."""
+    return name.startswith(_ORDER) or name in ("X_d", "Y_d", "N_d")
+
+
+def is_actuator(name: str) -> bool:
+    """True for an actuator's measured value."""
+    return name.startswith(_ACTUATOR) and not name.startswith(_ORDER)
+
+
+def is_angle(name: str) -> bool:
+    """True for an angle that may wrap and that can be unwrapped: no rudder, and no direction of the wind."""
+    return name in ("psi", "phi", "theta") or name.startswith("alpha_")
+
+
+def unwrapped(angle: Floats) -> Floats:
+    """Return an angle [rad] without jumps of 2 pi; missing samples stay missing and hide nothing after them."""
+    result = angle.copy()
+    finite = np.isfinite(angle)
+    known = angle[finite]
+    # Whole turns are counted and then multiplied once, so that hours of turning gather no rounding.
+    turns = np.cumsum(np.round(np.diff(known) / (2 * np.pi)))
+    result[finite] = np.concatenate([known[:1], known[1:] - 2 * np.pi * turns])
+    return result
+
+
+def clean(name: str, time_s: Floats, values: Floats) -> tuple[Floats, ColumnQuality]:
+    """Return a column without single implausible samples, and what was found in it.
+
+    A sample is a spike when it leaves its neighbours by more than 8 robust standard deviations of the usual
+    step and more than a vessel can do, and comes back. Isolated ones become NaN; others are counted as jumps and
+    kept. Orders are never touched.
+
+    Parameters
+    ----------
+    name
+        Canonical name; decides what is plausible.
+    time_s
+        Sample times [s], ascending, shape (n,).
+    values
+        Samples in SI units, shape (n,); angles unwrapped. Not changed.
+
+    Returns
+    -------
+    values
+        Shape (n,), NaN where missing, infinite or removed.
+    quality
+        What was found.
+    """
+    finite = np.isfinite(values)
+    missing = int(values.size - np.count_nonzero(finite))
+    known, times = (values, time_s) if missing == 0 else (values[finite], time_s[finite])
+    result = np.where(finite, values, np.nan)
+    if known.size < 2:
+        return result, ColumnQuality(name, values.size, missing, constant=known.size == 1)
+    step = np.diff(known)
+    still = step == 0.0
+    constant = bool(still.all())
+    held, longest = 0, 0.0
+    if not constant and name in NAVIGATION + WEATHER:
+        held, longest = int(np.count_nonzero(still)), _longest(still, times)
+    spikes = jumps = 0
+    if not constant and not is_order(name) and name != "wind_from" and known.size >= 8:
+        single, jumps = _spikes(name, times, known, step)
+        spikes = int(single.size)
+        result[np.flatnonzero(finite)[single]] = np.nan
+    return result, ColumnQuality(name, values.size, missing, spikes, jumps, held, longest, constant)
+
+
+def stale(time_s: Floats, columns: Mapping[str, Floats], longest_s: float) -> Flags:
+    """Return which samples of a navigation stream only repeat what a sensor said long before, shape (n,).
+
+    Every column of the stream must stand still at once for longer than `longest_s`, with a velocity that is not zero,
+    in a stream that otherwise changes from sample to sample: then the sender repeats itself, and nothing was measured.
+    """
+    time_s = np.asarray(time_s, dtype=float)
+    none = np.zeros(time_s.size, dtype=bool)
+    moving = [name for name in ("u", "v", "vel_N", "vel_E", "r") if name in columns]
+    if not moving or time_s.size < 3 or any(is_actuator(name) or is_order(name) for name in columns):
+        return none
+    repeats = np.ones(time_s.size - 1, dtype=bool)
+    for name in columns:
+        repeats &= np.diff(columns[name]) == 0.0
+    if not repeats.any() or repeats.mean() > 0.2:
+        return none
+    at_rest = np.all([columns[name][1:] == 0.0 for name in moving], axis=0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], repeats & ~at_rest, [False]]).astype(np.int8)))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if time_s[last] - time_s[first] > longest_s:
+            none[first + 1 : last + 1] = True
+    return none
+
+
+def require_excited(track: Track, nu: Floats, tau: Floats) -> None:
+    """Refuse signals from which nothing can be identified.
+
+    Parameters
+    ----------
+    track
+        Names the log, and says which rows are valid.
+    nu, tau
+        Unsmoothed velocity and applied force, shape (n, 3).
+
+    Raises
+    ------
+    FerryIdError
+        Where surge, sway or yaw rate is constant over the whole log, or the applied force is.
+    """
+    rows = track.valid
+    for name, values, unit in zip(("u", "v", "r"), nu.T, ("m/s", "m/s", "rad/s"), strict=True):
+        if np.ptp(values[rows]) == 0.0:
+            raise FerryIdError(
+                f"{track.log}: constant signal {name}, needed by the fit, found {values[rows][0]:g} {unit} throughout. "
+                "Fix: check that the profile maps the right field, or use a log in which the vessel moves in every axis"
+            )
+    if np.all(np.ptp(tau[rows], axis=0) == 0.0):
+        force = ", ".join(f"{value:g}" for value in tau[rows][0])
+        raise FerryIdError(
+            f"{track.log}: constant signal, the applied force never changes, found ({force}) N, N, N·m throughout. "
+            "Fix: check the actuator signals in the profile, or use a log in which the actuators are used"
+        )
+
+
+def cross_checks(track: Track) -> tuple[str, ...]:
+    """Return sentences on kinematic contradictions: yaw rate against heading, velocity against position.
+
+    Changes over two seconds are compared with the integrals of the rates, so that no noisy derivative is formed.
+    Nothing is corrected here.
+    """
+    columns = track.columns
+    span = max(2, round(2.0 * track.rate_hz))
+    said: list[str] = []
+    if "psi" in columns and "r" in columns:
+        turned, integrated = _changes(np.diff(columns["psi"]), columns["r"], track, span)
+        said += _compare("yaw rate", "heading", turned, integrated, 0.035, _YAW_RATE_GAINS)
+    if {"x", "y", "psi", "u", "v"} <= set(columns):
+        north, east = np.diff(columns["x"]), np.diff(columns["y"])
+        psi = (columns["psi"][1:] + columns["psi"][:-1]) / 2
+        c, s = np.cos(psi), np.sin(psi)
+        ahead, u = _changes(c * north + s * east, columns["u"], track, span)
+        aside, v = _changes(c * east - s * north, columns["v"], track, span)
+        said += _compare("surge velocity", "position", ahead, u, 0.5, _SPEED_GAINS)
+        said += _compare("sway velocity", "position", aside, v, 0.5, _SPEED_GAINS)
+    return tuple(said)
+
+
+_YAW_RATE_GAINS = (
+    (np.pi / 180, "it looks like degrees per second that are read as rad/s"),
+    (180 / np.pi, "it looks like rad/s that are read as degrees per second"),
+)
+_SPEED_GAINS = (
+    (0.514444, "it looks like knots that are read as m/s"),
+    (1 / 0.514444, "it looks like m/s that are read as knots"),
+    (1 / 3.6, "it looks like km/h that are read as m/s"),
+)
+
+
+def _compare(
+    rate: str, of: str, change: Floats, integral: Floats, least: float, known: tuple[tuple[float, str], ...]
+) -> list[str]:
+    if change.size < 10 or np.sqrt(np.mean(change**2)) < least or not np.any(integral):
+        return []
+    both = float(change @ integral)
+    gain = both / float(integral @ integral)
+    correlation = both / float(np.sqrt((change @ change) * (integral @ integral)))
+    numbers = f"gain {gain:.3g}, correlation {correlation:.2f}"
+    if abs(correlation) < 0.5:
+        return [f"The {rate} does not follow the {of} ({numbers}): check topic, frame and clocks."]
+    sign = "has the wrong sign against" if gain < 0 else ""
+    size = next((text for value, text in known if abs(abs(gain) / value - 1.0) < 0.15), "")
+    if sign:
+        return [f"The {rate} {sign} the {of} ({numbers})" + (f", and {size}." if size else ".")]
+    if abs(gain - 1.0) > 0.1:
+        return [f"The {rate} does not match the {of} ({numbers})" + (f": {size}." if size else ".")]
+    return []
+
+
+def _changes(step: Floats, rate: Floats, track: Track, span: int) -> tuple[Floats, Floats]:
+    """Return changes of a signal and integrals of its rate over windows of `span` rows inside measured data."""
+    area = (rate[1:] + rate[:-1]) / (2 * track.rate_hz)
+    good = np.isfinite(step) & np.isfinite(area) & track.valid[1:] & track.valid[:-1]
+    count = (good.size // span) * span
+    whole = good[:count].reshape(-1, span).all(axis=1)
+    change = step[:count].reshape(-1, span)[whole].sum(axis=1)
+    integral = area[:count].reshape(-1, span)[whole].sum(axis=1)
+    return change, integral
+
+
+def _longest(flags: Flags, times: Floats) -> float:
+    """Return the longest time [s] over which consecutive flags are set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    if edges.size == 0:
+        return 0.0
+    return float(np.max(times[edges[1::2]] - times[edges[::2]]))
+
+
+def _spikes(name: str, times: Floats, known: Floats, step: Floats) -> tuple[NDArray[np.int64], int]:
+    """Return the samples that are isolated spikes, and the number of implausible steps that are not."""
+    stride = max(1, step.size // _MEDIAN_OF)
+    some = np.abs(step[::stride])
+    some = some[some > 0.0]
+    noise = 1.4826 * float(np.median(some)) if some.size else 0.0
+    interval = np.diff(times)
+    usual = float(np.median(interval[::stride]))
+    if name in _IMPLAUSIBLE:
+        floor, per_second = _IMPLAUSIBLE[name]
+    else:
+        low, high = np.quantile(known[::stride], [0.01, 0.99])
+        floor, per_second = _IMPLAUSIBLE_SHARE * float(high - low), 0.0
+        if floor == 0.0:
+            return np.empty(0, dtype=np.int64), 0
+    stretch = np.maximum(1.0, interval / usual) if usual > 0 else np.ones_like(interval)
+    limit = np.maximum(_SPIKE_NOISES * noise * stretch, floor + per_second * interval)
+    large = np.abs(step) > limit
+    if not large.any():
+        return np.empty(0, dtype=np.int64), 0
+    out, back = step[:-1], step[1:]
+    returns = np.abs(out + back) < 0.5 * np.minimum(np.abs(out), np.abs(back))
+    peaks = np.flatnonzero(large[:-1] & large[1:] & (out * back < 0) & returns) + 1
+    apart = np.diff(peaks, prepend=-10, append=known.size + 10) > 3
+    single = peaks[apart[:-1] & apart[1:]]
+    if single.size > _SPIKES_AT_MOST * known.size and single.size > 1:
+        single = single[:0]
+    if is_actuator(name):
+        # An actuator may well step; only what comes straight back is implausible.
+        return single, int(peaks.size - single.size)
+    return single, int(np.count_nonzero(large) - 2 * single.size)

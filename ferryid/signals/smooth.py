@@ -1,0 +1,296 @@
+"""Smoothing and differentiation of the velocities, and the applied force smoothed alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.signals.align import segments
+from ferryid.signals.kalman import fit_levels, smooth_runs
+from ferryid.signals.quality import require_excited
+from ferryid.signals.track import Motion, Track
+from ferryid.vessel import applied_force
+from ferryid.vessel.hull import current_in_body
+from ferryid.vessel.profile import Profile
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SMOOTHERS = ("square", "savgol", "kalman")
+_POLYNOMIAL = 3
+_WEATHER_SHARE = 0.8
+"""Wind or current is used where it was measured on this share of the rows; fewer, and it is left out."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Unsmoothed motion and forces of one log: what smoothing needs, worked out once for many windows.
+
+    Attributes are those of `Motion`; `usable` marks rows on which everything was measured.
+    """
+
+    log: str
+    t: Floats
+    rate_hz: float
+    eta: Floats
+    nu: Floats
+    tau: Floats
+    usable: Flags
+    tau_d: Floats | None
+    wind: Floats | None
+    current: Floats | None
+    repairs: tuple[str, ...]
+
+
+def smooth(track: Track, profile: Profile, window_s: float, smoother: str = "square") -> Motion:
+    """Smooth one log and differentiate its velocities.
+
+    Position, velocity, applied and commanded force, wind and current all pass through the same zero-phase filter, so
+    that force and motion stay comparable; the force is formed before, from unsmoothed actuator signals.
+
+    Parameters
+    ----------
+    track
+        Aligned signals.
+    profile
+        Turns actuator signals into forces.
+    window_s
+        Window [s]; 0 leaves the signals as they are.
+    smoother
+        ``"square"``: centred moving average over an odd number of rows, then the central difference, thesis (4.8).
+        ``"savgol"``: local cubic over the window (at least 5 rows), and its slope. ``"kalman"``: fixed-interval
+        smoother of a constant-acceleration model per axis, its noise found by maximum likelihood and its equivalent
+        window kept at `window_s` or above, since the noise of a navigation filter is coloured and likelihood takes
+        slow noise for motion.
+
+    Returns
+    -------
+    Motion
+        `valid` only where the whole window lies inside measured data.
+
+    Raises
+    ------
+    FerryIdError
+        For an unknown smoother, a window longer than every unbroken stretch, or constant signals.
+    """
+    return smooth_measured(measure(track, profile), window_s, smoother)
+
+
+def measure(track: Track, profile: Profile) -> Measured:
+    """Return unsmoothed velocities and forces of a track.
+
+    Raises
+    ------
+    FerryIdError
+        Where velocities or the applied force never change.
+    """
+    columns, n = track.columns, track.t.size
+    nothing = np.full(n, np.nan)
+    nu = np.column_stack([columns[name] for name in ("u", "v", "r")])
+    eta = np.column_stack([columns.get(name, nothing) for name in ("x", "y", "psi")])
+    repairs = list(track.repairs)
+    usable = track.valid.copy()
+    wind, current = (
+        _weather(track, columns.get(f"{what}_N"), columns.get(f"{what}_E"), what, usable, repairs)
+        for what in ("wind", "current")
+    )
+    through_water = nu if current is None else nu - current_in_body(current, eta[:, 2])
+    tau, notes = applied_force(profile, columns, through_water)
+    repairs.extend(notes)
+    tau_d = None
+    if {"X_d", "Y_d", "N_d"} <= set(columns):
+        tau_d = np.column_stack([columns[name] for name in ("X_d", "Y_d", "N_d")])
+    usable &= np.isfinite(nu).all(axis=1) & np.isfinite(tau).all(axis=1)
+    if not usable.any():
+        raise FerryIdError(
+            f"{track.log}: no row has both velocity and applied force, found {np.count_nonzero(track.valid)} aligned "
+            "rows. Fix: check the actuator signals in the profile"
+        )
+    require_excited(track, nu, tau)
+    return Measured(track.log, track.t, track.rate_hz, eta, nu, tau, usable, tau_d, wind, current, tuple(repairs))
+
+
+def smooth_measured(measured: Measured, window_s: float, smoother: str = "square") -> Motion:
+    """Smooth what `measure` returned; see `smooth`."""
+    if smoother not in SMOOTHERS:
+        raise FerryIdError(
+            f'settings: there is no smoother called "{smoother}".{did_you_mean(smoother, SMOOTHERS)} '
+            f"Fix: choose one of {', '.join(SMOOTHERS)}"
+        )
+    rate = measured.rate_hz
+    rows = odd_rows(window_s, rate)
+    # Refused before any work, and again below where a smoother needs more than was asked for.
+    _within(measured, rows // 2)
+    parts = _columns(measured)
+    stacked = np.hstack(list(parts.values()))
+    if smoother == "square":
+        smoothed = moving_mean(stacked, rows)
+        nu_dot = central_difference(smoothed[:, :3], rate)
+        # The difference reaches one row further than the average on both sides.
+        half = rows // 2 + 1
+        said = _told(smoother, rows, window_s, rate)
+    elif smoother == "savgol":
+        rows = max(rows, _POLYNOMIAL + 2)
+        value, slope = local_polynomial(rows, _POLYNOMIAL)
+        smoothed, nu_dot = correlate(stacked, value), correlate(stacked[:, :3], slope * rate)
+        half = rows // 2
+        said = _told(smoother, rows, window_s, rate)
+    else:
+        levels = fit_levels(measured.nu, segments(measured.usable), rate, window_s)
+        axes = [axis for name in parts for axis in _AXIS_OF[name]]
+        smoothed, nu_dot = smooth_runs(stacked, axes, levels, rate)
+        half = max(1, round(max(level.window_s for level in levels) * rate / 2))
+        said = "Smoothing: Kalman smoother, constant acceleration; " + ", ".join(
+            f"{name} noise {level.noise:.2g} {unit}, equivalent window {level.window_s:.2g} s"
+            for name, unit, level in zip(("surge", "sway", "yaw"), ("m/s", "m/s", "rad/s"), levels, strict=True)
+        )
+    valid = _within(measured, half)
+    ends = np.cumsum([part.shape[1] for part in parts.values()])[:-1]
+    done = dict(zip(parts, np.hsplit(smoothed, ends), strict=True))
+    return Motion(
+        log=measured.log,
+        t=measured.t,
+        rate_hz=rate,
+        eta=done["eta"],
+        nu=done["nu"],
+        nu_dot=nu_dot,
+        tau=done["tau"],
+        valid=valid,
+        raw_nu=measured.nu,
+        tau_d=done.get("tau_d"),
+        wind=done.get("wind"),
+        current=done.get("current"),
+        repairs=(*measured.repairs, said),
+    )
+
+
+def odd_rows(window_s: float, rate_hz: float) -> int:
+    """Return the odd number of rows nearest to a window; 1 for none."""
+    return 2 * int(np.floor(window_s * rate_hz / 2)) + 1
+
+
+def moving_mean(values: Floats, rows: int) -> Floats:
+    """Return the centred moving average, shape (n, c); NaN where the window leaves the data or meets a NaN.
+
+    Each window is the tail of one block of `rows` samples and the head of the next, both summed within their block.
+    Nothing is ever subtracted, so that no digits are lost however long the log or large the offset, and a NaN spoils
+    only the windows that hold it.
+
+    Parameters
+    ----------
+    values
+        Shape (n, c). Not changed.
+    rows
+        Odd number of samples in a window.
+    """
+    n, c = values.shape
+    result = np.full((c, n), np.nan)
+    if n >= rows:
+        blocks = -(-n // rows)
+        # Samples of a block lie along the first axis: its sums then run over whole contiguous lines of blocks.
+        padded = np.zeros((c, blocks * rows))
+        padded[:, :n] = values.T
+        head = padded.reshape(c, blocks, rows).transpose(0, 2, 1).copy()
+        tail = head.copy()
+        for i in range(1, rows):
+            head[:, i] += head[:, i - 1]
+            tail[:, rows - 1 - i] += tail[:, rows - i]
+        # A window that begins at sample j > 0 of a block ends at sample j - 1 of the next.
+        tail[:, 1:, :-1] += head[:, :-1, 1:]
+        sums = tail.transpose(0, 2, 1).reshape(c, blocks * rows)
+        half = rows // 2
+        result[:, half : n - half] = sums[:, : n - 2 * half] / rows
+    return result.T
+
+
+def central_difference(values: Floats, rate_hz: float) -> Floats:
+    """Return the slope between the rows before and after, shape (n, c); NaN in the first and last row."""
+    slope = np.full_like(values, np.nan)
+    slope[1:-1] = (values[2:] - values[:-2]) * (rate_hz / 2)
+    return slope
+
+
+def local_polynomial(rows: int, degree: int) -> tuple[Floats, Floats]:
+    """Return weights for value and slope per row of a least-squares polynomial at its centre, shape (rows,) each.
+
+    Savitzky and Golay (1964).
+    """
+    half = rows // 2
+    # On (-1, 1) the powers stay well conditioned for any window.
+    place = np.arange(-half, half + 1) / half
+    fit = np.linalg.pinv(np.vander(place, degree + 1, increasing=True))
+    return fit[0], fit[1] / half
+
+
+def correlate(values: Floats, weights: Floats) -> Floats:
+    """Return the weighted sums of the rows around each row, shape (n, c); NaN where they leave the data."""
+    result = np.full_like(values, np.nan)
+    half = weights.size // 2
+    if len(values) >= weights.size:
+        for i, column in enumerate(values.T):
+            result[half : len(values) - half, i] = np.convolve(column, weights[::-1], "valid")
+    return result
+
+
+_AXIS_OF = {
+    "nu": (0, 1, 2),
+    "tau": (0, 1, 2),
+    "eta": (0, 1, 2),
+    "tau_d": (0, 1, 2),
+    "wind": (0, 0),
+    "current": (0, 0),
+}
+"""Which axis's smoother each column goes through; every equation of motion is then filtered as a whole."""
+
+
+def _columns(measured: Measured) -> dict[str, Floats]:
+    parts = {name: getattr(measured, name) for name in _AXIS_OF}
+    return {name: part for name, part in parts.items() if part is not None}
+
+
+def _told(smoother: str, rows: int, window_s: float, rate_hz: float) -> str:
+    if rows == 1:
+        return "Smoothing: none (window 0)."
+    said = f"Smoothing: {smoother} window of {rows} rows, {rows / rate_hz:.3g} s at {rate_hz:g} Hz"
+    if abs(rows / rate_hz - window_s) > 1e-9:
+        said += f" (asked for {window_s:g} s; the number of rows must be odd)"
+    return said + "."
+
+
+def _within(measured: Measured, half: int) -> Flags:
+    """Return the rows with `half` usable rows on either side."""
+    usable = measured.usable
+    valid = np.zeros_like(usable)
+    stretches = segments(usable)
+    for stretch in stretches:
+        valid[stretch.start + half : max(stretch.start + half, stretch.stop - half)] = True
+    if not valid.any():
+        longest = max(stretch.stop - stretch.start for stretch in stretches) / measured.rate_hz
+        needed = (2 * half + 1) / measured.rate_hz
+        raise FerryIdError(
+            f"{measured.log}: log shorter than the smoothing window, found {longest:.2f} s unbroken where "
+            f"{needed:.2f} s are needed. Fix: use a longer log or a shorter --window"
+        )
+    return valid
+
+
+def _weather(
+    track: Track, north: Floats | None, east: Floats | None, what: str, usable: Flags, repairs: list[str]
+) -> Floats | None:
+    """Return wind or current, and take rows without it out of `usable`; None where there is (nearly) none."""
+    if north is None or east is None:
+        return None
+    flow = np.column_stack([north, east])
+    known: Flags = np.all(np.isfinite(flow), axis=1)
+    share = float(np.mean(known[track.valid])) if track.valid.any() else 0.0
+    if share < _WEATHER_SHARE:
+        repairs.append(f"The {what} was measured on {100 * share:.0f} % of the rows only and is left out.")
+        return None
+    lost = int(np.count_nonzero(usable & ~known))
+    if lost:
+        repairs.append(f"{lost} rows ({lost / track.rate_hz:.1f} s) are not used: the {what} was not measured.")
+    usable &= known
+    return flow
