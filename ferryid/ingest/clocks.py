@@ -166,7 +166,8 @@ def _shifted(
         return time_ns, rows, report
     zone = " (a time zone?)" if shift_ns % _QUARTER_HOUR_NS == 0 else ""
     side = "behind" if shift_ns > 0 else "ahead of"
-    note = f"the sender's clock is {_span_text(abs(shift_ns))} {side} the recorder's{zone}: stamps are shifted onto the latter"
+    span = _span_text(abs(shift_ns))
+    note = f"the sender's clock is {span} {side} the recorder's{zone}: stamps are shifted onto the recorder's"
     gaps = tuple((start + shift_ns, end + shift_ns) for start, end in report.gaps)
     return (
         time_ns + np.int64(shift_ns),
@@ -188,7 +189,7 @@ def _one_topic(receive_ns: Nanoseconds, stamp_ns: Nanoseconds | None) -> tuple[N
     """Repair one topic, its stamps not yet shifted to the recorder's base."""
     receive = np.ascontiguousarray(receive_ns, dtype=np.int64)
     if stamp_ns is None:
-        return _ordered(receive, "receive", ("no header: receive times are used",), drop_far_side=True)
+        return _ordered(receive, "receive", ("no header stamps: receive times are used",), drop_far_side=True)
     stamp = np.ascontiguousarray(stamp_ns, dtype=np.int64)
     reason, notes, stamp, facts = _judge(receive, stamp)
     if reason:

@@ -96,8 +96,6 @@ def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> T
         notes.append(plan.note)
     elif not plan.stamp and guess_stamp(names):
         notes.append(f'the profile maps no stamp, though column "{guess_stamp(names)[0]}" looks like one')
-    if not plan.stamp:
-        notes.append("receive times only: no stamp columns")
     fields = {name: _type_of(sample[name], shape.decimal) for name in names}
     start, end = _span(shape, names, plan, tail, encoding)
     lines_in_file = _count_lines(path, size)

@@ -16,7 +16,7 @@ UNIT_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
 _DATETIME = re.compile(r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T]\d{2}:\d{2}:\d{2}([.,]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$")
 _TIME_NAME = re.compile(
     r"%?(rosbag|log|gps|unix|epoch|utc|receive|recv|elapsed|rec)?[ _.]*"
-    r"(t|tvec|time|timestamp|stamp|times|date|datetime|date[ _]?time|utc)(?:[ _.]*(\d|abs|rel|utc))?$"
+    r"(t|tvec|time|timestamp|stamp|times|date|datetime|date[ _]?time|utc|sec|secs|seconds|zeit|tid|temps)(?:[ _.]*(\d|abs|rel|utc))?$"
 )
 _UNIT_WORD = re.compile(
     r"(?: *[\[(] *|[ _.]+)(s|sec|secs|seconds?|ms|msec|millis|us|usec|micros|ns|nsec|nanos) *[\])]?$"
@@ -70,7 +70,8 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
     for name, values in sample.items():
         if values and all(looks_like_datetime(value) for value in values):
             return _plan(sample, name, "datetime", "date and time")
-    name = next(iter(sample), "")
+    # Without a name the first column may be the time; one with a name says that it is something else.
+    name = next((one for one in sample if one == "column 1"), "")
     numbers = _rising(sample.get(name, ()), strict=True)
     # A row counter also rises: an unnamed first column of whole numbers from 0 or 1 in steps of one is no time.
     if numbers is None or (np.all(np.diff(numbers) == 1.0) and numbers[0] in (0.0, 1.0)):
@@ -182,11 +183,16 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
         counted = base * 1_000_000_000 + fraction * 10 ** (9 - longest)
         if np.sum(np.diff(counted[good]) < 0) < np.sum(np.diff(padded[good]) < 0):
             note = (
-                f"{int(short.sum())} of {rows} times have a fraction without its leading zeros "
+                f"{_share(int(short.sum()), rows)} of the times have a fraction without its leading zeros "
                 f"(an unpadded count of {_PREFIX[longest]}seconds): read as such"
             )
             padded = counted
     return np.where(good, padded, 0), good, note
+
+
+def _share(part: int, whole: int) -> str:
+    """A count, or percent where it is more than one in a hundred."""
+    return f"{100 * part / whole:.0f} %" if part * 100 > whole else str(part)
 
 
 def _zone_offset_s(

@@ -11,6 +11,8 @@ from ferryid.ingest.log import Format, Loss, TableLayout
 from ferryid.ingest.table_text import TextSheet, open_text
 from ferryid.ingest.tables import TableReader
 
+_BAG_SUFFIXES = (".bag", ".bag.active", ".mcap", ".mcap.zstd", ".db3", ".db3.zstd")
+
 
 def _files(folder: Path) -> Iterator[Path]:
     """CSV files of the folder and of folders in it, hidden ones left out, in a fixed order."""
@@ -19,7 +21,9 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return path.is_dir() and next(_files(path), None) is not None
+    if not path.is_dir() or any(name.endswith(_BAG_SUFFIXES) for name in (file.name for file in path.iterdir())):
+        return False  # notes in a CSV beside bags do not make the bags a table
+    return next(_files(path), None) is not None
 
 
 def _open(path: Path, layout: TableLayout | None) -> TableReader:
@@ -37,7 +41,17 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
             f"{path}: none of the {len(losses)} CSV files in this folder is a table with a time column; "
             f"{losses[0].file}: {losses[0].what}"
         )
+    if len(sheets) > 1 and len({sheet.names for sheet in sheets}) == 1 and _are_relative(sheets):
+        note = f"{len(sheets)} files with the same columns: if they are separate runs, pass each file by itself"
+        sheets = [
+            replace(s, topic=replace(s.topic, note="; ".join(filter(None, (s.topic.note, note))))) for s in sheets
+        ]
     return TableReader(sheets, losses)
+
+
+def _are_relative(sheets: list[TextSheet]) -> bool:
+    """True where every file counts its time from its own start (before 1973 as an epoch)."""
+    return all(sheet.topic.end_ns is not None and sheet.topic.end_ns < 10**17 for sheet in sheets)
 
 
 def _sheet(file: Path, layout: TableLayout | None, topic: str) -> TextSheet:

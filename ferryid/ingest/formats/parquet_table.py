@@ -75,8 +75,6 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
     if plan is None:
         plan = _guess(path, file, fields)
         notes.append(plan.note)
-    if not plan.stamp:
-        notes.append("receive times only: no stamp columns")
     times, good, _ = to_ns(column_from_arrow(_read(path, [plan.column]).column(plan.column)), plan.unit)
     topic = Topic(
         name="table",

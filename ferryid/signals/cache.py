@@ -1,0 +1,236 @@
+"""Recordings kept as Parquet under ``out/logs``: found again while log, profile and ferryid are unchanged."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ferryid import __version__
+from ferryid.errors import FerryIdError
+from ferryid.ingest.clocks import ClockReport
+from ferryid.ingest.log import Loss, Topic
+from ferryid.signals.parquet import TIME_COLUMNS, read_table, unit_of, write_table
+from ferryid.signals.stream import Recording, Stream
+from ferryid.vessel.profile import Profile
+
+SCHEMA = "ferryid.recording/1"
+_NOTE = "recording.json"
+
+
+def folder_of(out: Path, name: str, sha256: str, profile_sha256: str) -> Path:
+    """Folder of one recording: ``out/logs/<name>-<hash of the log>-<hash of the profile>``."""
+    return out / "logs" / f"{name}-{sha256.rpartition(':')[2][:8]}-{profile_sha256[:8]}"
+
+
+def signatures(paths: Sequence[Path]) -> list[list[Any]]:
+    """Path, size, time of change and inode of every file, by which an unchanged file is recognised."""
+    result: list[list[Any]] = []
+    for path in paths:
+        state = path.stat()
+        result.append([str(path.resolve()), state.st_size, state.st_mtime_ns, state.st_ino])
+    return result
+
+
+def has_any(out: Path, name: str, profile: Profile) -> bool:
+    """True where some recording of that name and profile is kept, perhaps of another content."""
+    return next(_kept(out, name, profile), None) is not None
+
+
+def by_files(out: Path, name: str, path: str | Path, profile: Profile, *, verify: bool) -> Recording | None:
+    """Return the kept recording of a single, unchanged file without opening the log; None if there is none."""
+    file = Path(path)
+    if not file.is_file():
+        return None
+    try:
+        now = signatures([file])
+    except OSError:
+        return None  # whoever opens the log next says what is wrong with it
+    for folder, note in _kept(out, name, profile):
+        if note["files"] == now and (note["verified"] or not verify):
+            return load(folder)
+    return None
+
+
+def by_content(
+    out: Path, name: str, sha256: str, paths: Sequence[Path], profile: Profile, *, verify: bool
+) -> Recording | None:
+    """Return the kept recording of the same content whose files were touched or replaced; None if there is none."""
+    for folder, note in _kept(out, name, profile):
+        if note["recording"]["sha256"] == sha256 and (note["verified"] or not verify):
+            kept = load(folder)
+            return kept if kept.files == tuple(str(path) for path in paths) else None
+    return None
+
+
+def _kept(out: Path, name: str, profile: Profile) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Folders of this name and profile that this version of ferryid wrote, with their notes."""
+    for folder in sorted((out / "logs").glob(f"{_escaped(name)}-????????-{profile.sha256[:8]}")):
+        try:
+            note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue  # an incomplete folder counts as none and is replaced
+        if (
+            note.get("schema") == SCHEMA
+            and note.get("version") == __version__
+            and note["recording"]["profile_sha256"] == profile.sha256
+        ):
+            yield folder, note
+
+
+def _escaped(name: str) -> str:
+    return name.replace("[", "[[]")
+
+
+def store(out: Path, recording: Recording, files: list[list[Any]], *, verify: bool) -> Path:
+    """Write a recording to its folder: first under a temporary name, then renamed, so that it is whole or absent.
+
+    Raises
+    ------
+    FerryIdError
+        For a folder that cannot be written or a disk that is full.
+    """
+    folder = folder_of(out, recording.name, recording.sha256, recording.profile_sha256)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with _temporary(folder.parent, recording.name) as draft:
+            tables = {
+                topic: f"{number:03d}{_file_part(topic)}.parquet" for number, topic in enumerate(recording.streams)
+            }
+            _write_streams(draft, recording, tables)
+            note = {
+                "schema": SCHEMA,
+                "version": __version__,
+                "verified": verify,
+                "files": files,
+                "tables": tables,
+                "recording": _plain(recording),
+            }
+            (draft / _NOTE).write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
+            if folder.exists():
+                with _temporary(folder.parent, recording.name) as old:
+                    os.rename(folder, old / "replaced")
+            os.rename(draft, folder)
+    except OSError as error:
+        raise FerryIdError(
+            f"{folder}: the recording cannot be written ({error.strerror or error}). "
+            "Fix: free space or choose a writable folder with --out"
+        ) from error
+    return folder
+
+
+@contextlib.contextmanager
+def _temporary(parent: Path, name: str) -> Iterator[Path]:
+    """A folder that is gone afterwards, unless it was renamed."""
+    draft = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=parent))
+    draft.chmod(0o777 & ~_umask())
+    try:
+        yield draft
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _umask() -> int:
+    """The permissions that new folders of this process lack."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _write_streams(draft: Path, recording: Recording, tables: Mapping[str, str]) -> None:
+    origin = {
+        "version": __version__,
+        "log": recording.name,
+        "log_sha256": recording.sha256,
+        "profile": recording.profile_name,
+        "profile_sha256": recording.profile_sha256,
+    }
+
+    def write(stream: Stream) -> None:
+        columns: dict[str, Any] = {"time_ns": stream.time_ns}
+        if stream.receive_ns is not stream.time_ns:
+            columns["receive_ns"] = stream.receive_ns
+        columns |= stream.columns
+        metadata = {
+            **origin,
+            "topic": stream.topic,
+            "units": {name: unit_of(name) for name in columns},
+            "signals": {name: recording.found[name] for name in stream.columns if name in recording.found},
+            "clock": stream.clock.to_dict(),
+            "losses": [asdict(loss) for loss in recording.losses if loss.topic in (None, stream.topic)],
+        }
+        write_table(draft / tables[stream.topic], columns, metadata)
+
+    # Largest first, so that two threads end together.
+    ordered = sorted(recording.streams.values(), key=lambda one: -len(one.time_ns) * (2 + len(one.columns)))
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(write, ordered))
+
+
+def load(folder: Path) -> Recording:
+    """Read a recording that `store` wrote.
+
+    Raises
+    ------
+    FerryIdError
+        For a folder that is incomplete or damaged.
+    """
+    try:
+        note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise FerryIdError(
+            f"{folder}: this is no recording of ferryid ({error}). Fix: run ferryid ingest on the log again"
+        ) from error
+    plain = note["recording"]
+    with ThreadPoolExecutor(2) as pool:
+        tables = dict(
+            zip(note["tables"], pool.map(lambda name: read_table(folder / name), note["tables"].values()), strict=True)
+        )
+    streams = {}
+    for topic, (columns, _) in tables.items():
+        time_ns = columns["time_ns"]
+        signals = {name: values for name, values in columns.items() if name not in TIME_COLUMNS}
+        clock = ClockReport.from_dict(plain["clocks"][topic])
+        streams[topic] = Stream(topic, time_ns, signals, clock, columns.get("receive_ns", time_ns))
+    return Recording(
+        name=plain["name"],
+        files=tuple(plain["files"]),
+        sha256=plain["sha256"],
+        profile_name=plain["profile_name"],
+        profile_sha256=plain["profile_sha256"],
+        streams=streams,
+        topics=tuple(Topic(**topic) for topic in plain["topics"]),
+        losses=tuple(Loss(**loss) for loss in plain["losses"]),
+        found=plain["found"],
+        missing=plain["missing"],
+        notes=tuple(plain["notes"]),
+    )
+
+
+def _plain(recording: Recording) -> dict[str, Any]:
+    """Everything of a recording but its columns, for JSON."""
+    return {
+        "name": recording.name,
+        "files": list(recording.files),
+        "sha256": recording.sha256,
+        "profile_name": recording.profile_name,
+        "profile_sha256": recording.profile_sha256,
+        "clocks": {topic: stream.clock.to_dict() for topic, stream in recording.streams.items()},
+        "topics": [{**asdict(topic), "fields": dict(topic.fields)} for topic in recording.topics],
+        "losses": [asdict(loss) for loss in recording.losses],
+        "found": dict(recording.found),
+        "missing": dict(recording.missing),
+        "notes": list(recording.notes),
+    }
+
+
+def _file_part(topic: str) -> str:
+    """The topic in a form that every file system takes."""
+    return "".join(c if c.isalnum() else "_" for c in topic if c.isascii())[:80]

@@ -1,0 +1,122 @@
+"""What is known about the quality of one recording, as plain data for `inspect`, models and reports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ferryid.ingest.log import Loss
+from ferryid.signals.parquet import unit_of
+from ferryid.signals.quality import clean, is_angle, unwrapped
+from ferryid.signals.stream import Recording, Stream
+from ferryid.signals.track import Motion, Track
+
+
+def data_quality(recording: Recording, track: Track | Motion | None = None) -> dict[str, Any]:
+    """Collect clocks, losses, and findings on every signal of a recording.
+
+    Parameters
+    ----------
+    recording
+        Signals at their own rates.
+    track
+        What was made of them, whose repairs are told as well.
+
+    Returns
+    -------
+    dict
+        For JSON: ``files``, ``sha256``, ``profile``, ``profile_sha256``, ``duration_s``, ``streams`` (topic to ``clock``
+        and ``signals``), ``losses``, ``found``, ``missing`` and ``remarks`` (sentences, the whole story for a person).
+    """
+    streams = {topic: stream_quality(stream) for topic, stream in recording.streams.items()}
+    return {
+        "files": list(recording.files),
+        "sha256": recording.sha256,
+        "profile": recording.profile_name,
+        "profile_sha256": recording.profile_sha256,
+        "duration_s": (recording.end_ns - recording.start_ns) * 1e-9,
+        "streams": streams,
+        "losses": [plain_loss(loss) for loss in recording.losses],
+        "found": dict(recording.found),
+        "missing": dict(recording.missing),
+        "remarks": remarks(recording, track.repairs if track is not None else ()),
+    }
+
+
+def stream_quality(stream: Stream) -> dict[str, Any]:
+    """Return the clock of one stream and, per signal, its range and its missing, held and implausible samples."""
+    time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
+    signals = {}
+    for name, values in stream.columns.items():
+        _, found = clean(name, time_s, unwrapped(values) if is_angle(name) else values)
+        finite = values[np.isfinite(values)]
+        signals[name] = {
+            "unit": unit_of(name),
+            "minimum": float(finite.min()) if len(finite) else None,
+            "maximum": float(finite.max()) if len(finite) else None,
+            **{key: value for key, value in asdict(found).items() if key != "name"},
+        }
+    return {"clock": stream.clock.to_dict(), "signals": signals}
+
+
+def remarks(recording: Recording, repairs: Sequence[str] = ()) -> list[str]:
+    """Return everything a user should know of a recording as sentences, losses first, each once."""
+    told = [f"Lost: {loss_sentence(loss)}" for loss in recording.losses]
+    told += recording.notes
+    told += grouped_notes({topic: stream.clock.notes for topic, stream in recording.streams.items()})
+    for topic, stream in recording.streams.items():
+        told += [f"{topic}: {counted}" for counted in _counted(stream)]
+    told += [f"{quantity} is missing: {reason}" for quantity, reason in recording.missing.items()]
+    told += repairs
+    return list(dict.fromkeys(told))
+
+
+def _counted(stream: Stream) -> list[str]:
+    clock = stream.clock
+    told = []
+    if clock.out_of_order:
+        told.append(f"{clock.out_of_order} rows out of order were sorted into place.")
+    if clock.duplicates:
+        told.append(f"{clock.duplicates} rows repeat the time of another and were left out.")
+    if clock.gaps:
+        lengths = [(end - start) * 1e-9 for start, end in clock.gaps]
+        told.append(
+            f"{len(lengths)} gaps in the recording, the longest {max(lengths):.2f} s, {sum(lengths):.1f} s in all."
+        )
+    return told
+
+
+def grouped_notes(notes: Mapping[str, Sequence[str]]) -> list[str]:
+    """Join the same note on several topics to one sentence that names at most three of them."""
+    topics: dict[str, list[str]] = {}
+    for topic, sentences in notes.items():
+        for sentence in sentences:
+            topics.setdefault(sentence, []).append(topic)
+    told = []
+    for sentence, names in topics.items():
+        told.append(f"{named(names)}: {sentence}.")
+    return told
+
+
+def named(topics: Sequence[str]) -> str:
+    """Name at most three topics, and count the others."""
+    return ", ".join(topics[:3]) + (f" and {len(topics) - 3} more" if len(topics) > 3 else "")
+
+
+def plain_loss(loss: Loss) -> dict[str, Any]:
+    """Return a loss for JSON, its length in seconds added."""
+    return {**asdict(loss), "seconds": loss.seconds}
+
+
+def loss_sentence(loss: Loss) -> str:
+    """Return a loss as one sentence: file, topic, what, how many messages and seconds."""
+    name = loss.file.rpartition("/")[2]
+    topic = f" {loss.topic}" if loss.topic else ""
+    amount = [f"{loss.messages} messages" if loss.messages is not None else "", ""]
+    if loss.seconds is not None:
+        amount[1] = f"{loss.seconds:.3f} s"
+    size = ", ".join(part for part in amount if part)
+    return f"{name}{topic}: {loss.what.rstrip('.')}" + (f" ({size})." if size else ".")

@@ -1,0 +1,218 @@
+"""What is in a log: topics, rates, gaps, clocks, losses, and which signals a vessel profile finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest import open_log, supported_formats
+from ferryid.ingest.clocks import ClockReport, repair_all
+from ferryid.ingest.hashing import content_hash
+from ferryid.ingest.log import Reader, Series, Topic
+from ferryid.signals.data_quality import grouped_notes, plain_loss, remarks, stream_quality
+from ferryid.signals.recording import log_name, make_recording, name_of
+from ferryid.signals.render import render_inspect
+from ferryid.vessel.load import bundled, load_profile
+from ferryid.vessel.profile import Profile
+from ferryid.vessel.signal_map import Selection, select, survey
+
+__all__ = ["inspect", "render_inspect"]
+
+SCHEMA = "ferryid.inspect/1"
+_BULKY = ("uint8", "int8", "byte", "char", "octet", "float32", "float64", "uint16", "int16", "bytes")
+_EPOCH_NS = 10**17
+"""Times below (1973) are counted from the start of the log, not from 1970."""
+
+
+def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = False) -> dict[str, Any]:
+    """List what a log holds, and what a vessel profile makes of it.
+
+    Parameters
+    ----------
+    path
+        Log in any supported format; parts of one recording joined by ``+``.
+    profile
+        Vessel profile whose signals are looked for; without one all bundled profiles are tried.
+    verify
+        Read the whole log, check every checksum and hash every byte.
+
+    Returns
+    -------
+    dict
+        For JSON, schema ``ferryid.inspect/1``.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be opened.
+    """
+    reader = open_log(path, profile.table if profile is not None else None)
+    with ThreadPoolExecutor(1) as pool:
+        hashing = pool.submit(content_hash, reader.paths, verify=verify)
+        selection = survey(profile, reader.topics) if profile is not None else None
+        wanted: dict[str, Sequence[str]] = {topic.name: () for topic in reader.topics if _is_small(topic)}
+        wanted |= selection.wanted if selection is not None else {}
+        series, problems = _read(reader, wanted, verify=verify)
+        repaired = repair_all(series)
+        vessel = None
+        if profile is not None and selection is not None:
+            vessel = _vessel(reader, log_name(path), profile, selection, series, repaired)
+        sha256 = hashing.result()
+    notes = grouped_notes({topic.name: topic.note.split("; ") for topic in reader.topics if topic.note})
+    notes += grouped_notes({topic: report.notes for topic, (_, _, report) in repaired.items()})
+    starts = [topic.start_ns for topic in reader.topics if topic.start_ns is not None]
+    ends = [topic.end_ns for topic in reader.topics if topic.end_ns is not None]
+    return {
+        "schema": SCHEMA,
+        "path": str(path),
+        "name": log_name(path),
+        "format": _format_of(Path(path), reader),
+        "files": [{"path": str(file), "bytes": _size(file)} for file in reader.paths],
+        "sha256": sha256,
+        "start": _clock_time(min(starts)) if starts else None,
+        "duration_s": (max(ends) - min(starts)) * 1e-9 if starts and ends else 0.0,
+        "messages": sum(topic.count for topic in reader.topics),
+        "topics": [
+            _topic(topic, repaired[topic.name][2] if topic.name in repaired else None, problems)
+            for topic in sorted(reader.topics, key=lambda one: one.name)
+        ],
+        "losses": [plain_loss(loss) for loss in reader.losses],
+        "notes": notes,
+        "vessel": vessel,
+        "bundled": _bundled_matches(path, reader) if profile is None else [],
+    }
+
+
+def _is_small(topic: Topic) -> bool:
+    """True for messages whose times are cheap to read: known layout, and no long sequence of numbers in it."""
+    return bool(topic.fields) and not any(
+        name.endswith("[]") and kind.startswith(_BULKY) for name, kind in topic.fields.items()
+    )
+
+
+def _read(
+    reader: Reader, wanted: Mapping[str, Sequence[str]], *, verify: bool
+) -> tuple[dict[str, Series], dict[str, str]]:
+    """Read everything at once, or where one topic cannot be read, each by itself."""
+    try:
+        return reader.read(wanted, verify=verify), {}
+    except FerryIdError:
+        series: dict[str, Series] = {}
+        problems: dict[str, str] = {}
+        for topic, fields in wanted.items():
+            try:
+                series |= reader.read({topic: fields}, verify=verify)
+            except FerryIdError as error:
+                problems[topic] = str(error)
+        return series, problems
+
+
+def _topic(topic: Topic, clock: ClockReport | None, problems: Mapping[str, str]) -> dict[str, Any]:
+    duration = (
+        (topic.end_ns - topic.start_ns) * 1e-9 if topic.start_ns is not None and topic.end_ns is not None else 0.0
+    )
+    rate = clock.rate_hz if clock is not None else (topic.count - 1) / duration if duration > 0 else float("nan")
+    why = ""
+    if clock is None:
+        why = problems.get(
+            topic.name, "large messages: header stamps were not read" if topic.fields else "unknown layout"
+        )
+    return {
+        "name": topic.name,
+        "type": topic.type,
+        "encoding": topic.encoding,
+        "count": topic.count,
+        "rate_hz": float(rate) if np.isfinite(rate) else None,
+        "duration_s": duration,
+        "start_ns": topic.start_ns,
+        "end_ns": topic.end_ns,
+        "fields": dict(topic.fields),
+        "note": topic.note,
+        "clock": clock.to_dict() if clock is not None else None,
+        "clock_unknown": why,
+    }
+
+
+def _vessel(
+    reader: Reader,
+    name: str,
+    profile: Profile,
+    selection: Selection,
+    series: Mapping[str, Series],
+    repaired: Mapping[str, Any],
+) -> dict[str, Any]:
+    """What the profile makes of the log: signals with their ranges, and why it would refuse the log, if it would."""
+    usable, problem = True, ""
+    try:
+        select(profile, reader.topics, name_of(reader))
+    except FerryIdError as error:
+        usable, problem = False, str(error)
+    streams: dict[str, Any] = {}
+    told: list[str] = []
+    wanted = {topic: fields for topic, fields in selection.wanted.items() if topic in series}
+    if wanted:
+        try:
+            kept = replace(selection, wanted=wanted)
+            recording = make_recording(reader, name, profile, kept, series, repaired)
+            streams = {topic: stream_quality(one) for topic, one in recording.streams.items() if len(one.time_ns)}
+            told = remarks(replace(recording, losses=(), notes=selection.notes, streams={}, missing={}))
+        except FerryIdError as error:
+            usable, problem = False, problem or str(error)
+    return {
+        "name": profile.name,
+        "sha256": profile.sha256,
+        "usable": usable,
+        "problem": problem,
+        "found": dict(selection.found),
+        "missing": dict(selection.missing),
+        "streams": streams,
+        "remarks": told,
+    }
+
+
+def _bundled_matches(path: str | Path, reader: Reader) -> list[dict[str, Any]]:
+    """How many of its signals every bundled profile finds in the log, best first, and whether it would take the log."""
+    is_table = any(topic.encoding == "table" for topic in reader.topics)
+    matches = []
+    for name in bundled():
+        profile = load_profile(name)
+        try:
+            # A table is named by the profile's own layout, so that it is opened the way the profile would.
+            topics = open_log(path, profile.table).topics if is_table and profile.table is not None else reader.topics
+            found = survey(profile, topics)
+            select(profile, topics, str(path))
+            usable = True
+        except FerryIdError:
+            usable = False
+            found = survey(profile, reader.topics)
+        of = len(profile.signals)
+        matches.append({"name": name, "usable": usable, "found": of - len(found.missing), "signals": of})
+    return sorted(matches, key=lambda one: (not one["usable"], -int(str(one["found"])), str(one["name"])))
+
+
+def _format_of(path: Path, reader: Reader) -> str:
+    """Name of the format that takes the log's folder, or else its first file, and the number of files."""
+    name = next((entry.name for entry in supported_formats() if path.is_dir() and entry.matches(path, b"")), "")
+    if not name and reader.paths:
+        first = reader.paths[0]
+        with first.open("rb") as file:
+            head = file.read(64)
+        name = next((entry.name for entry in supported_formats() if entry.matches(first, head)), "")
+    return f"{name}, {len(reader.paths)} files" if len(reader.paths) > 1 else name
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size
+
+
+def _clock_time(time_ns: int) -> str | None:
+    """A time since 1970 as ISO 8601 in UTC; None for one that is counted from the start of a log."""
+    if time_ns < _EPOCH_NS:
+        return None
+    return f"{np.datetime64(time_ns, 'ns')}Z"

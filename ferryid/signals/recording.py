@@ -1,0 +1,154 @@
+"""From a log to SI signals per topic: open, select, read, put on one clock, convert; cached as Parquet."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest import open_log
+from ferryid.ingest.clocks import ClockReport, Rows, repair_all
+from ferryid.ingest.hashing import content_hash
+from ferryid.ingest.log import Nanoseconds, Reader, Series, Topic
+from ferryid.signals import cache
+from ferryid.signals.data_quality import data_quality, grouped_notes
+from ferryid.signals.stream import Recording, Stream
+from ferryid.vessel.profile import Profile
+from ferryid.vessel.signal_map import Selection, convert, select
+
+__all__ = ["Recording", "Stream", "data_quality", "log_name", "make_recording", "name_of", "read_recording", "record"]
+
+
+def record(path: str | Path, profile: Profile, out: Path | None = None, *, verify: bool = False) -> Recording:
+    """Read the signals that a profile maps from one log.
+
+    Parameters
+    ----------
+    path
+        Log in any supported format; parts of one recording joined by ``+``.
+    profile
+        Vessel profile.
+    out
+        Output folder. With it the result is kept as Parquet under ``out/logs`` and taken from there as long as log,
+        profile and ferryid version are unchanged.
+    verify
+        Read the whole log, check every checksum and hash every byte, also of what is not mapped.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be used: no known format, a required signal that it lacks, no row, an unwritable `out`.
+    """
+    name = log_name(path)
+    if out is not None:
+        kept = cache.by_files(out, name, path, profile, verify=verify)
+        if kept is not None:
+            return kept
+    reader = open_log(path, profile.table)
+    with ThreadPoolExecutor(1) as pool:
+        hashing: Future[str] = pool.submit(content_hash, reader.paths, verify=verify)
+        if out is not None and cache.has_any(out, name, profile):
+            kept = cache.by_content(out, name, hashing.result(), reader.paths, profile, verify=verify)
+            if kept is not None:
+                return kept
+        signatures = cache.signatures(reader.paths)
+        recording = replace(read_recording(reader, name, profile, verify=verify), sha256=hashing.result())
+    if out is not None:
+        cache.store(out, recording, signatures, verify=verify)
+    return recording
+
+
+def read_recording(reader: Reader, name: str, profile: Profile, *, verify: bool = False) -> Recording:
+    """Decode, put on one clock and convert what a profile maps in an opened log; its hash is left empty.
+
+    Raises
+    ------
+    FerryIdError
+        As `record`.
+    """
+    selection = select(profile, reader.topics, name_of(reader))
+    series = reader.read(selection.wanted, verify=verify)
+    return make_recording(reader, name, profile, selection, series, repair_all(series))
+
+
+def make_recording(
+    reader: Reader,
+    name: str,
+    profile: Profile,
+    selection: Selection,
+    series: Mapping[str, Series],
+    repaired: Mapping[str, tuple[Nanoseconds, Rows, ClockReport]],
+) -> Recording:
+    """Convert decoded and repaired series to a recording; its hash is left empty.
+
+    Raises
+    ------
+    FerryIdError
+        Where no mapped topic has a row, or a field is not what the profile says.
+    """
+    streams = {topic: _stream(profile, series[topic], *repaired[topic]) for topic in selection.wanted}
+    if not any(len(stream.time_ns) for stream in streams.values()):
+        raise FerryIdError(
+            f"{name_of(reader)}: none of the mapped topics holds a row, looked at {', '.join(sorted(streams))}. "
+            "Fix: pass a log that was recorded with these topics running"
+        )
+    return Recording(
+        name=name,
+        files=tuple(str(path) for path in reader.paths),
+        sha256="",
+        profile_name=profile.name,
+        profile_sha256=profile.sha256,
+        streams=streams,
+        topics=reader.topics,
+        losses=reader.losses,
+        found=dict(selection.found),
+        missing=dict(selection.missing),
+        notes=_log_notes(streams, selection, reader.topics),
+    )
+
+
+def _stream(profile: Profile, series: Series, time_ns: Nanoseconds, rows: Rows, clock: ClockReport) -> Stream:
+    if clock.dropped or clock.out_of_order:
+        # Only now are rows copied: nearly every topic is in order and keeps its arrays.
+        columns = {path: values[rows] for path, values in series.columns.items()}
+        series = Series(series.topic, series.receive_ns[rows], None, columns)
+    receive_ns = time_ns if clock.source == "receive" else series.receive_ns
+    return Stream(series.topic, time_ns, convert(profile, series), clock, receive_ns)
+
+
+def _log_notes(streams: Mapping[str, Stream], selection: Selection, topics: tuple[Topic, ...]) -> tuple[str, ...]:
+    """What concerns several topics at once, and what their reader repaired."""
+    notes = [*selection.notes]
+    notes += grouped_notes(
+        {topic.name: topic.note.split("; ") for topic in topics if topic.name in streams and topic.note}
+    )
+    stamped = sorted(topic for topic, stream in streams.items() if stream.clock.source == "stamp")
+    received = sorted(topic for topic, stream in streams.items() if stream.clock.source == "receive")
+    if stamped and received:
+        notes.append(
+            f"{len(stamped)} topic(s) are on their senders' stamps and {len(received)} on receive times "
+            f"({', '.join(received)}): the latter are later by their unknown latency"
+        )
+    elif received:
+        notes.append("all topics are on receive times")
+    return tuple(notes)
+
+
+def log_name(path: str | Path) -> str:
+    """Name of a log for folders and reports: file or folder name without suffixes, parts counted."""
+    text = str(path)
+    first, _, more = text.partition("+") if not Path(text).exists() else (text, "", "")
+    stem = re.sub(r"\.(bag|mcap|db3|csv|parquet|txt|dat|tsv|zstd|active)$", "", Path(first).resolve().name)
+    clean = re.sub(r"[^A-Za-z0-9._-]+", "_", stem).strip("._") or "log"
+    return f"{clean}-and-{more.count('+') + 1}-more" if more else clean
+
+
+def name_of(reader: Reader) -> str:
+    """The file of a log, or the first of several and how many more, for messages."""
+    paths = [str(path) for path in reader.paths]
+    if not paths:
+        return "log"
+    return paths[0] if len(paths) == 1 else f"{paths[0]} (and {len(paths) - 1} more)"

@@ -1,0 +1,90 @@
+"""The signals of a log before they share a grid: one stream per topic, and the recording that holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.ingest.clocks import ClockReport
+from ferryid.ingest.log import Loss, Nanoseconds, Topic
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The signals of one topic at its own rate.
+
+    Attributes
+    ----------
+    topic
+        Topic name.
+    time_ns
+        Strictly rising times on the log's one time base [ns], shape (n,).
+    columns
+        Canonical signal name to values in SI units (rpm for propeller speeds), float64, shape (n,).
+    clock
+        How the times came about.
+    receive_ns
+        Receive times of the same rows [ns], shape (n,); `time_ns` itself where the topic is on the receive clock.
+    """
+
+    topic: str
+    time_ns: Nanoseconds
+    columns: Mapping[str, Floats]
+    clock: ClockReport
+    receive_ns: Nanoseconds
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The mapped signals of one log, each topic at its own rate, with everything that was found out about them.
+
+    Attributes
+    ----------
+    name
+        Name of the log: its file or folder without the suffix.
+    files
+        Path of every file read.
+    sha256
+        Content hash (``sampled-sha256:...`` for files over 1 GiB that were not verified).
+    profile_name, profile_sha256
+        The vessel profile that mapped the signals.
+    streams
+        Topic name to its signals.
+    topics
+        All topics of the log, mapped or not.
+    losses
+        What could not be read.
+    found
+        Canonical signal to ``"topic: field"``.
+    missing
+        Quantity of the profile to the reason why this log does not give it.
+    notes
+        Sentences for the user about the log as a whole.
+    """
+
+    name: str
+    files: tuple[str, ...]
+    sha256: str
+    profile_name: str
+    profile_sha256: str
+    streams: Mapping[str, Stream]
+    topics: tuple[Topic, ...]
+    losses: tuple[Loss, ...]
+    found: Mapping[str, str]
+    missing: Mapping[str, str]
+    notes: tuple[str, ...]
+
+    @property
+    def start_ns(self) -> int:
+        """First time of any stream [ns]."""
+        return min(int(stream.time_ns[0]) for stream in self.streams.values() if len(stream.time_ns))
+
+    @property
+    def end_ns(self) -> int:
+        """Last time of any stream [ns]."""
+        return max(int(stream.time_ns[-1]) for stream in self.streams.values() if len(stream.time_ns))
