@@ -1,0 +1,1 @@
+"""Benchmarks against the best rivals at hand; `python -m tests.bench` writes reports/benchmarks.md."""
