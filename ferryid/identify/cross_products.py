@@ -25,6 +25,8 @@ CHUNK_ROWS = 8192
 """Rows in the scratch: 1.6 MB at 25 columns, so that it is still in the cache when it is multiplied."""
 _BLOCK_ROWS = 2048
 """Rows in one BLAS call. Small enough for OpenBLAS to stay on one thread, which is faster here than two."""
+LARGEST = 1e150
+"""Values from here on are refused: their squares overflow."""
 SEGMENT_ROWS = 16 * CHUNK_ROWS
 """Rows summed together. Fixed, so that the digits of a sum do not depend on the number of workers."""
 
@@ -62,9 +64,21 @@ class CrossProducts:
         FerryIdError
             When a value is not finite; the message names the column.
         """
-        X, Y = rows_of(X, Y, mask, where)
-        accumulator = Accumulator(X.shape[1], Y.shape[1], names=names, where=where)
-        accumulator.add(X, Y, mask)
+        return cls.of(Rows.of(X, Y, mask, where), names=names, where=where)
+
+    @classmethod
+    def of(cls, *parts: Rows, names: Sequence[str] = (), where: str = "fit") -> CrossProducts:
+        """Cross-products of the rows of one or several logs.
+
+        Raises
+        ------
+        FerryIdError
+            When a value is not finite; the message names the column.
+        """
+        first = parts[0].chunk(0, 0)
+        accumulator = Accumulator(first[0].shape[1], first[1].shape[1], names=names, where=where)
+        for rows in parts:
+            accumulator.add_rows(rows)
         return accumulator.result()
 
     def shifted(self, shift: Floats) -> CrossProducts:
@@ -139,6 +153,60 @@ def total(parts: Iterable[CrossProducts]) -> CrossProducts:
     return reduce(add, parts)
 
 
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of one log for a fit, as a matrix or as something that is evaluated chunk by chunk and then forgotten.
+
+    Attributes
+    ----------
+    inputs
+        One array of shape (n, K), the basis itself; or, with `evaluate`, its arguments, n rows each, None where absent.
+    Y
+        Outputs, shape (n, m).
+    mask
+        Rows to use, shape (n,); None: all.
+    evaluate
+        ``evaluate(*inputs)`` returns the basis (rows, K) for a slice of the inputs. Fastest when that is the transpose
+        of an array with one basis term a row.
+    """
+
+    inputs: tuple[Floats | None, ...]
+    Y: Floats
+    mask: Flags | None = None
+    evaluate: Evaluate | None = None
+
+    @classmethod
+    def of(cls, X: Floats, Y: Floats, mask: Flags | None = None, where: str = "fit") -> Rows:
+        """Rows of a matrix `X` (n, K) and outputs `Y` (n, m) or (n,).
+
+        Raises
+        ------
+        FerryIdError
+            Where the shapes do not fit together.
+        """
+        X, Y = np.asarray(X, dtype=np.float64), np.asarray(Y, dtype=np.float64)
+        Y = Y[:, None] if Y.ndim == 1 else Y
+        if X.ndim != 2 or Y.ndim != 2 or len(X) != len(Y) or (mask is not None and mask.shape != (len(X),)):
+            found = f"{X.shape}, {Y.shape} and {None if mask is None else mask.shape}"
+            raise FerryIdError(
+                f"{where}: basis, outputs and mask of a fit need the same rows, their shapes are {found}. "
+                "Fix: pass (n, K), (n, m) and (n,)"
+            )
+        return cls((X,), Y, mask)
+
+    def chunk(self, low: int, high: int) -> tuple[Floats, Floats]:
+        """Return basis (rows, K) and outputs (rows, m) of the rows in use from `low` up to `high`."""
+        pieces = [None if values is None else values[low:high] for values in self.inputs]
+        outputs = self.Y[low:high]
+        if self.mask is not None and not (keep := self.mask[low:high]).all():
+            pieces = [None if piece is None else piece[keep] for piece in pieces]
+            outputs = outputs[keep]
+        if self.evaluate is not None:
+            return self.evaluate(*pieces), outputs
+        assert pieces[0] is not None
+        return pieces[0], outputs
+
+
 class Accumulator:
     """Collect cross-products chunk by chunk; its memory does not grow with the number of rows.
 
@@ -165,104 +233,85 @@ class Accumulator:
         self._products = np.zeros((K + m + 1, K + m + 1))
 
     def add(self, X: Floats, Y: Floats, mask: Flags | None = None) -> None:
-        """Add the rows of `X` (n, K) and `Y` (n, m) where `mask` (n,) is true."""
-        X, Y = rows_of(X, Y, mask, self._where)
-        self._add(None, (X,), Y, mask)
+        """Add the rows of `X` (n, K) and `Y` (n, m) where `mask` (n,) is true.
 
-    def add_evaluated(self, evaluate: Evaluate, inputs: Sequence[Floats], Y: Floats, mask: Flags | None = None) -> None:
-        """Add the rows of ``evaluate(*inputs)`` (n, K) and `Y` (n, m), evaluated chunk by chunk and then forgotten.
-
-        Fastest when `evaluate` returns the transpose of an array with one basis term a row.
+        Raises
+        ------
+        FerryIdError
+            When a value is not finite; the message names the column.
         """
-        self._add(evaluate, tuple(inputs), Y, mask)
+        self.add_rows(Rows.of(X, Y, mask, self._where))
+
+    def add_evaluated(
+        self, evaluate: Evaluate, inputs: Sequence[Floats | None], Y: Floats, mask: Flags | None = None
+    ) -> None:
+        """Add the rows of ``evaluate(*inputs)`` (n, K) and `Y` (n, m), evaluated chunk by chunk; see `Rows`."""
+        self.add_rows(Rows(tuple(inputs), Y, mask, evaluate))
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add rows."""
+        if self._shift is None:
+            self._shift = _first_mean(rows)
+        shift = self._shift
+        if shift is None:
+            return
+
+        def segment(low: int) -> tuple[int, Floats]:
+            return self._segment(rows, shift, low, min(low + SEGMENT_ROWS, len(rows.Y)))
+
+        starts = range(0, len(rows.Y), SEGMENT_ROWS)
+        if len(starts) > 2 and self._workers > 1:
+            with ThreadPoolExecutor(self._workers) as pool:
+                sums = list(pool.map(segment, starts))
+        else:
+            sums = [segment(low) for low in starts]
+        for count, products in sums:
+            self._n += count
+            self._products += products
 
     def result(self) -> CrossProducts:
         """Return what has been added so far."""
         shift = np.zeros(self._K + self._m) if self._shift is None else self._shift
         return CrossProducts(self._n, self._K, self._m, shift.copy(), self._products.copy())
 
-    def _add(self, evaluate: Evaluate | None, inputs: tuple[Floats, ...], Y: Floats, mask: Flags | None) -> None:
-        rows = len(Y)
-        if self._shift is None:
-            self._shift = self._first_mean(evaluate, inputs, Y, mask)
-        if self._shift is None:
-            return
-        bounds = [(low, min(low + SEGMENT_ROWS, rows)) for low in range(0, rows, SEGMENT_ROWS)]
-
-        def segment(bound: tuple[int, int]) -> tuple[int, Floats]:
-            return self._segment(evaluate, inputs, Y, mask, *bound)
-
-        if len(bounds) > 2 and self._workers > 1:
-            with ThreadPoolExecutor(self._workers) as pool:
-                sums = list(pool.map(segment, bounds))
-        else:
-            sums = [segment(bound) for bound in bounds]
-        for count, products in sums:
-            self._n += count
-            self._products += products
-
-    def _first_mean(
-        self, evaluate: Evaluate | None, inputs: tuple[Floats, ...], Y: Floats, mask: Flags | None
-    ) -> Floats | None:
-        for low in range(0, len(Y), CHUNK_ROWS):
-            X, Y_chunk = _chunk(evaluate, inputs, Y, mask, low, min(low + CHUNK_ROWS, len(Y)))
-            if len(Y_chunk):
-                with np.errstate(all="ignore"):
-                    return np.concatenate([X.mean(axis=0), Y_chunk.mean(axis=0)])
-        return None
-
-    def _segment(
-        self,
-        evaluate: Evaluate | None,
-        inputs: tuple[Floats, ...],
-        Y: Floats,
-        mask: Flags | None,
-        start: int,
-        stop: int,
-    ) -> tuple[int, Floats]:
-        assert self._shift is not None
+    def _segment(self, rows: Rows, shift: Floats, start: int, stop: int) -> tuple[int, Floats]:
         K, width = self._K, self._K + self._m + 1
         products = np.zeros((width, width))
         scratch: Floats | None = None
         count = 0
         for low in range(start, stop, CHUNK_ROWS):
-            X, Y_chunk = _chunk(evaluate, inputs, Y, mask, low, min(low + CHUNK_ROWS, stop))
-            rows = len(Y_chunk)
+            X, Y = rows.chunk(low, min(low + CHUNK_ROWS, stop))
             if scratch is None:
                 # Row-major [bases; outputs; ones] when the basis comes that way, else rows as they lie.
-                flat = np.empty(width * CHUNK_ROWS)
+                flat = np.empty(width * min(CHUNK_ROWS, stop - start))
                 by_term = X.strides[0] < X.strides[1]
                 scratch = flat.reshape(width, -1).T if by_term else flat.reshape(-1, width)
                 scratch[:, -1] = 1.0
+            filled = scratch[: len(Y)]
             with np.errstate(all="ignore"):
-                np.subtract(X, self._shift[:K], out=scratch[:rows, :K])
-                np.subtract(Y_chunk, self._shift[K:], out=scratch[:rows, K:-1])
-                part = _gram(scratch[:rows])
+                np.subtract(X, shift[:K], out=filled[:, :K])
+                np.subtract(Y, shift[K:], out=filled[:, K:-1])
+                part = gram(filled)
             if not np.isfinite(part).all():
-                raise not_finite(X, Y_chunk, self._names, self._where)
+                raise not_finite(X, Y, self._names, self._where)
             products += part
-            count += rows
+            count += len(Y)
         return count, products
 
 
-def rows_of(X: Floats, Y: Floats, mask: Flags | None, where: str) -> tuple[Floats, Floats]:
-    """Return `X` and `Y` as two-dimensional float arrays of equal length, or say what does not fit."""
-    X = np.asarray(X, dtype=np.float64)
-    Y = np.asarray(Y, dtype=np.float64)
-    Y = Y[:, None] if Y.ndim == 1 else Y
-    if X.ndim != 2 or Y.ndim != 2 or len(X) != len(Y) or (mask is not None and mask.shape != (len(X),)):
-        found = f"{X.shape}, {Y.shape} and {None if mask is None else mask.shape}"
-        raise FerryIdError(
-            f"{where}: basis, outputs and mask of a fit need the same rows, their shapes are {found}. "
-            "Fix: pass (n, K), (n, m) and (n,)"
-        )
-    return X, Y
+def _first_mean(rows: Rows) -> Floats | None:
+    for low in range(0, len(rows.Y), CHUNK_ROWS):
+        X, Y = rows.chunk(low, low + CHUNK_ROWS)
+        if len(Y):
+            with np.errstate(all="ignore"):
+                return np.concatenate([X.mean(axis=0), Y.mean(axis=0)])
+    return None
 
 
 def not_finite(X: Floats, Y: Floats, names: Sequence[str], where: str) -> FerryIdError:
     """Name the first column that holds NaN, infinity or values whose squares overflow."""
     columns = np.hstack([X, Y])
-    bad = ~(np.abs(columns) < 1e150)
+    bad = ~(np.abs(columns) < LARGEST)
     column = int(np.argmax(bad.any(axis=0)))
     if column >= X.shape[1]:
         name = f"output {column - X.shape[1] + 1}"
@@ -275,18 +324,7 @@ def not_finite(X: Floats, Y: Floats, names: Sequence[str], where: str) -> FerryI
     )
 
 
-def _chunk(
-    evaluate: Evaluate | None, inputs: tuple[Floats, ...], Y: Floats, mask: Flags | None, low: int, high: int
-) -> tuple[Floats, Floats]:
-    pieces = [values[low:high] for values in inputs]
-    outputs = Y[low:high]
-    if mask is not None and not (keep := mask[low:high]).all():
-        pieces = [piece[keep] for piece in pieces]
-        outputs = outputs[keep]
-    return (pieces[0] if evaluate is None else evaluate(*pieces)), outputs
-
-
-def _gram(rows: Floats) -> Floats:
+def gram(rows: Floats) -> Floats:
     """``rows' rows`` in blocks of `_BLOCK_ROWS`, by BLAS syrk."""
     whole = len(rows) // _BLOCK_ROWS * _BLOCK_ROWS
     tail = rows[whole:]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, not_finite, rows_of
+from ferryid.identify.cross_products import CHUNK_ROWS, LARGEST, CrossProducts, Rows, not_finite
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -58,22 +58,31 @@ class QrFactor:
         FerryIdError
             When a value is not finite; the message names the column.
         """
-        X, Y = rows_of(X, Y, mask, where)
-        K, m = X.shape[1], Y.shape[1]
+        return cls.of(Rows.of(X, Y, mask, where), names=names, where=where)
+
+    @classmethod
+    def of(cls, *parts: Rows, names: Sequence[str] = (), where: str = "fit") -> QrFactor:
+        """Factorise the rows of one or several logs, 8192 rows at a time.
+
+        Raises
+        ------
+        FerryIdError
+            When a value is not finite; the message names the column.
+        """
+        first = parts[0].chunk(0, 0)
+        K, m = first[0].shape[1], first[1].shape[1]
         factor = cls(0, K, m, np.zeros(K + m), np.zeros((1 + K + m, 1 + K + m)))
-        for low in range(0, len(Y), CHUNK_ROWS):
-            rows = slice(low, low + CHUNK_ROWS)
-            keep = slice(None) if mask is None else mask[rows]
-            X_chunk, Y_chunk = X[rows][keep], Y[rows][keep]
-            if not len(Y_chunk):
+        chunks = (part.chunk(low, low + CHUNK_ROWS) for part in parts for low in range(0, len(part.Y), CHUNK_ROWS))
+        for X, Y in chunks:
+            if not len(Y):
                 continue
-            if not (np.abs(X_chunk).max(initial=0.0) < 1e150 and np.abs(Y_chunk).max(initial=0.0) < 1e150):
-                raise not_finite(X_chunk, Y_chunk, names, where)
-            shift = factor.shift if factor.n else np.concatenate([X_chunk.mean(axis=0), Y_chunk.mean(axis=0)])
-            block = np.empty((len(Y_chunk), 1 + K + m))
+            if not (np.abs(X).max(initial=0.0) < LARGEST and np.abs(Y).max(initial=0.0) < LARGEST):
+                raise not_finite(X, Y, names, where)
+            shift = factor.shift if factor.n else np.concatenate([X.mean(axis=0), Y.mean(axis=0)])
+            block = np.empty((len(Y), 1 + K + m))
             block[:, 0] = 1.0
-            np.subtract(X_chunk, shift[:K], out=block[:, 1 : 1 + K])
-            np.subtract(Y_chunk, shift[K:], out=block[:, 1 + K :])
+            np.subtract(X, shift[:K], out=block[:, 1 : 1 + K])
+            np.subtract(Y, shift[K:], out=block[:, 1 + K :])
             factor += cls(len(block), K, m, shift, _triangle(block))
         return factor
 
@@ -152,19 +161,22 @@ def standard_deviations(mean: Floats, squares: Floats, n: int) -> Floats:
     return np.where(constant, np.inf, deviation)
 
 
-def factorise(
-    X: Floats, Y: Floats, mask: Flags | None = None, *, names: Sequence[str] = (), where: str = "fit"
-) -> CrossProducts | QrFactor:
+def factorise(*parts: Rows, names: Sequence[str] = (), where: str = "fit") -> CrossProducts | QrFactor:
     """Cross-products of the rows, or their QR factor where `condition` says that cross-products would lose digits.
 
     The rows are gone over a second time only when the condition of the standardised basis exceeds
     `CONDITION_FOR_QR`, or when a linear dependence shows that is neither a constant nor a duplicate column.
+
+    Raises
+    ------
+    FerryIdError
+        When a value is not finite; the message names the column.
     """
-    cross = CrossProducts.from_rows(X, Y, mask, names=names, where=where)
+    cross = CrossProducts.of(*parts, names=names, where=where)
     number, unexplained = condition(cross)
     if number <= CONDITION_FOR_QR and not unexplained:
         return cross
-    return QrFactor.from_rows(X, Y, mask, names=names, where=where)
+    return QrFactor.of(*parts, names=names, where=where)
 
 
 def _triangle(rows: Floats) -> Floats:

@@ -275,7 +275,7 @@ def group_outputs(allowed: Flags | None, K: int, m: int) -> list[tuple[NDArray[n
 
 
 def sse(source: CrossProducts | QrFactor, coefficients: Floats, intercepts: Floats) -> Floats:
-    """Sum of squared errors over the rows of `source` for coefficients (A, K, m) and intercepts (A, m), shape (A, m)."""
+    """Sum of squared errors (A, m) over the rows of `source`, for coefficients (A, K, m) and intercepts (A, m)."""
     return source.sse(coefficients, intercepts)
 
 
@@ -291,8 +291,10 @@ def training_sums(folds: Sequence[Source]) -> list[Source]:
         before[i] = before[i - 1] + folds[i]
         after[-1 - i] = folds[-1 - i] + after[-i]
     last = len(folds) - 1
-    inner: list[Source] = [before[i - 1] + after[i + 1] for i in range(1, last)]
-    return [after[1], *inner, before[last - 1]]
+    sums = [after[1]]
+    sums.extend(before[i - 1] + after[i + 1] for i in range(1, last))
+    sums.append(before[last - 1])
+    return sums
 
 
 def sweep_components(
