@@ -105,14 +105,17 @@ def folds(
     guard_s: float = GUARD_S,
     rows: Sequence[Flags] | None = None,
 ) -> Iterator[Split]:
-    """Yield k splits for cross-validation: contiguous k-th parts of every log validate in turn, purged as blocks are.
+    """Yield splits for cross-validation: contiguous parts of every log validate in turn, purged as blocks are.
+
+    A log is cut into k parts, or into as many as are two purge gaps long; a short log is one part. The parts are dealt
+    to the folds in order.
 
     Parameters
     ----------
     motions, window_s, guard_s
         As in `split`.
     k
-        Number of folds, 2 or more.
+        Number of folds, 2 or more; fewer where there are fewer parts.
     rows
         Rows to divide, one mask a log: the training rows of a `Split`, to leave its validation rows untouched. The
         valid rows where None.
@@ -120,25 +123,28 @@ def folds(
     Raises
     ------
     FerryIdError
-        For a log too short for k folds.
+        For a single log too short for two folds.
     """
     if k < 2:
-        raise FerryIdError(
-            f"settings: cross-validation needs 2 folds or more, found {k}. Fix: give 2 or more, 5 is usual"
-        )
-    purge_s = [_purge_s(motion, window_s, guard_s) for motion in motions]
+        raise FerryIdError(f"settings: cross-validation needs 2 folds or more, found {k}. Fix: give 5, which is usual")
     used = [motion.valid if rows is None else rows[i] & motion.valid for i, motion in enumerate(motions)]
-    numbers = [_number(mask, k) for mask in used]
-    for motion, mask, purge in zip(motions, used, purge_s, strict=True):
-        if np.count_nonzero(mask) / motion.rate_hz < 2.0 * k * purge:
-            raise _too_short(motion, mask, 2.0 * k * purge, f"{k} folds")
-    for fold in range(k):
+    purge_s = [_purge_s(motion, window_s, guard_s) for motion in motions]
+    parts = [
+        max(1, min(k, int(np.count_nonzero(mask) / motion.rate_hz / (2.0 * purge))))
+        for motion, mask, purge in zip(motions, used, purge_s, strict=True)
+    ]
+    number = min(k, sum(parts))
+    if number < 2:
+        raise _too_short(motions[0], used[0], 4.0 * purge_s[0], "two folds")
+    first = np.cumsum([0, *parts[:-1]])
+    fold_of = [(_number(mask, part) + start) % number for mask, part, start in zip(used, parts, first, strict=True)]
+    for fold in range(number):
         masks = [
-            _purged(mask, number == fold, round(purge * motion.rate_hz))
-            for motion, mask, number, purge in zip(motions, used, numbers, purge_s, strict=True)
+            _purged(mask, of == fold, round(purge * motion.rate_hz))
+            for motion, mask, of, purge in zip(motions, used, fold_of, purge_s, strict=True)
         ]
         training, validation = zip(*masks, strict=True)
-        yield Split(f"fold {fold + 1} of {k}", training, validation, min(purge_s))
+        yield Split(f"fold {fold + 1} of {number}", training, validation, min(purge_s))
 
 
 def correlation_time(values: Floats, valid: Flags, rate_hz: float, longest_s: float = 30.0) -> float:
