@@ -78,7 +78,7 @@ def _signals(profile: Profile) -> list[str]:
         (
             signal.quantity,
             ", ".join(canonical_columns(signal)),
-            f"{signal.topic}: {', '.join(signal.fields)}",
+            f"{signal.topic}: {_fields(signal)}",
             _how(signal),
         )
         for signal in profile.signals
@@ -91,6 +91,14 @@ def _signals(profile: Profile) -> list[str]:
             for row in rows
         ),
     ]
+
+
+def _fields(signal: Signal) -> str:
+    """Shorten four quaternion fields, which differ in their last letter, to one."""
+    first = signal.fields[0]
+    if signal.unit == "quaternion" and all(path[:-1] == first[:-1] for path in signal.fields):
+        return f"{first[:-1]}{{{','.join(path[-1] for path in signal.fields)}}}"
+    return ", ".join(signal.fields)
 
 
 def _how(signal: Signal) -> str:

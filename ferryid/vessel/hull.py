@@ -65,9 +65,9 @@ def current_in_body(current_ne: Floats, psi: Floats) -> Floats:
 def inverse_dynamics(hull: Hull, nu_dot: Floats, nu: Floats, nu_c: Floats | None = None) -> Floats:
     """Return the force that the motion takes, ``M nu_dot + C nu + D nu``, shape (n, 3) [N, N, N·m].
 
-    With a current, added mass and damping act on the velocity through the water ``nu_r = nu - nu_c`` and the rigid body on
-    `nu`; an irrotational, steady current turns with the body: ``nu_c_dot = [r v_c, -r u_c, 0]``. This is exact where
-    (2.19)-(2.20) is an approximation.
+    With a current, added mass and damping act on the velocity through the water ``nu_r = nu - nu_c`` and the rigid
+    body on `nu`; an irrotational, steady current turns with the body: ``nu_c_dot = [r v_c, -r u_c, 0]``. This is
+    exact where (2.19)-(2.20) is an approximation.
 
     Parameters
     ----------
@@ -115,9 +115,8 @@ def forward(hull: Hull, nu: Floats, tau: Floats, nu_c: Floats | None = None) -> 
     nu = np.asarray(nu, dtype=np.float64)
     still = inverse_dynamics(hull, np.zeros_like(nu), nu, nu_c)
     # M_RB nu_dot + M_A (nu_dot - nu_c_dot) + ... = tau, so the whole mass acts on nu_dot.
-    return np.linalg.solve(hull.M, (np.asarray(tau, dtype=np.float64) - still).reshape(-1, 3).T).T.reshape(
-        nu.shape
-    )
+    rest = (np.asarray(tau, dtype=np.float64) - still).reshape(-1, 3)
+    return np.asarray(np.linalg.solve(hull.M, rest.T), dtype=np.float64).T.reshape(nu.shape)
 
 
 def _current_rate(nu: Floats, nu_c: Floats) -> Floats:

@@ -55,9 +55,6 @@ def _actuator(reader: TableReader) -> Actuator:
     elif kind in ("propeller", "force"):
         angle_rad = math.radians(reader.number("angle_deg", 0.0, at_least=-360.0, at_most=360.0))
     curve = _curve(reader.table("thrust"))
-    if curve is None and kind in ("azimuth", "propeller", "tunnel") and not reader.has("thrust"):
-        # A curve is needed only for a speed signal; parse_signals knows whether there is one.
-        pass
     inflow = _inflow(reader, kind)
     rudder: dict[str, float] = {}
     table = reader.table("rudder", required=kind == "propeller_rudder", needs="whose force it must give")
@@ -99,6 +96,7 @@ def _rudder(reader: TableReader) -> dict[str, float]:
         "eta": reader.number("eta", 1.0, at_least=0.0, at_most=1.0),
         "gamma_R": reader.number("gamma_R", 1.0, at_least=0.0),
     }
+    rudder["gamma_R_minus"] = reader.number("gamma_R_minus", rudder["gamma_R"], at_least=0.0)
     rudder["l_R_m"] = reader.number("l_R_m", rudder["x_m"])
     slope, aspect = reader.has("f_alpha"), reader.has("aspect_ratio")
     f_alpha = reader.number("f_alpha", above=0.0)
@@ -158,7 +156,7 @@ def _valid(reader: TableReader, *, required: bool) -> tuple[float, float] | None
 def _table_curve(reader: TableReader, unit: str, valid: tuple[float, float] | None) -> ThrustCurve | None:
     speeds = reader.numbers("speed", required=True)
     forces = reader.numbers("force", required=True)
-    per = reader.whole("units", 1, at_least=1)
+    per = reader.whole("measured_on", 1, at_least=1)
     if not speeds or not forces:
         return None
     if len(speeds) != len(forces) or len(speeds) < 2:

@@ -41,7 +41,7 @@ def parse_hull(reader: TableReader | None) -> Hull | None:
     """Read ``[hull]`` with its mass matrix and damping; None, with faults noted, where it cannot be used."""
     if reader is None:
         return None
-    length_m = reader.number("length_m", required=True, above=0.0)
+    length_m = reader.number("length_m", above=0.0)
     beam_m = reader.number("beam_m", above=0.0)
     draught_m = reader.number("draught_m", above=0.0)
     mass_kg = reader.number("mass_kg", required=True, above=0.0)
@@ -156,8 +156,8 @@ def _damping(reader: TableReader | None) -> dict[str, float]:
     cross = -0.5 * (terms.get("Y_r", 0.0) + terms.get("N_v", 0.0))
     if sway >= 0.0 and yaw >= 0.0 and sway * yaw < cross**2:
         reader.fault(
-            "the linear damping of sway and yaw is not dissipative: ((Y_r + N_v)/2)² exceeds Y_v·N_r, so some slow motion "
-            "gains energy. Fix: check the signs and units of Y_r and N_v",
+            "the linear damping of sway and yaw is not dissipative: ((Y_r + N_v)/2)² exceeds Y_v·N_r, so some "
+            "slow motion gains energy. Fix: check the signs and units of Y_r and N_v",
             warning=True,
         )
     return terms

@@ -21,7 +21,7 @@ _OPTIONAL = ("wind", "current", "tau_d", "roll", "pitch")
 def parse_signals(
     reader: TableReader | None, actuators: tuple[Actuator, ...], faults: list[Fault]
 ) -> tuple[Signal, ...]:
-    """Read every ``[signals.<quantity>]``, noting faults, and check that the map is complete and free of contradictions."""
+    """Read every ``[signals.<quantity>]``, noting faults, what the map lacks and where it contradicts itself."""
     if reader is None:
         return ()
     by_name = {actuator.name: actuator for actuator in actuators}
@@ -224,8 +224,8 @@ def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple
     velocity = mapped.get("velocity")
     if velocity is not None and velocity.frame in WORLD_FRAMES and "heading" not in mapped:
         reader.fault(
-            f"velocity is in the world frame {velocity.frame}, and without a heading it cannot be turned into surge and "
-            'sway. Fix: map [signals.heading], or give frame = "FRD" if it is in the body frame',
+            f"velocity is in the world frame {velocity.frame}, and without a heading it cannot be turned into "
+            'surge and sway. Fix: map [signals.heading], or give frame = "FRD" if it is in the body frame',
             "velocity",
         )
     wind = mapped.get("wind")
@@ -245,8 +245,8 @@ def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple
         and rate.frame != velocity.frame
     ):
         reader.fault(
-            f"velocity is {velocity.frame} and yaw_rate {rate.frame} in the same message {rate.topic}: one message has one "
-            f"body frame. Fix: give both the same frame (and sign = -1 where the sender errs)",
+            f"velocity is {velocity.frame} and yaw_rate {rate.frame} in the same message {rate.topic}: one "
+            "message has one body frame. Fix: give both the same frame (and sign = -1 where the sender errs)",
             "yaw_rate",
         )
     for actuator in actuators:

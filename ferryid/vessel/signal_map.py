@@ -1,9 +1,10 @@
 """Finding a profile's signals in a log, and turning their fields into canonical columns in SI units.
 
-Canonical columns: ``x, y`` [m, NED]; ``psi`` [rad]; ``phi, theta`` [rad]; ``u, v`` [m/s, FRD, over ground]; ``r`` [rad/s];
-``vel_N, vel_E`` [m/s]; ``wind_speed`` [m/s], ``wind_from`` [rad, clockwise]; ``wind_N, wind_E`` [m/s, where the air goes to];
-``current_N, current_E`` [m/s, where the water goes to]; for an actuator NAME ``n_NAME`` [rpm], ``alpha_NAME`` [rad],
-``delta_NAME`` [rad], ``F_NAME`` [N]; orders with ``_cmd`` after the prefix (``n_cmd_NAME``); ``X_d, Y_d`` [N], ``N_d`` [N·m].
+Canonical columns: ``x, y`` [m, NED]; ``psi`` [rad]; ``phi, theta`` [rad]; ``u, v`` [m/s, FRD, over ground];
+``r`` [rad/s]; ``vel_N, vel_E`` [m/s]; ``wind_speed`` [m/s], ``wind_from`` [rad, clockwise]; ``wind_N, wind_E`` [m/s,
+where the air goes to]; ``current_N, current_E`` [m/s, where the water goes to]; for an actuator NAME ``n_NAME`` [rpm],
+``alpha_NAME`` [rad], ``delta_NAME`` [rad], ``F_NAME`` [N]; orders with ``_cmd`` after the prefix (``n_cmd_NAME``);
+``X_d, Y_d`` [N], ``N_d`` [N·m].
 """
 
 from __future__ import annotations
@@ -129,8 +130,8 @@ def select(profile: Profile, topics: Sequence[Topic], where: str) -> Selection:
         more = f" ({len(lacking) - 1} more required signals are missing)" if len(lacking) > 1 else ""
         raise FerryIdError(
             f"{where}: {signal.quantity} is needed by the profile {profile.name} ({profile.path}:{signal.line}), "
-            f"{selection.missing[signal.quantity]}{more}. Fix: correct the signal map, or set required = false where the "
-            "signal can be missed"
+            f"{selection.missing[signal.quantity]}{more}. Fix: correct the signal map, or set "
+            "required = false where the signal can be missed"
         )
     return selection
 
@@ -213,8 +214,8 @@ def _position(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
     if np.any(beyond):
         raise FerryIdError(
             f"{topic}: position needs a latitude within ±90 deg, found "
-            f"{math.degrees(float(latitude[np.argmax(beyond)])):g} deg in {signal.fields[0]}. Fix: give the latitude first "
-            "in fields, and its unit"
+            f"{math.degrees(float(latitude[np.argmax(beyond)])):g} deg in {signal.fields[0]}. Fix: give the "
+            "latitude first in fields, and its unit"
         )
     return list(local_north_east(latitude, longitude))
 
@@ -257,7 +258,8 @@ def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic]) -> str:
     if topic is None:
         names = [candidate.name for candidate in topics]
         listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
-        return f'found no topic "{signal.topic}" (there is {listed or "none"}).{did_you_mean(signal.topic, names)}'.rstrip()
+        hint = did_you_mean(signal.topic, names)
+        return f'found no topic "{signal.topic}" (there is {listed or "none"}).{hint}'
     if topic.count == 0:
         return f"found {topic.name} without a single message"
     for path in signal.fields:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Actuator, Floats, Profile, ThrustCurve
-from ferryid.vessel.rudder import rudder_force
+from ferryid.vessel.rudder import inflow_speed, rudder_force
 
 FRESH_WATER = 1000.0
 """Density of water [kg/m³] where an actuator states none."""
@@ -134,8 +134,8 @@ def actuator_columns(
                         candidates.append((role, column, order))
             if not candidates:
                 raise FerryIdError(
-                    f"{profile.path}: the {roles[-1]} of {actuator.name} is needed for the applied force, found neither "
-                    f'feedback nor order. Fix: map [signals."{actuator.name}.{roles[-1]}"] or its ".command"'
+                    f"{profile.path}: the {roles[-1]} of {actuator.name} is needed for the applied force, found "
+                    f'neither feedback nor order. Fix: map [signals."{actuator.name}.{roles[-1]}"] or its ".command"'
                 )
             role, column, order = candidates[0]
             chosen[actuator.name, role] = column
@@ -222,7 +222,7 @@ def _strength(
     force, clipped = thrust(
         curve,
         signals["speed"],
-        advance_mps=nu[:, 0] * (1.0 - actuator.inflow.get("wake_fraction", 0.0)),
+        advance_mps=inflow_speed(nu[:, 0], actuator.inflow.get("wake_fraction", 0.0)),
         diameter_m=actuator.inflow.get("diameter_m", math.nan),
         water_density=actuator.inflow.get("water_density", FRESH_WATER),
     )

@@ -48,7 +48,7 @@ def wind_force(
 
 
 def wind_coefficients(areas: WindAreas, gamma: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return ``C_X, C_Y, C_N`` of the angle of attack `gamma` [rad], zero from ahead and negative from starboard, (2.18)."""
+    """Return ``C_X, C_Y, C_N`` of the angle of attack `gamma` [rad], 0 from ahead, negative from starboard."""
     gamma = np.asarray(gamma, dtype=np.float64)
     cd_l = areas.CD_l_AF * areas.frontal_m2 / areas.lateral_m2
     denominator = 1.0 - 0.5 * areas.delta * (1.0 - cd_l / areas.CD_t) * np.sin(2.0 * gamma) ** 2
