@@ -185,7 +185,7 @@ def _decimal_of(rows: Sequence[Sequence[str]], separator: str) -> str:
 
 def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     """Guess the separator as the one that splits most lines into rows of one length."""
-    best: tuple[int, int, str, str, int] | None = None
+    best: tuple[int, float, int, str, str, int] | None = None
     sample = list(lines[:_SAMPLE_LINES])
     for separator in (",", ";", "\t", "whitespace"):
         split = [_split(line, separator) for line in sample]
@@ -195,18 +195,20 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
             continue
         width, count = Counter(len(split[place]) for place in rows).most_common(1)[0]
         first = next(place for place in rows if len(split[place]) == width)
-        rank = (count, width, separator, decimal, first)
-        if best is None or rank[:2] > best[:2]:
+        cells = [cell for place in rows if len(split[place]) == width for cell in split[place]]
+        share = sum(_is_value(cell, decimal) for cell in cells) / len(cells)
+        rank = (count, share, width, separator, decimal, first)
+        if best is None or rank[:3] > best[:3]:
             best = rank
     filled = [line for line in sample if line.strip()]
-    if best is None or best[0] * 10 < 6 * (len([line for line in sample[best[4] :] if line.strip()])):
+    if best is None or best[0] * 10 < 6 * (len([line for line in sample[best[5] :] if line.strip()])):
         if len(filled) == 1 and any(len(_split(filled[0], separator)) > 1 for separator in (",", ";", "\t")):
             raise FerryIdError(f"{path}: the table holds a header and no rows. Fix: record or export the log again")
         raise FerryIdError(
             f"{path}: this text is not a table of numbers, found {_quoted(filled[0] if filled else '')}. "
             "Fix: pass a log, or describe the table under [table] in the profile (separator, skip_rows, columns)"
         )
-    _, width, separator, decimal, first = best
+    _, _, width, separator, decimal, first = best
     header = first
     while header > 0 and len(_split(lines[header - 1], separator)) == width:
         header -= 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,12 +12,14 @@ from numpy.typing import NDArray
 
 from ferryid.ingest.log import Column, Nanoseconds
 
+_READABLE = 0.75
+"""Share of the cells that must be readable in a column that is guessed to be the time."""
 _PREFIX = {3: "milli", 6: "micro", 9: "nano"}
 UNIT_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
 _DATETIME = re.compile(r"\s*\d{4}[-/.]\d{2}[-/.]\d{2}[ T]\d{2}:\d{2}:\d{2}([.,]\d*)?\s*(Z|[+-]\d{2}:?\d{2})?\s*$")
 _TIME_NAME = re.compile(
     r"%?(rosbag|log|gps|unix|epoch|utc|receive|recv|elapsed|rec)?[ _.]*"
-    r"(t|tvec|time|timestamp|stamp|times|date|datetime|date[ _]?time|utc|sec|secs|seconds|zeit|tid|temps)(?:[ _.]*(\d|abs|rel|utc))?$"
+    r"(t|tvec|times?|timestamp|stamp|date|date[ _]?time|utc|secs?|seconds|zeit|tid|temps)(?:[ _.]*(\d|abs|rel|utc))?$"
 )
 _UNIT_WORD = re.compile(
     r"(?: *[\[(] *|[ _.]+)(s|sec|secs|seconds?|ms|msec|millis|us|usec|micros|ns|nsec|nanos) *[\])]?$"
@@ -61,14 +64,14 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
         bare, word = _without_unit(name)
         if not _TIME_NAME.match(bare):
             continue
-        if values and all(looks_like_datetime(value) for value in values):
+        if _are_datetimes(values):
             return _plan(sample, name, "datetime", "date and time")
         numbers = _rising(values, strict=False)
         if numbers is not None:
             unit = _UNIT_OF_WORD.get(word) or _unit_of_size(numbers)
             return _plan(sample, name, unit, unit)
     for name, values in sample.items():
-        if values and all(looks_like_datetime(value) for value in values):
+        if _are_datetimes(values):
             return _plan(sample, name, "datetime", "date and time")
     # Without a name the first column may be the time; one with a name says that it is something else.
     name = next((one for one in sample if one == "column 1"), "")
@@ -227,16 +230,26 @@ def _without_unit(name: str) -> tuple[str, str]:
 
 def _rising(values: Sequence[str], *, strict: bool) -> NDArray[np.float64] | None:
     """The values as numbers if they rise, else None."""
-    try:
-        numbers = np.array([float(value) for value in values])
-    except ValueError:
+    readable = [number for value in values if math.isfinite(number := _float_or_nan(value))]
+    if not readable or len(readable) < _READABLE * len(values):
         return None
-    if len(numbers) == 0 or not np.isfinite(numbers).all():
-        return None
+    numbers = np.array(readable)
     steps = np.diff(numbers)
     if strict:
         return numbers if len(steps) and bool((steps > 0).all()) else None
     return numbers if len(steps) == 0 or float(np.mean(steps >= 0)) > 0.8 else None
+
+
+def _float_or_nan(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _are_datetimes(values: Sequence[str]) -> bool:
+    readable = sum(looks_like_datetime(value) for value in values)
+    return readable > 0 and readable >= _READABLE * len(values)
 
 
 def _unit_of_size(numbers: NDArray[np.float64]) -> str:

@@ -29,7 +29,7 @@ def data_quality(recording: Recording, track: Track | Motion | None = None) -> d
     -------
     dict
         For JSON: ``files``, ``sha256``, ``profile``, ``profile_sha256``, ``duration_s``, ``streams`` (topic to ``clock``
-        and ``signals``), ``losses``, ``found``, ``missing`` and ``remarks`` (sentences, the whole story for a person).
+        and ``signals``), ``losses``, ``found``, ``missing`` and ``remarks`` (sentences: all of it for a person).
     """
     streams = {topic: stream_quality(stream) for topic, stream in recording.streams.items()}
     return {

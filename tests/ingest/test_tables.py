@@ -1,0 +1,382 @@
+"""Tables as logs: what is in the file is what comes out, and what does not come out is counted."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as parquet
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest import open_log
+from ferryid.ingest.log import Reader, Series, TableLayout
+from ferryid.ingest.table_time import datetimes_to_ns, guess_time, numbers_to_ns
+
+
+def write(folder: Path, name: str, content: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def read_all(path: Path, layout: TableLayout | None = None) -> tuple[Series, Reader]:
+    reader = open_log(path, layout)
+    series = reader.read({topic.name: tuple(topic.fields) for topic in reader.topics})
+    return series["table"], reader
+
+
+# --- what is read -------------------------------------------------------------------------------------------------
+
+
+def test_plain_csv_without_a_layout_guesses_and_tells(tmp_path: Path) -> None:
+    series, reader = read_all(write(tmp_path, "log.csv", "t [s],u [m/s],mode\n0.0,1.5,auto\n0.1,-2,manual\n"))
+    assert series.receive_ns.tolist() == [0, 100_000_000]
+    assert series.stamp_ns is None
+    assert series.columns["u [m/s]"].tolist() == [1.5, -2.0]
+    assert series.columns["mode"].tolist() == ["auto", "manual"]
+    (topic,) = reader.topics
+    assert dict(topic.fields) == {"t [s]": "float64", "u [m/s]": "float64", "mode": "string"}
+    assert (topic.count, topic.start_ns, topic.end_ns) == (2, 0, 100_000_000)
+    assert 'time guessed: column "t [s]" (s)' in topic.note
+    assert reader.losses == ()
+
+
+def test_only_wanted_columns_come(tmp_path: Path) -> None:
+    reader = open_log(write(tmp_path, "log.csv", "time,a,b\n0,1,2\n1,3,4\n"))
+    series = reader.read({"table": ("b",)})["table"]
+    assert list(series.columns) == ["b"]
+    assert reader.read({"table": ()})["table"].receive_ns.tolist() == [0, 1_000_000_000]
+
+
+def test_semicolons_with_decimal_commas_and_byte_order_mark(tmp_path: Path) -> None:
+    path = write(tmp_path, "log.csv", b"\xef\xbb\xbfTime;speed\r\n0,0;1,25\r\n0,5;-2,5\r\n")
+    series, reader = read_all(path)
+    assert series.receive_ns.tolist() == [0, 500_000_000]
+    assert series.columns["speed"].tolist() == [1.25, -2.5]
+    assert "decimal comma" in reader.topics[0].note
+    assert "byte-order mark" in reader.topics[0].note
+    stated, _ = read_all(path, TableLayout(time="Time", separator=";"))
+    assert stated.columns["speed"].tolist() == [1.25, -2.5]
+
+
+def test_utf16_and_cp1252_text(tmp_path: Path) -> None:
+    text = "time,course [°]\n0,10.5\n1,11.5\n"
+    for name, encoding in (("a.csv", "utf-16"), ("b.csv", "cp1252")):
+        series, _ = read_all(write(tmp_path, name, text.encode(encoding)))
+        assert series.columns["course [°]"].tolist() == [10.5, 11.5]
+
+
+def test_blank_separated_text_with_lines_to_skip(tmp_path: Path) -> None:
+    text = " Model basin\n Run 12 of 30\n\n   .000000   1.50\t -.25  \n   .050000   1.75   -.50\n  0.1 2 +3e0"
+    layout = TableLayout(time="t", columns=("t", "x", "y"), skip_rows=3, separator="whitespace")
+    path = write(tmp_path, "run.dat", text)
+    for series, _ in (read_all(path, layout),):
+        assert series.receive_ns.tolist() == [0, 50_000_000, 100_000_000]
+        assert series.columns["x"].tolist() == [1.5, 1.75, 2.0]
+        assert series.columns["y"].tolist() == [-0.25, -0.5, 3.0]
+    guessed, reader = read_all(path)
+    assert guessed.columns["column 3"].tolist() == [-0.25, -0.5, 3.0]
+    assert "3 line(s) before the table skipped" in reader.topics[0].note
+
+
+def test_repeated_and_missing_names_are_numbered(tmp_path: Path) -> None:
+    series, reader = read_all(write(tmp_path, "log.csv", ",time,u,u\n0,0.0,1,2\n1,0.1,3,4\n"))
+    assert series.columns["u"].tolist() == [1, 3]
+    assert series.columns["u (2)"].tolist() == [2, 4]
+    assert series.columns["column 1"].tolist() == [0, 1]
+    assert "repeated column names" in reader.topics[0].note
+
+
+def test_missing_cells_are_nan_and_booleans_are_kept(tmp_path: Path) -> None:
+    series, _ = read_all(write(tmp_path, "log.csv", "time,a,n,ok\n0,,1,True\n1,nan,,False\n2,2.5,3,True\n"))
+    np.testing.assert_array_equal(series.columns["a"], [np.nan, np.nan, 2.5])
+    np.testing.assert_array_equal(series.columns["n"], [1, np.nan, 3])
+    assert series.columns["ok"].dtype == bool
+
+
+def test_header_with_a_units_line_below(tmp_path: Path) -> None:
+    series, reader = read_all(write(tmp_path, "log.csv", "time,u\n[s],[m/s]\n0,1\n1,2\n"))
+    assert series.columns["u"].tolist() == [1, 2]
+    assert "units?" in reader.topics[0].note
+
+
+def test_stamps_from_two_columns_keep_nanoseconds(tmp_path: Path) -> None:
+    text = (
+        "time,header_stamp_secs,header_stamp_nsecs,x\n2025/04/11 11:15:45.313396019,1744362945,312026019,1\n"
+        "2025/04/11 11:15:45.413396020,1744362945,412026021,2\n"
+    )
+    path = write(tmp_path, "log.csv", text)
+    layout = TableLayout(time="time", time_unit="datetime", stamp=("header_stamp_secs", "header_stamp_nsecs"))
+    for series, _ in (read_all(path, layout), read_all(path)):
+        assert series.receive_ns.tolist() == [1744370145313396019, 1744370145413396020]
+        assert series.stamp_ns is not None
+        assert series.stamp_ns.tolist() == [1744362945312026019, 1744362945412026021]
+
+
+def test_folder_is_one_topic_per_file(tmp_path: Path) -> None:
+    (tmp_path / "run" / "nav").mkdir(parents=True)
+    write(tmp_path / "run", "rpm.csv", "time,data\n0,1\n1,2\n2,2\n")
+    write(tmp_path / "run" / "nav", "pose.csv", "time,x\n0.5,1\n")
+    write(tmp_path / "run", "notes.csv", "who,what\nme,nothing\n")
+    reader = open_log(tmp_path / "run")
+    assert [topic.name for topic in reader.topics] == ["/nav/pose", "/rpm"]
+    assert reader.read({"/rpm": ("data",)})["/rpm"].columns["data"].tolist() == [1, 2, 2]
+    (loss,) = reader.losses
+    assert loss.topic == "/notes"
+    assert "not a table" in loss.what
+
+
+def test_parquet_with_typed_times_structs_and_missing_values(tmp_path: Path) -> None:
+    times = pa.array([1744370145313396019, 1744370145413396020], pa.timestamp("ns"))
+    pose = pa.array([{"x": 1.5, "y": 2}, {"x": 2.5, "y": None}])
+    table = pa.table({"when": times, "pose": pose, "on": [True, None], "list": [[1.0], [2.0]], "who": ["a", None]})
+    parquet.write_table(table, tmp_path / "log.parquet")
+    for layout in (None, TableLayout(time="when")):
+        series, reader = read_all(tmp_path / "log.parquet", layout)
+        assert series.receive_ns.tolist() == [1744370145313396019, 1744370145413396020]
+        assert "list" not in reader.topics[0].fields
+        assert series.columns["pose.x"].tolist() == [1.5, 2.5]
+        np.testing.assert_array_equal(series.columns["pose.y"], [2, np.nan])
+        np.testing.assert_array_equal(series.columns["on"], [1, np.nan])
+        assert series.columns["who"].tolist() == ["a", ""]
+        assert reader.topics[0].end_ns == 1744370145413396020
+
+
+def test_parquet_of_several_row_groups_reads_only_the_wanted_column(tmp_path: Path) -> None:
+    table = pa.table({"time_ns": np.arange(1000) * 5, "u": np.arange(1000.0), "f": np.arange(1000, dtype=np.float32)})
+    parquet.write_table(table, tmp_path / "log.parquet", row_group_size=300)
+    reader = open_log(tmp_path / "log.parquet")
+    series = reader.read({"table": ("u",)})["table"]
+    assert list(series.columns) == ["u"]
+    np.testing.assert_array_equal(series.columns["u"], np.arange(1000.0))
+    np.testing.assert_array_equal(series.receive_ns, np.arange(1000) * 5)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    rows=st.lists(
+        st.tuples(
+            st.floats(allow_nan=False, allow_infinity=False),
+            st.integers(-(2**53), 2**53),
+            st.text(alphabet=st.characters(codec="ascii", exclude_characters="\r\n\0", min_codepoint=32), max_size=12),
+        ),
+        min_size=2,
+        max_size=20,
+    ),
+    separator=st.sampled_from([",", ";", "\t"]),
+    end=st.sampled_from(["\n", "\r\n"]),
+)
+def test_any_csv_reads_as_pythons_csv_module_reads_it(
+    tmp_path: Path, rows: list[tuple[float, int, str]], separator: str, end: str
+) -> None:
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, delimiter=separator, lineterminator=end)
+    writer.writerow(["time", "a", "b", "text"])
+    for number, row in enumerate(rows):
+        writer.writerow([number * 0.5, *row[:2], "x" + row[2]])
+    path = write(tmp_path, "log.csv", buffer.getvalue())
+    series, reader = read_all(path, TableLayout(time="time", separator=separator))
+    expected = list(csv.reader(io.StringIO(buffer.getvalue(), newline=""), delimiter=separator))[1:]
+    assert reader.losses == ()
+    assert series.columns["a"].tolist() == [float(row[1]) for row in expected]
+    assert series.columns["b"].tolist() == [int(row[2]) for row in expected]
+    assert series.columns["text"].tolist() == [row[3] for row in expected]
+
+
+# --- times --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("2025/04/11 11:15:45.313396019", (2025, 4, 11, 11, 15, 45, 313396019)),
+        ("2024-02-29T23:59:59Z", (2024, 2, 29, 23, 59, 59, 0)),
+        ("1969-12-31 23:59:59.5", (1969, 12, 31, 23, 59, 59, 500000000)),
+        ("2025-04-11 13:15:45.25+02:00", (2025, 4, 11, 11, 15, 45, 250000000)),
+        ("2025-04-11T11:15:45,123", (2025, 4, 11, 11, 15, 45, 123000000)),
+    ],
+)
+def test_datetimes_against_the_standard_library(text: str, expected: tuple[int, ...]) -> None:
+    times, good, note = datetimes_to_ns([text])
+    seconds = int((datetime(*expected[:6], tzinfo=UTC) - datetime(1970, 1, 1, tzinfo=UTC)).total_seconds())
+    assert (times.tolist(), good.tolist(), note) == ([seconds * 10**9 + expected[6]], [True], "")
+
+
+@given(st.lists(st.datetimes(min_value=datetime(1700, 1, 1), max_value=datetime(2200, 1, 1)), min_size=1, max_size=5))
+def test_datetimes_of_any_day_against_numpy(moments: list[datetime]) -> None:
+    texts = [moment.isoformat(sep=" ", timespec="microseconds") for moment in moments]
+    times, good, _ = datetimes_to_ns(texts)
+    assert good.all()
+    assert times.tolist() == np.array(texts, dtype="datetime64[ns]").astype(np.int64).tolist()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "11:15", "2025-02-30 00:00:00", "2025-13-01 00:00:00", "11.04.2025 11:15:45", "2025-04-11 11:15:45 pm"]
+)
+def test_what_is_no_date_is_unreadable(text: str) -> None:
+    _, good, _ = datetimes_to_ns(["2025-04-11 11:15:45.5", text])
+    assert good.tolist() == [True, False]
+
+
+def test_fractions_without_leading_zeros_are_recognised_by_order() -> None:
+    nanoseconds = [981391041, 1081833647, 1182833862, 1294568436, 2004000001]
+    texts = [f"2025/04/11 11:15:{44 + ns // 10**9}.{ns % 10**9}" for ns in nanoseconds]
+    assert texts[1].endswith("45.81833647")
+    times, _, note = datetimes_to_ns(texts)
+    assert np.diff(times).tolist() == np.diff(nanoseconds).tolist()
+    assert "leading zeros" in note
+    # Fractions cut of their trailing zeros are the ordinary case, and not touched.
+    times, _, note = datetimes_to_ns(["2025-04-11 11:15:45.25", "2025-04-11 11:15:45.251", "2025-04-11 11:15:45.3"])
+    assert np.diff(times).tolist() == [1_000_000, 49_000_000]
+    assert note == ""
+
+
+def test_epoch_seconds_keep_what_a_float_can_hold() -> None:
+    times, good = numbers_to_ns(np.array([1744362945.5, -0.25, np.nan, 1e300]), "s")
+    assert times[:2].tolist() == [1744362945_500_000_000, -250_000_000]
+    assert good.tolist() == [True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("sample", "column", "unit"),
+    [
+        ({"": ["0", "1"], "tvec": ["0.0", "0.5"]}, "tvec", "s"),
+        ({"a": ["1", "2"], "time (ms)": ["0", "20"]}, "time (ms)", "ms"),
+        ({"timestamp": ["1744362945123456789", "1744362945223456789"]}, "timestamp", "ns"),
+        ({"%time": ["1744362945.1", "1744362945.2"]}, "%time", "s"),
+        ({"column 1": ["0.0", "0.05", "0.1"], "column 2": ["3", "2", "3"]}, "column 1", "s"),
+    ],
+)
+def test_time_column_is_guessed(sample: dict[str, list[str]], column: str, unit: str) -> None:
+    plan = guess_time(sample)
+    assert plan is not None
+    assert (plan.column, plan.unit) == (column, unit)
+
+
+def test_a_row_counter_or_a_named_rising_column_is_no_time() -> None:
+    assert guess_time({"column 1": ["0", "1", "2"], "u": ["1", "2", "3"]}) is None
+    assert guess_time({"J": ["0", "0.05", "0.1"], "Kt": ["0.3", "0.2", "0.1"]}) is None
+
+
+# --- damage -------------------------------------------------------------------------------------------------------
+
+
+def test_rows_with_a_wrong_number_of_fields_are_counted(tmp_path: Path) -> None:
+    series, reader = read_all(write(tmp_path, "log.csv", "time,a\n0,1\n1,2,3\n2,4\n3\n4,5\n"))
+    assert series.columns["a"].tolist() == [1, 4, 5]
+    (loss,) = reader.losses
+    assert loss.messages == 2
+    assert "line 3" in loss.what
+    assert '"1,2,3"' in loss.what
+
+
+def test_a_row_cut_at_the_end_is_told_apart(tmp_path: Path) -> None:
+    series, reader = read_all(write(tmp_path, "log.csv", "time,a,b\n0,1,1\n1,2,2\n2,4"))
+    assert series.columns["a"].tolist() == [1, 2]
+    assert [loss.messages for loss in reader.losses] == [1]
+    assert "ends in the middle of a row" in reader.losses[0].what
+
+
+def test_unreadable_numbers_and_times_are_counted(tmp_path: Path) -> None:
+    series, reader = read_all(write(tmp_path, "log.csv", "time,a\n0,1\n1,ERR\n2,4\nreset,9\n4,5\n"))
+    assert series.receive_ns.tolist() == [0, 10**9, 2 * 10**9, 4 * 10**9]
+    np.testing.assert_array_equal(series.columns["a"], [1, np.nan, 4, 5])
+    by_text = {loss.what.split(" ")[1]: loss for loss in reader.losses}
+    assert set(by_text) == {"cells", "rows"}
+    assert by_text["rows"].messages == 1
+    assert by_text["rows"].seconds == pytest.approx(2.0)
+
+
+def test_reading_twice_does_not_count_twice(tmp_path: Path) -> None:
+    reader = open_log(write(tmp_path, "log.csv", "time,a\n0,1\n1,2,3\n2,4\n"))
+    for _ in range(2):
+        reader.read({"table": ("a",)})
+    assert len(reader.losses) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "layout", "expected"),
+    [
+        ("a.csv", "time,u\n", None, "header and no rows"),
+        ("a.csv", "time,u\n", TableLayout(time="time"), "header and no rows"),
+        ("a.txt", "Dear all,\nthe trial went well,\nregards\n", None, "not a table"),
+        ("a.csv", "a,b\n1,2\n1,2\n", None, "looks like a time"),
+        ("a.csv", "time,u\n0,1\n1,2\n", TableLayout(time="tiem"), 'Did you mean "time"?'),
+        ("a.csv", "time;u\n0;1\n1;2\n", TableLayout(time="time"), "separator"),
+        ("a.csv", "time,u\n0,1\n1,2\n", TableLayout(time="c", columns=("a", "b", "c")), "3 column names but 2 fields"),
+        ("a.csv", "time,u\nx,1\ny,2\n", TableLayout(time="time"), "readable time"),
+        ("a.csv", "time,u\n0,1\n", TableLayout(time="time", time_unit="datetime"), "readable time"),
+        ("a.csv", "time,u\n0,1\n", TableLayout(time="time", skip_rows=9), "no rows after 9 lines"),
+        ("a.csv", "time,u\n0,1\n", TableLayout(time="time", encoding="utf-99"), "encoding"),
+        ("a.parquet", b"PAR1 and then nothing", None, "Parquet file cannot be read"),
+        ("a.csv", "time,u\n0,1\n", TableLayout(time="time", separator="::"), "separator"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_in_one_line(
+    tmp_path: Path, name: str, content: str | bytes, layout: TableLayout | None, expected: str
+) -> None:
+    path = write(tmp_path, name, content)
+    with pytest.raises(FerryIdError) as caught:
+        read_all(path, layout)
+    message = str(caught.value)
+    assert expected in message
+    assert message.startswith(str(path))
+    assert "Fix:" in message
+    assert "\n" not in message
+
+
+def test_misspelt_column_gets_the_nearest_name(tmp_path: Path) -> None:
+    reader = open_log(write(tmp_path, "log.csv", "time,speed\n0,1\n1,2\n"))
+    with pytest.raises(FerryIdError, match='Did you mean "speed"'):
+        reader.read({"table": ("sped",)})
+    with pytest.raises(FerryIdError, match="no topic"):
+        reader.read({"/odom": ("x",)})
+
+
+def test_opening_and_reading_a_csv_does_not_import_pandas(tmp_path: Path) -> None:
+    path = write(tmp_path, "log.csv", "time,u,mode\n0,1.5,a\n1,,b\n")
+    code = (
+        "import sys; from ferryid.ingest import open_log, supported_formats; supported_formats()\n"
+        "assert 'pandas' not in sys.modules and 'pyarrow' not in sys.modules\n"
+        f"open_log({str(path)!r}).read({{'table': ('u', 'mode')}})\n"
+        "assert 'pandas' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+# --- real recordings ----------------------------------------------------------------------------------------------
+
+
+def test_kvlcc2_text(shared_data: Callable[[str], Path]) -> None:
+    names = ("t", "x", "y", "psi", "u", "v", "r", "p", "delta", "n", "T", "Q")
+    layout = TableLayout(time="t", columns=names, skip_rows=4, separator="whitespace", encoding="cp1252")
+    series, reader = read_all(shared_data("kvlcc2/HSVA_CPMC_KVLCC2_Z_10_05.dat"), layout)
+    assert len(series.receive_ns) == 3501
+    assert set(np.diff(series.receive_ns).tolist()) == {50_000_000}
+    assert series.columns["Q"][-1] == 1.11433
+    assert reader.losses == ()
+
+
+def test_milliampere_2025_folder(shared_data: Callable[[str], Path]) -> None:
+    reader = open_log(shared_data("milliampere1"))
+    assert len(reader.topics) == 21
+    series = reader.read({"/vectorVS330/fix": ("latitude",), "/actuators/actuator_1/azimuth_angle": ("data",)})
+    fix = series["/vectorVS330/fix"]
+    assert fix.stamp_ns is not None
+    # The recorder wrote local time: two hours ahead, and otherwise within a second of the receiver's stamps.
+    latency_s = (fix.receive_ns - fix.stamp_ns) * 1e-9 - 7200
+    assert float(latency_s.min()) > 0
+    assert float(latency_s.max()) < 1
+    assert bool((np.diff(fix.receive_ns) > 0).all())
+    assert math.isclose(fix.columns["latitude"][0], 63.44119928516667)
