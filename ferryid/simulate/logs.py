@@ -37,6 +37,7 @@ def write_log(
     *,
     storage: str = "sqlite3",
     overwrite: bool = False,
+    chunk_bytes: int = CHUNK_BYTES,
 ) -> None:
     """Write the log of a trial, in the format that the name of `out` asks for.
 
@@ -52,6 +53,8 @@ def write_log(
         Storage of a ROS2 folder: ``sqlite3`` or ``mcap``.
     overwrite
         Replace what is there.
+    chunk_bytes
+        Size of a chunk of an MCAP file or a bag before compression.
 
     Raises
     ------
@@ -77,10 +80,10 @@ def write_log(
     streams = [stream for stream in simulation.streams if len(stream.stamp_ns)]
     if suffix == ".mcap":
         with replacing(out) as temporary:
-            _write_mcap(streams, temporary)
+            _write_mcap(streams, temporary, chunk_bytes)
     elif suffix == ".bag":
         with replacing(out) as temporary:
-            _write_ros1(streams, temporary)
+            _write_ros1(streams, temporary, chunk_bytes)
     else:
         with replacing(out) as temporary, _inside(temporary, out.name) as folder:
             _write_ros2(streams, folder, storage)
@@ -125,10 +128,10 @@ def _in_order(streams: list[Stream], ros_version: int) -> Iterator[tuple[int, in
     return heapq.merge(*(rows(index, stream) for index, stream in enumerate(streams)), key=lambda row: row[:2])
 
 
-def _write_mcap(streams: list[Stream], path: Path) -> None:
+def _write_mcap(streams: list[Stream], path: Path, chunk_bytes: int) -> None:
     store = typestore(2)
     with path.open("wb") as file:
-        writer = McapWriter(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        writer = McapWriter(file, chunk_size=chunk_bytes, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library=f"ferryid {__version__}")
         schemas: dict[str, int] = {}
         channels = []
@@ -144,10 +147,10 @@ def _write_mcap(streams: list[Stream], path: Path) -> None:
         writer.finish()  # type: ignore[no-untyped-call]
 
 
-def _write_ros1(streams: list[Stream], path: Path) -> None:
+def _write_ros1(streams: list[Stream], path: Path, chunk_bytes: int) -> None:
     store = typestore(1)
     writer = Ros1Writer(path)
-    writer.chunk_threshold = CHUNK_BYTES
+    writer.chunk_threshold = chunk_bytes
     writer.set_compression(Ros1Writer.CompressionFormat.LZ4)
     with writer:
         connections = [writer.add_connection(s.topic, s.type, typestore=store) for s in streams]

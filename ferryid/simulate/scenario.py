@@ -291,7 +291,7 @@ def _points(table: TableReader) -> tuple[Pose, ...]:
     good = bool(rows) and all(isinstance(row, list) and len(row) == 3 for row in rows)
     if not good or not all(type(value) in (int, float) and abs(value) < 1e5 for row in rows for value in row):
         table.fault(
-            '"points" must hold [north_m, east_m, heading_deg] rows. Fix: points = [[10, 0, 0], [10, 5, 90]]',
+            '"points" must hold rows of [north_m, east_m, heading_deg]. Fix: points = [[10, 0, 0], [10, 5, 90]]',
             "points",
         )
         return ()
