@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.cross_products import CrossProducts, gram
+from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, Rows, gram
 from ferryid.identify.qr import standard_deviations
-from ferryid.identify.simpls import extract, group_outputs, simpls, total
+from ferryid.identify.simpls import extract, group_outputs, simpls
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -92,21 +92,30 @@ class Blocks:
         return cls(np.array([part.n for part in parts]), first.K, first.m, first.shift, products)
 
     @classmethod
-    def cut(cls, X: Floats, Y: Floats, bounds: Ints) -> Blocks:
-        """Cross-products of the rows from ``bounds[i]`` up to ``bounds[i + 1]`` of `X` (n, K) and `Y` (n, m)."""
-        K, m = X.shape[1], Y.shape[1]
-        shift = np.concatenate([X.mean(axis=0), Y.mean(axis=0)])
-        products = np.empty((len(bounds) - 1, K + m + 1, K + m + 1))
-        flat = np.empty((K + m + 1) * int(np.diff(bounds).max()))
-        by_term = X.strides[0] < X.strides[1]
-        scratch = flat.reshape(K + m + 1, -1).T if by_term else flat.reshape(-1, K + m + 1)
-        scratch[:, -1] = 1.0
-        for i, (low, high) in enumerate(pairwise(bounds)):
-            rows = scratch[: high - low]
-            np.subtract(X[low:high], shift[:K], out=rows[:, :K])
-            np.subtract(Y[low:high], shift[K:], out=rows[:, K:-1])
-            products[i] = gram(rows)
-        return cls(np.diff(bounds), K, m, shift, products)
+    def of(cls, parts: Sequence[Rows], rate_hz: Sequence[float], block_s: float) -> Blocks:
+        """Cut the rows of one or several logs into blocks of about `block_s` seconds, none across two logs."""
+        spans = [
+            (rows, low, high)
+            for rows, rate in zip(parts, rate_hz, strict=True)
+            for low, high in _spans(rows, max(1, round(block_s * rate)))
+        ]
+        blocks = []
+        shift: Floats | None = None
+        for rows, low, high in spans:
+            X, Y = rows.chunk(low, high)
+            if shift is None:
+                shift = np.concatenate([X.mean(axis=0), Y.mean(axis=0)])
+                K, m = X.shape[1], Y.shape[1]
+            by_term = X.strides[0] < X.strides[1]
+            joined = np.empty((len(Y), K + m + 1), order="F" if by_term else "C")
+            np.subtract(X, shift[:K], out=joined[:, :K])
+            np.subtract(Y, shift[K:], out=joined[:, K:-1])
+            joined[:, -1] = 1.0
+            blocks.append(gram(joined))
+        if shift is None:
+            raise FerryIdError("fit: no rows to draw from for the intervals, found 0. Fix: use a longer log")
+        products = np.array(blocks)
+        return cls(products[:, -1, -1].round().astype(np.int64), K, m, shift, products)
 
     def whole(self) -> CrossProducts:
         """Cross-products of all blocks together."""
@@ -187,8 +196,7 @@ def bootstrap(
 
 
 def bootstrap_rows(
-    X: Sequence[Floats],
-    Y: Sequence[Floats],
+    parts: Sequence[Rows],
     rate_hz: Sequence[float],
     components: int,
     *,
@@ -205,12 +213,12 @@ def bootstrap_rows(
 
     Parameters
     ----------
-    X, Y
-        One array a log, shape (n, K) and (n, m), rows in order of time.
+    parts
+        Training rows of each log, in order of time.
     rate_hz
         Rows per second of each log.
     block_s
-        Length of a block [s]; by default `block_rows` of the fit's residual, the longest over logs and outputs.
+        Length of a block [s]; by default from the autocorrelation of the fit's residual, see `block_seconds`.
 
     Other parameters are those of `bootstrap`.
 
@@ -219,32 +227,13 @@ def bootstrap_rows(
     FerryIdError
         When the rows do not give two blocks, or a value is not finite.
     """
-    parts = [CrossProducts.from_rows(x, y, where=where) for x, y in zip(X, Y, strict=True)]
     notes: tuple[str, ...] = ()
     if block_s is None:
-        fit = simpls(total(parts), components, scale=scale, scale_y=scale_y, allowed=allowed, where=where)
-        lengths = [
-            block_rows(y - x @ fit.coefficients[-1] - fit.intercepts[-1]) / rate
-            for x, y, rate in zip(X, Y, rate_hz, strict=True)
-            if len(y) >= FEWEST_BLOCKS
-        ]
-        block_s = max(lengths, default=0.0)
-    seconds = sum(len(y) / rate for y, rate in zip(Y, rate_hz, strict=True))
-    if block_s * FEWEST_BLOCKS > seconds:
-        notes = (
-            f"Residuals stay correlated over blocks of {block_s:.3g} s; the rows allow "
-            f"{seconds / FEWEST_BLOCKS:.3g} s only: the intervals are probably too narrow.",
-        )
-        block_s = seconds / FEWEST_BLOCKS
-    block_s = max(block_s, seconds / _MOST_BLOCKS)
-    cuts = [
-        Blocks.cut(x, y, _even_bounds(len(y), max(1, round(block_s * rate))))
-        for x, y, rate in zip(X, Y, rate_hz, strict=True)
-        if len(y)
-    ]
-    stacked = _join(cuts)
+        cross = CrossProducts.of(*parts, where=where)
+        fit = simpls(cross, components, scale=scale, scale_y=scale_y, allowed=allowed, where=where)
+        block_s, notes = block_seconds(parts, rate_hz, fit.coefficients[-1], fit.intercepts[-1])
     return bootstrap(
-        stacked,
+        Blocks.of(parts, rate_hz, block_s),
         components,
         draws=draws,
         seed=seed,
@@ -256,6 +245,30 @@ def bootstrap_rows(
         notes=notes,
         where=where,
     )
+
+
+def block_seconds(
+    parts: Sequence[Rows], rate_hz: Sequence[float], coefficients: Floats, intercepts: Floats
+) -> tuple[float, tuple[str, ...]]:
+    """Length of a block [s] for a fit with `coefficients` (K, m) and `intercepts` (m,), and what to know about it.
+
+    The longest of `block_rows` over the logs, but so that there are from 10 to 500 blocks.
+    """
+    lengths, seconds = [0.0], 0.0
+    for rows, rate in zip(parts, rate_hz, strict=True):
+        chunks = (rows.chunk(low, low + CHUNK_ROWS) for low in range(0, len(rows.Y), CHUNK_ROWS))
+        residual = np.concatenate([Y - X @ coefficients - intercepts for X, Y in chunks])
+        seconds += len(residual) / rate
+        if len(residual) >= FEWEST_BLOCKS:
+            lengths.append(block_rows(residual) / rate)
+    longest, allowed_s = max(lengths), seconds / FEWEST_BLOCKS
+    if longest <= allowed_s:
+        return max(longest, seconds / _MOST_BLOCKS), ()
+    note = (
+        f"Residuals stay correlated over blocks of {longest:.3g} s; the rows allow {allowed_s:.3g} s only: "
+        "the intervals are probably too narrow."
+    )
+    return allowed_s, (note,)
 
 
 def block_rows(residual: Floats) -> int:
@@ -304,15 +317,13 @@ def _politis_white(series: Floats) -> int:
     return max(1, min(int(np.ceil(best)), longest))
 
 
-def _even_bounds(n: int, length: int) -> Ints:
-    """Bounds of blocks of about `length` rows, as equal as can be."""
-    return np.linspace(0, n, max(1, round(n / length)) + 1).round().astype(np.int64)
-
-
-def _join(cuts: Sequence[Blocks]) -> Blocks:
-    first = cuts[0]
-    products = [first.products, *(_moved(cut, first.shift) for cut in cuts[1:])]
-    return Blocks(np.concatenate([cut.n for cut in cuts]), first.K, first.m, first.shift, np.concatenate(products))
+def _spans(rows: Rows, length: int) -> list[tuple[int, int]]:
+    """Bounds of blocks with about `length` used rows each, as equal as can be."""
+    used = np.arange(len(rows.Y)) if rows.mask is None else np.flatnonzero(rows.mask)
+    if not len(used):
+        return []
+    bounds = np.linspace(0, len(used), max(1, round(len(used) / length)) + 1).round().astype(np.int64)
+    return [(int(used[low]), int(used[high - 1]) + 1) for low, high in pairwise(bounds)]
 
 
 def _moved(blocks: Blocks, shift: Floats) -> Floats:

@@ -60,7 +60,7 @@ class Simpls:
     extracted
         Number of components found in each group, G of them.
     rank
-        Numerical rank of the scaled basis.
+        Numerical rank of the scaled columns that each group may use, G of them.
     explained_x
         Cumulative fraction of the scaled basis' variance, shape (A,), mean over the groups.
     explained_y
@@ -79,7 +79,7 @@ class Simpls:
     loadings: Floats
     y_loadings: Floats
     extracted: tuple[int, ...]
-    rank: int
+    rank: tuple[int, ...]
     explained_x: Floats
     explained_y: Floats
 
@@ -148,43 +148,112 @@ def simpls(
     ----------
     De Jong (1993), Chemometrics and Intelligent Laboratory Systems 18, 251-263; thesis Appendix A.
     """
+    return simpls_many([source], components, scale=scale, scale_y=scale_y, allowed=allowed, where=where)[0]
+
+
+def simpls_many(
+    sources: Sequence[CrossProducts | QrFactor],
+    components: int,
+    *,
+    scale: bool = True,
+    scale_y: bool | None = None,
+    allowed: Flags | None = None,
+    where: str = "fit",
+) -> list[Simpls]:
+    """Fit several sets of rows side by side, each exactly as `simpls` does, which also lists the parameters."""
     if components < 1:
         raise FerryIdError(f"{where}: a fit needs at least one component, {components} asked. Fix: ask for 1 or more")
-    if source.n < 2:
+    fewest = min(source.n for source in sources)
+    if fewest < 2:
         raise FerryIdError(
-            f"{where}: a fit needs at least two rows, found {source.n}. Fix: use a longer log or a wider time range"
+            f"{where}: a fit needs at least two rows, found {fewest}. Fix: use a longer log or a wider time range"
         )
+    scales = [_scales(source, scale, scale if scale_y is None else scale_y) for source in sources]
+    groups = group_outputs(allowed, sources[0].K, sources[0].m)
+    solved = [_solve(sources, scales, columns, outputs, components) for columns, outputs in groups]
+    names = tuple(tuple(outputs.tolist()) for _, outputs in groups)
+    return [
+        _assemble(source, scales[i], names, [group[i] for group in solved], components)
+        for i, source in enumerate(sources)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Factors:
+    """One group of outputs of one fit, in the principal axes of the scaled columns."""
+
+    columns: NDArray[np.intp]
+    outputs: NDArray[np.intp]
+    eigenvalues: Floats
+    axes: Floats
+    R: Floats
+    P: Floats
+    Q: Floats
+    found: int
+
+
+def _scales(source: CrossProducts | QrFactor, by_column: bool, by_output: bool) -> Floats:
+    """Divisor of every column, infinite where a column is constant."""
+    deviation = standard_deviations(*source.moments(), source.n)
+    unit = np.where(np.isfinite(deviation), 1.0, np.inf)
+    K = source.K
+    return np.concatenate([(deviation if by_column else unit)[:K], (deviation if by_output else unit)[K:]])
+
+
+def _solve(
+    sources: Sequence[CrossProducts | QrFactor],
+    scales: Sequence[Floats],
+    columns: NDArray[np.intp],
+    outputs: NDArray[np.intp],
+    components: int,
+) -> list[_Factors]:
+    spectra = []
+    for source, divisor in zip(sources, scales, strict=True):
+        usable = np.isfinite(divisor)
+        some, targets = columns[usable[columns]], outputs[usable[source.K + outputs]]
+        finite = np.where(usable, divisor, 1.0)
+        spectra.append((some, targets, *source.spectrum(some, targets, finite)))
+    # Side by side, shorter ones filled with zeros: a direction without variance stays zero.
+    widest = max(len(spectrum[2]) for spectrum in spectra)
+    eigenvalues = np.zeros((len(sources), widest))
+    S = np.zeros((len(sources), widest, len(outputs)))
+    for i, (_, targets, values, _, covariance) in enumerate(spectra):
+        eigenvalues[i, : len(values)] = values
+        S[i, : len(values), : len(targets)] = covariance
+    R, P, Q, found = extract(lambda r: eigenvalues * r, S, components)
+    return [
+        _Factors(
+            some, targets, values, axes, R[i, : len(values)], P[i, : len(values)], Q[i, : len(targets)], int(found[i])
+        )
+        for i, (some, targets, values, axes, _) in enumerate(spectra)
+    ]
+
+
+def _assemble(
+    source: CrossProducts | QrFactor,
+    scales: Floats,
+    groups: tuple[tuple[int, ...], ...],
+    solved: Sequence[_Factors],
+    components: int,
+) -> Simpls:
     K, m = source.K, source.m
     mean, squares = source.moments()
-    deviation = standard_deviations(mean, squares, source.n)
-    by_output = scale if scale_y is None else scale_y
-    unit = np.where(np.isfinite(deviation), 1.0, np.inf)
-    scales = np.concatenate([(deviation if scale else unit)[:K], (deviation if by_output else unit)[K:]])
-    groups = group_outputs(allowed, K, m)
-
     coefficients = np.zeros((components, K, m))
-    weights = np.zeros((len(groups), K, components))
+    weights = np.zeros((len(solved), K, components))
     loadings = np.zeros_like(weights)
-    y_loadings = np.zeros((len(groups), m, components))
-    extracted, explained_x = [], np.zeros(components)
-    for number, (columns, outputs) in enumerate(groups):
-        columns = columns[np.isfinite(scales[columns])]
-        outputs = outputs[np.isfinite(scales[K + outputs])]
-        eigenvalues, axes, S = source.spectrum(columns, outputs, np.where(np.isfinite(scales), scales, 1.0))
-        R, P, Q, found = extract(_diagonal(eigenvalues), S[None], components)
-        extracted.append(int(found[0]))
-        weights[number, columns] = axes @ R[0]
-        loadings[number, columns] = axes @ P[0]
-        y_loadings[number, outputs] = Q[0]
-        steps = np.cumsum(R[0].T[:, :, None] * Q[0].T[:, None, :], axis=0)
-        scaled = axes @ steps * scales[K + outputs] / scales[columns][:, None]
-        coefficients[np.ix_(np.arange(components), columns, outputs)] = scaled
-        if len(eigenvalues):
-            explained_x += np.cumsum(np.sum(P[0] ** 2, axis=0)) / eigenvalues.sum() / len(groups)
-    variance_y = squares[K:] / np.where(np.isfinite(scales[K:]), scales[K:], 1.0) ** 2
+    y_loadings = np.zeros((len(solved), m, components))
+    explained_x = np.zeros(components)
+    for number, one in enumerate(solved):
+        weights[number, one.columns] = one.axes @ one.R
+        loadings[number, one.columns] = one.axes @ one.P
+        y_loadings[number, one.outputs] = one.Q
+        steps = np.cumsum(one.R.T[:, :, None] * one.Q.T[:, None, :], axis=0)
+        units = scales[K + one.outputs] / scales[one.columns][:, None]
+        coefficients[:, one.columns[:, None], one.outputs] = one.axes @ steps * units
+        if len(one.eigenvalues):
+            explained_x += np.cumsum(np.sum(one.P**2, axis=0)) / one.eigenvalues.sum() / len(solved)
+    variance_y = np.where(np.isfinite(scales[K:]), squares[K:] / scales[K:] ** 2, 0.0)
     explained_y = np.cumsum(np.sum(y_loadings**2, axis=0), axis=1).T
-    everything = np.flatnonzero(np.isfinite(scales[:K]))
-    rank = len(source.spectrum(everything, np.arange(0), np.where(np.isfinite(scales), scales, 1.0))[0])
     return Simpls(
         n=source.n,
         coefficients=coefficients,
@@ -193,12 +262,12 @@ def simpls(
         scale_x=scales[:K],
         mean_y=mean[K:],
         scale_y=scales[K:],
-        groups=tuple(tuple(int(output) for output in outputs) for _, outputs in groups),
+        groups=groups,
         weights=weights,
         loadings=loadings,
         y_loadings=y_loadings,
-        extracted=tuple(extracted),
-        rank=rank,
+        extracted=tuple(one.found for one in solved),
+        rank=tuple(len(one.eigenvalues) for one in solved),
         explained_x=explained_x,
         explained_y=explained_y / np.where(variance_y > 0.0, variance_y, 1.0),
     )
@@ -319,10 +388,8 @@ def sweep_components(
             f"{where}: cross-validation needs two folds with rows, found {len(folds)}. "
             "Fix: use a longer log or fewer folds"
         )
-    errors = []
-    for fold, rest in zip(folds, training_sums(folds), strict=True):
-        fit = simpls(rest, components, scale=scale, scale_y=scale_y, allowed=allowed, where=where)
-        errors.append(fold.sse(fit.coefficients, fit.intercepts))
+    fits = simpls_many(training_sums(folds), components, scale=scale, scale_y=scale_y, allowed=allowed, where=where)
+    errors = [fold.sse(fit.coefficients, fit.intercepts) for fold, fit in zip(folds, fits, strict=True)]
     squares = np.array(errors)
     rows = np.array([fold.n for fold in folds], dtype=float)
     mean = squares.sum(axis=0) / rows.sum()
@@ -341,10 +408,6 @@ def one_standard_error(mse: Floats, standard_error: Floats) -> int:
     band = (standard_error / unit).mean(axis=1)
     lowest = int(np.argmin(curve))
     return int(np.argmax(curve <= curve[lowest] + band[lowest])) + 1
-
-
-def _diagonal(eigenvalues: Floats) -> Callable[[Floats], Floats]:
-    return lambda r: eigenvalues * r
 
 
 def _times(matrix: Floats, vector: Floats) -> Floats:
