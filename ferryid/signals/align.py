@@ -242,6 +242,8 @@ def _on_grid(source: _Source, t0_ns: int, t: Floats, rate: float, repairs: list[
             if times.size == 0:
                 result[name] = np.full(t.size, np.nan)
                 continue
+            # Half a bin at either end has its mean elsewhere.
+            inside = inside & (t >= times[0] - _EXACT_S) & (t <= times[-1] + _EXACT_S)
         result[name] = np.where(inside, np.interp(t, times, known), np.nan)
     if wind:
         along, across = result.pop("_wind_along"), result.pop("_wind_across")

@@ -246,8 +246,8 @@ def cross_checks(track: Track) -> tuple[str, ...]:
         c, s = np.cos(psi), np.sin(psi)
         ahead, u = _changes(c * north + s * east, columns["u"], track, span)
         aside, v = _changes(c * east - s * north, columns["v"], track, span)
-        said += _compare("surge velocity", "position", ahead, u, 0.5, _SPEED_GAINS)
-        said += _compare("sway velocity", "position", aside, v, 0.5, _SPEED_GAINS)
+        said += _compare("surge velocity", "position", ahead, u, 0.2, _SPEED_GAINS)
+        said += _compare("sway velocity", "position", aside, v, 0.2, _SPEED_GAINS)
     return tuple(said)
 
 

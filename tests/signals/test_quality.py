@@ -1,0 +1,187 @@
+"""Signal quality: what is wrong is found and counted, what is right is left alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError
+from ferryid.signals.quality import clean, cross_checks, require_excited, stale, unwrapped
+from ferryid.signals.track import Track
+
+Floats = NDArray[np.float64]
+
+T = np.arange(0, 120, 0.05)
+
+
+def voyage(**changes: Floats) -> Track:
+    """A turning, speeding voyage with position, velocity and heading that agree."""
+    psi = 0.5 * np.sin(0.1 * T) + 0.05 * T
+    u, v, r = 1.0 + 0.5 * np.sin(0.07 * T), 0.3 * np.cos(0.05 * T), 0.05 * np.cos(0.1 * T) + 0.05
+    fine = np.linspace(0, T[-1], 20 * T.size)
+    heading = 0.5 * np.sin(0.1 * fine) + 0.05 * fine
+    north = np.cos(heading) * (1.0 + 0.5 * np.sin(0.07 * fine)) - np.sin(heading) * 0.3 * np.cos(0.05 * fine)
+    east = np.sin(heading) * (1.0 + 0.5 * np.sin(0.07 * fine)) + np.cos(heading) * 0.3 * np.cos(0.05 * fine)
+    step = fine[1] - fine[0]
+    x, y = (np.interp(T, fine, np.concatenate([[0], np.cumsum((d[1:] + d[:-1]) / 2 * step)])) for d in (north, east))
+    columns = {"x": x, "y": y, "psi": psi, "u": u, "v": v, "r": r, **changes}
+    return Track("trial", T, 0, 20.0, columns, np.ones(T.size, dtype=bool))
+
+
+def test_agreeing_signals_raise_no_finding() -> None:
+    assert cross_checks(voyage()) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "said"),
+    [
+        ("r", -1.0, "yaw rate has the wrong sign against the heading"),
+        ("r", 180 / np.pi, "degrees per second that are read as rad/s"),
+        ("r", np.pi / 180, "rad/s that are read as degrees per second"),
+        (
+            "u",
+            1 / 0.514444,
+            "surge velocity does not match the position (gain 0.514, correlation 1.00): it looks like knots",
+        ),
+        ("u", 0.514444, "m/s that are read as knots"),
+        ("v", -1.0, "sway velocity has the wrong sign against the position (gain -1"),
+        ("u", 1.3, "surge velocity does not match the position (gain 0.769"),
+    ],
+)
+def test_wrong_signs_and_units_are_named(name: str, factor: float, said: str) -> None:
+    track = voyage()
+    (finding,) = cross_checks(voyage(**{name: factor * track.columns[name]}))
+    assert said in finding
+
+
+def test_a_yaw_rate_from_elsewhere_is_named() -> None:
+    (finding,) = cross_checks(voyage(r=0.1 * np.sin(2.1 * T)))
+    assert "does not follow the heading" in finding
+
+
+def test_gaps_do_not_enter_the_cross_checks() -> None:
+    track = voyage()
+    columns = {name: values.copy() for name, values in track.columns.items()}
+    columns["x"][1000:] += 500.0
+    columns["u"][995:1005] = np.nan
+    valid = np.isfinite(columns["u"])
+    assert cross_checks(Track("trial", T, 0, 20.0, columns, valid)) == ()
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    places=st.lists(st.integers(0, 110), min_size=1, max_size=8, unique=True),
+    size=st.floats(0.8, 100),
+    noise=st.floats(0.0, 0.02),
+)
+def test_isolated_spikes_are_found_exactly(places: list[int], size: float, noise: float) -> None:
+    rng = np.random.default_rng(3)
+    good = np.sin(0.2 * T) + rng.normal(0, noise, T.size)
+    where = np.array(sorted(places)) * 20 + 10
+    bad = good.copy()
+    bad[where] += size * rng.choice([-1, 1], where.size)
+    result, quality = clean("u", T, bad)
+    assert quality.spikes == where.size
+    assert quality.jumps == 0
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(result)), where)
+    untouched = np.isfinite(result)
+    np.testing.assert_array_equal(result[untouched], bad[untouched])
+
+
+@settings(max_examples=40, deadline=None)
+@given(noise=st.floats(1e-4, 0.5), rate=st.floats(1, 100), seed=st.integers(0, 1000))
+def test_honest_noise_is_never_taken_out(noise: float, rate: float, seed: int) -> None:
+    t = np.arange(3000) / rate
+    values = np.random.default_rng(seed).normal(0, noise, t.size)
+    result, quality = clean("u", t, values)
+    assert quality.spikes == 0
+    np.testing.assert_array_equal(result, values)
+
+
+def test_a_lasting_step_is_reported_and_kept() -> None:
+    values = np.sin(0.2 * T) + np.where(T > 60, 5.0, 0.0)
+    result, quality = clean("u", T, values)
+    assert (quality.spikes, quality.jumps) == (0, 1)
+    np.testing.assert_array_equal(result, values)
+    assert quality.sentences() == ("u: 1 implausible steps were found and kept.",)
+
+
+def test_orders_and_resting_actuators_are_left_alone() -> None:
+    pulses = np.where(np.arange(T.size) % 400 == 0, 500.0, 0.0)
+    assert clean("n_cmd_thruster1", T, pulses)[1].spikes == 0
+    resting = clean("n_thruster1", T, np.where(T > 60, 300.0, 0.0))[1]
+    assert (resting.spikes, resting.jumps, resting.held) == (0, 0, 0)
+
+
+def test_held_and_missing_samples_are_counted() -> None:
+    values = np.sin(T)
+    values[100:111] = values[100]
+    values[500] = values[499]
+    values[700:705] = np.nan
+    values[800] = np.inf
+    result, quality = clean("v", T, values)
+    assert (quality.missing, quality.held) == (6, 11)
+    assert quality.longest_held_s == pytest.approx(0.5)
+    assert np.isnan(result[800])
+
+
+def test_a_slow_sensor_in_a_fast_stream_is_told_by_its_repeats() -> None:
+    quality = clean("x", T, np.repeat(np.sin(T[::4]), 4))[1]
+    assert quality.held == 1800
+    assert "updated slower than it is recorded" in quality.sentences()[0]
+
+
+def test_a_constant_is_called_one() -> None:
+    assert clean("u", T, np.full(T.size, 0.3))[1].constant
+    assert not clean("u", T, np.sin(T))[1].constant
+
+
+def test_a_vessel_at_rest_is_not_a_stale_sensor() -> None:
+    rng = np.random.default_rng(0)
+    moving = rng.normal(1, 0.1, T.size)
+    moving[100:300] = moving[100]
+    still = moving.copy()
+    still[100:300] = 0.0
+    assert stale(T, {"u": moving}, 0.5).sum() == 199
+    assert stale(T, {"u": still}, 0.5).sum() == 0
+    assert stale(T, {"u": moving, "psi": rng.normal(size=T.size)}, 0.5).sum() == 0
+    assert stale(T, {"u": np.repeat(moving[::4], 4)}, 0.1).sum() == 0
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), lost=st.integers(0, 50))
+def test_unwrapping_is_exact_and_survives_missing_samples(seed: int, lost: int) -> None:
+    rng = np.random.default_rng(seed)
+    angle = np.cumsum(rng.uniform(-0.5, 0.5, 400))
+    wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
+    wrapped[rng.choice(400, lost, replace=False)] = np.nan
+    # Samples lost in a row can hide half a turn; one in a row cannot at half a radian a sample.
+    pairs = np.isnan(wrapped)
+    wrapped[1:][pairs[1:] & pairs[:-1]] = ((angle + np.pi) % (2 * np.pi) - np.pi)[1:][pairs[1:] & pairs[:-1]]
+    result = unwrapped(wrapped)
+    turns = (result - angle)[np.isfinite(result)] / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns[0]), atol=1e-12)
+    np.testing.assert_array_equal(np.isnan(result), np.isnan(wrapped))
+
+
+def test_unwrapping_a_long_turn_gathers_no_rounding() -> None:
+    angle = 0.3 * np.arange(500_000)
+    result = unwrapped((angle + np.pi) % (2 * np.pi) - np.pi)
+    assert np.abs(result - angle).max() < 1e-9
+
+
+def test_constant_signals_are_refused() -> None:
+    track = voyage()
+    nu = np.column_stack([track.columns[name] for name in ("u", "v", "r")])
+    tau = np.column_stack([np.sin(T), 0 * T, 0 * T])
+    require_excited(track, nu, tau)
+    for i, name in enumerate(("u", "v", "r")):
+        flat = nu.copy()
+        flat[:, i] = 0.25
+        with pytest.raises(FerryIdError, match=rf"trial: constant signal {name}.*0\.25.*Fix: "):
+            require_excited(track, flat, tau)
+    with pytest.raises(FerryIdError, match=r"trial: constant signal, the applied force never changes.*Fix: "):
+        require_excited(track, nu, np.ones_like(nu))
