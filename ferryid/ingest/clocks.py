@@ -189,7 +189,7 @@ def _one_topic(receive_ns: Nanoseconds, stamp_ns: Nanoseconds | None) -> tuple[N
     """Repair one topic, its stamps not yet shifted to the recorder's base."""
     receive = np.ascontiguousarray(receive_ns, dtype=np.int64)
     if stamp_ns is None:
-        return _ordered(receive, "receive", ("no header stamps: receive times are used",), drop_far_side=True)
+        return _ordered(receive, "receive", ("no header: receive times only",), drop_far_side=True)
     stamp = np.ascontiguousarray(stamp_ns, dtype=np.int64)
     reason, notes, stamp, facts = _judge(receive, stamp)
     if reason:

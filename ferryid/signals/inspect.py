@@ -64,8 +64,10 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
         if profile is not None and selection is not None:
             vessel = _vessel(reader, log_name(path), profile, selection, series, repaired)
         sha256 = hashing.result()
-    notes = grouped_notes({topic.name: topic.note.split("; ") for topic in reader.topics if topic.note})
-    notes += grouped_notes({topic: report.notes for topic, (_, _, report) in repaired.items()})
+    topics = [
+        _topic(topic, repaired[topic.name][2] if topic.name in repaired else None, problems)
+        for topic in sorted(reader.topics, key=lambda one: one.name)
+    ]
     starts = [topic.start_ns for topic in reader.topics if topic.start_ns is not None]
     ends = [topic.end_ns for topic in reader.topics if topic.end_ns is not None]
     return {
@@ -78,12 +80,9 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
         "start": _clock_time(min(starts)) if starts else None,
         "duration_s": (max(ends) - min(starts)) * 1e-9 if starts and ends else 0.0,
         "messages": sum(topic.count for topic in reader.topics),
-        "topics": [
-            _topic(topic, repaired[topic.name][2] if topic.name in repaired else None, problems)
-            for topic in sorted(reader.topics, key=lambda one: one.name)
-        ],
+        "topics": topics,
         "losses": [plain_loss(loss) for loss in reader.losses],
-        "notes": notes,
+        "notes": grouped_notes({topic["name"]: _notes(topic) for topic in topics}),
         "vessel": vessel,
         "bundled": _bundled_matches(path, reader) if profile is None else [],
     }
@@ -121,7 +120,10 @@ def _topic(topic: Topic, clock: ClockReport | None, problems: Mapping[str, str])
     why = ""
     if clock is None:
         why = problems.get(
-            topic.name, "large messages: header stamps were not read" if topic.fields else "unknown layout"
+            topic.name,
+            "large messages: header stamps were not read"
+            if topic.fields
+            else "message layout not known: header stamps were not read",
         )
     return {
         "name": topic.name,
@@ -137,6 +139,16 @@ def _topic(topic: Topic, clock: ClockReport | None, problems: Mapping[str, str])
         "clock": clock.to_dict() if clock is not None else None,
         "clock_unknown": why,
     }
+
+
+def _notes(topic: Mapping[str, Any]) -> list[str]:
+    """What its reader and its clock say of a topic, each once."""
+    clock = topic["clock"]
+    told = [
+        *filter(None, topic["note"].split("; ")),
+        *(clock["notes"] if clock is not None else [topic["clock_unknown"]]),
+    ]
+    return list(dict.fromkeys(told))
 
 
 def _vessel(

@@ -122,9 +122,11 @@ def _stream(profile: Profile, series: Series, time_ns: Nanoseconds, rows: Rows, 
 def _log_notes(streams: Mapping[str, Stream], selection: Selection, topics: tuple[Topic, ...]) -> tuple[str, ...]:
     """What concerns several topics at once, and what their reader repaired."""
     notes = [*selection.notes]
-    notes += grouped_notes(
-        {topic.name: topic.note.split("; ") for topic in topics if topic.name in streams and topic.note}
-    )
+    # Which topics have a header is told with their clocks.
+    told = {
+        one.name: [note for note in one.note.split("; ") if note and not note.startswith("no header")] for one in topics
+    }
+    notes += grouped_notes({topic: told[topic] for topic in streams if topic in told})
     stamped = sorted(topic for topic, stream in streams.items() if stream.clock.source == "stamp")
     received = sorted(topic for topic, stream in streams.items() if stream.clock.source == "receive")
     if stamped and received:

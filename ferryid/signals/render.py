@@ -74,7 +74,7 @@ def _topics(topics: Sequence[Mapping[str, Any]]) -> str:
             values = [
                 clock["source"],
                 _seconds(clock["offset_s"]),
-                _number(clock["drift_ppm"], ".1f"),
+                _drift(clock, topic["duration_s"]),
                 _seconds(clock["jitter_s"]),
                 f"{len(clock['gaps'])} ({longest:.1f} s)" if clock["gaps"] else "0",
             ]
@@ -124,7 +124,8 @@ def _vessel(vessel: Mapping[str, Any]) -> str:
         if signal is None:
             rows.append([name, "", "", "", "", "", "", source])
             continue
-        held = f"{100 * signal['held'] / max(1, signal['count']):.0f} %" if signal["held"] else "0"
+        share = signal["held"] / max(1, signal["count"])
+        held = "0" if share == 0 else "<1 %" if share < 0.01 else f"{100 * share:.0f} %"
         rows.append(
             [
                 name,
@@ -157,6 +158,14 @@ def _listed(title: str, sentences: Sequence[str]) -> str:
     for sentence in sentences:
         lines += textwrap.wrap(sentence, WIDTH, initial_indent="  ", subsequent_indent="      ", break_long_words=False)
     return "\n".join(lines)
+
+
+def _drift(clock: Mapping[str, Any], duration_s: float) -> str:
+    """Drift [ppm], or "~0" where jitter hides it over so short a log."""
+    if clock["drift_ppm"] is None:
+        return ""
+    hidden = abs(clock["drift_ppm"]) * 1e-6 * duration_s < clock["jitter_s"]
+    return "~0" if hidden else f"{clock['drift_ppm']:.1f}"
 
 
 def _number(value: float | None, form: str) -> str:
