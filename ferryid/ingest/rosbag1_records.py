@@ -1,0 +1,505 @@
+"""Records of a ROS1 bag (format 2.0): its index, and the walk that stands in for a missing one.
+
+Reference: http://wiki.ros.org/Bags/Format/2.0
+"""
+
+from __future__ import annotations
+
+import struct
+from bz2 import BZ2Decompressor
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, NamedTuple
+
+import lz4.frame
+import numpy as np
+from numpy.typing import NDArray
+
+MAGIC = b"#ROSBAG V2.0\n"
+MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
+# A record header holds a few names, a topic among them; anything longer is damage.
+MAX_HEADER = 1 << 16
+Entries = NDArray[np.void]
+INDEX_ENTRY = np.dtype([("sec", "<u4"), ("nsec", "<u4"), ("offset", "<u4")])
+SALVAGE_STEP = 4096
+COMPRESSIONS = ("none", "bz2", "lz4")
+
+_U32 = struct.Struct("<I").unpack_from
+
+
+class RecordError(Exception):
+    """Bytes that are no record of a bag."""
+
+
+class Record(NamedTuple):
+    """One record: its header fields and where its data lies [bytes]; `end` may be behind a truncated file's end."""
+
+    position: int
+    fields: Mapping[bytes, bytes]
+    start: int
+    end: int
+
+    @property
+    def op(self) -> int:
+        """Kind of the record."""
+        return self.fields[b"op"][0]
+
+    def number(self, name: bytes) -> int:
+        """Return an unsigned header field of four or eight bytes."""
+        value = self.fields.get(name, b"")
+        if len(value) not in (4, 8):
+            raise RecordError(f"no {name.decode()} in the record at byte {self.position}")
+        return int.from_bytes(value, "little")
+
+
+@dataclass(frozen=True)
+class Connection:
+    """One publisher of one topic: its message type and that type's definition."""
+
+    number: int
+    topic: str
+    msgtype: str
+    md5sum: str
+    definition: str
+
+
+@dataclass
+class Chunk:
+    """One chunk of messages.
+
+    Attributes
+    ----------
+    position
+        Byte at which its record begins.
+    start, end
+        Its stored bytes; `end` is behind the end of a truncated file.
+    compression
+        ``"none"``, ``"bz2"`` or ``"lz4"``.
+    size
+        Bytes when decompressed.
+    index
+        Connection number to (byte of the first index entry, number of entries).
+    walked
+        Connection number to entries found in the chunk itself, for a chunk without an index.
+    start_ns, end_ns
+        Receive times of its messages [ns], None where no chunk information record tells.
+    """
+
+    position: int
+    start: int
+    end: int
+    compression: str
+    size: int
+    index: dict[int, tuple[int, int]] = field(default_factory=dict)
+    start_ns: int | None = None
+    end_ns: int | None = None
+    walked: dict[int, Entries] = field(default_factory=dict)
+
+    def count(self, connection: int) -> int:
+        """Number of messages of one connection."""
+        if connection in self.walked:
+            return len(self.walked[connection])
+        return self.index.get(connection, (0, 0))[1]
+
+    def entries(self, data: Any, connection: int) -> Entries:
+        """Receive time and place in the decompressed chunk of every message of one connection, shape (n,)."""
+        if connection in self.walked:
+            return self.walked[connection]
+        first, count = self.index.get(connection, (0, 0))
+        return np.frombuffer(data, INDEX_ENTRY, count, first)
+
+    @property
+    def connections(self) -> frozenset[int]:
+        """Connections with messages in the chunk."""
+        return frozenset(self.walked) | frozenset(self.index)
+
+
+class Records:
+    """Parses records; a header like one seen before (as all index records) is compared with it, not parsed."""
+
+    def __init__(self, data: Any) -> None:
+        self.data = data
+        self._size = len(data)
+        # Length of a header to its bytes with the values masked, that mask, and where the values lie.
+        self._seen: dict[int, tuple[int, int, tuple[tuple[bytes, int, int], ...]]] = {}
+
+    def at(self, position: int) -> Record:
+        """Parse the record that begins at a byte.
+
+        Raises
+        ------
+        RecordError
+            Where the bytes are no record, or the data ends within its header.
+        """
+        if position + 4 > self._size:
+            raise RecordError(f"the data ends at byte {self._size}, in a record header")
+        length = _U32(self.data, position)[0]
+        stop = position + 4 + length
+        if length > MAX_HEADER or stop + 4 > self._size:
+            raise RecordError(f"no record header at byte {position}")
+        header = bytes(self.data[position + 4 : stop])
+        seen = self._seen.get(length)
+        if seen is not None and int.from_bytes(header, "little") & seen[1] == seen[0]:
+            fields = {name: header[start:end] for name, start, end in seen[2]}
+        else:
+            fields = self._parsed(header, position)
+        return Record(position, fields, stop + 4, stop + 4 + _U32(self.data, stop)[0])
+
+    def _parsed(self, header: bytes, position: int) -> dict[bytes, bytes]:
+        spans: list[tuple[bytes, int, int]] = []
+        mask = bytearray(b"\xff" * len(header))
+        cursor = 0
+        while cursor < len(header):
+            size = _U32(header, cursor)[0] if cursor + 4 <= len(header) else 0
+            start, end = cursor + 4, cursor + 4 + size
+            name, equals, value = header[start:end].partition(b"=")
+            if not equals or end > len(header):
+                raise RecordError(f"no header fields in the record at byte {position}")
+            spans.append((name, end - len(value), end))
+            mask[end - len(value) : end] = bytes(len(value))
+            cursor = end
+        fields = {name: header[start:end] for name, start, end in spans}
+        if len(fields.get(b"op", b"")) != 1:
+            raise RecordError(f"no kind of record at byte {position}")
+        kept = int.from_bytes(mask, "little")
+        self._seen[len(header)] = int.from_bytes(header, "little") & kept, kept, tuple(spans)
+        return fields
+
+
+def connection_of(data: Any, record: Record) -> Connection:
+    """Read a connection record."""
+    inner: dict[bytes, bytes] = {}
+    cursor, stop = record.start, min(record.end, len(data))
+    while cursor + 4 <= stop:
+        size = _U32(data, cursor)[0]
+        name, equals, value = bytes(data[cursor + 4 : min(cursor + 4 + size, stop)]).partition(b"=")
+        if not equals:
+            raise RecordError(f"no connection in the record at byte {record.position}")
+        inner[name] = value
+        cursor += 4 + size
+    try:
+        topic = (record.fields.get(b"topic") or inner[b"topic"]).decode()
+        msgtype, md5sum = inner[b"type"].decode(), inner[b"md5sum"].decode()
+        definition = inner[b"message_definition"].decode(errors="replace")
+    except (KeyError, UnicodeDecodeError) as error:
+        raise RecordError(f"no connection in the record at byte {record.position}") from error
+    return Connection(record.number(b"conn"), topic, msgtype, md5sum, definition)
+
+
+def chunk_of(record: Record) -> Chunk:
+    """Read the header of a chunk record."""
+    compression = record.fields.get(b"compression", b"").decode(errors="replace")
+    return Chunk(record.position, record.start, record.end, compression, record.number(b"size"))
+
+
+def note_index(data: Any, chunk: Chunk, record: Record) -> None:
+    """Add an index record to the chunk that it follows."""
+    count = record.number(b"count")
+    if record.number(b"ver") != 1 or record.end - record.start != 12 * count or record.end > len(data):
+        raise RecordError(f"index record of another size or version at byte {record.position}")
+    chunk.index[record.number(b"conn")] = record.start, count
+
+
+def note_chunk_info(chunk: Chunk, record: Record) -> None:
+    """Add the times of a chunk information record to its chunk."""
+    times = [record.fields.get(name, b"") for name in (b"start_time", b"end_time")]
+    if record.number(b"count") and all(len(time) == 8 for time in times):
+        chunk.start_ns, chunk.end_ns = (_U32(time, 0)[0] * 1_000_000_000 + _U32(time, 4)[0] for time in times)
+
+
+def read_index(records: Records) -> tuple[list[Connection], list[Chunk]]:
+    """Read connections and chunks by the index at the file's end.
+
+    Raises
+    ------
+    RecordError
+        Where the bag has no index, or a damaged one.
+    """
+    data = records.data
+    header = records.at(len(MAGIC))
+    position = header.number(b"index_pos")
+    if position == 0 or position > len(data):
+        raise RecordError("the bag was not closed" if position == 0 else "the index lies behind the end of the file")
+    connections, chunks = [], []
+    for _ in range(header.number(b"conn_count")):
+        record = records.at(position)
+        if record.op != CONNECTION or record.end > len(data):
+            raise RecordError(f"no connection at byte {position}")
+        connections.append(connection_of(data, record))
+        position = record.end
+    for _ in range(header.number(b"chunk_count")):
+        record = records.at(position)
+        if record.op != CHUNK_INFO or record.end > len(data):
+            raise RecordError(f"no chunk information at byte {position}")
+        chunks.append(_indexed_chunk(records, record))
+        position = record.end
+    return connections, chunks
+
+
+def _indexed_chunk(records: Records, info: Record) -> Chunk:
+    record = records.at(info.number(b"chunk_pos"))
+    if record.op != CHUNK or record.end > len(records.data):
+        raise RecordError(f"no chunk at byte {record.position}")
+    chunk = chunk_of(record)
+    note_chunk_info(chunk, info)
+    position = record.end
+    for _ in range(info.number(b"count")):
+        record = records.at(position)
+        if record.op != INDEX:
+            raise RecordError(f"no index record at byte {position}")
+        note_index(records.data, chunk, record)
+        position = record.end
+    return chunk
+
+
+@dataclass
+class Walked:
+    """What a walk over the records found: `gaps` are stretches of bytes that are no records."""
+
+    connections: dict[int, Connection] = field(default_factory=dict)
+    chunks: list[Chunk] = field(default_factory=list)
+    gaps: list[tuple[int, int]] = field(default_factory=list)
+
+
+def walk(records: Records) -> Walked:
+    """Walk over the records of a bag without an index, past damaged stretches, to the end of what is there."""
+    data = records.data
+    found = Walked()
+    position = len(MAGIC)
+    by_position: dict[int, Chunk] = {}
+    while position < len(data):
+        try:
+            record = records.at(position)
+            if record.op == CHUNK:
+                chunk = chunk_of(record)
+                found.chunks.append(chunk)
+                by_position[position] = chunk
+            elif record.end > len(data):
+                raise RecordError(f"the file ends in the record at byte {position}")
+            elif record.op == INDEX and found.chunks:
+                note_index(data, found.chunks[-1], record)
+            elif record.op == CONNECTION:
+                connection = connection_of(data, record)
+                found.connections[connection.number] = connection
+            elif record.op == CHUNK_INFO and record.number(b"chunk_pos") in by_position:
+                note_chunk_info(by_position[record.number(b"chunk_pos")], record)
+            following = record.end
+        except RecordError:
+            following = _next_chunk(records, position + 1)
+            found.gaps.append((position, following))
+        # A chunk whose length is damaged would swallow those behind it: its successor must be a record too.
+        if following < len(data) and not _is_record(records, following):
+            resumed = _next_chunk(records, position + 1)
+            if resumed < following:
+                found.gaps.append((position, resumed))
+                following = resumed
+        position = following
+    return found
+
+
+def _is_record(records: Records, position: int) -> bool:
+    try:
+        records.at(position)
+    except RecordError:
+        return False
+    return True
+
+
+def _next_chunk(records: Records, position: int) -> int:
+    """Find where the next chunk record begins; the end of the data when there is none."""
+    data = records.data
+    marker = b"\x04\x00\x00\x00op=\x05"
+    place = data.find(marker, position)
+    while place != -1:
+        # The header's fields come in any order, so its length lies up to the other fields' length before the marker.
+        for start in range(max(position, place - 64), place - 3):
+            try:
+                record = records.at(start)
+                if record.op == CHUNK and chunk_of(record).compression in COMPRESSIONS:
+                    return start
+            except RecordError:
+                continue
+        place = data.find(marker, place + 1)
+    return len(data)
+
+
+def walk_chunk(buffer: Any) -> tuple[dict[int, Connection], dict[int, Entries]]:
+    """List the connections and the message records of one decompressed chunk, up to its first damaged byte."""
+    connections: dict[int, Connection] = {}
+    entries: dict[int, list[tuple[int, int, int]]] = {}
+    for record in _records(buffer):
+        try:
+            if record.op == CONNECTION:
+                connection = connection_of(buffer, record)
+                connections[connection.number] = connection
+            elif record.op == MESSAGE:
+                time = record.number(b"time")
+                entry = (time & 0xFFFFFFFF, time >> 32, record.position)
+                entries.setdefault(record.number(b"conn"), []).append(entry)
+        except RecordError:
+            break
+    return connections, {number: np.array(found, INDEX_ENTRY) for number, found in entries.items()}
+
+
+def _records(buffer: Any) -> Iterator[Record]:
+    position, records = 0, Records(buffer)
+    while position < len(buffer):
+        try:
+            record = records.at(position)
+        except RecordError:
+            return
+        if record.end > len(buffer):
+            return
+        yield record
+        position = record.end
+
+
+class Messages:
+    """Finds the data of message records in decompressed chunks; one shape of header serves them all."""
+
+    def __init__(self) -> None:
+        self._shapes: dict[int, np.dtype[np.void]] = {}
+
+    def locate(
+        self, buffer: Any, entries: Entries, connections: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_] | None]:
+        """Return where the messages lie.
+
+        Parameters
+        ----------
+        buffer
+            A decompressed chunk.
+        entries
+            Times and places of the message records, shape (n,).
+        connections
+            Number of the connection that each must have, shape (n,).
+
+        Returns
+        -------
+        tuple
+            Starts and sizes [bytes], shape (n,), and which records are intact, None when all are.
+        """
+        places = entries["offset"].astype(np.int64)
+        limit = memoryview(buffer).nbytes
+        shape = self._shape(buffer, int(places[0]))
+        starts, sizes = np.zeros(len(places), np.int64), np.zeros(len(places), np.int64)
+        good = np.zeros(len(places), np.bool_)
+        if shape is not None and limit >= shape.itemsize:
+            inside = places <= limit - shape.itemsize
+            windows = np.ndarray((limit - shape.itemsize + 1,), f"V{shape.itemsize}", buffer=buffer, strides=(1,))
+            headers = windows[places if inside.all() else np.where(inside, places, 0)].view(shape)
+            starts = places + shape.itemsize
+            sizes = headers["size"].astype(np.int64)
+            good = (
+                inside
+                & (headers["length"] == shape.itemsize - 8)
+                & (headers["op"] == MESSAGE)
+                & (headers["conn"] == connections)
+                & (headers["sec"] == entries["sec"])
+                & (headers["nsec"] == entries["nsec"])
+                & (starts + sizes <= limit)
+            )
+            if good.all():
+                return starts, sizes, None
+        records = Records(buffer)
+        for row in np.flatnonzero(~good).tolist():
+            found = _message_at(records, int(places[row]), entries[row], int(connections[row]), limit)
+            if found is not None:
+                starts[row], sizes[row] = found.start, found.end - found.start
+                good[row] = True
+        return starts, sizes, good
+
+    def _shape(self, buffer: Any, place: int) -> np.dtype[np.void] | None:
+        try:
+            record = Records(buffer).at(place) if place < len(buffer) else None
+        except RecordError:
+            return None
+        if record is None or record.op != MESSAGE:
+            return None
+        length = record.start - place
+        shape = self._shapes.get(length)
+        if shape is None:
+            at, cursor = {}, 4
+            # The fields come in the writer's order, each as its length, its name, "=" and the value.
+            for name, value in record.fields.items():
+                cursor += 4 + len(name) + 1
+                at[name] = cursor
+                cursor += len(value)
+            if not (len(record.fields.get(b"conn", b"")) == 4 and len(record.fields.get(b"time", b"")) == 8):
+                return None
+            places = [0, at[b"op"], at[b"conn"], at[b"time"], at[b"time"] + 4, length - 4]
+            names = ["length", "op", "conn", "sec", "nsec", "size"]
+            formats = ["<u4", "u1", "<u4", "<u4", "<u4", "<u4"]
+            shape = np.dtype({"names": names, "formats": formats, "offsets": places, "itemsize": length})
+            self._shapes[length] = shape
+        return shape
+
+
+def _message_at(records: Records, place: int, entry: Any, connection: int, limit: int) -> Record | None:
+    """Return the one message record that an index entry means, None when it is damaged."""
+    try:
+        record = records.at(place)
+        # An index entry may point at the connection record written before its first message.
+        while record.op == CONNECTION:
+            record = records.at(record.end)
+        time = int(entry["sec"]) | int(entry["nsec"]) << 32
+        wanted = record.op == MESSAGE and record.number(b"conn") == connection and record.number(b"time") == time
+    except RecordError:
+        return None
+    return record if wanted and record.end <= limit else None
+
+
+def decompressed(data: Any, chunk: Chunk, *, exact: bool) -> tuple[Any, str]:
+    """Return the messages of a chunk and an empty string, or what is left of them and what is wrong.
+
+    Parameters
+    ----------
+    data
+        The file.
+    chunk
+        Where in it.
+    exact
+        Make sure of the length, for a chunk whose messages no index locates: ten times slower with lz4.
+    """
+    stored = memoryview(data)[chunk.start : min(chunk.end, len(data))]
+    fault = "it is cut off" if chunk.end > len(data) else ""
+    if chunk.compression == "none":
+        return stored, fault or ("its size is wrong" if len(stored) < chunk.size else "")
+    if chunk.compression not in COMPRESSIONS:
+        return b"", f"its compression {chunk.compression!r} is unknown"
+    try:
+        if chunk.compression == "lz4" and not exact and not fault:
+            return memoryview(_lz4().decompress(stored, chunk.size)), ""
+        # One byte more than the stated size lets the decoder come to the end mark and its checksum.
+        decoder = _decoder(chunk.compression)
+        content = decoder.decompress(stored, chunk.size + 1)
+        if len(content) == chunk.size and decoder.eof:
+            return content, fault
+        fault = fault or f"{len(content)} of {chunk.size} bytes decompress"
+    except (RuntimeError, OSError, EOFError, ValueError) as error:
+        fault = fault or f"it does not decompress ({error})"
+    return _salvaged(stored, chunk.compression), fault
+
+
+@cache
+def _lz4() -> Any:
+    """Return Arrow's lz4 codec: eight times as fast as lz4.frame, but silent about an output shorter than asked for."""
+    import pyarrow as pa
+
+    return pa.Codec("lz4")
+
+
+def _decoder(compression: str) -> Any:
+    return lz4.frame.LZ4FrameDecompressor() if compression == "lz4" else BZ2Decompressor()
+
+
+def _salvaged(stored: memoryview, compression: str) -> bytes:
+    """Decompress in small steps up to the first damaged byte."""
+    decoder, content = _decoder(compression), bytearray()
+    for place in range(0, len(stored), SALVAGE_STEP):
+        try:
+            content += decoder.decompress(stored[place : place + SALVAGE_STEP])
+        except (RuntimeError, OSError, EOFError, ValueError):
+            break
+    return bytes(content)
