@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.simulate.logs import write_log
+from ferryid.simulate.logs import check_output, write_log
 from ferryid.simulate.scenario import list_scenarios, load_scenario
 from ferryid.simulate.trial import simulate
 
@@ -36,6 +36,7 @@ def run_scenario(
         Takes the place of the scenario's own.
     """
     asked = load_scenario(scenario)
+    check_output(out, truth, storage=storage, overwrite=overwrite)
     simulation = simulate(asked, seed)
     write_log(simulation, out, truth, storage=storage, overwrite=overwrite)
     control = simulation.control

@@ -61,6 +61,25 @@ def write_log(
     FerryIdError
         For a suffix or storage that is not one of these, existing output, or a place that cannot be written.
     """
+    check_output(out, truth, storage=storage, overwrite=overwrite)
+    suffix = out.suffix.lower()
+    streams = [stream for stream in simulation.streams if len(stream.stamp_ns)]
+    if suffix == ".mcap":
+        with replacing(out) as temporary:
+            _write_mcap(streams, temporary, chunk_bytes)
+    elif suffix == ".bag":
+        with replacing(out) as temporary:
+            _write_ros1(streams, temporary, chunk_bytes)
+    else:
+        with replacing(out) as temporary, _inside(temporary, out.name) as folder:
+            _write_ros2(streams, folder, storage)
+    if truth is not None:
+        with replacing(truth) as temporary:
+            _write_truth(simulation, temporary)
+
+
+def check_output(out: Path, truth: Path | None = None, *, storage: str = "sqlite3", overwrite: bool = False) -> None:
+    """Refuse names and places that `write_log` cannot or must not write to; the parameters are the same."""
     if storage not in STORAGES:
         raise FerryIdError(
             f'{out}: storage of a ROS2 folder cannot be "{storage}".{did_you_mean(storage, STORAGES)} '
@@ -77,19 +96,6 @@ def write_log(
         if truth.resolve() == out.resolve():
             raise FerryIdError(f"{truth}: log and truth cannot be the same file. Fix: give --truth another name")
         _check_free(truth, folder=False, overwrite=overwrite)
-    streams = [stream for stream in simulation.streams if len(stream.stamp_ns)]
-    if suffix == ".mcap":
-        with replacing(out) as temporary:
-            _write_mcap(streams, temporary, chunk_bytes)
-    elif suffix == ".bag":
-        with replacing(out) as temporary:
-            _write_ros1(streams, temporary, chunk_bytes)
-    else:
-        with replacing(out) as temporary, _inside(temporary, out.name) as folder:
-            _write_ros2(streams, folder, storage)
-    if truth is not None:
-        with replacing(truth) as temporary:
-            _write_truth(simulation, temporary)
 
 
 def _check_free(path: Path, *, folder: bool, overwrite: bool) -> None:

@@ -113,8 +113,8 @@ class Scenario:
 def list_scenarios() -> dict[str, str]:
     """Return the bundled scenarios: name to title, in alphabetical order."""
     folder = resources.files("ferryid.simulate.scenarios")
-    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return {name[:-5]: tomllib.loads((folder / name).read_text("utf-8"))["title"] for name in names}
+    names = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return {name: tomllib.loads((folder / f"{name}.toml").read_text("utf-8"))["title"] for name in names}
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
