@@ -72,7 +72,10 @@ def compare(
                     "a": by_axis(mean_square(motion.tau, tau_a, rows)),
                     "b": by_axis(mean_square(motion.tau, tau_b, rows)),
                 },
-                "r2": {"a": by_axis(r_squared(motion.tau, tau_a, rows)), "b": by_axis(r_squared(motion.tau, tau_b, rows))},
+                "r2": {
+                    "a": by_axis(r_squared(motion.tau, tau_a, rows)),
+                    "b": by_axis(r_squared(motion.tau, tau_b, rows)),
+                },
                 "b_over_a": {
                     axis: {"value": value, "low": low, "high": high, "says": _says(low, high, axis)}
                     for axis, (value, low, high) in zip(AXES, difference, strict=True)
@@ -168,7 +171,10 @@ def render_comparison(result: dict[str, Any]) -> str:
                 f"  {axis:<8}{entry['mse']['a'][axis] ** 0.5:>12.4g}{entry['mse']['b'][axis] ** 0.5:>12.4g}"
                 f"{_number(ratio['value']):>10}{interval:>18}  {ratio['says']}"
             )
-        for key, label, factor in (("position_m", "position [m]", 1.0), ("heading_rad", "heading [deg]", np.degrees(1.0))):
+        for key, label, factor in (
+            ("position_m", "position [m]", 1.0),
+            ("heading_rad", "heading [deg]", np.degrees(1.0)),
+        ):
             for who in ("a", "b"):
                 run = entry["free_run"][who]
                 pairs = zip(run["horizons_s"], run[key], strict=True)
@@ -178,7 +184,9 @@ def render_comparison(result: dict[str, Any]) -> str:
     lines.append(f"  {'term':<24}" + "".join(f"{axis + ' A':>13}{axis + ' B':>13}" for axis in AXES))
     for row in result["coefficients"]:
         cells = "".join(
-            f"{format(row[axis][who]['value'], '.4g') if who in row[axis] else '-':>13}" for axis in AXES for who in ("a", "b")
+            f"{format(row[axis][who]['value'], '.4g') if who in row[axis] else '-':>13}"
+            for axis in AXES
+            for who in ("a", "b")
         )
         lines.append(f"  {row['term']:<24}{cells}")
     return "\n".join(lines)

@@ -45,9 +45,7 @@ class Estimator:
             tau[rows] += self.basis.of(motion, rows) @ self.theta + self.intercept
         return tau
 
-    def __call__(
-        self, nu_dot: Floats, nu: Floats, psi: Floats, wind: Floats | None, current: Floats | None
-    ) -> Floats:
+    def __call__(self, nu_dot: Floats, nu: Floats, psi: Floats, wind: Floats | None, current: Floats | None) -> Floats:
         """Return the force for given states, all with s rows; a `free_run.ForceModel`."""
         tau = force_of_motion(self.profile, self.scale, nu_dot, nu, psi, wind=wind, current=current)
         if self.basis is None or self.theta is None or self.intercept is None:

@@ -79,13 +79,13 @@ def evaluate(
             }
         )
     progress("")
-    pooled = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+    tau, base_all, model_all = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     return {
         "schema": "ferryid.evaluate/1",
         "model": {"name": model.name, "version": model.version, "accepted": model.accepted},
         "window_s": window,
         "logs": entries,
-        "pooled": force_scores(*pooled, np.ones(len(pooled[0]), dtype=bool)),
+        "pooled": force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)),
     }
 
 
@@ -130,7 +130,10 @@ def _free_run_lines(runs: dict[str, Any]) -> list[str]:
     lines.append(f"{'  free run, horizon [s]':<34}" + "".join(f"{horizon:>11g}" for horizon in horizons))
     for part in ("base", "model"):
         run = runs[part]
-        for key, label, factor in (("position_m", "position [m]", 1.0), ("heading_rad", "heading [deg]", np.degrees(1.0))):
+        for key, label, factor in (
+            ("position_m", "position [m]", 1.0),
+            ("heading_rad", "heading [deg]", np.degrees(1.0)),
+        ):
             values = "".join(f"{_number(value, factor):>11}" for value in run[key])
             lines.append(f"{'  ' + label + ', ' + part:<34}{values}")
         if run["note"]:

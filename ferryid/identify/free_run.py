@@ -12,6 +12,7 @@ from ferryid.signals.track import Motion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Rows = NDArray[np.int64]
 
 ForceModel = Callable[[Floats, Floats, Floats, Floats | None, Floats | None], Floats]
 """``force(nu_dot (s, 3), nu (s, 3), psi (s,), wind (s, 2), current (s, 2)) -> tau (s, 3)``, linear in ``nu_dot``."""
@@ -96,7 +97,7 @@ def _mass(force: ForceModel, motion: Motion) -> Floats | None:
     return mass if positive else None
 
 
-def _starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[NDArray, NDArray]:
+def _starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[Rows, Rows]:
     """Return start rows and the end of the unbroken stretch that each lies in."""
     good = allowed & motion.valid & np.isfinite(motion.nu).all(axis=1) & np.isfinite(motion.tau).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
@@ -111,9 +112,7 @@ def _starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_
     return np.array(starts, dtype=int), np.array(ends, dtype=int)
 
 
-def _integrate(
-    force: ForceModel, mass: Floats, motion: Motion, starts: NDArray, horizon_s: float
-) -> tuple[Floats, int]:
+def _integrate(force: ForceModel, mass: Floats, motion: Motion, starts: Rows, horizon_s: float) -> tuple[Floats, int]:
     """Return states (starts, steps + 1, 6) of position, heading, velocity, and the rows per step."""
     stride = max(1, int(STEP_S * motion.rate_hz))
     substeps = max(1, int(np.ceil(1.0 / (STEP_S * motion.rate_hz))))
@@ -128,7 +127,7 @@ def _integrate(
     path = np.empty((len(starts), steps + 1, 6))
     path[:, 0] = state
 
-    def derivative(at: Floats, rows: NDArray, following: NDArray, part: float) -> Floats:
+    def derivative(at: Floats, rows: Rows, following: Rows, part: float) -> Floats:
         psi, nu = at[:, 2], at[:, 3:]
         tau = _between(motion.tau, rows, following, part)
         wind = None if motion.wind is None else _between(motion.wind, rows, following, part)
@@ -154,12 +153,12 @@ def _integrate(
     return path, stride
 
 
-def _between(values: Floats, rows: NDArray, following: NDArray, part: float) -> Floats:
+def _between(values: Floats, rows: Rows, following: Rows, part: float) -> Floats:
     result: Floats = (1.0 - part) * values[rows] + part * values[following]
     return result
 
 
-def _errors(path: Floats, stride: int, motion: Motion, starts: NDArray, ends: NDArray, horizons: Floats) -> Floats:
+def _errors(path: Floats, stride: int, motion: Motion, starts: Rows, ends: Rows, horizons: Floats) -> Floats:
     """Return |error| of position, heading, speed and yaw rate, shape (starts, horizons, 4)."""
     error = np.full((len(starts), len(horizons), 4), np.nan)
     for h, horizon in enumerate(horizons):

@@ -124,7 +124,8 @@ def as_text(result: FitResult, stored: Stored, report: Path) -> str:
     lines.append(f"{'on validation rows':<28}" + "".join(f"{axis:>12}" for axis in AXES))
     for label, part in (("base", "base"), ("new", "model")):
         lines.append(
-            f"{'rms force error, ' + label:<28}" + "".join(f"{scores['mse'][part][axis] ** 0.5:>12.3g}" for axis in AXES)
+            f"{'rms force error, ' + label:<28}"
+            + "".join(f"{scores['mse'][part][axis] ** 0.5:>12.3g}" for axis in AXES)
         )
     lines.append(f"{'R², new':<28}" + "".join(f"{_number(scores['r2']['model'][axis]):>12}" for axis in AXES))
     lines.append("")

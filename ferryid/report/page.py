@@ -149,7 +149,10 @@ def _free_run_figures(result: FitResult) -> list[dict[str, str]]:
         )
     if base.example or new.example:
         shown.append(
-            {"svg": figures.free_run_example(base, new), "caption": "One of these runs, over the longest stretch there is."}
+            {
+                "svg": figures.free_run_example(base, new),
+                "caption": "One of these runs, over the longest stretch there is.",
+            }
         )
     return shown
 
@@ -231,7 +234,10 @@ def _provenance(result: FitResult) -> list[dict[str, str]]:
     ]
     for log in model.training:
         rows.append(
-            (f"log {log['name']}", f"{', '.join(log['files'])}; {log['seconds']:.0f} s, {log['rows']} rows; {log['sha256']}")
+            (
+                f"log {log['name']}",
+                f"{', '.join(log['files'])}; {log['seconds']:.0f} s, {log['rows']} rows; {log['sha256']}",
+            )
         )
     return [{"name": name, "value": value} for name, value in rows]
 

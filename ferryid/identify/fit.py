@@ -1,0 +1,332 @@
+"""One fit from logs to verdict, in the order in which a person would do it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid import __version__
+from ferryid.errors import FerryIdError
+from ferryid.identify.accept import accept
+from ferryid.identify.basis import Basis, basis, relative_flow
+from ferryid.identify.bootstrap import FEWEST_BLOCKS, Blocks, block_rows, bootstrap
+from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, Rows
+from ferryid.identify.estimate import Estimator
+from ferryid.identify.excitation import excitation
+from ferryid.identify.free_run import free_run
+from ferryid.identify.model import AXES, Model
+from ferryid.identify.qr import QrFactor, factorise
+from ferryid.identify.residual import residual
+from ferryid.identify.result import ComponentCurve, Excitation, FitResult, LogFit
+from ferryid.identify.scores import force_scores, usable
+from ferryid.identify.settings import FitSettings
+from ferryid.identify.simpls import Simpls, one_standard_error, simpls, sse, sweep_components
+from ferryid.identify.split import Split, folds, split
+from ferryid.signals.prepare import Prepared, prepare
+from ferryid.signals.track import Motion
+from ferryid.vessel.profile import Profile
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+MAX_COMPONENTS = 21
+SWEEP_FOLDS = 5
+LEAST_VALIDATION_S = 60.0
+
+
+def quiet(_stage: str) -> None:
+    """Show no progress."""
+
+
+def fit(
+    logs: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    out: Path,
+    *,
+    name: str = "",
+    verify: bool = False,
+    progress: Callable[[str], None] = quiet,
+) -> FitResult:
+    """Fit a correction of the base model to one or more logs and judge it on rows it did not see.
+
+    Parameters
+    ----------
+    logs
+        Paths; parts of one recording joined by ``+``.
+    profile
+        The vessel.
+    settings
+        How to fit.
+    out
+        Output folder, whose ``logs`` keep the ingested tables.
+    name
+        Name of the model; the profile's where empty.
+    verify
+        Check every checksum of the logs.
+    progress
+        Called with the name of each stage.
+
+    Raises
+    ------
+    FerryIdError
+        For input that cannot be used, with file, cause and remedy.
+    """
+    prepared = [_prepare(path, profile, settings, out, verify, progress) for path in logs]
+    motions = _told_apart([one.motion for one in prepared])
+    functions = _basis(settings, motions)
+    progress("computing the residual")
+    targets = [residual(profile, motion, settings.scale, settings.residual) for motion in motions]
+    measured = [residual(profile, motion, settings.scale) for motion in motions]
+    motions = [
+        replace(motion, valid=_usable(motion, functions, target, error))
+        for motion, target, error in zip(motions, targets, measured, strict=True)
+    ]
+    parts = split(motions, settings.split, window_s=settings.window_s)
+
+    progress("fitting")
+    training = factorise(
+        *_rows(functions, motions, targets, parts.training), names=functions.terms, where=motions[0].log
+    )
+    validation = type(training).of(*_rows(functions, motions, measured, parts.validation))
+    most = min(MAX_COMPONENTS, len(functions.terms))
+    model_fit = simpls(training, most, allowed=functions.mask)
+    chosen = _components(settings, functions, motions, targets, parts, most, type(training))
+    theta, intercept = model_fit.coefficients[chosen - 1], model_fit.intercepts[chosen - 1]
+
+    progress("resampling blocks for the intervals")
+    blocks, block_s = _blocks(functions, motions, targets, parts, model_fit, chosen)
+    spread = bootstrap(
+        blocks, chosen, draws=settings.draws, seed=settings.seed, allowed=functions.mask, block_s=block_s
+    )
+
+    progress("judging")
+    base = Estimator(profile, settings.scale)
+    new = Estimator(profile, settings.scale, functions, theta, intercept)
+    fitted = [
+        LogFit(motion, train, check, base.of(motion), new.of(motion), one.quality)
+        for one, motion, train, check in zip(prepared, motions, parts.training, parts.validation, strict=True)
+    ]
+    scores = _scores(fitted, parts)
+    verdict = accept(
+        np.array([scores["mse"]["base"][axis] for axis in AXES]),
+        np.array([scores["mse"]["model"][axis] for axis in AXES]),
+    )
+    known = excitation(training, functions.terms, model_fit.vip(chosen), motions, parts.training, functions.mask)
+    progress("running free")
+    free_base = free_run(base, motions, parts.validation)
+    free_new = free_run(new, motions, parts.validation)
+    model = Model(
+        name=name or profile.name,
+        version=0,
+        created=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        ferryid_version=__version__,
+        profile_text=profile.text,
+        scale=settings.scale,
+        settings={**settings.plain(), "basis": functions.name, "components": chosen, "rate_hz": settings.rate_hz},
+        terms=functions.terms,
+        units=functions.units,
+        theta=theta,
+        intercept=intercept,
+        low=spread.low,
+        high=spread.high,
+        intercept_low=spread.intercept_low,
+        intercept_high=spread.intercept_high,
+        covariance=spread.covariance,
+        ranges=known.ranges,
+        training=tuple(
+            {
+                "name": one.motion.log,
+                "files": [Path(file).name for file in one.recording.files],
+                "sha256": one.recording.sha256,
+                "seconds": float(mask.sum() / one.motion.rate_hz),
+                "rows": int(mask.sum()),
+            }
+            for one, mask in zip(prepared, parts.training, strict=True)
+        ),
+        scores=scores,
+        accepted=verdict.accepted,
+    )
+    curve = _curve(model_fit, training, validation, scores, chosen)
+    warnings = _warnings(settings, parts, known, prepared, motions)
+    return FitResult(model, verdict, tuple(fitted), curve, known, free_base, free_new, warnings)
+
+
+def _prepare(
+    path: str, profile: Profile, settings: FitSettings, out: Path, verify: bool, progress: Callable[[str], None]
+) -> Prepared:
+    progress(f"reading {Path(path).name}")
+    return prepare(
+        path,
+        profile,
+        out,
+        window_s=settings.window_s,
+        smoother=settings.smoother,
+        rate_hz=settings.rate_hz,
+        verify=verify,
+    )
+
+
+def _told_apart(motions: Sequence[Motion]) -> list[Motion]:
+    """Number logs of the same name, so that messages and figures can tell them apart."""
+    names = [motion.log for motion in motions]
+    return [
+        replace(motion, log=f"{motion.log} ({names[: i + 1].count(motion.log)})")
+        if names.count(motion.log) > 1
+        else motion
+        for i, motion in enumerate(motions)
+    ]
+
+
+def _basis(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
+    """Return the basis of the settings; wind and current join it when every log has them, unless the name says how."""
+    if "+" in settings.basis:
+        return basis(settings.basis, structure=settings.structure)
+    wind = "thesis" if all(motion.wind is not None for motion in motions) else None
+    current = "thesis" if all(motion.current is not None for motion in motions) else None
+    return basis(settings.basis, wind=wind, current=current, structure=settings.structure)
+
+
+def _usable(motion: Motion, functions: Basis, target: Floats, error: Floats) -> Flags:
+    """Return the rows on which force, residual and every measurement that the basis needs are known."""
+    rows = usable(motion, target, error, motion.nu, motion.nu_dot)
+    if functions.needs_wind and motion.wind is not None:
+        rows &= np.isfinite(motion.wind).all(axis=1) & np.isfinite(motion.eta[:, 2])
+    if functions.needs_current and motion.current is not None:
+        rows &= np.isfinite(motion.current).all(axis=1) & np.isfinite(motion.eta[:, 2])
+    if not rows.any():
+        raise FerryIdError(
+            f"{motion.log}: no moment at which velocity, acceleration and applied force are all known. "
+            "Fix: see ferryid inspect for gaps, and give a log in which navigation and actuators overlap"
+        )
+    return rows
+
+
+def _rows(functions: Basis, motions: Sequence[Motion], outputs: Sequence[Floats], masks: Sequence[Flags]) -> list[Rows]:
+    """Return basis and outputs of the marked rows of every log; the basis is evaluated in chunks and forgotten."""
+    rows = []
+    for motion, output, mask in zip(motions, outputs, masks, strict=True):
+        flows = [
+            relative_flow(motion.nu, motion.eta[:, 2], flow) if needed and flow is not None else None
+            for needed, flow in ((functions.needs_wind, motion.wind), (functions.needs_current, motion.current))
+        ]
+        rows.append(Rows((motion.nu, motion.nu_dot, *flows), output, mask, functions.evaluate))
+    return rows
+
+
+def _components(
+    settings: FitSettings,
+    functions: Basis,
+    motions: Sequence[Motion],
+    targets: Sequence[Floats],
+    parts: Split,
+    most: int,
+    kind: type[CrossProducts] | type[QrFactor],
+) -> int:
+    """Return the number of components asked for, or the fewest that cross-validation cannot tell from the best."""
+    if settings.components != "auto":
+        return min(int(settings.components), most)
+    cuts = list(folds(motions, SWEEP_FOLDS, window_s=settings.window_s, rows=parts.training))
+    # A row near the border of its fold would leak into the neighbour's training sum: it sits out.
+    apart = [
+        [
+            cut.validation[i] & np.logical_and.reduce([other.training[i] for other in cuts if other is not cut])
+            for i in range(len(motions))
+        ]
+        for cut in cuts
+    ]
+    rows = [_rows(functions, motions, targets, masks) for masks in apart]
+    if kind is QrFactor:
+        errors, spread = sweep_components([QrFactor.of(*part) for part in rows], most, allowed=functions.mask)
+    else:
+        errors, spread = sweep_components([CrossProducts.of(*part) for part in rows], most, allowed=functions.mask)
+    return one_standard_error(errors, spread)
+
+
+def _blocks(
+    functions: Basis, motions: Sequence[Motion], targets: Sequence[Floats], parts: Split, fitted: Simpls, chosen: int
+) -> tuple[Blocks, float]:
+    """Return the cross-products of training blocks, and their length [s]: long enough to know little of each other."""
+    theta, intercept = fitted.coefficients[chosen - 1], fitted.intercepts[chosen - 1]
+    memories = []
+    for rows, motion in zip(_rows(functions, motions, targets, parts.training), motions, strict=True):
+        chunks = (rows.chunk(low, low + CHUNK_ROWS) for low in range(0, len(motion.t), CHUNK_ROWS))
+        left = np.concatenate([output - values @ theta - intercept for values, output in chunks])
+        if len(left) >= FEWEST_BLOCKS:
+            memories.append(block_rows(left) / motion.rate_hz)
+    seconds = sum(float(mask.sum()) / motion.rate_hz for motion, mask in zip(motions, parts.training, strict=True))
+    length_s = min(max(memories, default=0.0), seconds / FEWEST_BLOCKS)
+    blocks = []
+    for motion, target, mask in zip(motions, targets, parts.training, strict=True):
+        used = np.flatnonzero(mask)
+        for piece in np.array_split(used, max(1, round(len(used) / max(1.0, length_s * motion.rate_hz)))):
+            if len(piece):
+                blocks.append(CrossProducts.from_rows(functions.of(motion, piece), target[piece]))
+    return Blocks.stack(blocks), length_s
+
+
+def _scores(fitted: Sequence[LogFit], parts: Split) -> dict[str, Any]:
+    rows = [log.validation for log in fitted]
+    tau, base, model = (
+        np.concatenate([values[mask] for values, mask in zip(columns, rows, strict=True)])
+        for columns in (
+            (log.motion.tau for log in fitted),
+            (log.tau_base for log in fitted),
+            (log.tau_model for log in fitted),
+        )
+    )
+    scores = force_scores(tau, base, model, np.ones(len(tau), dtype=bool))
+    seconds = sum(float(mask.sum()) / log.motion.rate_hz for log, mask in zip(fitted, rows, strict=True))
+    return {**scores, "rows": len(tau), "seconds": seconds, "split": parts.kind, "split_notes": list(parts.notes)}
+
+
+def _curve(
+    model_fit: Simpls,
+    training: CrossProducts | QrFactor,
+    validation: CrossProducts | QrFactor,
+    scores: dict[str, Any],
+    chosen: int,
+) -> ComponentCurve:
+    """Return errors for every number of components over the base model's error on the validation rows."""
+    unit = np.array([scores["mse"]["base"][axis] for axis in AXES])
+    unit = np.where(unit > 0, unit, 1.0)
+    most = len(model_fit.coefficients)
+    return ComponentCurve(
+        np.arange(1, most + 1),
+        sse(training, model_fit.coefficients, model_fit.intercepts) / max(training.n, 1) / unit,
+        sse(validation, model_fit.coefficients, model_fit.intercepts) / max(validation.n, 1) / unit,
+        chosen,
+        model_fit.explained_x,
+        model_fit.explained_y,
+    )
+
+
+def _warnings(
+    settings: FitSettings, parts: Split, known: Excitation, prepared: Sequence[Prepared], motions: Sequence[Motion]
+) -> tuple[str, ...]:
+    """Return what a reader must know before trusting the verdict."""
+    warnings = []
+    if parts.kind == "every-kth":
+        warnings.append("Validation rows share smoothing windows with training rows: the error is told too small.")
+    if np.isfinite(known.heading_coverage) and known.heading_coverage < 0.5:
+        warnings.append(
+            f"Headings cover only {known.heading_coverage:.0%} of the compass: wind and hull cannot be told apart."
+        )
+    if known.undetermined:
+        named = ", ".join(list(known.undetermined)[:6]) + (" ..." if len(known.undetermined) > 6 else "")
+        warnings.append(f"This log cannot determine {len(known.undetermined)} of the terms: {named}.")
+    seconds = sum(float(mask.sum()) / motion.rate_hz for motion, mask in zip(motions, parts.validation, strict=True))
+    if seconds < LEAST_VALIDATION_S:
+        warnings.append(f"Only {seconds:.0f} s validate: the verdict rests on little data.")
+    if settings.residual == "commanded":
+        warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
+    for one in prepared:
+        if one.recording.losses:
+            warnings.append(f"{one.recording.name}: parts of the log could not be read; see data quality.")
+    return tuple(warnings)
