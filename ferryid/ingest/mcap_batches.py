@@ -1,0 +1,323 @@
+"""The wanted messages of an MCAP file, some chunks at a time, decompressed ahead of the decoders."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.ingest.mcap_chunks import Loaded, Unpacker, content, load_carefully
+from ferryid.ingest.mcap_index import (
+    MESSAGE,
+    MESSAGE_HEADER,
+    RECORD_HEADER,
+    Bytes,
+    Chunk,
+    DamagedRecord,
+    Index,
+    Messages,
+    chunk_at,
+    index_entries,
+    message_table,
+    record_header,
+)
+
+LOADERS = 2
+"""Threads that decompress while the decoders run: zstd, lz4 and the checksum release the interpreter."""
+AHEAD = 3
+"""Batches loaded ahead of the decoders."""
+BATCH_BYTES = 2 << 20
+"""Decompressed bytes in one batch: several small pieces share the cost of a call, and stay in the cache."""
+BATCH_MESSAGES = 16_384
+WHOLE_FROM = 0.9
+"""A compressed chunk wanted up to this part of its length is read to its end, for its checksum's sake."""
+CHECKED_FROM = 0.5
+"""The checksum of an uncompressed chunk is taken where at least this part of its bytes is wanted anyway."""
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What to take of one chunk: per channel (log time [ns], offset in the chunk), shape (n, 2), and up to where."""
+
+    chunk: Chunk
+    crc: int
+    entries: Mapping[int, NDArray[np.int64]]
+    last: int
+    whole: bool
+
+    @property
+    def plain(self) -> bool:
+        return self.chunk.compression == ""
+
+    @property
+    def alone(self) -> bool:
+        """True where lz4 gives the whole chunk in memory of its own."""
+        return self.whole and self.chunk.compression == "lz4"
+
+    @property
+    def size(self) -> int:
+        """Bytes to decompress; a last message that is cut short gets more."""
+        return 0 if self.plain else self.chunk.uncompressed_size if self.whole else self.last + RECORD_HEADER
+
+    @property
+    def count(self) -> int:
+        return sum(len(rows) for rows in self.entries.values())
+
+
+def batches(
+    file: memoryview,
+    whole_file: Bytes,
+    index: Index,
+    wanted: Collection[int],
+    name: str,
+    topics: Mapping[int, str],
+    verify: bool,
+) -> Iterator[Loaded]:
+    """Yield the wanted messages in file order; a buffer is valid only until the next is asked for.
+
+    Parameters
+    ----------
+    file, whole_file
+        The same bytes of the file as a memoryview and as an array.
+    index
+        Chunks and loose messages of the file.
+    wanted
+        Channel ids.
+    name, topics
+        File name and topic per channel id, for losses.
+    verify
+        Read every chunk to its end and check its checksum, whatever is wanted.
+    """
+
+    def carefully(chunk: Chunk, reason: str) -> Loaded:
+        return load_carefully(file, whole_file, chunk, wanted, name, topics, reason)
+
+    def run(batch: Sequence[_Plan], room: Bytes) -> list[Loaded]:
+        try:
+            return [_load(file, whole_file, batch, room, verify)]
+        except DamagedRecord:
+            return [each for plan in batch for each in one(plan)]
+
+    def one(plan: _Plan) -> list[Loaded]:
+        try:
+            return [_load(file, whole_file, [plan], None, verify)]
+        except DamagedRecord as error:
+            return [carefully(plan.chunk, str(error))]
+
+    rooms: deque[Bytes] = deque()
+    pending: deque[tuple[Future[list[Loaded]], Bytes]] = deque()
+    with ThreadPoolExecutor(LOADERS) as pool:
+        try:
+            for item in _gathered(file, index, wanted, verify):
+                if isinstance(item, list):
+                    room = rooms.popleft() if rooms else np.empty(2 * BATCH_BYTES, np.uint8)
+                    pending.append((pool.submit(run, item, room), room))
+                    if len(pending) <= AHEAD:
+                        continue
+                    future, room = pending.popleft()
+                    yield from future.result()
+                    rooms.append(room)
+                    continue
+                while pending:
+                    yield from pending.popleft()[0].result()
+                if isinstance(item, Messages):
+                    yield _loose(whole_file, item, wanted)
+                else:
+                    yield carefully(*item)
+            while pending:
+                yield from pending.popleft()[0].result()
+        finally:
+            for future, _ in pending:
+                future.cancel()
+
+
+def _gathered(
+    file: memoryview, index: Index, wanted: Collection[int], verify: bool
+) -> Iterator[list[_Plan] | Messages | tuple[Chunk, str]]:
+    """Yield batches of plans, loose messages, and chunks whose index is damaged with the reason, in file order."""
+    batch: list[_Plan] = []
+    size = count = 0
+    for item in _items(index):
+        if isinstance(item, Messages):
+            if batch:
+                yield batch
+                batch, size, count = [], 0, 0
+            yield item
+            continue
+        if not (verify or _holds(item, wanted)):
+            continue
+        try:
+            plan = _plan(file, item, wanted, verify)
+        except DamagedRecord as error:
+            if batch:
+                yield batch
+                batch, size, count = [], 0, 0
+            yield item, str(error)
+            continue
+        if batch and (
+            size + plan.size > BATCH_BYTES
+            or count + plan.count > BATCH_MESSAGES
+            or plan.plain != batch[-1].plain
+            or plan.alone
+            or batch[-1].alone
+        ):
+            yield batch
+            batch, size, count = [], 0, 0
+        batch.append(plan)
+        size += plan.size
+        count += plan.count
+    if batch:
+        yield batch
+
+
+def _items(index: Index) -> Iterator[Chunk | Messages]:
+    """Yield chunks and the stretches of messages between them, in file order."""
+    loose = index.loose
+    if loose is None:
+        yield from index.chunks
+        return
+    first = 0
+    for chunk in index.chunks:
+        stop = int(np.searchsorted(loose.starts, chunk.offset))
+        if stop > first:
+            yield loose.take(slice(first, stop))
+            first = stop
+        yield chunk
+    if first < len(loose):
+        yield loose.take(slice(first, None))
+
+
+def _holds(chunk: Chunk, wanted: Collection[int]) -> bool:
+    if chunk.table is not None:
+        return bool(np.isin(chunk.table.channels, list(wanted)).any())
+    return chunk.indexed is not None and any(channel in wanted for channel in chunk.indexed)
+
+
+def _loose(buffer: Bytes, messages: Messages, wanted: Collection[int]) -> Loaded:
+    rows = {channel: messages.take(messages.channels == channel) for channel in wanted}
+    return Loaded(buffer, {channel: found for channel, found in rows.items() if len(found)}, ())
+
+
+def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], verify: bool) -> _Plan:
+    """Look up the wanted messages of a chunk; DamagedRecord where header and index disagree."""
+    header, crc, _ = chunk_at(file, chunk.offset)
+    stated = header.compression, header.data_offset, header.uncompressed_size, header.start_ns, header.end_ns
+    if stated != (
+        chunk.compression,
+        chunk.data_offset,
+        chunk.uncompressed_size,
+        chunk.start_ns,
+        chunk.end_ns,
+    ) or (header.compressed_size != chunk.compressed_size and not chunk.truncated):
+        raise DamagedRecord("a chunk's header and its index disagree")
+    entries: dict[int, NDArray[np.int64]] = {}
+    if chunk.table is not None:
+        for channel in wanted:
+            rows = chunk.table.take(chunk.table.channels == channel)
+            if len(rows):
+                entries[channel] = np.stack([rows.log_ns, rows.starts - MESSAGE_HEADER], axis=1)
+    else:
+        for channel, (offset, count) in (chunk.indexed or {}).items():
+            if count and channel in wanted:
+                entries[channel] = index_entries(file, channel, offset, count)
+    last = max((int(rows[:, 1].max()) for rows in entries.values()), default=0)
+    if not 0 <= last < chunk.uncompressed_size or chunk.data_offset + chunk.compressed_size > len(file):
+        raise DamagedRecord("a message index points outside its chunk")
+    whole = verify or chunk.truncated or last >= WHOLE_FROM * chunk.uncompressed_size
+    return _Plan(chunk, crc, entries, last, whole)
+
+
+def _load(
+    file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Bytes | None, verify: bool
+) -> Loaded:
+    """Load the chunks of one batch, decompressed behind one another in `room`; DamagedRecord if anything is wrong.
+
+    Without `room` the batch is one chunk, which brings its own memory.
+    """
+    buffer = whole_file if batch[0].plain else whole_file[:0]
+    bases: list[int] = []
+    limits: list[int] = []
+    used = 0
+    for plan in batch:
+        if plan.plain:
+            if plan.chunk.compressed_size != plan.chunk.uncompressed_size and not plan.chunk.truncated:
+                raise DamagedRecord("an uncompressed chunk states two sizes")
+            bases.append(plan.chunk.data_offset)
+            limits.append(plan.chunk.data_offset + plan.chunk.compressed_size)
+            continue
+        own = room is None or plan.alone
+        data = _unpacked(file, whole_file, plan, None if own or room is None else room[used:])
+        bases.append(used)
+        used += len(data)
+        limits.append(used)
+        buffer = data if own or room is None else room[:used]
+    messages, taken = _located(buffer, batch, np.array(bases), np.array(limits))
+    for plan, size in zip(batch, taken.tolist(), strict=True):
+        if plan.plain and (verify or size >= CHECKED_FROM * plan.chunk.uncompressed_size):
+            content(file, whole_file, plan.chunk, plan.crc)
+    return Loaded(buffer, messages, ())
+
+
+def _unpacked(file: memoryview, whole_file: Bytes, plan: _Plan, room: Bytes | None) -> Bytes:
+    """Decompress a chunk as far as it is wanted."""
+    if room is not None and plan.size > len(room):
+        raise DamagedRecord("a chunk is larger than the room of a batch")
+    if plan.whole:
+        return content(file, whole_file, plan.chunk, plan.crc, room)
+    unpacker = Unpacker(file, plan.chunk, room)
+    head = unpacker.upto(plan.last + RECORD_HEADER)
+    if len(head) < plan.last + RECORD_HEADER:
+        raise DamagedRecord("a chunk is shorter than its index says")
+    opcode, length = record_header(head, plan.last)
+    size = plan.last + RECORD_HEADER + length
+    if opcode != MESSAGE or size > plan.chunk.uncompressed_size or (room is not None and size > len(room)):
+        raise DamagedRecord("a message index and its messages disagree")
+    return unpacker.upto(size)
+
+
+def _located(
+    buffer: Bytes, batch: Sequence[_Plan], bases: NDArray[np.int64], limits: NDArray[np.int64]
+) -> tuple[dict[int, Messages], NDArray[np.float64]]:
+    """Read the headers of all wanted messages and hold them against the index.
+
+    Returns
+    -------
+    tuple
+        Messages per channel id, and the bytes wanted of each chunk, shape (chunks,).
+    """
+    channels = sorted({channel for plan in batch for channel in plan.entries})
+    parts = [
+        (channel, number, plan.entries[channel])
+        for channel in channels
+        for number, plan in enumerate(batch)
+        if channel in plan.entries
+    ]
+    if not parts:
+        return {}, np.zeros(len(batch))
+    lengths = [len(rows) for _, _, rows in parts]
+    owner = np.repeat([number for _, number, _ in parts], lengths)
+    channel_of = np.repeat([channel for channel, _, _ in parts], lengths)
+    entries = np.concatenate([rows for _, _, rows in parts])
+    table, opcodes = message_table(buffer, entries[:, 1] + bases[owner])
+    fits = (
+        (opcodes == MESSAGE)
+        & (table.channels == channel_of)
+        & (table.log_ns == entries[:, 0])
+        & (table.sizes >= 0)
+        & (table.starts + table.sizes <= limits[owner])
+    )
+    if not fits.all():
+        raise DamagedRecord("a message index and its messages disagree")
+    messages: dict[int, Messages] = {}
+    bounds = np.searchsorted(channel_of, channels).tolist()
+    for channel, first, stop in zip(channels, bounds, [*bounds[1:], len(channel_of)], strict=True):
+        one = table.take(slice(first, stop))
+        if (one.starts[1:] < one.starts[:-1]).any():
+            # Some writers sort a message index by time; the file's order is that of the records.
+            one = one.take(np.argsort(one.starts))
+        messages[channel] = one
+    return messages, np.bincount(owner, table.sizes, minlength=len(batch)).astype(np.float64)

@@ -1,0 +1,184 @@
+"""What the channels of an MCAP file carry: type, fields and decoder, from the schema in the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from mcap.records import Channel, Schema
+from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.msg import normalize_msgtype
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
+from ferryid.ingest.json_messages import JsonDecoder, sample_fields, schema_fields
+from ferryid.ingest.protobuf import ProtobufDecoder, protobuf_fields
+
+MESSAGE_ENCODINGS = ("ros1", "cdr", "protobuf", "json")
+_SCHEMA_ENCODINGS = {
+    "ros1": ("ros1msg",),
+    "cdr": ("ros2msg", "ros2idl", "omgidl"),
+    "protobuf": ("protobuf",),
+    "json": ("jsonschema", ""),
+}
+_IDL_FILE = re.compile(r"^=+\r?\nIDL: [^\n]*\n", re.MULTILINE)
+
+
+class LazyFields(Mapping[str, str]):
+    """Fields of a topic, read from its definition when first asked for: most topics of a log are never asked."""
+
+    def __init__(self, load: Callable[[], Mapping[str, str]]) -> None:
+        self._load = load
+        self._fields: Mapping[str, str] | None = None
+
+    def _loaded(self) -> Mapping[str, str]:
+        if self._fields is None:
+            self._fields = self._load()
+        return self._fields
+
+    def __getitem__(self, path: str) -> str:
+        return self._loaded()[path]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._loaded())
+
+    def __len__(self) -> int:
+        return len(self._loaded())
+
+    def __repr__(self) -> str:
+        return repr(dict(self._loaded()))
+
+    def __reduce__(self) -> tuple[type[dict[str, str]], tuple[dict[str, str]]]:
+        return dict, (dict(self._loaded()),)
+
+
+class DefinitionError(ValueError):
+    """A message definition that rosbags cannot parse."""
+
+
+def type_name(channel: Channel, schema: Schema | None) -> str:
+    """Return the name of a channel's message type, ROS types as ``package/msg/Name``."""
+    if schema is None:
+        return ""
+    if channel.message_encoding in ("ros1", "cdr") and re.fullmatch(r"\w+/\w+|\w+/msg/\w+", schema.name):
+        return str(normalize_msgtype(schema.name))
+    return schema.name
+
+
+def problem(channel: Channel, schema: Schema | None) -> str:
+    """Say why messages of this channel cannot be decoded; an empty string where they can."""
+    encoding = channel.message_encoding
+    if encoding not in MESSAGE_ENCODINGS:
+        return f"message encoding {encoding!r} cannot be decoded"
+    if schema is None:
+        if encoding == "json":
+            return ""
+        return "its schema is not in the file" if channel.schema_id else "the channel has no schema"
+    if schema.encoding not in _SCHEMA_ENCODINGS[encoding] and not (encoding == "cdr" and not schema.data):
+        return f"schema encoding {schema.encoding!r} does not fit messages in {encoding}"
+    if not schema.data and encoding == "cdr" and not _is_standard(type_name(channel, schema)):
+        return "the schema holds no definition"
+    if not schema.data and encoding == "protobuf":
+        return "the schema holds no definition"
+    return ""
+
+
+def remark(channel: Channel, schema: Schema | None) -> str:
+    """Say what a user must know of a channel that can be decoded."""
+    if channel.message_encoding == "cdr" and schema is not None and not schema.data:
+        return "no definition in the file: that of the ROS2 distribution is used"
+    return ""
+
+
+@cache
+def _standard() -> Any:
+    return get_typestore(Stores.LATEST)
+
+
+def _is_standard(name: str) -> bool:
+    return name in _standard().fielddefs
+
+
+@cache
+def _typestore(encoding: str, name: str, schema_encoding: str, definition: bytes) -> Any:
+    """Return a rosbags Typestore that holds one schema alone, so that equal names in other schemas cannot clash."""
+    if not definition and encoding == "cdr":
+        return _standard()
+    store = get_typestore(Stores.EMPTY)
+    try:
+        text = definition.decode()
+        if schema_encoding in ("ros2idl", "omgidl"):
+            types: dict[str, Any] = {}
+            for part in _IDL_FILE.split(text):
+                if part.strip():
+                    types.update(get_types_from_idl(part))
+        else:
+            types = dict(get_types_from_msg(text, name))
+        store.register(types)
+    except (TypesysError, ValueError, KeyError, AssertionError, RecursionError) as error:
+        first = (str(error).splitlines() or [type(error).__name__])[0]
+        raise DefinitionError(f"the definition of {name} cannot be parsed ({first})") from error
+    return store
+
+
+def fields_of(channel: Channel, schema: Schema | None, first: Callable[[], bytes]) -> Mapping[str, str]:
+    """Return the fields of a channel's messages; `first` gives one message, for JSON without a schema."""
+    if problem(channel, schema):
+        return {}
+    name, definition = type_name(channel, schema), b"" if schema is None else schema.data
+    encoding = channel.message_encoding
+    if encoding == "protobuf":
+        return LazyFields(lambda: protobuf_fields(definition, name))
+    if encoding == "json":
+        return LazyFields(lambda: schema_fields(definition) or sample_fields(first()))
+    schema_encoding = "" if schema is None else schema.encoding
+    return LazyFields(lambda: _ros_fields(encoding, name, schema_encoding, definition))
+
+
+def _ros_fields(encoding: str, name: str, schema_encoding: str, definition: bytes) -> dict[str, str]:
+    try:
+        return leaf_fields(_typestore(encoding, name, schema_encoding, definition), name)
+    except DefinitionError:
+        return {}
+
+
+def decoder_of(
+    channel: Channel, schema: Schema | None, paths: Sequence[str], capacity: int, where: str
+) -> Decoder:
+    """Return a decoder for a channel's messages.
+
+    Raises
+    ------
+    FerryIdError
+        Where they cannot be decoded, or for a path that they do not have.
+    """
+    said = f"{where}: {channel.topic}"
+    fault = problem(channel, schema)
+    if fault:
+        raise FerryIdError(
+            f"{said}: the messages cannot be decoded, {fault}. Fix: record the topic as "
+            f"{', '.join(MESSAGE_ENCODINGS)} with its definition, or map another topic"
+        )
+    name, encoding = type_name(channel, schema), channel.message_encoding
+    definition = b"" if schema is None else schema.data
+    if encoding == "protobuf":
+        return ProtobufDecoder(definition, name, channel.topic, paths, said)
+    if encoding == "json":
+        return JsonDecoder(channel.topic, paths, said)
+    try:
+        store = _typestore(encoding, name, "" if schema is None else schema.encoding, definition)
+    except DefinitionError as error:
+        raise FerryIdError(
+            f"{said}: {error}, its fields were asked for. "
+            "Fix: record again with a valid definition, or map another topic"
+        ) from error
+    if paths and not leaf_fields(store, name):
+        raise FerryIdError(
+            f"{said}: the definition of {name} lacks a type that it is made of, its fields were asked for. "
+            "Fix: record again with complete definitions, or map another topic"
+        )
+    return decoder_for(
+        "ros1" if encoding == "ros1" else "cdr", store, name, channel.topic, paths, capacity, where
+    )
