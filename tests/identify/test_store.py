@@ -1,0 +1,126 @@
+"""Model files and the store: nothing is lost, nothing is overwritten, and wrong files are told in one line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.identify.basis import basis
+from ferryid.identify.model import Model, to_json
+from ferryid.identify.store import load, load_file, save, stored_models
+from ferryid.vessel import load_profile
+
+
+def made(accepted: bool = True, seed: int = 0) -> Model:
+    functions = basis("modulus")
+    K = len(functions.terms)
+    rng = np.random.default_rng(seed)
+    theta = rng.normal(size=(K, 3)) * 1e3 / 7
+    covariance = rng.normal(size=(3, K + 1, K + 1))
+    return Model(
+        name="boat",
+        version=0,
+        created="2026-01-01T00:00:00Z",
+        ferryid_version="0.1.0",
+        profile_text=load_profile("milliampere").text,
+        scale={"delta": 0.4, "sigma": 0.4, "zeta": 1.0},
+        settings={"basis": "modulus", "structure": "coupled", "components": 7, "window_s": 1.0},
+        terms=functions.terms,
+        units=functions.units,
+        theta=theta,
+        intercept=rng.normal(size=3),
+        low=theta - 1,
+        high=theta + 1,
+        intercept_low=rng.normal(size=3),
+        intercept_high=rng.normal(size=3),
+        covariance=covariance,
+        ranges={"u": (-0.5, 1.25)},
+        training=({"name": "log", "files": ["log.bag"], "sha256": "ab", "seconds": 60.0, "rows": 1200},),
+        scores={"normalised_mse": 0.5, "per_axis": {"surge": 0.4, "sway": 0.5, "yaw": 0.6}},
+        accepted=accepted,
+    )
+
+
+def test_a_model_comes_back_to_the_last_digit(tmp_path: Path) -> None:
+    stored = save(made(), tmp_path)
+    again = load_file(stored.path)
+    for name in ("theta", "intercept", "low", "high", "intercept_low", "intercept_high", "covariance"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(stored.model, name))
+    assert to_json(again) == to_json(stored.model)
+
+
+def test_current_moves_only_on_acceptance(tmp_path: Path) -> None:
+    assert save(made(), tmp_path).current
+    rejected = save(made(accepted=False, seed=1), tmp_path)
+    assert (rejected.model.version, rejected.current) == (2, False)
+    assert load("boat", tmp_path).version == 1
+    assert save(made(seed=2), tmp_path).current
+    assert load("boat", tmp_path).version == 3
+    assert [(s.model.version, s.model.accepted, s.current) for s in stored_models(tmp_path)] == [
+        (1, True, False),
+        (2, False, False),
+        (3, True, True),
+    ]
+
+
+def test_the_same_model_at_another_time_is_the_same_version(tmp_path: Path) -> None:
+    first = save(made(), tmp_path)
+    before = first.path.read_bytes()
+    again = save(replace(made(), created="2030-01-01T00:00:00Z"), tmp_path)
+    assert again.model.version == first.model.version
+    assert first.path.read_bytes() == before
+    assert len(stored_models(tmp_path)) == 1
+
+
+def test_a_name_without_an_accepted_version_gives_the_newest(tmp_path: Path) -> None:
+    save(made(accepted=False), tmp_path)
+    save(made(accepted=False, seed=1), tmp_path)
+    assert load("boat", tmp_path).version == 2
+    assert load("boat@1", tmp_path).version == 1
+
+
+@pytest.mark.parametrize(
+    ("reference", "told"),
+    [
+        ("baot", 'Did you mean "boat"'),
+        ("boat@7", "there are 1"),
+        ("boat@first", "there are 1"),
+        ("nowhere/m.json", "no such model file"),
+    ],
+)
+def test_a_wrong_reference_is_told(tmp_path: Path, reference: str, told: str) -> None:
+    save(made(), tmp_path)
+    with pytest.raises(FerryIdError, match=told):
+        load(reference, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda data: data.update(schema="ferryid.model/9", ferryid_version="3.2"), r"ferryid>=3\.2"),
+        (lambda data: data.update(schema="something"), "not a ferryid model"),
+        (lambda data: data.pop("coefficients"), "coefficients"),
+        (lambda data: data["coefficients"]["yaw"].pop("u"), "missing or wrong"),
+    ],
+)
+def test_a_damaged_or_newer_file_is_told(tmp_path: Path, change, told: str) -> None:
+    path = save(made(), tmp_path).path
+    data = json.loads(path.read_text(encoding="utf-8"))
+    change(data)
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(FerryIdError, match=told) as caught:
+        load_file(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_cut_file_is_told(tmp_path: Path) -> None:
+    path = save(made(), tmp_path).path
+    path.write_text(path.read_text(encoding="utf-8")[:500], encoding="utf-8")
+    with pytest.raises(FerryIdError, match="not readable as a model file"):
+        load_file(path)
