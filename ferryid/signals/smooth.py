@@ -188,21 +188,24 @@ def moving_mean(values: Floats, rows: int) -> Floats:
     """
     n, c = values.shape
     result = np.full((c, n), np.nan)
-    if n >= rows:
-        blocks = -(-n // rows)
-        # Samples of a block lie along the first axis: its sums then run over whole contiguous lines of blocks.
-        padded = np.zeros((c, blocks * rows))
-        padded[:, :n] = values.T
-        head = padded.reshape(c, blocks, rows).transpose(0, 2, 1).copy()
-        tail = head.copy()
+    if n < rows:
+        return result.T
+    half, blocks = rows // 2, -(-n // rows)
+    # One column at a time stays in the cache; samples of a block lie along the first axis, so that every sum runs over a
+    # whole contiguous line of blocks.
+    padded = np.zeros(blocks * rows)
+    head, tail = np.empty((rows, blocks)), np.empty((rows, blocks))
+    for k in range(c):
+        padded[:n], padded[n:] = values[:, k], 0.0
+        head[:] = padded.reshape(blocks, rows).T
+        tail[:] = head
         for i in range(1, rows):
-            head[:, i] += head[:, i - 1]
-            tail[:, rows - 1 - i] += tail[:, rows - i]
+            head[i] += head[i - 1]
+            tail[rows - 1 - i] += tail[rows - i]
         # A window that begins at sample j > 0 of a block ends at sample j - 1 of the next.
-        tail[:, 1:, :-1] += head[:, :-1, 1:]
-        sums = tail.transpose(0, 2, 1).reshape(c, blocks * rows)
-        half = rows // 2
-        result[:, half : n - half] = sums[:, : n - 2 * half] / rows
+        tail[1:, :-1] += head[:-1, 1:]
+        padded.reshape(blocks, rows)[:] = tail.T
+        np.divide(padded[: n - 2 * half], rows, out=result[k, half : n - half])
     return result.T
 
 
