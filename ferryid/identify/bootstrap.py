@@ -139,7 +139,9 @@ def bootstrap(
     """Refit SIMPLS on as many blocks as there are, drawn with replacement, `draws` times over.
 
     Columns are scaled as in the fit to all blocks, and directions in which no block varies are left out: the scale is a
-    choice of units, not an estimate. Intervals are percentiles of the draws.
+    choice of units, not an estimate. Intervals are percentiles of the draws, moved out for the number B of blocks: at the
+    probability where a normal variable reaches ``sqrt(B/(B - 1)) t`` of Student's t with B - 1 degrees (Hesterberg).
+    The covariance is that of the draws times B/(B - 1).
 
     Parameters
     ----------
@@ -166,8 +168,11 @@ def bootstrap(
     References
     ----------
     Carlstein (1986), Annals of Statistics 14, 1171-1179 (blocks that do not overlap); Lahiri (2003), Resampling Methods
-    for Dependent Data, chapter 2.
+    for Dependent Data, chapter 2; Hesterberg (2015), The American Statistician 69, 371-386, section 5.3 (expanded
+    percentiles).
     """
+    from scipy.special import ndtr, stdtrit  # a tenth of a second to import: only where it is needed
+
     stacked = blocks if isinstance(blocks, Blocks) else Blocks.stack(blocks)
     count = len(stacked.n)
     if count < 2:
@@ -178,10 +183,11 @@ def bootstrap(
         notes = (*notes, f"Only {count} independent stretches to draw from: the intervals are probably too narrow.")
     coefficients, intercepts = _draw(stacked, components, draws, seed, scale, scale_y, allowed)
     table = np.concatenate([coefficients, intercepts[:, None, :]], axis=1).transpose(2, 1, 0)
-    tail = (1.0 - level) / 2.0
+    widened = count / (count - 1)
+    tail = float(ndtr(np.sqrt(widened) * stdtrit(count - 1, (1.0 - level) / 2.0)))
     low, high = np.quantile(table, [tail, 1.0 - tail], axis=2)
     deviation = table - table.mean(axis=2, keepdims=True)
-    covariance = deviation @ deviation.transpose(0, 2, 1) / max(draws - 1, 1)
+    covariance = deviation @ deviation.transpose(0, 2, 1) / max(draws - 1, 1) * widened
     return Bootstrap(
         low=low[:, :-1].T,
         high=high[:, :-1].T,
