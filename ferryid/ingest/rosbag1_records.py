@@ -20,8 +20,8 @@ MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 # A record header holds a few names, a topic among them; anything longer is damage.
 MAX_HEADER = 1 << 16
-Entries = NDArray[np.void]
-INDEX_ENTRY = np.dtype([("sec", "<u4"), ("nsec", "<u4"), ("offset", "<u4")])
+# Index entries, shape (n, 3): seconds and nanoseconds of the receive time, place of the record in its chunk.
+Entries = NDArray[np.uint32]
 SALVAGE_STEP = 4096
 COMPRESSIONS = ("none", "bz2", "lz4")
 
@@ -107,7 +107,7 @@ class Chunk:
         if connection in self.walked:
             return self.walked[connection]
         first, count = self.index.get(connection, (0, 0))
-        return np.frombuffer(data, INDEX_ENTRY, count, first)
+        return np.frombuffer(data, "<u4", 3 * count, first).reshape(count, 3)
 
     @property
     def connections(self) -> frozenset[int]:
@@ -339,7 +339,7 @@ def walk_chunk(buffer: Any) -> tuple[dict[int, Connection], dict[int, Entries]]:
                 entries.setdefault(record.number(b"conn"), []).append(entry)
         except RecordError:
             break
-    return connections, {number: np.array(found, INDEX_ENTRY) for number, found in entries.items()}
+    return connections, {number: np.array(found, np.uint32) for number, found in entries.items()}
 
 
 def _records(buffer: Any) -> Iterator[Record]:
@@ -380,12 +380,12 @@ class Messages:
         tuple
             Starts and sizes [bytes], shape (n,), and which records are intact, None when all are.
         """
-        places = entries["offset"].astype(np.int64)
+        places = entries[:, 2].astype(np.int64)
         limit = memoryview(buffer).nbytes
         shape = self._shape(buffer, int(places[0]))
         starts, sizes = np.zeros(len(places), np.int64), np.zeros(len(places), np.int64)
         good = np.zeros(len(places), np.bool_)
-        if shape is not None and limit >= shape.itemsize:
+        if shape is not None:
             inside = places <= limit - shape.itemsize
             windows = np.ndarray((limit - shape.itemsize + 1,), f"V{shape.itemsize}", buffer=buffer, strides=(1,))
             headers = windows[places if inside.all() else np.where(inside, places, 0)].view(shape)
@@ -396,8 +396,8 @@ class Messages:
                 & (headers["length"] == shape.itemsize - 8)
                 & (headers["op"] == MESSAGE)
                 & (headers["conn"] == connections)
-                & (headers["sec"] == entries["sec"])
-                & (headers["nsec"] == entries["nsec"])
+                & (headers["sec"] == entries[:, 0])
+                & (headers["nsec"] == entries[:, 1])
                 & (starts + sizes <= limit)
             )
             if good.all():
@@ -411,28 +411,28 @@ class Messages:
         return starts, sizes, good
 
     def _shape(self, buffer: Any, place: int) -> np.dtype[np.void] | None:
+        """Return the shape of the message header at a place, None where none is."""
         try:
-            record = Records(buffer).at(place) if place < len(buffer) else None
-        except RecordError:
+            known = self._shapes.get(_U32(buffer, place)[0])
+            return known or self._new_shape(Records(buffer).at(place))
+        except (RecordError, struct.error):
             return None
-        if record is None or record.op != MESSAGE:
-            return None
-        length = record.start - place
-        shape = self._shapes.get(length)
-        if shape is None:
-            at, cursor = {}, 4
-            # The fields come in the writer's order, each as its length, its name, "=" and the value.
-            for name, value in record.fields.items():
-                cursor += 4 + len(name) + 1
-                at[name] = cursor
-                cursor += len(value)
-            if not (len(record.fields.get(b"conn", b"")) == 4 and len(record.fields.get(b"time", b"")) == 8):
-                return None
-            places = [0, at[b"op"], at[b"conn"], at[b"time"], at[b"time"] + 4, length - 4]
-            names = ["length", "op", "conn", "sec", "nsec", "size"]
-            formats = ["<u4", "u1", "<u4", "<u4", "<u4", "<u4"]
-            shape = np.dtype({"names": names, "formats": formats, "offsets": places, "itemsize": length})
-            self._shapes[length] = shape
+
+    def _new_shape(self, record: Record) -> np.dtype[np.void]:
+        at, cursor = {}, 4
+        # The fields come in the writer's order, each as its length, its name, "=" and the value.
+        for name, value in record.fields.items():
+            cursor += 4 + len(name) + 1
+            at[name, len(value)] = cursor
+            cursor += len(value)
+        try:
+            time = at[b"time", 8]
+            places = [0, at[b"op", 1], at[b"conn", 4], time, time + 4, cursor]
+        except KeyError as error:
+            raise RecordError(f"no message at byte {record.position}") from error
+        names, formats = ["length", "op", "conn", "sec", "nsec", "size"], ["<u4", "u1", "<u4", "<u4", "<u4", "<u4"]
+        shape = np.dtype({"names": names, "formats": formats, "offsets": places, "itemsize": cursor + 4})
+        self._shapes[cursor - 4] = shape
         return shape
 
 
@@ -443,7 +443,7 @@ def _message_at(records: Records, place: int, entry: Any, connection: int, limit
         # An index entry may point at the connection record written before its first message.
         while record.op == CONNECTION:
             record = records.at(record.end)
-        time = int(entry["sec"]) | int(entry["nsec"]) << 32
+        time = int(entry[0]) | int(entry[1]) << 32
         wanted = record.op == MESSAGE and record.number(b"conn") == connection and record.number(b"time") == time
     except RecordError:
         return None

@@ -296,9 +296,9 @@ class Rosbag1Reader:
             if not pieces:
                 continue
             entries = np.concatenate([piece for _, piece in pieces]) if len(pieces) > 1 else pieces[0][1]
-            owners = np.repeat([number for number, _ in pieces], [len(piece) for _, piece in pieces])
+            owners = np.concatenate([np.full(len(piece), number) for number, piece in pieces])
             if len(pieces) > 1:
-                order = np.argsort(entries["offset"], kind="stable")
+                order = np.argsort(entries[:, 2], kind="stable")
                 entries, owners = entries[order], owners[order]
             parts.append((name, entries, owners))
         if not parts:
@@ -334,7 +334,7 @@ class Rosbag1Reader:
 
 
 def _nanoseconds(entries: Entries) -> NDArray[np.int64]:
-    times: NDArray[np.int64] = entries["sec"].astype(np.int64) * NS + entries["nsec"]
+    times: NDArray[np.int64] = entries[:, 0].astype(np.int64) * NS + entries[:, 1]
     return times
 
 
