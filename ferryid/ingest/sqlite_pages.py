@@ -298,8 +298,10 @@ def leaves(pages: Pages, root: int) -> tuple[Integers, Integers, Integers, list[
         ]
         numbers, low, high = numbers[there], low[there], high[there]
         kinds = (int(pages.page(n)[0]) for n in numbers.tolist())
-        if next((kind for kind in kinds if kind in (LEAF, INTERIOR)), LEAF) == LEAF:
-            return numbers, low, high, damages, lost_branch or not there.any()
+        kind = next((kind for kind in kinds if kind in (LEAF, INTERIOR)), None)
+        if kind != INTERIOR:
+            # All leaves are at one level. Where no page of it can be told, more may have been below.
+            return numbers, low, high, damages, lost_branch or kind is None
         lost_branch |= not there.all()
         below: list[tuple[Integers, Integers, Integers]] = []
         for number, after, until in zip(numbers.tolist(), low.tolist(), high.tolist(), strict=True):

@@ -91,7 +91,7 @@ def unpack_file(path: Path, folder: Path) -> tuple[Path, tuple[Loss, ...]]:
                 out.write(stream.decompress(data))
                 done += len(data)
                 # A file may hold several frames; what follows the end of one begins the next.
-                data = stream.unused_data if stream.eof else b""
+                data = (stream.unused_data or b"") if stream.eof else b""
                 done -= len(data)
                 if stream.eof and (data or source.peek(1)):
                     stream = _stream(codec)

@@ -27,6 +27,7 @@ from ferryid.ingest.sqlite_pages import (
 )
 from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file, working_folder
 
+DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
 MESSAGE_COLUMNS = ["id", "topic_id", "timestamp", "data"]
 
 
@@ -40,8 +41,8 @@ class Storage:
         Compression of every single message: ``"zstd"``, ``"lz4"``, or an empty string.
     distro
         ROS distribution that recorded, or an empty string.
-    digests
-        Topic name to type hash.
+    digests, encodings
+        Topic name to type hash and to serialisation; the latter counts more than the file's own word for it.
     messages, end_ns
         Number of messages and time of the last [ns], None where they are not stated.
     """
@@ -49,6 +50,7 @@ class Storage:
     codec: str = ""
     distro: str = ""
     digests: Mapping[str, str] = field(default_factory=dict)
+    encodings: Mapping[str, str] = field(default_factory=dict)
     messages: int | None = None
     end_ns: int | None = None
 
@@ -80,21 +82,21 @@ class Sqlite3Log:
     """
 
     def __init__(self, path: Path, storage: Storage | None = None) -> None:
-        self.paths = (path,)
+        self.paths: tuple[Path, ...] = (path,)
         self._storage = storage or Storage()
         self._file, losses = self._settled(path)
-        recorded = self._recorded()
         self._ids: dict[str, list[int]] = {}
-        for number, name, *_ in recorded.topics:
-            self._ids.setdefault(name, []).append(number)
-        known = {number for number, *_ in recorded.topics}
         with Pages(self._file) as pages:
-            self._rows, damages = find_rows(pages, recorded.root, known)
             cut = (
-                f"the file ends after {pages.bytes} bytes of {pages.stated}; "
+                f"the file ends after {pages.bytes} bytes of {pages.stated}"
                 if pages.bytes < pages.stated
                 else ""
             )
+            recorded = self._recorded(cut)
+            for number, name, *_ in recorded.topics:
+                self._ids.setdefault(name, []).append(number)
+            known = {number for number, *_ in recorded.topics}
+            self._rows, damages = find_rows(pages, recorded.root, known)
         losses += tuple(self._told(damages, cut))
         foreign = ~np.isin(self._rows.topic_id, sorted(known))
         if foreign.any():
@@ -104,7 +106,7 @@ class Sqlite3Log:
                 ),
             )
         self._definitions: dict[str, Definition] = {}
-        self.topics = tuple(self._topics(recorded))
+        self.topics: tuple[Topic, ...] = tuple(self._topics(recorded))
         self.losses: tuple[Loss, ...] = losses
         self._opening_losses = losses
 
@@ -142,7 +144,7 @@ class Sqlite3Log:
         connection.execute("PRAGMA writable_schema=ON")
         return connection
 
-    def _recorded(self) -> Recorded:
+    def _recorded(self, cut: str) -> Recorded:
         path = self.paths[0]
         try:
             with closing(self._connect()) as connection:
@@ -159,6 +161,8 @@ class Sqlite3Log:
                 if columns.get("messages") != MESSAGE_COLUMNS or not {"id", "name", "type"} <= {
                     *columns.get("topics", ())
                 }:
+                    if cut:
+                        raise sqlite3.DatabaseError(cut)
                     found = ", ".join(sorted(tables)) or "none"
                     raise FerryIdError(
                         f"{path}: an SQLite database but not one of rosbag2, found the tables: {found}. "
@@ -206,7 +210,7 @@ class Sqlite3Log:
                 continue
             yield Loss(
                 str(self.paths[0]),
-                f"{cut}{damage.where}",
+                "; ".join(filter(None, (cut, damage.where))),
                 messages=lost,
                 start_ns=int(rows.time_ns[first - 1]) if first else None,
                 end_ns=int(rows.time_ns[last]) if last < len(rows) else self._storage.end_ns,
@@ -217,7 +221,8 @@ class Sqlite3Log:
         for name, numbers in self._ids.items():
             entries = [entry for entry in recorded.topics if entry[0] in numbers]
             types = sorted({normalized(entry[2]) for entry in entries})
-            _, _, _, encoding, digest = entries[0]
+            _, _, _, own_encoding, digest = entries[0]
+            encoding = self._storage.encodings.get(name, own_encoding)
             times = self._rows.time_ns[np.isin(self._rows.topic_id, numbers)]
             if encoding != "cdr":
                 found = Definition(
@@ -347,18 +352,18 @@ def open_file(path: Path, layout: TableLayout | None = None) -> Sqlite3Log:
 
 
 def refuse_foreign(path: Path, topics: Sequence[Topic]) -> None:
-    """Refuse a log none of whose topics is serialised as CDR.
+    """Refuse a log none of whose topics is serialised in a way that can be decoded.
 
     Raises
     ------
     FerryIdError
         Naming the serialisation found.
     """
-    formats = sorted({topic.encoding for topic in topics})
-    if topics and "cdr" not in formats:
+    found = {topic.encoding for topic in topics}
+    if found and found.isdisjoint(DECODABLE):
         raise FerryIdError(
             f"{path}: none of its {len(topics)} topics can be decoded, found them serialised as "
-            f"{', '.join(repr(name) for name in formats)}. Fix: record with a CDR middleware (all of ROS2's own are)"
+            f"{', '.join(sorted(found))}. Fix: record with a middleware that uses CDR, as all of ROS2's own do"
         )
 
 
