@@ -356,7 +356,7 @@ def _gaps(times: Nanoseconds, steps: Nanoseconds) -> tuple[tuple[tuple[int, int]
     sample = _sample(steps)
     period = float(np.median(sample))
     limit = max(_GAP_PERIODS * period, _SHORTEST_GAP_NS)
-    varies = bool(np.mean(sample > limit) > 0.05)
+    varies = len(sample) >= 20 and bool(np.mean(sample > limit) > 0.05)
     if varies:
         limit = max(_GAP_PERIODS * float(np.quantile(sample, 0.95)), _SHORTEST_GAP_NS)
     places = np.flatnonzero(steps > limit)

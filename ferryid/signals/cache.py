@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import shutil
-import tempfile
+import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,30 +45,42 @@ def has_any(out: Path, name: str, profile: Profile) -> bool:
     return next(_kept(out, name, profile), None) is not None
 
 
-def by_files(out: Path, name: str, path: str | Path, profile: Profile, *, verify: bool) -> Recording | None:
-    """Return the kept recording of a single, unchanged file without opening the log; None if there is none."""
-    file = Path(path)
-    if not file.is_file():
-        return None
+def by_files(out: Path, name: str, paths: Sequence[Path], profile: Profile, *, verify: bool) -> Recording | None:
+    """Return the kept recording of files that did not change since, without reading any of them; None if there is none."""
     try:
-        now = signatures([file])
+        now = signatures(paths)
     except OSError:
         return None  # whoever opens the log next says what is wrong with it
     for folder, note in _kept(out, name, profile):
         if note["files"] == now and (note["verified"] or not verify):
-            return load(folder)
+            return _loaded(folder, paths)
     return None
 
 
 def by_content(
     out: Path, name: str, sha256: str, paths: Sequence[Path], profile: Profile, *, verify: bool
 ) -> Recording | None:
-    """Return the kept recording of the same content whose files were touched or replaced; None if there is none."""
+    """Return the kept recording of files that were touched but hold the same bytes; None if there is none."""
+    now = signatures(paths)
     for folder, note in _kept(out, name, profile):
-        if note["recording"]["sha256"] == sha256 and (note["verified"] or not verify):
-            kept = load(folder)
-            return kept if kept.files == tuple(str(path) for path in paths) else None
+        same_paths = [one[0] for one in note["files"]] == [one[0] for one in now]
+        if note["recording"]["sha256"] == sha256 and same_paths and (note["verified"] or not verify):
+            kept = _loaded(folder, paths)
+            # Noted anew so that the next time nothing is hashed; a folder that cannot be written is merely slower.
+            with contextlib.suppress(OSError):
+                fresh = folder / f"{_NOTE}.{uuid.uuid4().hex}"
+                fresh.write_text(json.dumps({**note, "files": now}, indent=1) + "\n", encoding="utf-8")
+                os.replace(fresh, folder / _NOTE)
+            return kept
     return None
+
+
+def _loaded(folder: Path, paths: Sequence[Path]) -> Recording | None:
+    """A kept recording under the present spelling of its paths; None for a damaged one, which is then made anew."""
+    try:
+        return replace(load(folder), files=tuple(str(path) for path in paths))
+    except FerryIdError:
+        return None
 
 
 def _kept(out: Path, name: str, profile: Profile) -> Iterator[tuple[Path, dict[str, Any]]]:
@@ -114,10 +127,7 @@ def store(out: Path, recording: Recording, files: list[list[Any]], *, verify: bo
                 "recording": _plain(recording),
             }
             (draft / _NOTE).write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
-            if folder.exists():
-                with _temporary(folder.parent, recording.name) as old:
-                    os.rename(folder, old / "replaced")
-            os.rename(draft, folder)
+            _put(draft, folder)
     except OSError as error:
         raise FerryIdError(
             f"{folder}: the recording cannot be written ({error.strerror or error}). "
@@ -126,22 +136,28 @@ def store(out: Path, recording: Recording, files: list[list[Any]], *, verify: bo
     return folder
 
 
+def _put(draft: Path, folder: Path) -> None:
+    """Rename a finished folder to its place; an older one there is removed."""
+    if folder.exists():
+        with _temporary(folder.parent, folder.name) as old:
+            os.rename(folder, old / "replaced")
+    try:
+        os.rename(draft, folder)
+    except OSError as error:
+        # Another process finished the same recording meanwhile: one is as good as the other.
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            raise
+
+
 @contextlib.contextmanager
 def _temporary(parent: Path, name: str) -> Iterator[Path]:
     """A folder that is gone afterwards, unless it was renamed."""
-    draft = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=parent))
-    draft.chmod(0o777 & ~_umask())
+    draft = parent / f".{name}-{uuid.uuid4().hex}"
+    draft.mkdir()
     try:
         yield draft
     finally:
         shutil.rmtree(draft, ignore_errors=True)
-
-
-def _umask() -> int:
-    """The permissions that new folders of this process lack."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _write_streams(draft: Path, recording: Recording, tables: Mapping[str, str]) -> None:

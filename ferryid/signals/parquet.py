@@ -79,6 +79,7 @@ def write_table(path: Path, columns: Mapping[str, NDArray[Any]], metadata: Mappi
         use_dictionary=False,
         column_encoding=encodings,
         write_statistics=False,
+        write_page_checksum=True,
     )
 
 
@@ -94,8 +95,7 @@ def read_table(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     import pyarrow.parquet as parquet
 
     try:
-        # The footer alone is checked on opening; pages are checked as they are read.
-        table = parquet.ParquetFile(path).read()
+        table = parquet.ParquetFile(path, page_checksum_verification=True).read()
         metadata: dict[str, Any] = json.loads(table.schema.metadata[METADATA_KEY])
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
         raise FerryIdError(

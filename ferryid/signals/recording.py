@@ -43,11 +43,15 @@ def record(path: str | Path, profile: Profile, out: Path | None = None, *, verif
         For a log that cannot be used: no known format, a required signal that it lacks, no row, an unwritable `out`.
     """
     name = log_name(path)
-    if out is not None:
-        kept = cache.by_files(out, name, path, profile, verify=verify)
+    if out is not None and Path(path).is_file():
+        kept = cache.by_files(out, name, [Path(path)], profile, verify=verify)
         if kept is not None:
             return kept
     reader = open_log(path, profile.table)
+    if out is not None:
+        kept = cache.by_files(out, name, reader.paths, profile, verify=verify)
+        if kept is not None:
+            return kept
     with ThreadPoolExecutor(1) as pool:
         hashing: Future[str] = pool.submit(content_hash, reader.paths, verify=verify)
         if out is not None and cache.has_any(out, name, profile):

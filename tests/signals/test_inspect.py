@@ -1,0 +1,117 @@
+"""`inspect`: every fact of a log is in the output, as JSON and as text that fits a terminal."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.signals.inspect import inspect, render_inspect
+from ferryid.signals.render import table
+from ferryid.vessel.load import load_profile
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+
+
+def look(path: Path, profile: str | None = None) -> tuple[dict[str, Any], str]:
+    result = inspect(path, load_profile(profile) if profile else None)
+    json.dumps(result, allow_nan=False)
+    text = render_inspect(result)
+    assert max(map(len, text.splitlines())) <= 100
+    return result, text
+
+
+def test_mcap_without_a_profile() -> None:
+    result, text = look(FIXTURES / "short.mcap")
+    assert result["schema"] == "ferryid.inspect/1"
+    assert result["format"] == "MCAP"
+    topics = {topic["name"]: topic for topic in result["topics"]}
+    assert len(topics) == 9
+    odometry = topics["/navigation/odometry"]
+    assert (odometry["count"], odometry["type"], odometry["encoding"]) == (900, "nav_msgs/msg/Odometry", "cdr")
+    assert odometry["clock"]["source"] == "stamp"
+    assert odometry["clock"]["offset_s"] == pytest.approx(0.05, abs=0.02)  # the recorder is 40 ms ahead, plus latency
+    assert odometry["rate_hz"] == pytest.approx(10, rel=0.01)
+    assert topics["/camera/image/compressed"]["clock"] is None
+    assert "header stamps were not read" in text
+    (match,) = (one for one in result["bundled"] if one["name"] == "milliampere")
+    assert match["usable"]
+    assert match["found"] == match["signals"]
+    assert "milliampere: fits" in text
+    assert "Lost: nothing" in text
+
+
+def test_mcap_with_its_profile_shows_signals_in_si() -> None:
+    result, text = look(FIXTURES / "short.bag", "milliampere")
+    vessel = result["vessel"]
+    assert vessel["usable"]
+    assert vessel["missing"] == {}
+    surge = vessel["streams"]["/navigation/odometry"]["signals"]["u"]
+    assert surge["unit"] == "m/s"
+    assert -1 < surge["minimum"] < surge["maximum"] < 2
+    assert "n_thruster1" in text
+    assert "rpm" in text
+
+
+def test_truncated_log_shows_what_is_lost() -> None:
+    result, text = look(FIXTURES / "truncated.mcap")
+    assert result["losses"]
+    assert "Lost\n" in text
+
+
+def test_wrong_profile_says_what_is_missing(tmp_path: Path) -> None:
+    result, text = look(FIXTURES / "short.mcap", "vtec-usv")
+    assert not result["vessel"]["usable"]
+    assert result["vessel"]["missing"]
+    assert "does not fit" in text
+    assert "missing" in text
+
+
+def test_table_without_a_profile_lists_its_columns(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time [s],speed over ground\n0,1\n0.1,2\n0.2,3\n5,x\n5.1,5\n")
+    result, text = look(path)
+    assert "speed over ground" in text
+    assert "time guessed" in text
+    assert result["start"] is None
+    assert result["topics"][0]["clock"]["gaps"] == [[200_000_000, 5_000_000_000]]
+
+
+def test_folder_of_runs_says_so(tmp_path: Path) -> None:
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("t,u\n0,1\n0.1,2\n0.2,3\n")
+    _, text = look(tmp_path)
+    assert "separate runs" in text
+
+
+def test_no_log_is_an_error() -> None:
+    with pytest.raises(FerryIdError, match="Fix:"):
+        inspect(FIXTURES / "README.md")
+
+
+def test_long_names_keep_their_end_and_fit() -> None:
+    text = table(["topic", "type", "count"], [["/very" * 30 + "/end", "t" * 50, "1"]], left=(0, 1))
+    assert max(map(len, text.splitlines())) <= 100
+    assert "/end" in text
+
+
+@pytest.mark.parametrize(
+    ("relative", "profile"),
+    [
+        ("milliampere1", "milliampere-2025"),
+        ("vtec_usv/exp37_1_2016-02-11-10-41-20.bag", "vtec-usv"),
+        ("gunnerus/RVG_ManeuveringTests.csv", "gunnerus"),
+        ("kvlcc2/HSVA_CPMC_KVLCC2_Z_10_05.dat", "kvlcc2-model"),
+        ("esso_osaka/zigzag/zigzag_31-Jul-2020_13_04_24.csv", "esso-osaka"),
+    ],
+)
+def test_bundled_profile_of_a_real_recording_is_found(
+    shared_data: Callable[[str], Path], relative: str, profile: str
+) -> None:
+    result, _ = look(shared_data(relative))
+    assert [one["name"] for one in result["bundled"] if one["usable"]] == [profile]
+    assert look(shared_data(relative), profile)[0]["vessel"]["usable"]
