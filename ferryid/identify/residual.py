@@ -20,6 +20,9 @@ FORMS = ("measured", "commanded", "parallel")
 HORIZON_S = 1.0
 """Length of the parallel simulation [s], centred on the row that it judges."""
 
+_PASSES = 3
+_RUNS = 4096
+
 
 def base_force(profile: Profile, motion: Motion, scale: Mapping[str, float]) -> Floats:
     """Return the applied force as the base model estimates it from the motion of a log [N, N, N·m], shape (n, 3).
@@ -103,10 +106,9 @@ def residual(
     form
         ``"measured"``: ``tau_mes - F_0``, thesis (3.1). ``"commanded"``: ``tau_d - F_0`` (Jervan 2020); actuator
         dynamics become part of the correction. ``"parallel"`` (after Gale et al. 2017): the base model runs beside the
-        vessel under the same measured force, from the measured velocity half a horizon before each row to half
-        a horizon after it; the residual is the constant force that would account for the velocity by which they
-        part, ``M_0 (nu_simulated - nu_measured) / horizon_s``. It never forms an acceleration. As the horizon shrinks
-        it tends to ``"measured"``; over a longer one the base model's own damping takes a share of the error.
+        vessel under the same measured force, from the measured velocity half a horizon before each row to half a
+        horizon after it; the residual is the constant force that it must be relieved of to arrive at the measured velocity.
+        It never forms an acceleration, and tends to ``"measured"`` as the horizon shrinks.
     horizon_s
         Horizon of ``"parallel"`` [s], rounded to an even number of rows.
 
@@ -139,32 +141,39 @@ def residual(
 
 def _parallel(profile: Profile, motion: Motion, scale: Mapping[str, float], horizon_s: float) -> Floats:
     half = max(1, round(horizon_s * motion.rate_hz / 2))
-    count = len(motion.t) - 2 * half
     result = np.full_like(motion.nu, np.nan)
-    if count <= 0:
-        return result
+    # Runs that are simulated together fit into the cache.
+    for first in range(0, len(motion.t) - 2 * half, _RUNS):
+        count = min(_RUNS, len(motion.t) - 2 * half - first)
+        result[first + half : first + half + count] = _relief(profile, motion, scale, first, count, 2 * half)
+    return result
+
+
+def _relief(profile: Profile, motion: Motion, scale: Mapping[str, float], first: int, count: int, steps: int) -> Floats:
+    """Return the constant force that each of `count` runs must be relieved of, from row `first` on, shape (count, 3)."""
     mass = scaled(profile.hull, scale).M / float(scale.get("zeta", 1.0))
     inverse = np.linalg.inv(mass)
     dt = 1.0 / motion.rate_hz
     still = np.zeros((count, 3))
+    relief = still
 
-    def nu_dot(nu: Floats, first: int) -> Floats:
-        rows = slice(first, first + count)
+    def nu_dot(nu: Floats, start: int) -> Floats:
+        rows = slice(start, start + count)
         wind = None if motion.wind is None else motion.wind[rows]
         current = None if motion.current is None else motion.current[rows]
         needed = force_of_motion(profile, scale, still, nu, motion.eta[rows, 2], wind=wind, current=current)
-        rate: Floats = (motion.tau[rows] - needed) @ inverse.T
+        rate: Floats = (motion.tau[rows] - relief - needed) @ inverse.T
         return rate
 
-    # All runs go at once: line k of `nu` is the run that began at row k, and step i takes it from row k+i to k+i+1.
-    nu = motion.nu[:count]
     with np.errstate(over="ignore", invalid="ignore"):
-        for step in range(2 * half):
-            # Heun's rule uses the measured forces at both ends and invents none in between.
-            before = nu_dot(nu, step)
-            after = nu_dot(nu + dt * before, step + 1)
-            nu = nu + dt / 2 * (before + after)
-        parted = nu - motion.nu[2 * half :]
-        result[half : half + count] = parted @ (mass / (2 * half * dt)).T
-    result[~np.isfinite(result)] = np.nan
-    return result
+        for _ in range(_PASSES):
+            nu = motion.nu[first : first + count]
+            for step in range(first, first + steps):
+                # Heun's rule uses the measured forces at both ends and invents none in between.
+                before = nu_dot(nu, step)
+                after = nu_dot(nu + dt * before, step + 1)
+                nu = nu + dt / 2 * (before + after)
+            # What remains after a pass is what damping and turning took of its correction.
+            parted = nu - motion.nu[first + steps : first + steps + count]
+            relief = relief + parted @ (mass / (steps * dt)).T
+    return np.where(np.isfinite(relief), relief, np.nan)
