@@ -66,8 +66,13 @@ def to_world(surge: Floats, sway: Floats, psi_rad: Floats) -> tuple[Floats, Floa
     return cos * surge - sin * sway, sin * surge + cos * sway
 
 
-def derivative(values: Floats, rate_hz: float) -> Floats:
-    """Return the central difference on a uniform grid, shape (n,); NaN beside missing samples and at the ends."""
+def derivative(values: Floats, rate_hz: float, *, angle: bool = False) -> Floats:
+    """Return the central difference on a uniform grid, shape (n,); NaN beside missing samples and at the ends.
+
+    With `angle` each difference is wrapped, so that a heading may jump by a full turn.
+    """
+    step = values[2:] - values[:-2]
     slope = np.full(values.shape, np.nan)
-    slope[1:-1] = 0.5 * rate_hz * (values[2:] - values[:-2])
+    # The sample itself is not used, but where it is missing the difference would reach across the gap.
+    slope[1:-1] = np.where(np.isnan(values[1:-1]), np.nan, 0.5 * rate_hz * (wrap(step) if angle else step))
     return slope

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from ferryid.errors import FerryIdError
-from ferryid.vessel.frames import derivative, to_body, to_world, wrap
+from ferryid.vessel.frames import derivative, to_body, to_world
 from ferryid.vessel.profile import Floats, Profile, Signal
 
 
@@ -80,11 +80,7 @@ def _slope(profile: Profile, values: Floats, rate_hz: float | None, *, angle: bo
             f"{profile.path}: the log has no velocity or yaw rate and the rate of its rows is not known. "
             "Fix: pass rate_hz to resolve"
         )
-    if not angle:
-        return derivative(values, rate_hz)
-    slope = np.full(values.shape, np.nan)
-    slope[1:-1] = 0.5 * rate_hz * wrap(values[2:] - values[:-2])
-    return slope
+    return derivative(values, rate_hz, angle=angle)
 
 
 def _move_position(out: dict[str, Floats], signal: Signal | None) -> None:

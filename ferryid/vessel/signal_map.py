@@ -19,7 +19,7 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import Series, Topic
 from ferryid.vessel.frames import heading_from_enu, local_north_east, yaw_of_quaternion
 from ferryid.vessel.profile import Floats, Profile, Signal
-from ferryid.vessel.thrusters import ROLE_PREFIX, needed_roles
+from ferryid.vessel.thrusters import ROLE_PREFIX, needed_roles, order_note
 from ferryid.vessel.units import factor
 
 _TEXT_TYPES = frozenset({"string", "wstring", "str", "object", "large_string", "utf8", "datetime"})
@@ -86,10 +86,7 @@ def survey(profile: Profile, topics: Sequence[Topic]) -> Selection:
         columns = canonical_columns(signal)
         shown = signal.fields if len(columns) == len(signal.fields) else (", ".join(signal.fields),)
         found.update({column: f"{topic.name}: {path}" for column, path in zip(columns, shown, strict=True)})
-    notes = tuple(
-        f"The {role} of {name} is taken from the order: the log has no feedback of it."
-        for name, role in _orders_instead(profile, missing)
-    )
+    notes = tuple(order_note(name, role) for name, role in _orders_instead(profile, missing))
     return Selection({name: tuple(paths) for name, paths in wanted.items()}, found, missing, notes)
 
 
@@ -263,7 +260,7 @@ def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic]) -> str:
     if topic.count == 0:
         return f"found {topic.name} without a single message"
     for path in signal.fields:
-        kind = _field_type(path, topic.fields)
+        kind = _field_type(path, topic)
         if kind is None:
             fields = list(topic.fields)
             listed = ", ".join(fields[:6]) + (", ..." if len(fields) > 6 else "")
@@ -276,10 +273,13 @@ def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic]) -> str:
     return ""
 
 
-def _field_type(path: str, fields: Mapping[str, str]) -> str | None:
-    if path in fields:
-        return fields[path]
-    if path.endswith("]") and "[" in path:
+def _field_type(path: str, topic: Topic) -> str | None:
+    """Return the type of a field, an element of an array included, or None where the topic has no such field."""
+    fields = topic.fields
+    # In a message "name[3]" is listed for an array of three and asked for as its fourth element; a table has no arrays.
+    if topic.encoding == "table" or not path.endswith("]"):
+        return fields.get(path)
+    if "[" in path:
         name, _, index = path[:-1].rpartition("[")
         if not index.isdigit():
             return None

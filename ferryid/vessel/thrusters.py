@@ -94,6 +94,11 @@ def needed_roles(actuator: Actuator) -> tuple[tuple[str, ...], ...]:
     return (strength, *turn)
 
 
+def order_note(name: str, role: str) -> str:
+    """Say that an order stands in for the feedback of an actuator."""
+    return f"The {role} of {name} is the order, as there is no feedback: its lag stays in the residual."
+
+
 def actuator_columns(
     profile: Profile, available: Collection[str], *, measured: bool = True
 ) -> tuple[dict[tuple[str, str], str], tuple[str, ...]]:
@@ -140,9 +145,7 @@ def actuator_columns(
             role, column, order = candidates[0]
             chosen[actuator.name, role] = column
             if order and measured:
-                notes.append(
-                    f"The {role} of {actuator.name} is the order, not feedback: the actuator's lag is in the residual."
-                )
+                notes.append(order_note(actuator.name, role))
     return chosen, tuple(notes)
 
 

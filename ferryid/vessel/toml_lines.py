@@ -33,15 +33,14 @@ def key_lines(text: str) -> dict[KeyPath, int]:
             continue
         if stripped.startswith("["):
             array = stripped.startswith("[[")
-            names = _parts(stripped[2 if array else 1 :])
+            names, _ = _parts(stripped[2 if array else 1 :])
             table = _place(names, counts, array)
             for end in range(1, len(table) + 1):
                 found.setdefault(table[:end], number)
             continue
-        keys = _parts(stripped)
+        keys, value = _parts(stripped)
         for end in range(1, len(keys) + 1):
             found.setdefault((*table, *keys[:end]), number)
-        value = stripped.split("=", 1)[-1]
         for quote in ('"""', "'''"):
             if value.count(quote) == 1:
                 closing = quote
@@ -58,8 +57,8 @@ def line_of(lines: dict[KeyPath, int], path: KeyPath) -> int:
     return 1
 
 
-def _parts(text: str) -> tuple[str, ...]:
-    """Split a dotted key, as far as its ``=`` or ``]``."""
+def _parts(text: str) -> tuple[tuple[str, ...], str]:
+    """Split a dotted key, as far as its ``=`` or ``]``, and return what follows."""
     parts: list[str] = []
     position = 0
     while match := _PART.match(text, position):
@@ -67,7 +66,7 @@ def _parts(text: str) -> tuple[str, ...]:
         position = match.end()
         if match.group(4) != ".":
             break
-    return tuple(parts)
+    return tuple(parts), text[position:]
 
 
 def _place(names: tuple[str, ...], counts: dict[KeyPath, int], array: bool) -> KeyPath:
@@ -86,9 +85,12 @@ def _bracket_balance(text: str) -> int:
     """Count brackets opened less closed, outside strings and before a comment."""
     balance = 0
     quote = ""
+    escaped = False
     for character in text:
         if quote:
-            quote = "" if character == quote else quote
+            if character == quote and not escaped:
+                quote = ""
+            escaped = character == "\\" and quote == '"' and not escaped
         elif character in "\"'":
             quote = character
         elif character == "#":

@@ -1,0 +1,353 @@
+"""Every fault of a profile is explained with its line: one edit of a sound profile at a time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.vessel import bundled, check_profile, load_profile, parse_profile
+
+SOUND = """schema = "ferryid.vessel/1"
+name = "boat"
+source = "made up for a test"
+[hull]
+length_m = 5.0
+mass_kg = 1000.0
+inertia_z = 2000.0
+[hull.M]
+m11 = 1200.0
+m22 = 1500.0
+m23 = 10.0
+m32 = 10.0
+m33 = 2500.0
+[hull.D]
+"X_u" = -20.0
+"Y_v" = -50.0
+"N_r" = -90.0
+[wind]
+frontal_m2 = 1.0
+lateral_m2 = 2.0
+length_m = 5.0
+CD_t = 0.9
+CD_l_AF = 0.5
+delta = 0.8
+[[actuator]]
+name = "left"
+kind = "azimuth"
+position_m = [-2.0, -0.5]
+thrust = { kind = "polynomial", coefficients = [0.01, 0.0, 1e-7], valid = [-900, 900] }
+[[actuator]]
+name = "right"
+kind = "propeller_rudder"
+position_m = [-2.0, 0.5]
+diameter_m = 0.3
+[actuator.thrust]
+kind = "table"
+speed = [-900, 0, 900]
+force = [-200, 0, 300]
+[actuator.rudder]
+area_m2 = 0.1
+x_m = -2.3
+aspect_ratio = 1.5
+[signals.velocity]
+topic = "/nav"
+fields = ["u", "v"]
+unit = "m/s"
+frame = "FRD"
+[signals.yaw_rate]
+topic = "/nav"
+field = "r"
+unit = "rad/s"
+frame = "FRD"
+[signals."left.speed"]
+topic = "/left"
+field = "n"
+unit = "rpm"
+[signals."left.angle"]
+topic = "/left"
+field = "a"
+unit = "rad"
+[signals."right.speed"]
+topic = "/right"
+field = "n"
+unit = "rps"
+[signals."right.rudder"]
+topic = "/right"
+field = "d"
+unit = "deg"
+"""
+
+# (text to replace, its replacement with @ on the line of the fault, what the message must say)
+CASES = {
+    "newer schema": ('vessel/1"', 'vessel/9"@', "install a newer ferryid"),
+    "no schema": ('schema = "ferryid.vessel/1"', "@", 'the file lacks "schema"'),
+    "name with a space": ('name = "boat"', 'name = "my boat"@', "use letters, digits"),
+    "source is no text": ('source = "made up for a test"', "source = 3@", "must be a string, found a number"),
+    "unknown key": ("length_m = 5.0\nmass", "lenght_m = 5.0@\nmass", 'Did you mean "length_m"?'),
+    "unknown table": ("[wind]", "[winds]@", 'unknown key "winds"'),
+    "no mass": ("[hull]\nlength_m = 5.0\nmass_kg = 1000.0", "[hull]@\nlength_m = 5.0", 'lacks "mass_kg"'),
+    "negative mass": ("mass_kg = 1000.0", "mass_kg = -1.0@", "must be above 0, found -1"),
+    "mass as text": ("mass_kg = 1000.0", 'mass_kg = "1000"@', "must be a number, found a string"),
+    "mass not finite": ("mass_kg = 1000.0", "mass_kg = inf@", "must be above 0, found inf"),
+    "no inertia": (
+        "[hull]\nlength_m = 5.0\nmass_kg = 1000.0\ninertia_z = 2000.0",
+        "[hull]@\nmass_kg = 1.0",
+        "lacks a moment of inertia",
+    ),
+    "inertia twice": ("inertia_z = 2000.0", "inertia_z = 2000.0\nk_zz_m = 1.0@", "say the same thing"),
+    "inertia below the parallel axis": (
+        "inertia_z = 2000.0",
+        "x_g_m = 2.0\ninertia_z = 2000.0@",
+        "must exceed",
+    ),
+    "centre of gravity off the hull": (
+        "mass_kg = 1000.0",
+        "x_g_m = 6.0@\nmass_kg = 10.0",
+        "lies outside a hull",
+    ),
+    "mass matrix": (
+        "[hull.M]\nm11 = 1200.0\nm22 = 1500.0\nm23 = 10.0\nm32 = 10.0",
+        "[hull.M]@\nm11 = 1200.0\nm22 = 1500.0\nm23 = 3000.0\nm32 = 3000.0",
+        "not positive definite",
+    ),
+    "added mass": ("m11 = 1200.0", "m11 = 900.0@", "the added mass would be negative"),
+    "damping that feeds": ('"X_u" = -20.0', '"X_u" = 20.0@', "feeds energy into the motion"),
+    "damping that couples": ('[hull.D]\n"X_u" = -20.0', '[hull.D]@\n"Y_r" = 500.0', "not dissipative"),
+    "damping term": ('"X_u" = -20.0', '"X_|u|" = -20.0@', 'Did you mean "X_|u|u"?'),
+    "wind delta": ("delta = 0.8", "delta = 1.8@", "at least 0 and at most 1"),
+    "same name": ('name = "right"', 'name = "left"@', "is taken by the one on line 25"),
+    "name for columns": ('name = "left"', 'name = "port-aft"@', "becomes part of column names"),
+    "actuator kind": ('kind = "azimuth"', 'kind = "azimut"@', 'Did you mean "azimuth"?'),
+    "position": ("position_m = [-2.0, -0.5]", "position_m = [-2.0]@", "must hold 2 numbers, found 1"),
+    "no actuator": (
+        '[[actuator]]\nname = "left"',
+        '[[actuators]]@\nname = "left"',
+        'unknown key "actuators"',
+    ),
+    "range reversed": ("valid = [-900, 900] }", "valid = [900, -900] }@", '"valid" is reversed'),
+    "range without rest": (
+        "valid = [-900, 900] }",
+        "valid = [100, 900] }@",
+        "leaves out a stopped propeller",
+    ),
+    "thrust of the wrong sign": (
+        "[0.01, 0.0, 1e-7], valid = [-900, 900] }",
+        "[-0.01, 0.0, 1e-7], valid = [-900, 900] }@",
+        "wrong sign",
+    ),
+    "thrust that falls": (
+        "[0.01, 0.0, 1e-7], valid = [-900, 900] }",
+        "[0.2, 0.0, -2e-7], valid = [-900, 900] }@",
+        "not monotone",
+    ),
+    "table unsorted": (
+        "speed = [-900, 0, 900]",
+        "speed = [0, -900, 900]@",
+        "must rise from entry to entry, found 0 before -900",
+    ),
+    "table through zero": ("force = [-200, 0, 300]", "force = [-200, 10, 300]", "does not pass through zero"),
+    "table that falls": ("force = [-200, 0, 300]", "force = [200, 0, 300]@", "falls from 200 to 0 N"),
+    "table lengths": ("force = [-200, 0, 300]", "force = [-200, 0]@", '"speed" has 3 entries and "force" 2'),
+    "range beyond the table": (
+        "speed = [-900, 0, 900]",
+        "valid = [-1000, 900]@\nspeed = [-900, 0, 900]",
+        "beyond the table",
+    ),
+    "rudder on an azimuth": (
+        "position_m = [-2.0, -0.5]",
+        "rudder = { area_m2 = 1.0, x_m = -2.0, f_alpha = 2.0 }@\nposition_m = [-2.0, -0.5]",
+        "has no rudder",
+    ),
+    "rudder without slope": (
+        "[actuator.rudder]\narea_m2 = 0.1\nx_m = -2.3\naspect_ratio = 1.5",
+        "[actuator.rudder]@\narea_m2 = 0.1\nx_m = -2.3",
+        "lift slope once",
+    ),
+    "rudder missing": (
+        "[actuator.rudder]\narea_m2 = 0.1\nx_m = -2.3\naspect_ratio = 1.5",
+        "",
+        'lacks "rudder"',
+    ),
+    "no diameter": ("diameter_m = 0.3\n", "", 'needs "diameter_m"'),
+    "unknown unit": ('unit = "m/s"', 'unit = "m/sec"@', 'Did you mean "m/s"?'),
+    "unit of the wrong kind": (
+        'field = "d"\nunit = "deg"',
+        'field = "d"\nunit = "m"@',
+        "measures a length, but this is an angle",
+    ),
+    "no frame": (
+        '[signals.velocity]\ntopic = "/nav"\nfields = ["u", "v"]\nunit = "m/s"\nframe = "FRD"',
+        '[signals.velocity]@\ntopic = "/nav"\nfields = ["u", "v"]\nunit = "m/s"',
+        "its signs are not known",
+    ),
+    "frame that does not exist": (
+        'unit = "m/s"\nframe = "FRD"',
+        'unit = "m/s"\nframe = "FRU"@',
+        'Did you mean "FRD"?',
+    ),
+    "world velocity without heading": (
+        'fields = ["u", "v"]\nunit = "m/s"\nframe = "FRD"',
+        'fields = ["u", "v"]\nunit = "m/s"\nframe = "NED"',
+        "without a heading it cannot be turned into surge",
+    ),
+    "two body frames in one message": (
+        'field = "r"\nunit = "rad/s"\nframe = "FRD"',
+        'field = "r"\nunit = "rad/s"\nframe = "FLU"',
+        "one message has one body frame",
+    ),
+    "one field for a velocity": ('fields = ["u", "v"]', 'fields = ["u"]@', "must name 2 fields, found 1"),
+    "no topic": (
+        '[signals.velocity]\ntopic = "/nav"',
+        "[signals.velocity]@",
+        '[signals.velocity] lacks "topic"',
+    ),
+    "signal of no actuator": (
+        '[signals."left.speed"]',
+        '[signals."lef.speed"]@',
+        'does not list. Did you mean "left"?',
+    ),
+    "signal of another kind of actuator": (
+        '[signals."left.angle"]',
+        '[signals."left.rudder"]@',
+        'which is of kind "azimuth"',
+    ),
+    "unquoted actuator signal": ('[signals."left.angle"]', "[signals.left.angle]@", "with the quotes"),
+    "unknown signal": ("[signals.yaw_rate]", "[signals.yawrate]@", 'Did you mean "yaw_rate"?'),
+    "azimuth without angle": (
+        '[signals."left.angle"]\ntopic = "/left"\nfield = "a"\nunit = "rad"\n',
+        "",
+        'left is of kind "azimuth" and has no angle signal',
+    ),
+    "speed without curve": (
+        'thrust = { kind = "polynomial", coefficients = [0.01, 0.0, 1e-7], valid = [-900, 900] }\n',
+        "",
+        "has a speed signal but no thrust curve",
+    ),
+    "no yaw": (
+        '[signals.yaw_rate]\ntopic = "/nav"\nfield = "r"\nunit = "rad/s"\nframe = "FRD"\n',
+        "",
+        "no yaw rate can be had",
+    ),
+    "no velocity": (
+        '[signals.velocity]\ntopic = "/nav"\nfields = ["u", "v"]\nunit = "m/s"\nframe = "FRD"\n',
+        "",
+        "no surge and sway velocity can be had",
+    ),
+    "sign": ('field = "a"\nunit = "rad"', 'field = "a"\nunit = "rad"\nsign = -2@', "must be 1 or -1"),
+    "body frame for a heading": (
+        "[signals.yaw_rate]",
+        '[signals.heading]\ntopic = "/h"\nfield = "h"\nunit = "rad"\nframe = "FRD"@\n[signals.yaw_rate]',
+        "in the body frame",
+    ),
+    "degrees for metres": (
+        "[signals.yaw_rate]",
+        '[signals.position]\ntopic = "/p"\nfields = ["x", "y"]\nunit = "deg"@\nframe = "NED"\n[signals.yaw_rate]',
+        "measures an angle, but this is a length",
+    ),
+    "metres for degrees": (
+        "[signals.yaw_rate]",
+        '[signals.position]\ntopic = "/p"\nfields = ["x", "y"]\nunit = "m"@\nframe = "geodetic"\n[signals.yaw_rate]',
+        "measures a length, but this is an angle",
+    ),
+    "bow wind without heading": (
+        "[signals.yaw_rate]",
+        '[signals.wind]@\ntopic = "/w"\nspeed = "s"\nunit = "m/s"\ndirection = "d"\ndirection_unit = "deg"\n'
+        'reference = "bow"\nair = "true"\n[signals.yaw_rate]',
+        "relative to the bow",
+    ),
+    "throttle without full speed": (
+        'field = "n"\nunit = "rpm"',
+        'field = "n"\nunit = "%"',
+        "the speed at full throttle",
+    ),
+    "table layout": ("[wind]", '[table]\nseparator = ":"@\n[wind]', '"separator" cannot be'),
+    "time column": ("[wind]", '[table]\ncolumns = ["t", "x"]\ntime = "time"@\n[wind]', 'not among "columns"'),
+    "encoding": ("[wind]", '[table]\nencoding = "utf-9"@\n[wind]', "unknown text encoding"),
+    "syntax": ("mass_kg = 1000.0", "mass_kg = = 1000.0@", "not valid TOML"),
+}
+
+
+def test_the_profile_all_cases_start_from_is_sound() -> None:
+    profile = parse_profile(SOUND, "boat.toml")
+    assert profile.hull.D == {"X_u": -20.0, "Y_v": -50.0, "N_r": -90.0}
+    assert profile.actuators[1].rudder["f_alpha"] == pytest.approx(6.13 * 1.5 / 3.75)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_fault_is_explained_with_its_line(case: str, tmp_path: Path) -> None:
+    old, new, says = CASES[case]
+    assert SOUND.count(old) >= 1
+    marked = SOUND.replace(old, new, 1)
+    path = tmp_path / "boat.toml"
+    path.write_text(marked.replace("@", ""))
+    faults = check_profile(path)
+    matching = [fault for fault in faults if says in fault.message]
+    assert matching, faults
+    if "@" in marked:
+        line = marked[: marked.index("@")].count("\n") + 1
+        assert matching[0].line == line
+    if not matching[0].warning:
+        with pytest.raises(FerryIdError, match=r"boat\.toml:\d+: ") as caught:
+            load_profile(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_every_fault_is_found_at_once(tmp_path: Path) -> None:
+    text = SOUND.replace("mass_kg = 1000.0", "mass_kg = -1.0").replace('unit = "rps"', 'unit = "rpx"')
+    text = text.replace("x_m = -2.3", "x_n = -2.3")
+    path = tmp_path / "boat.toml"
+    path.write_text(text)
+    faults = check_profile(path)
+    assert [fault.line for fault in faults] == sorted(fault.line for fault in faults)
+    assert len(faults) == 4  # x_n is unknown and x_m is missing
+    with pytest.raises(FerryIdError, match=r"boat\.toml:6: .* \(3 more faults: see ferryid vessel check "):
+        load_profile(path)
+
+
+def test_warnings_do_not_keep_a_profile_from_loading() -> None:
+    profile = parse_profile(SOUND.replace('"X_u" = -20.0', '"X_u" = 20.0'), "boat.toml")
+    assert profile.hull.D["X_u"] == 20.0
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(FerryIdError, match="no such file"):
+        load_profile(tmp_path / "nothing.toml")
+    with pytest.raises(FerryIdError, match="a folder"):
+        load_profile(tmp_path)
+    with pytest.raises(FerryIdError, match='Did you mean "milliampere"'):
+        load_profile("miliampere")
+    broken = tmp_path / "latin.toml"
+    broken.write_bytes(b'name = "\xe6"')
+    with pytest.raises(FerryIdError, match="UTF-8 text, found byte 0xe6 at offset 8"):
+        load_profile(broken)
+    empty = tmp_path / "empty.toml"
+    empty.write_text("")
+    with pytest.raises(FerryIdError, match=r'empty\.toml:1: the file lacks "schema"'):
+        load_profile(empty)
+
+
+def test_bundled_names_and_text_survive_embedding() -> None:
+    assert bundled() == (
+        "esso-osaka",
+        "gunnerus",
+        "kvlcc2-model",
+        "milliampere",
+        "milliampere-2025",
+        "vtec-usv",
+    )
+    for name in bundled():
+        profile = load_profile(name)
+        again = parse_profile(profile.text, "model.json")
+        assert again.sha256 == profile.sha256
+        assert again.signals == profile.signals
+
+
+def test_import_is_cheap() -> None:
+    heavy = "('pandas', 'scipy', 'matplotlib', 'pyarrow')"
+    code = f"import sys, ferryid.vessel; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
