@@ -44,7 +44,7 @@ def test_bundled_scenarios():
         assert scenario.name == name
         assert scenario.title == title
     thesis = load_scenario("twelve-corner")
-    assert (thesis.delta, thesis.sigma, thesis.duration_s) == (0.4, 0.4, 720.0)
+    assert (thesis.delta, thesis.sigma, thesis.duration_s) == (0.4, 0.4, 1440.0)
 
 
 def test_every_key_arrives():

@@ -174,7 +174,7 @@ def test_imu_feels_gravity_and_the_turn(trial):
 
 def test_the_trial_tells_the_hull_from_the_scaled_base_model():
     """Ordinary least squares on the logged motion brings the force error far below the scaled model's, on other data."""
-    scenario = load_scenario("twelve-corner")
+    scenario = replace(load_scenario("twelve-corner"), duration_s=720.0)
     hull = load_profile("milliampere").hull
     base = replace(hull, M=0.4 * hull.M, D={name: 0.4 * value for name, value in hull.D.items()})
 
