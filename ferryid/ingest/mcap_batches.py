@@ -35,8 +35,10 @@ BATCH_BYTES = 2 << 20
 BATCH_MESSAGES = 16_384
 WHOLE_FROM = 0.9
 """A compressed chunk wanted up to this part of its length is read to its end, for its checksum's sake."""
-CHECKED_FROM = 0.5
-"""The checksum of an uncompressed chunk is taken where at least this part of its bytes is wanted anyway."""
+CHECKED_FROM = 0.25
+"""The checksum of an uncompressed chunk is taken where at least this part of its bytes is wanted."""
+SMALL = 64 << 10
+"""A chunk up to this size [bytes] is always read to its end and checked: that costs next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -98,13 +100,13 @@ def batches(
 
     def run(batch: Sequence[_Plan], room: Bytes) -> list[Loaded]:
         try:
-            return [_load(file, whole_file, batch, room, verify)]
+            return [_load(file, whole_file, batch, room)]
         except DamagedRecord:
             return [each for plan in batch for each in one(plan)]
 
     def one(plan: _Plan) -> list[Loaded]:
         try:
-            return [_load(file, whole_file, [plan], None, verify)]
+            return [_load(file, whole_file, [plan], None)]
         except DamagedRecord as error:
             return [carefully(plan.chunk, str(error))]
 
@@ -227,13 +229,14 @@ def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], verify: bool)
     last = max((int(rows[:, 1].max()) for rows in entries.values()), default=0)
     if not 0 <= last < chunk.uncompressed_size or chunk.data_offset + chunk.compressed_size > len(file):
         raise DamagedRecord("a message index points outside its chunk")
-    whole = verify or chunk.truncated or last >= WHOLE_FROM * chunk.uncompressed_size
+    whole = verify or chunk.truncated
+    # The last message of an uncompressed chunk says nothing of how much of it is wanted.
+    whole = whole or (chunk.compression != "" and last >= WHOLE_FROM * chunk.uncompressed_size)
+    whole = whole or chunk.uncompressed_size <= SMALL
     return _Plan(chunk, crc, entries, last, whole)
 
 
-def _load(
-    file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Bytes | None, verify: bool
-) -> Loaded:
+def _load(file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Bytes | None) -> Loaded:
     """Load the chunks of one batch, decompressed behind one another in `room`; DamagedRecord if anything is wrong.
 
     Without `room` the batch is one chunk, which brings its own memory.
@@ -257,7 +260,7 @@ def _load(
         buffer = data if own or room is None else room[:used]
     messages, taken = _located(buffer, batch, np.array(bases), np.array(limits))
     for plan, size in zip(batch, taken.tolist(), strict=True):
-        if plan.plain and (verify or size >= CHECKED_FROM * plan.chunk.uncompressed_size):
+        if plan.plain and (plan.whole or size >= CHECKED_FROM * plan.chunk.uncompressed_size):
             content(file, whole_file, plan.chunk, plan.crc)
     return Loaded(buffer, messages, ())
 
@@ -287,7 +290,7 @@ def _located(
     Returns
     -------
     tuple
-        Messages per channel id, and the bytes wanted of each chunk, shape (chunks,).
+        Messages per channel id, and the bytes that they take up in each chunk, shape (chunks,).
     """
     channels = sorted({channel for plan in batch for channel in plan.entries})
     parts = [
@@ -320,4 +323,4 @@ def _located(
             # Some writers sort a message index by time; the file's order is that of the records.
             one = one.take(np.argsort(one.starts))
         messages[channel] = one
-    return messages, np.bincount(owner, table.sizes, minlength=len(batch)).astype(np.float64)
+    return messages, np.bincount(owner, table.sizes + MESSAGE_HEADER, minlength=len(batch)).astype(np.float64)

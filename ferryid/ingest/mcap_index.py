@@ -263,7 +263,7 @@ def _chunk_from_index(content: memoryview) -> Chunk:
     index_length, name_length = struct.unpack_from("<QI", content, 36 + size)
     name = bytes(content[48 + size : 48 + size + name_length]).decode("ascii")
     stored, unpacked = struct.unpack_from("<QQ", content, 48 + size + name_length)
-    ends = [place for place, _ in places[1:]] + [offset + length + index_length]
+    ends = [place for place, _ in [*places, (offset + length + index_length, 0)][1:]]
     indexed = {
         channel: (place, (end - place - 15) // 16) for (place, channel), end in zip(places, ends, strict=True)
     }
@@ -344,7 +344,7 @@ def spans(index: Index, file: memoryview, channels: Iterable[int]) -> dict[int, 
 
 def _times(chunk: Chunk, file: memoryview, channel: int) -> Nanoseconds:
     if chunk.table is not None:
-        return chunk.table.log_ns[chunk.table.channels == channel]
+        return chunk.table.take(chunk.table.channels == channel).log_ns
     offset, count = (chunk.indexed or {}).get(channel, (0, 0))
     if not count:
         return np.empty(0, np.int64)

@@ -71,9 +71,7 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
 
 def _needs_walk(index: Index) -> bool:
     """Tell whether messages lie outside the indexed chunks, or the summary does not list all chunks."""
-    if index.statistics is None:
-        return not index.chunks
-    if index.statistics.chunk_count != len(index.chunks):
+    if index.statistics is None or index.statistics.chunk_count != len(index.chunks):
         return True
     indexed = sum(index.counts().values())
     return index.statistics.message_count > indexed and all(
@@ -128,15 +126,16 @@ def scan(file: memoryview, name: str) -> Index:
     position: int | None = len(MAGIC)
     while position is not None:
         messages, others, end = walk(file, position, len(file))
-        _define(index, file, others)
         position = None
         finished = [start for opcode, start, _ in others if opcode == DATA_END]
-        if finished:
-            index.data_end = finished[0]
-        elif _sane_chunk(file, end):
+        index.data_end = min(finished, default=len(file))
+        # What follows the data repeats it, and is damaged where the file had to be walked.
+        others = [record for record in others if record[1] < index.data_end]
+        _define(index, file, others)
+        if not finished and _sane_chunk(file, end):
             # The file ends inside this chunk.
             others += [(CHUNK, end, len(file) - end - RECORD_HEADER), (_DAMAGE, end, 0)]
-        else:
+        elif not finished:
             end = _end_of_sound_records(messages, others, end)
             suspect = messages[-1] if messages and (not others or messages[-1] > others[-1][1]) else end
             position = _next_record(file, suspect + 1, index.channels)

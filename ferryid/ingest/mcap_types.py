@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 from mcap.records import Channel, Schema
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
@@ -14,7 +15,9 @@ from rosbags.typesys.msg import normalize_msgtype
 from ferryid.errors import FerryIdError
 from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
 from ferryid.ingest.json_messages import JsonDecoder, sample_fields, schema_fields
+from ferryid.ingest.layout import EMPTY_MEMBER
 from ferryid.ingest.protobuf import ProtobufDecoder, protobuf_fields
+from ferryid.ingest.ros2_types import Definition, define
 
 MESSAGE_ENCODINGS = ("ros1", "cdr", "protobuf", "json")
 _SCHEMA_ENCODINGS = {
@@ -23,6 +26,7 @@ _SCHEMA_ENCODINGS = {
     "protobuf": ("protobuf",),
     "json": ("jsonschema", ""),
 }
+_SERVICE = re.compile(rb"^---\s*$", re.MULTILINE)
 _IDL_FILE = re.compile(r"^=+\r?\nIDL: [^\n]*\n", re.MULTILINE)
 
 
@@ -76,36 +80,33 @@ def problem(channel: Channel, schema: Schema | None) -> str:
         if encoding == "json":
             return ""
         return "its schema is not in the file" if channel.schema_id else "the channel has no schema"
-    if schema.encoding not in _SCHEMA_ENCODINGS[encoding] and not (encoding == "cdr" and not schema.data):
+    if not schema.data and (encoding == "protobuf" or (encoding == "cdr" and not schema.encoding)):
+        if encoding == "protobuf" or _bundled(channel, schema).typestore is None:
+            return "the schema holds no definition"
+        return ""
+    if schema.encoding not in _SCHEMA_ENCODINGS[encoding]:
         return f"schema encoding {schema.encoding!r} does not fit messages in {encoding}"
-    if not schema.data and encoding == "cdr" and not _is_standard(type_name(channel, schema)):
-        return "the schema holds no definition"
-    if not schema.data and encoding == "protobuf":
-        return "the schema holds no definition"
+    if schema.encoding == "ros2msg" and _SERVICE.search(schema.data):
+        return "the definition recorded is that of a service, not of its events"
     return ""
 
 
 def remark(channel: Channel, schema: Schema | None) -> str:
     """Say what a user must know of a channel that can be decoded."""
     if channel.message_encoding == "cdr" and schema is not None and not schema.data:
-        return "no definition in the file: that of the ROS2 distribution is used"
+        bundled = _bundled(channel, schema)
+        return bundled.note if bundled.fields else ""
     return ""
 
 
-@cache
-def _standard() -> Any:
-    return get_typestore(Stores.LATEST)
-
-
-def _is_standard(name: str) -> bool:
-    return name in _standard().fielddefs
+def _bundled(channel: Channel, schema: Schema) -> Definition:
+    """Return the definition that rosbags bundles, for a ROS2 type without a usable one in the file."""
+    return define(type_name(channel, schema), None, channel.metadata.get("topic_type_hash", ""), "")
 
 
 @cache
-def _typestore(encoding: str, name: str, schema_encoding: str, definition: bytes) -> Any:
+def _typestore(name: str, schema_encoding: str, definition: bytes) -> Any:
     """Return a rosbags Typestore that holds one schema alone, so that equal names in other schemas cannot clash."""
-    if not definition and encoding == "cdr":
-        return _standard()
     store = get_typestore(Stores.EMPTY)
     try:
         text = definition.decode()
@@ -118,8 +119,9 @@ def _typestore(encoding: str, name: str, schema_encoding: str, definition: bytes
             types = dict(get_types_from_msg(text, name))
         store.register(types)
     except (TypesysError, ValueError, KeyError, AssertionError, RecursionError) as error:
-        first = (str(error).splitlines() or [type(error).__name__])[0]
-        raise DefinitionError(f"the definition of {name} cannot be parsed ({first})") from error
+        raise DefinitionError(f"the definition of {name} cannot be parsed") from error
+    if name not in store.fielddefs:
+        raise DefinitionError(f"the definition of {name} describes other types")
     return store
 
 
@@ -133,21 +135,35 @@ def fields_of(channel: Channel, schema: Schema | None, first: Callable[[], bytes
         return LazyFields(lambda: protobuf_fields(definition, name))
     if encoding == "json":
         return LazyFields(lambda: schema_fields(definition) or sample_fields(first()))
-    schema_encoding = "" if schema is None else schema.encoding
-    return LazyFields(lambda: _ros_fields(encoding, name, schema_encoding, definition))
+    return LazyFields(lambda: _ros_definition(channel, schema).fields)
 
 
-def _ros_fields(encoding: str, name: str, schema_encoding: str, definition: bytes) -> dict[str, str]:
+def _ros_definition(channel: Channel, schema: Schema | None) -> Definition:
+    """Return the definition in the file, or the one that rosbags bundles, with a note, where that cannot be used."""
+    if schema is None:
+        return Definition(None, {}, "the channel has no schema")
+    name = type_name(channel, schema)
+    bundled = _bundled(channel, schema) if not schema.data and channel.message_encoding == "cdr" else None
+    if bundled is not None and bundled.fields:
+        return bundled
     try:
-        return leaf_fields(_typestore(encoding, name, schema_encoding, definition), name)
-    except DefinitionError:
-        return {}
+        store = _typestore(name, schema.encoding, schema.data)
+    except DefinitionError as error:
+        bundled = _bundled(channel, schema)
+        if channel.message_encoding == "cdr" and bundled.typestore is not None:
+            return replace(bundled, note=f"{error}; {bundled.note}")
+        return Definition(None, {}, str(error))
+    fields = leaf_fields(store, name)
+    members = [member for member, _ in store.fielddefs[name][1] if member != EMPTY_MEMBER]
+    if members and not fields:
+        return Definition(None, {}, f"the definition of {name} lacks a type that it is made of")
+    return Definition(store, fields, "")
 
 
 def decoder_of(
     channel: Channel, schema: Schema | None, paths: Sequence[str], capacity: int, where: str
-) -> Decoder:
-    """Return a decoder for a channel's messages.
+) -> tuple[Decoder, str]:
+    """Return a decoder for a channel's messages, and a note where another definition than the file's stands in.
 
     Raises
     ------
@@ -164,21 +180,15 @@ def decoder_of(
     name, encoding = type_name(channel, schema), channel.message_encoding
     definition = b"" if schema is None else schema.data
     if encoding == "protobuf":
-        return ProtobufDecoder(definition, name, channel.topic, paths, said)
+        return ProtobufDecoder(definition, name, channel.topic, paths, said), ""
     if encoding == "json":
-        return JsonDecoder(channel.topic, paths, said)
-    try:
-        store = _typestore(encoding, name, "" if schema is None else schema.encoding, definition)
-    except DefinitionError as error:
+        return JsonDecoder(channel.topic, paths, said), ""
+    found = _ros_definition(channel, schema)
+    if found.typestore is None:
         raise FerryIdError(
-            f"{said}: {error}, its fields were asked for. "
-            "Fix: record again with a valid definition, or map another topic"
-        ) from error
-    if paths and not leaf_fields(store, name):
-        raise FerryIdError(
-            f"{said}: the definition of {name} lacks a type that it is made of, its fields were asked for. "
-            "Fix: record again with complete definitions, or map another topic"
+            f"{said}: the messages cannot be decoded, {found.note}. "
+            "Fix: record again with valid definitions, or map another topic"
         )
-    return decoder_for(
-        "ros1" if encoding == "ros1" else "cdr", store, name, channel.topic, paths, capacity, where
-    )
+    kind: Literal["ros1", "cdr"] = "ros1" if encoding == "ros1" else "cdr"
+    decoder = decoder_for(kind, found.typestore, name, channel.topic, paths, capacity, where)
+    return decoder, found.note

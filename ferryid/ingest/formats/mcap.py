@@ -35,9 +35,9 @@ class McapLog:
     """An opened MCAP file; implements `Reader`.
 
     Checksums: that of the summary is always checked, a chunk's whenever the chunk is read to its end: unless only an
-    early part of a compressed chunk, or less than half of an uncompressed one, is wanted. ``verify`` checks them all,
-    and that of the data section. Where a chunk's checksum is wrong none of its messages can be trusted: they are left
-    out and counted.
+    early part of a large compressed chunk, or less than a quarter of a large uncompressed one, is wanted. ``verify``
+    checks them all, and that of the data section. Where a chunk's checksum is wrong none of its messages can be
+    trusted: they are left out and counted.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class McapLog:
         Its bytes where they are not in the file as such (a file compressed as a whole); by default the file is mapped.
     """
 
-    def __init__(self, path: Path, content: bytes | None = None) -> None:
+    def __init__(self, path: Path, content: Any = None) -> None:
         self.paths: tuple[Path, ...] = (path,)
         self._name = str(path)
         self._file = memoryview(_mapped(path) if content is None else content)
@@ -188,7 +188,7 @@ class McapLog:
             for channels in kinds.values():
                 capacity = sum(counts.get(channel.id, 0) for channel in channels)
                 try:
-                    decoder = mcap_types.decoder_of(
+                    decoder, note = mcap_types.decoder_of(
                         channels[0], self._schema(channels[0]), paths, capacity, self._name
                     )
                 except FerryIdError as error:
@@ -197,6 +197,8 @@ class McapLog:
                     what = f"messages of a second definition ({kind}) of the topic lack the wanted fields"
                     losses.append(Loss(self._name, what, name, capacity))
                 else:
+                    if note:
+                        losses.append(Loss(self._name, note, name, 0))
                     groups.append(_Group(name, tuple(channel.id for channel in channels), decoder))
             if len(groups) == made:
                 raise faults[0]
@@ -313,7 +315,7 @@ def _joined(losses: Sequence[Loss]) -> list[Loss]:
     return joined
 
 
-def open_mcap(path: Path, layout: TableLayout | None = None, *, content: bytes | None = None) -> Reader:
+def open_mcap(path: Path, layout: TableLayout | None = None, *, content: Any = None) -> Reader:
     """Open an MCAP file.
 
     Parameters
