@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import struct
 from bz2 import BZ2Decompressor
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, NamedTuple
@@ -23,6 +23,8 @@ MAX_HEADER = 1 << 16
 # Index entries, shape (n, 3): seconds and nanoseconds of the receive time, place of the record in its chunk.
 Entries = NDArray[np.uint32]
 SALVAGE_STEP = 4096
+# What lz4 can expand to at most; a stated size above that is damage, and would only be allocated for nothing.
+LZ4_RATIO = 255
 COMPRESSIONS = ("none", "bz2", "lz4")
 
 _U32 = struct.Struct("<I").unpack_from
@@ -253,108 +255,6 @@ def _indexed_chunk(records: Records, info: Record) -> Chunk:
     return chunk
 
 
-@dataclass
-class Walked:
-    """What a walk over the records found: `gaps` are stretches of bytes that are no records."""
-
-    connections: dict[int, Connection] = field(default_factory=dict)
-    chunks: list[Chunk] = field(default_factory=list)
-    gaps: list[tuple[int, int]] = field(default_factory=list)
-
-
-def walk(records: Records) -> Walked:
-    """Walk over the records of a bag without an index, past damaged stretches, to the end of what is there."""
-    data = records.data
-    found = Walked()
-    position = len(MAGIC)
-    by_position: dict[int, Chunk] = {}
-    while position < len(data):
-        try:
-            record = records.at(position)
-            if record.op == CHUNK:
-                chunk = chunk_of(record)
-                found.chunks.append(chunk)
-                by_position[position] = chunk
-            elif record.end > len(data):
-                raise RecordError(f"the file ends in the record at byte {position}")
-            elif record.op == INDEX and found.chunks:
-                note_index(data, found.chunks[-1], record)
-            elif record.op == CONNECTION:
-                connection = connection_of(data, record)
-                found.connections[connection.number] = connection
-            elif record.op == CHUNK_INFO and record.number(b"chunk_pos") in by_position:
-                note_chunk_info(by_position[record.number(b"chunk_pos")], record)
-            following = record.end
-        except RecordError:
-            following = _next_chunk(records, position + 1)
-            found.gaps.append((position, following))
-        # A chunk whose length is damaged would swallow those behind it: its successor must be a record too.
-        if following < len(data) and not _is_record(records, following):
-            resumed = _next_chunk(records, position + 1)
-            if resumed < following:
-                found.gaps.append((position, resumed))
-                following = resumed
-        position = following
-    return found
-
-
-def _is_record(records: Records, position: int) -> bool:
-    try:
-        records.at(position)
-    except RecordError:
-        return False
-    return True
-
-
-def _next_chunk(records: Records, position: int) -> int:
-    """Find where the next chunk record begins; the end of the data when there is none."""
-    data = records.data
-    marker = b"\x04\x00\x00\x00op=\x05"
-    place = data.find(marker, position)
-    while place != -1:
-        # The header's fields come in any order, so its length lies up to the other fields' length before the marker.
-        for start in range(max(position, place - 64), place - 3):
-            try:
-                record = records.at(start)
-                if record.op == CHUNK and chunk_of(record).compression in COMPRESSIONS:
-                    return start
-            except RecordError:
-                continue
-        place = data.find(marker, place + 1)
-    return len(data)
-
-
-def walk_chunk(buffer: Any) -> tuple[dict[int, Connection], dict[int, Entries]]:
-    """List the connections and the message records of one decompressed chunk, up to its first damaged byte."""
-    connections: dict[int, Connection] = {}
-    entries: dict[int, list[tuple[int, int, int]]] = {}
-    for record in _records(buffer):
-        try:
-            if record.op == CONNECTION:
-                connection = connection_of(buffer, record)
-                connections[connection.number] = connection
-            elif record.op == MESSAGE:
-                time = record.number(b"time")
-                entry = (time & 0xFFFFFFFF, time >> 32, record.position)
-                entries.setdefault(record.number(b"conn"), []).append(entry)
-        except RecordError:
-            break
-    return connections, {number: np.array(found, np.uint32) for number, found in entries.items()}
-
-
-def _records(buffer: Any) -> Iterator[Record]:
-    position, records = 0, Records(buffer)
-    while position < len(buffer):
-        try:
-            record = records.at(position)
-        except RecordError:
-            return
-        if record.end > len(buffer):
-            return
-        yield record
-        position = record.end
-
-
 class Messages:
     """Finds the data of message records in decompressed chunks; one shape of header serves them all."""
 
@@ -468,6 +368,8 @@ def decompressed(data: Any, chunk: Chunk, *, exact: bool) -> tuple[Any, str]:
         return stored, fault or ("its size is wrong" if len(stored) < chunk.size else "")
     if chunk.compression not in COMPRESSIONS:
         return b"", f"its compression {chunk.compression!r} is unknown"
+    if chunk.compression == "lz4" and chunk.size > LZ4_RATIO * len(stored):
+        return _salvaged(stored, "lz4"), fault or f"its stated size of {chunk.size} bytes is impossible"
     try:
         if chunk.compression == "lz4" and not exact and not fault:
             return memoryview(_lz4().decompress(stored, chunk.size)), ""

@@ -20,7 +20,7 @@ from rosbags.typesys.msg import normalize_msgtype
 
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
-from ferryid.ingest.layout import stamp_path
+from ferryid.ingest.layout import EMPTY_MEMBER, stamp_path
 from ferryid.ingest.log import Format, Loss, Series, TableLayout, Topic
 from ferryid.ingest.rosbag1_records import (
     MAGIC,
@@ -30,12 +30,10 @@ from ferryid.ingest.rosbag1_records import (
     Messages,
     RecordError,
     Records,
-    Walked,
     decompressed,
     read_index,
-    walk,
-    walk_chunk,
 )
+from ferryid.ingest.rosbag1_recovery import walk
 
 SUFFIXES = (".bag", ".bag.active")
 NS = 1_000_000_000
@@ -90,6 +88,7 @@ class Rosbag1Reader:
         except RecordError as error:
             connections, chunks = self._recovered(error)
         self._chunks = chunks
+        self._note_strangers({connection.number for connection in connections})
         self._by_topic: dict[str, list[Connection]] = {}
         for connection in connections:
             self._by_topic.setdefault(connection.topic, []).append(connection)
@@ -112,48 +111,49 @@ class Rosbag1Reader:
         )
 
     def _recovered(self, error: RecordError) -> tuple[list[Connection], list[Chunk]]:
-        """Read the bag without its index: walk over the records, and into the chunks that no index record covers."""
+        """Read the bag without its index, and note what is not there any more."""
+        path, size = self.paths[0], len(self._data)
         records = Records(self._data)
         try:
             index = records.at(len(MAGIC)).number(b"index_pos")
         except RecordError:
             index = 0
         found = walk(records)
-        self._walk_chunks(found)
-        path = self.paths[0]
         if not found.connections:
             raise FerryIdError(
                 f"{path}: no message can be recovered from the bag, {error}. Fix: copy it from the recorder again"
             ) from error
-        self._opening.append(
-            Loss(str(path), f"the index cannot be used ({error}); every record that is there was walked over", None, 0)
-        )
-        size = len(self._data)
-        if index > size:
-            self._opening.append(
-                Loss(
-                    str(path),
-                    f"the file ends at byte {size} of more than {index}: about {100 * (index - size) / index:.0f} % of "
-                    "the messages are lost at the end",
+
+        def lost(
+            what: str, messages: int | None = None, start_ns: int | None = None, end_ns: int | None = None
+        ) -> None:
+            self._opening.append(Loss(str(path), what, None, messages, start_ns, end_ns))
+
+        lost(f"the index cannot be used ({error}): read by a walk over all records, no message lost by that", 0)
+        for chunk in found.chunks:
+            if chunk.end > size:
+                kept = sum(len(entries) for entries in chunk.walked.values())
+                lost(
+                    f"the file ends in the chunk at byte {chunk.position}, which has {size - chunk.start} of its "
+                    f"{chunk.end - chunk.start} bytes: {kept} messages of it are intact"
                 )
-            )
+        if index > size:
+            lost(*_estimate(self._data, found.chunks, index))
+        for place, messages, start_ns, end_ns in found.missing:
+            lost(f"the chunk at byte {place} is damaged: its {messages} messages are lost", messages, start_ns, end_ns)
+        told = {place for place, *_ in found.missing}
         for first, end in found.gaps:
-            # The record that a truncated file breaks off in is the end just told, or part of a missing index.
-            if end < size or index <= size:
-                self._opening.append(Loss(str(path), f"bytes {first} to {end} are damaged and were left out"))
+            # Damage to the index itself, the end of a cut file and chunks with a count have been told already.
+            if first not in told and not 0 < index <= first and not (end >= size and index > size):
+                lost(f"bytes {first} to {end} are damaged: what they held is lost")
         return list(found.connections.values()), found.chunks
 
-    def _walk_chunks(self, found: Walked) -> None:
-        known = found.connections
-        for chunk in found.chunks:
-            if chunk.index and all(number in known for number in chunk.index):
-                continue
-            buffer, _ = decompressed(self._data, chunk, exact=True)
-            connections, offsets = walk_chunk(buffer)
-            for number, connection in connections.items():
-                known.setdefault(number, connection)
-            if not chunk.index:
-                chunk.walked = offsets
+    def _note_strangers(self, known: set[int]) -> None:
+        strangers = [(chunk, number) for chunk in self._chunks for number in chunk.connections - known]
+        if strangers:
+            count = sum(chunk.count(number) for chunk, number in strangers)
+            what = f"{count} messages belong to a connection whose topic and type are lost"
+            self._opening.append(Loss(str(self.paths[0]), what, None, count))
 
     def _topic(self, name: str) -> Topic:
         connections = self._by_topic[name]
@@ -170,7 +170,7 @@ class Rosbag1Reader:
             # To list the fields the parsed definitions will do; registering them compiles code, which only `read` needs.
             store.fielddefs.update(self._parsed(connections[0]))
             fields = leaf_fields(store, msgtypes[0])
-            if msgtypes[0] not in store.fielddefs:
+            if not fields and not _is_empty(store, msgtypes[0]):
                 note = "its message definition cannot be read"
             elif stamp_path(store, msgtypes[0]) is None:
                 note = "no header: receive times only"
@@ -226,20 +226,22 @@ class Rosbag1Reader:
         FerryIdError
             For a topic or field that the bag does not have, or a topic whose definition cannot be used.
         """
-        decoders = {name: self._decoder(name, paths) for name, paths in wanted.items()}
+        losses = list(self._opening)
+        decoders = {name: self._decoder(name, paths, losses) for name, paths in wanted.items()}
         numbers = {name: [one.number for one in self._by_topic[name]] for name in wanted}
         every = {number for group in numbers.values() for number in group}
         chunks = [chunk for chunk in self._chunks if verify or not every.isdisjoint(chunk.connections)]
-        messages, losses = Messages(), list(self._opening)
+        messages = Messages()
         for chunk, (buffer, fault) in zip(chunks, self._decompressed(chunks, verify), strict=True):
             tally = self._decode(chunk, buffer, messages, decoders, numbers)
-            if fault or tally.count:
+            # That a chunk is cut off by the end of the file was noted at opening.
+            if tally.count or (fault and chunk.end <= len(self._data)):
                 losses.append(self._loss(chunk, fault, tally))
         path = str(self.paths[0])
         self.losses = (*losses, *(loss for decoder in decoders.values() for loss in decoder.losses(path)))
         return {name: decoder.finish() for name, decoder in decoders.items()}
 
-    def _decoder(self, name: str, paths: Sequence[str]) -> Decoder:
+    def _decoder(self, name: str, paths: Sequence[str], losses: list[Loss]) -> Decoder:
         file = self.paths[0]
         if name not in self._by_topic:
             raise FerryIdError(
@@ -261,6 +263,14 @@ class Rosbag1Reader:
                 f"{file}: topic {name} cannot be decoded, found a definition of {topic.type} that is no valid message "
                 f"({str(error).splitlines()[0]}). Fix: correct the message file and record again"
             ) from error
+        if topic.type not in store.fielddefs:
+            raise FerryIdError(
+                f"{file}: topic {name} cannot be decoded, found no readable definition of {topic.type}. "
+                "Fix: copy the bag from the recorder again"
+            )
+        if connection.md5sum not in ("*", store.generate_msgdef(topic.type)[1]):
+            what = f"the definition of {topic.type} does not match its checksum: values of {name} may be misread"
+            losses.append(Loss(str(file), what, name, 0))
         return decoder_for("ros1", store, topic.type, name, paths, topic.count, where=str(file))
 
     def _decompressed(self, chunks: Sequence[Chunk], verify: bool) -> Iterator[tuple[Any, str]]:
@@ -319,8 +329,8 @@ class Rosbag1Reader:
         return tally
 
     def _loss(self, chunk: Chunk, fault: str, tally: _Tally) -> Loss:
-        known = f"{tally.count} messages of the wanted topics in it are lost"
-        # Without an index nothing tells how many messages lay behind the damage.
+        known = f"messages of the wanted topics lost in it: {tally.count}"
+        # Without index records nothing tells how many messages lay behind the damage.
         hidden = bool(fault) and not chunk.index
         return Loss(
             file=str(self.paths[0]),
@@ -331,6 +341,27 @@ class Rosbag1Reader:
             start_ns=min(tally.times, default=None),
             end_ns=max(tally.times, default=None),
         )
+
+
+def _is_empty(store: Any, msgtype: str) -> bool:
+    return msgtype in store.fielddefs and all(name == EMPTY_MEMBER for name, _ in store.fielddefs[msgtype][1])
+
+
+def _estimate(data: Any, chunks: Sequence[Chunk], index: int) -> tuple[str, None, int | None]:
+    """Say how much of a bag is missing behind the end of the file, from the bytes that its header announces."""
+    times = [
+        _nanoseconds(entries)
+        for chunk in chunks
+        for entries in (chunk.entries(data, number) for number in chunk.connections)
+        if len(entries)
+    ]
+    size, part = len(data), (index - len(data)) / len(data)
+    what = f"the file ends at byte {size} of more than {index}: about {100 * (index - size) / index:.0f} % is lost at the end"
+    if not times:
+        return what, None, None
+    first, last = min(int(one.min()) for one in times), max(int(one.max()) for one in times)
+    messages, seconds = part * sum(len(one) for one in times), part * (last - first) * 1e-9
+    return f"{what}, by the rate before it {messages:.0f} messages in {seconds:.1f} s", None, last
 
 
 def _nanoseconds(entries: Entries) -> NDArray[np.int64]:
