@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan2, cos, hypot, sin
+from math import atan2, ceil, cos, hypot, sin
 
 from ferryid.simulate.paths import Pose, shorter_way
 from ferryid.simulate.plant import Azimuth, Force, Hydrodynamics, required_force
@@ -43,14 +43,15 @@ class Reference:
     speed: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     acceleration: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
-    def advance(self, goal: Pose, h: float, substeps: int = 5) -> None:
+    def advance(self, goal: Pose, h: float) -> None:
         """Move towards `goal` for `h` seconds.
 
         The acceleration that the filter asks for is limited before it is integrated, and so is the speed: an
         integrator that had run on behind its limit would overshoot afterwards.
         """
-        d = h / substeps
         tuning = self.tuning
+        substeps = max(5, ceil(40.0 * max(tuning.omega_radps) * h))
+        d = h / substeps
         for i in range(3):
             w, zeta = tuning.omega_radps[i], tuning.damping[i]
             k = 2.0 * zeta + 1.0

@@ -28,9 +28,13 @@ def smooth_noise(random: np.random.Generator, n: int, step_s: float, std: float,
     e = exp(-w * step_s)
     A = np.array([[1.0 + w * step_s, step_s], [-w * w * step_s, 1.0 - w * step_s]]) * e
     P = np.diag([std * std, rate_std * rate_std])
-    L = np.linalg.cholesky(P - A @ P @ A.T)
+    Q = P - A @ P @ A.T
+    # Cholesky factor by hand: rounding may leave nothing of Q[0, 0] where the process hardly moves within a step.
+    first = sqrt(max(float(Q[0, 0]), 0.0))
+    cross = float(Q[1, 0]) / first if first > 0.0 else 0.0
+    second = sqrt(max(float(Q[1, 1]) - cross * cross, 0.0))
     white = random.standard_normal((n, 2))
-    kicks = (white @ L.T).tolist()
+    kicks = np.column_stack((first * white[:, 0], cross * white[:, 0] + second * white[:, 1])).tolist()
     x, x_dot = std * white[0, 0], rate_std * white[0, 1]
     a, b, c, d = A.ravel().tolist()
     values = [x]

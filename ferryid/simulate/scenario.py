@@ -19,7 +19,16 @@ from ferryid.vessel.toml_lines import key_lines
 
 SCHEMA = "ferryid.scenario/1"
 MASS = ("m11", "m22", "m23", "m32", "m33")
-LONGEST_S = 86_400.0
+LONGEST_S = 14_400.0
+"""Longest trial [s]; longer ones would not fit into the memory of a small machine."""
+MOST_ROUNDS = 1000
+LARGEST = {
+    **dict.fromkeys(("north_mps", "east_mps", "gust_std_mps"), 60.0),
+    **dict.fromkeys(("navigation_rate_hz", "thruster_rate_hz", "wind_rate_hz"), 200.0),
+    **dict.fromkeys(("imu_rate_hz", "camera_rate_hz"), 1000.0),
+    "omega_radps": 20.0,
+}
+"""Largest value of a key; 1e6 for those not listed. Beyond these no vessel is simulated, only overflow."""
 
 
 @dataclass(frozen=True)
@@ -172,8 +181,11 @@ def _read(top: TableReader, name: str, text: str) -> Scenario:
     seed = top.whole("seed", 0)
     start_ns = _start(top)
     path = _path(top)
-    longest = path.duration_s
-    duration_s = top.number("duration_s", longest, above=0.0, at_most=LONGEST_S)
+    duration_s = top.number("duration_s", path.duration_s, above=0.0, at_most=LONGEST_S)
+    if duration_s > LONGEST_S:
+        top.fault(
+            f"the path takes {duration_s:g} s, at most {LONGEST_S:g} s are simulated. Fix: set duration_s", "path"
+        )
     controller = _section(top, "controller")
     delta = controller.number("delta", 1.0, at_least=0.0, at_most=10.0)
     sigma = controller.number("sigma", 1.0, at_least=0.0, at_most=10.0)
@@ -232,12 +244,13 @@ def _numbers(
     """Read one number per field of a dataclass: above zero, of any sign, or else at least zero."""
     values = {}
     for key, default in vars(defaults).items():
+        largest = LARGEST.get(key, 1e6)
         if key in any_sign:
-            values[key] = table.number(key, default, at_least=-1e6, at_most=1e6)
+            values[key] = table.number(key, default, at_least=-largest, at_most=largest)
         elif key in positive:
-            values[key] = table.number(key, default, above=0.0, at_most=1e6)
+            values[key] = table.number(key, default, above=0.0, at_most=largest)
         else:
-            values[key] = table.number(key, default, at_least=0.0, at_most=1e6)
+            values[key] = table.number(key, default, at_least=0.0, at_most=largest)
     return values
 
 
@@ -246,8 +259,9 @@ def _triples(table: TableReader, defaults: Any) -> dict[str, Any]:
     values = {}
     for key, default in vars(defaults).items():
         given = table.numbers(key, 3)
-        if given and min(given) < 0.0:
-            table.fault(f'"{key}" must hold numbers of at least 0, found {min(given):g}', key)
+        largest = LARGEST.get(key, 1e6)
+        if given and not all(0.0 <= value <= largest for value in given):
+            table.fault(f'"{key}" must hold numbers of at least 0 and at most {largest:g}', key)
         values[key] = given or default
     return values
 
@@ -275,7 +289,10 @@ def _path(top: TableReader) -> SetPoints:
     kind = table.text("kind", required=True, options=(*PATHS, "points"))
     dwell_s = table.number("dwell_s", 60.0, above=0.0, at_most=LONGEST_S)
     size = table.number("size", 1.0, above=0.0, at_most=1e3)
-    rounds = max(1, table.whole("rounds", 1, at_least=1))
+    rounds = table.whole("rounds", 1, at_least=1)
+    if rounds > MOST_ROUNDS:
+        table.fault(f'"rounds" must be at most {MOST_ROUNDS}, found {rounds}', "rounds")
+        rounds = 1
     poses: tuple[Pose, ...] = ((0.0, 0.0, 0.0),)
     if kind == "points":
         poses = _points(table) or poses
@@ -304,6 +321,8 @@ def _true_hull(top: TableReader) -> dict[str, float]:
     factors = {}
     for name in (*MASS, *DAMPING):
         if table.has(name):
-            factors[name] = table.number(name, 1.0, at_least=0.0, at_most=10.0)
+            factors[name] = table.number(
+                name, 1.0, at_least=0.1 if name in ("m11", "m22", "m33") else 0.0, at_most=10.0
+            )
     table.close()
     return factors

@@ -38,6 +38,12 @@ def test_white_share():
     assert mixed.std() == pytest.approx(0.02, rel=0.08)
 
 
+def test_noise_that_hardly_moves_stays_a_constant():
+    x = smooth_noise(generator(1, "u"), 100, 0.05, 0.05, 1e-9)
+    assert np.ptp(x) < 1e-8
+    assert x[0] != 0.0
+
+
 def test_gusts_forget_with_their_time_constant():
     x = gusts(generator(3, "gust"), N, 0.1, 0.8, 5.0)
     assert x.std() == pytest.approx(0.8, rel=0.06)

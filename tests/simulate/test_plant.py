@@ -244,6 +244,8 @@ def test_thrust_table_is_the_curve_and_its_inverse():
 
 def test_azimuth_force_and_moment():
     table = plant.ThrustTable.of(PROFILE.actuators[0].thrust)
-    thruster = plant.Azimuth(1.8, 0.5, table, 0.4, 600.0, 0.2, 1.0, units=2.0, speed=700.0, angle=pi / 2)
+    thruster = plant.Azimuth(1.8, 0.5, table, 0.4, 600.0, 0.2, 1.0, units=2.0, speed=700.0, angle=0.6)
     F = 2.0 * thrust(PROFILE.actuators[0].thrust, np.array([700.0]))[0][0]
-    assert thruster.force() == pytest.approx((0.0, F, 1.8 * F), abs=1e-3)
+    assert thruster.force() == pytest.approx(
+        (F * cos(0.6), F * sin(0.6), 1.8 * F * sin(0.6) - 0.5 * F * cos(0.6)), abs=1e-3
+    )

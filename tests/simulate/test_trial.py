@@ -215,3 +215,21 @@ def test_vessels_that_cannot_be_simulated_are_refused():
         simulate(replace(scenario, vessel="vtec-usv"))
     with pytest.raises(FerryIdError, match="at least two control cycles"):
         simulate(replace(scenario, duration_s=0.01))
+
+
+def test_a_wild_scenario_still_gives_finite_numbers():
+    """Gains and noise far from any sense saturate the thrusters; nothing overflows."""
+    scenario = load_scenario("twelve-corner-wind")
+    wild = replace(
+        scenario,
+        duration_s=20.0,
+        gains=replace(scenario.gains, Kp=(1e6,) * 3, Kd=(1e6,) * 3, Ki=(1e6,) * 3),
+        reference=replace(scenario.reference, omega_radps=(20.0,) * 3, speed_limit=(1e6,) * 3),
+        wind=replace(scenario.wind, north_mps=60.0, gust_std_mps=60.0),
+        noise=replace(scenario.noise, velocity_mps=1e6, position_m=1e6),
+        sensors=replace(scenario.sensors, navigation_rate_hz=1.0),
+    )
+    simulation = simulate(wild)
+    assert simulation.control.saturated.any()
+    for values in (*vars(simulation.truth).values(), simulation.control.tau_d):
+        assert np.isfinite(values).all()
