@@ -318,9 +318,7 @@ def _orders_instead(profile: Profile, missing: Mapping[str, str]) -> list[tuple[
     instead = []
     for actuator in profile.actuators:
         for roles in needed_roles(actuator):
-            mapped = _alternatives(profile, f"{actuator.name}.{roles[0]}") or _alternatives(
-                profile, f"{actuator.name}.{roles[-1]}"
-            )
+            mapped = _alternatives(profile, f"{actuator.name}.{roles[0]}")
             here = [name for name in mapped if name not in missing]
             if here and all(name.endswith(".command") for name in here):
                 role = here[0].partition(".")[2].removesuffix(".command")
