@@ -17,7 +17,7 @@ def command(
     basis: Annotated[str, typer.Option(help="Basis functions: modulus or thesis.")] = "modulus",
     structure: Annotated[
         str, typer.Option(help="coupled: every term in every axis; decoupled: as in the 3-DOF model.")
-    ] = "coupled",
+    ] = "decoupled",
     components: Annotated[str, typer.Option(help="Number of SIMPLS components, or auto.")] = "auto",
     window: Annotated[float, typer.Option(help="Smoothing window [s].")] = 1.0,
     smoother: Annotated[str, typer.Option(help="square, savgol or kalman.")] = "square",
@@ -26,6 +26,9 @@ def command(
     rate: Annotated[
         float | None, typer.Option(help="Rate of the uniform grid [Hz]; the navigation's if left out.")
     ] = None,
+    inertia: Annotated[
+        str, typer.Option(help="auto: keep the base model's inertia where the fitted one cannot be right; or fitted.")
+    ] = "auto",
     delta: Annotated[float, typer.Option(help="Factor on the base model's M and C.")] = 1.0,
     sigma: Annotated[float, typer.Option(help="Factor on the base model's D.")] = 1.0,
     zeta: Annotated[float, typer.Option(help="Factor on the base model's force.")] = 1.0,
@@ -44,7 +47,7 @@ def command(
 
     settings = FitSettings(
         basis=basis, structure=structure, components=components, window_s=window, smoother=smoother, residual=residual,
-        split=split, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
+        split=split, inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
     )  # fmt: skip
     outcome = fit_and_report(logs, load_profile(vessel), settings, out, name=name, verify=verify, progress=progress)
     emit(outcome.json, outcome.text, json)

@@ -20,6 +20,7 @@ from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, Rows
 from ferryid.identify.estimate import Estimator
 from ferryid.identify.excitation import excitation
 from ferryid.identify.free_run import free_run
+from ferryid.identify.inertia import effective_mass, reason, unbelievable, unforced, without_inertia
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.qr import QrFactor, factorise
 from ferryid.identify.residual import residual
@@ -95,9 +96,7 @@ def fit(
         *_rows(functions, motions, targets, parts.training), names=functions.terms, where=motions[0].log
     )
     validation = type(training).of(*_rows(functions, motions, measured, parts.validation))
-    most = min(MAX_COMPONENTS, len(functions.terms))
-    model_fit = simpls(training, most, allowed=functions.mask)
-    chosen = _components(settings, functions, motions, targets, parts, most, type(training))
+    functions, model_fit, chosen, held = _regress(profile, settings, functions, motions, targets, parts, training)
     theta, intercept = model_fit.coefficients[chosen - 1], model_fit.intercepts[chosen - 1]
 
     progress("resampling blocks for the intervals")
@@ -154,7 +153,7 @@ def fit(
         accepted=verdict.accepted,
     )
     curve = _curve(model_fit, training, validation, scores, chosen)
-    warnings = _warnings(settings, parts, known, prepared, motions)
+    warnings = (*held, *_warnings(settings, parts, known, prepared, motions), *spread.notes)
     return FitResult(model, verdict, tuple(fitted), curve, known, free_base, free_new, warnings)
 
 
@@ -218,6 +217,33 @@ def _rows(functions: Basis, motions: Sequence[Motion], outputs: Sequence[Floats]
         ]
         rows.append(Rows((motion.nu, motion.nu_dot, *flows), output, mask, functions.evaluate))
     return rows
+
+
+def _regress(
+    profile: Profile,
+    settings: FitSettings,
+    functions: Basis,
+    motions: Sequence[Motion],
+    targets: Sequence[Floats],
+    parts: Split,
+    training: CrossProducts | QrFactor,
+) -> tuple[Basis, Simpls, int, tuple[str, ...]]:
+    """Return basis, SIMPLS fit and number of components, and on which axes the inertia had to be held and why."""
+    most = min(MAX_COMPONENTS, len(functions.terms))
+    tau = np.concatenate([motion.tau[mask] for motion, mask in zip(motions, parts.training, strict=True)])
+    base = tau - np.concatenate([target[mask] for target, mask in zip(targets, parts.training, strict=True)])
+    axes = unforced(tau, base) if settings.inertia == "auto" else np.zeros(3, dtype=bool)
+    told = {axis: reason(axis, np.zeros((3, 3)), profile, True) for axis in np.flatnonzero(axes).tolist()}
+    while True:
+        functions = replace(functions, mask=without_inertia(functions.mask, functions.terms, axes))
+        model_fit = simpls(training, most, allowed=functions.mask)
+        chosen = _components(settings, functions, motions, targets, parts, most, type(training))
+        mass = effective_mass(profile, settings.scale, functions.terms, model_fit.coefficients[chosen - 1])
+        more = unbelievable(profile, mass) & ~axes
+        if settings.inertia == "fitted" or not more.any():
+            return functions, model_fit, chosen, tuple(told.values())
+        told |= {axis: reason(axis, mass, profile, False) for axis in np.flatnonzero(more).tolist()}
+        axes = axes | more
 
 
 def _components(

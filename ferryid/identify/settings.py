@@ -6,13 +6,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.basis import basis
 
 CHOICES = {
-    "basis": ("modulus", "thesis"),
-    "structure": ("coupled", "decoupled"),
     "smoother": ("square", "savgol", "kalman"),
     "residual": ("measured", "commanded", "parallel"),
     "split": ("blocks", "logs", "every-kth"),
+    "inertia": ("auto", "fitted"),
 }
 
 
@@ -22,8 +22,10 @@ class FitSettings:
 
     Attributes
     ----------
-    basis, structure, smoother, residual, split
-        One of `CHOICES`.
+    basis, structure
+        See `ferryid.identify.basis.basis`; wind and current join the basis when all logs have them.
+    smoother, residual, split, inertia
+        One of `CHOICES`; inertia ``"auto"`` holds it at the base model's on axes where the fitted one cannot be right.
     components
         Number of SIMPLS components, or ``"auto"`` for cross-validation within the training rows.
     window_s
@@ -44,12 +46,13 @@ class FitSettings:
     """
 
     basis: str = "modulus"
-    structure: str = "coupled"
+    structure: str = "decoupled"
     components: str | int = "auto"
     window_s: float = 1.0
     smoother: str = "square"
     residual: str = "measured"
     split: str = "blocks"
+    inertia: str = "auto"
     rate_hz: float | None = None
     delta: float = 1.0
     sigma: float = 1.0
@@ -58,6 +61,7 @@ class FitSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        basis(self.basis, structure=self.structure)  # says what is wrong with either before any log is read
         for key, options in CHOICES.items():
             value = getattr(self, key)
             if value not in options:

@@ -1,0 +1,76 @@
+"""The effective mass of a fitted model, and where a log says too little of inertia to be believed.
+
+A regression of force on acceleration is degenerate where hardly any force acts: an estimate of "no inertia, no damping"
+then predicts the force perfectly. Noise in the derivative pulls the same way. Such a model fits and cannot be
+simulated, so the inertia of that axis is held at the base model's, which fixes the scale of everything else on the axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.identify.model import AXES
+from ferryid.vessel.parse_hull import rigid_mass
+from ferryid.vessel.profile import Hull, Profile
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+ACCELERATIONS = ("u_dot", "v_dot", "r_dot")
+LEAST_INERTIA = 0.5
+"""Fraction of the rigid body's inertia below which a fitted one is not believed; added mass can only add."""
+NO_FORCE = 1e-6
+"""An axis is without actuators when its force varies less than this part of what the base model needs."""
+
+
+def effective_mass(profile: Profile, scale: Mapping[str, float], terms: Sequence[str], theta: Floats) -> Floats:
+    """Return the mass matrix of base model and correction together [kg, kg·m, kg·m²], shape (3, 3)."""
+    mass = profile.hull.M * scale.get("delta", 1.0) / scale.get("zeta", 1.0)
+    for column, name in enumerate(ACCELERATIONS):
+        if name in terms:
+            mass[:, column] += theta[terms.index(name)]
+    return np.asarray(mass, dtype=np.float64)
+
+
+def unforced(tau: Floats, base: Floats) -> Flags:
+    """Return the axes on which no actuator acts, shape (3,), from measured and base force of the training rows."""
+    return np.asarray(np.std(tau, axis=0) <= NO_FORCE * np.std(base, axis=0))
+
+
+def unbelievable(profile: Profile, mass: Floats) -> Flags:
+    """Return the axes whose effective inertia cannot be right, shape (3,); all of them where the matrix as a whole is."""
+    weak = np.diag(mass) < LEAST_INERTIA * np.diag(_rigid(profile.hull))
+    positive = bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0.0))
+    return weak if weak.any() or positive else np.ones(3, dtype=bool)
+
+
+def without_inertia(mask: Flags, terms: Sequence[str], axes: Flags) -> Flags:
+    """Return the mask of a basis, shape (K, 3), without the acceleration terms on the given axes."""
+    kept = mask.copy()
+    for name in ACCELERATIONS:
+        if name in terms:
+            kept[terms.index(name), axes] = False
+    return kept
+
+
+def reason(axis: int, mass: Floats, profile: Profile, force_free: bool) -> str:
+    """Return why the inertia of an axis is held, in a sentence."""
+    if force_free:
+        return (
+            f"No actuator acts in {AXES[axis]}: its inertia is the base model's, and its error is that of an equation "
+            "without a force."
+        )
+    rigid = _rigid(profile.hull)[axis, axis]
+    unit = "kg·m²" if axis == 2 else "kg"
+    return (
+        f"In {AXES[axis]} the log would give an inertia of {mass[axis, axis]:.3g} {unit} (rigid body: {rigid:.3g} {unit}), "
+        "which cannot be: force and acceleration say too little of each other there, or the thrust curve is wrong. "
+        "The base model's inertia is kept."
+    )
+
+
+def _rigid(hull: Hull) -> Floats:
+    return np.asarray(rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z), dtype=np.float64)
