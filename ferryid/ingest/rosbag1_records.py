@@ -397,11 +397,20 @@ def _decoder(compression: str) -> Any:
 
 
 def _salvaged(stored: memoryview, compression: str) -> bytes:
-    """Decompress in small steps up to the first damaged byte."""
-    decoder, content = _decoder(compression), bytearray()
-    for place in range(0, len(stored), SALVAGE_STEP):
-        try:
-            content += decoder.decompress(stored[place : place + SALVAGE_STEP])
-        except (RuntimeError, OSError, EOFError, ValueError):
+    """Decompress up to the first damaged byte: in steps to near it, then from the start again and up to it byte by byte."""
+    good = _steps(stored, 0, SALVAGE_STEP, compression)[1]
+    return _steps(stored, good, 1, compression)[0]
+
+
+def _steps(stored: memoryview, first: int, step: int, compression: str) -> tuple[bytes, int]:
+    """Decompress `first` bytes at once and then in steps; returns the content and how many bytes were good."""
+    decoder = _decoder(compression)
+    content = bytearray(decoder.decompress(stored[:first]) if first else b"")
+    for place in range(first, len(stored), step):
+        if decoder.eof:
             break
-    return bytes(content)
+        try:
+            content += decoder.decompress(stored[place : place + step])
+        except (RuntimeError, OSError, EOFError, ValueError):
+            return bytes(content), place
+    return bytes(content), len(stored)
