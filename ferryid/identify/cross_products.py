@@ -23,8 +23,9 @@ NULL_EIGENVALUE = 1e-13
 
 CHUNK_ROWS = 8192
 """Rows in the scratch: 1.6 MB at 25 columns, so that it is still in the cache when it is multiplied."""
-_BLOCK_ROWS = 2048
-"""Rows in one BLAS call. Small enough for OpenBLAS to stay on one thread, which is faster here than two."""
+_BLAS_ENTRIES = 16_000
+"""Entries in one BLAS call. From 16,384 on OpenBLAS adds threads, which slows such thin products down, tenfold and more
+when other programs are busy; below, a product of one thread costs no more per row."""
 LARGEST = 1e150
 """Values from here on are refused: their squares overflow."""
 SEGMENT_ROWS = 16 * CHUNK_ROWS
@@ -325,11 +326,12 @@ def not_finite(X: Floats, Y: Floats, names: Sequence[str], where: str) -> FerryI
 
 
 def gram(rows: Floats) -> Floats:
-    """``rows' rows`` in blocks of `_BLOCK_ROWS`, by BLAS syrk."""
-    whole = len(rows) // _BLOCK_ROWS * _BLOCK_ROWS
+    """``rows' rows`` by BLAS syrk, in blocks of `_BLAS_ENTRIES`."""
+    block = max(1, _BLAS_ENTRIES // rows.shape[1])
+    whole = len(rows) // block * block
     tail = rows[whole:]
     product = tail.T @ tail
     if whole:
-        blocks = rows[:whole].reshape(-1, _BLOCK_ROWS, rows.shape[1])
+        blocks = rows[:whole].reshape(-1, block, rows.shape[1])
         product += np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0)
     return product
