@@ -56,7 +56,7 @@ def _head(result: Mapping[str, Any]) -> str:
     size = sum(file["bytes"] for file in result["files"])
     start = result["start"] or "not known (times are counted from the start)"
     lines = [
-        f"{result['path']}",
+        _cut(result["path"], WIDTH),
         f"  {result['format']}, {_bytes(size)}, {result['messages']} messages in {len(result['topics'])} topic(s)",
         f"  start {start}, duration {_duration(result['duration_s'])}",
         f"  {result['sha256']}",

@@ -164,6 +164,15 @@ def test_a_burst_of_held_up_messages_is_no_reset() -> None:
     np.testing.assert_array_equal(times, stamps)
 
 
+def test_a_single_late_message_is_no_reset() -> None:
+    stamps = sender(1000)
+    receive = received(stamps, 0.01)
+    receive[400] += 5 * SECOND
+    times, _, report = repair(receive, stamps)
+    assert (report.source, report.resets, report.replaced) == ("stamp", 0, 0)
+    np.testing.assert_array_equal(times, stamps)
+
+
 def test_single_senseless_stamps_are_replaced_and_counted() -> None:
     stamps = sender(1000)
     receive = received(stamps, 0.01)

@@ -40,7 +40,9 @@ def read_all(path: Path, layout: TableLayout | None = None) -> tuple[Series, Rea
 
 
 def test_plain_csv_without_a_layout_guesses_and_tells(tmp_path: Path) -> None:
-    series, reader = read_all(write(tmp_path, "log.csv", "t [s],u [m/s],mode\n0.0,1.5,auto\n0.1,-2,manual\n"))
+    path = write(tmp_path, "log.csv", "t [s],u [m/s],mode\n0.0,1.5,auto\n0.1,-2,manual\n")
+    assert open_log(path).topics[0].count == 2  # known before anything is read
+    series, reader = read_all(path)
     assert series.receive_ns.tolist() == [0, 100_000_000]
     assert series.stamp_ns is None
     assert series.columns["u [m/s]"].tolist() == [1.5, -2.0]
@@ -122,6 +124,14 @@ def test_stamps_from_two_columns_keep_nanoseconds(tmp_path: Path) -> None:
         assert series.receive_ns.tolist() == [1744370145313396019, 1744370145413396020]
         assert series.stamp_ns is not None
         assert series.stamp_ns.tolist() == [1744362945312026019, 1744362945412026021]
+
+
+def test_unreadable_stamps_count_as_zero_and_are_told(tmp_path: Path) -> None:
+    text = "time,stamp_secs,stamp_nsecs,x\n0,5,100,1\n1,,,2\n2,7,0,3\n3,8,0,3\n"
+    series, reader = read_all(write(tmp_path, "log.csv", text))
+    assert series.stamp_ns is not None
+    assert series.stamp_ns.tolist() == [5_000_000_100, 0, 7_000_000_000, 8_000_000_000]
+    assert "1 stamps are not readable" in reader.topics[0].note
 
 
 def test_folder_is_one_topic_per_file(tmp_path: Path) -> None:

@@ -220,6 +220,10 @@ def test_verify_does_not_take_what_was_not_verified(
     tmp_path: Path, ferry: Profile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     record(FIXTURES / "short.mcap", ferry, tmp_path)
+    with monkeypatch.context() as patch:
+        forbid_reading(patch)
+        with pytest.raises(AssertionError, match="was read"):
+            record(FIXTURES / "short.mcap", ferry, tmp_path, verify=True)
     verified = record(FIXTURES / "short.mcap", ferry, tmp_path, verify=True)
     forbid_reading(monkeypatch)
     assert_same(verified, record(FIXTURES / "short.mcap", ferry, tmp_path, verify=True))
