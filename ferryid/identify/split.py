@@ -73,7 +73,8 @@ def split(
     guard_s
         Time [s] purged in addition to one window.
     blocks
-        Number of blocks a log; fewer where blocks would be shorter than four purge gaps.
+        Number of blocks a log; fewer where blocks would be shorter than four purge gaps. Among several logs, one too short
+        for three blocks is a block itself, and of such logs the second, fifth ... validate.
     every
         k of ``"every-kth"``, 2 or more.
     validate
@@ -208,22 +209,28 @@ def _purged(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
 
 def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: int) -> Split:
     training, validation, notes, purges = [], [], [], []
+    short = 0
     for motion in motions:
         purge_s = _purge_s(motion, window_s, guard_s)
         seconds = np.count_nonzero(motion.valid) / motion.rate_hz
         number = min(blocks, int(seconds / (_LEAST_PURGES * purge_s)))
-        if number < 3:
+        if number < 3 and len(motions) == 1:
             raise _too_short(
                 motion, motion.valid, 3 * _LEAST_PURGES * purge_s, "three blocks and the gaps between them"
             )
-        part = _number(motion.valid, number)
+        if number < 3:
+            # A log too short for blocks of its own is one block among those of its kind.
+            part = np.full(motion.valid.size, short)
+            number, short = 1, short + 1
+        else:
+            part = _number(motion.valid, number)
         train, check = _purged(motion.valid, part % _VALIDATES_EVERY == 1, round(purge_s * motion.rate_hz))
         training.append(train)
         validation.append(check)
         purges.append(purge_s)
         lost = np.count_nonzero(motion.valid & ~train & ~check) / motion.rate_hz
         notes.append(
-            f"{motion.log}: {number} blocks of {seconds / number:.0f} s; "
+            f"{motion.log}: {number} block{'s' if number > 1 else ''} of {seconds / number:.0f} s; "
             f"{np.count_nonzero(train) / motion.rate_hz:.0f} s train, "
             f"{np.count_nonzero(check) / motion.rate_hz:.0f} s validate, "
             f"{lost:.0f} s purged in gaps of {purge_s:.1f} s."

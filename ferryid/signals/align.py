@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.signals.quality import (
     NAVIGATION,
+    VELOCITY,
     clean,
     cross_checks,
     is_actuator,
-    is_angle,
     is_order,
     stale,
-    unwrapped,
+    stuck,
 )
 from ferryid.signals.track import Track
 from ferryid.vessel import actuator_columns, resolve, resolve_notes
@@ -35,6 +35,9 @@ RATE_LIMIT_HZ = 20.0
 GAP_PERIODS = 3.0
 GAP_LEAST_S = 0.5
 """A stretch without samples is a gap when longer than three periods of its stream and than this [s]."""
+
+STUCK_PERIODS = 10.0
+"""A velocity that repeats itself for longer than a gap and than this many periods was not measured meanwhile."""
 
 _AVERAGED_ABOVE = 1.9
 """Streams this many times faster than the grid are averaged over each grid interval instead of sampled."""
@@ -171,8 +174,7 @@ def _source(stream: Stream, repairs: list[str]) -> _Source:
     bridge = max(GAP_PERIODS * period, GAP_LEAST_S)
     columns: dict[str, Floats] = {}
     for name, raw in stream.columns.items():
-        values = unwrapped(raw) if is_angle(name) else raw
-        columns[name], quality = clean(name, time_s, values)
+        columns[name], quality = clean(name, time_s, raw)
         repairs.extend(quality.sentences())
     old = stale(time_s, stream.columns, bridge)
     if old.any():
@@ -182,6 +184,14 @@ def _source(stream: Stream, repairs: list[str]) -> _Source:
             f"{stream.topic}: {int(old.sum())} of {old.size} messages repeat an old measurement for more than "
             f"{bridge:.2f} s; taken as missing."
         )
+    frozen = max(bridge, STUCK_PERIODS * period)
+    for name in VELOCITY:
+        if name in columns and (same := stuck(time_s, stream.columns[name], frozen) & ~old).any():
+            columns[name][same] = np.nan
+            repairs.append(
+                f"{name}: {int(same.sum())} of {same.size} samples repeat an old one to the last digit for more than "
+                f"{frozen:.2f} s; taken as missing."
+            )
     interval = np.diff(time_s)
     gaps = interval > bridge
     if on_change:

@@ -17,8 +17,9 @@ WINDOW_PER_TIME = 8.0 * np.sqrt(2.0) / 3.0
 Far from its ends the smoother's response is ``1 / (1 + (w T)^4)``, ``T^4 = R dt / q``. White noise keeps
 ``3 / (8 sqrt(2) T)`` of its density, and ``1 / window`` in a moving average.
 """
-_LONGEST_S = 60.0
-_LEAST_ROWS = 4
+_LONGEST_S = 20.0
+_GRID = 16
+_LEAST_ROWS = 2
 _FIT_ROWS = 200_000
 
 
@@ -68,24 +69,22 @@ def fit_levels(nu: Floats, stretches: Sequence[slice], rate_hz: float, window_s:
     tuple of Levels
         Surge, sway, yaw.
     """
-    from scipy.optimize import minimize_scalar
-
     dt = 1.0 / rate_hz
-    least = max(window_s / WINDOW_PER_TIME, 0.2 * dt)
-    most = max(_LONGEST_S / WINDOW_PER_TIME, 2.0 * least)
     runs = _some(stretches)
+    longest_s = max(run.stop - run.start for run in stretches) * dt
+    least = max(window_s / WINDOW_PER_TIME, 0.2 * dt)
+    most = max(min(_LONGEST_S, longest_s / 10) / WINDOW_PER_TIME, least)
     levels = []
     for axis in range(3):
         columns = [nu[run, axis] for run in runs]
-
-        def cost(log_time: float, columns: list[Floats] = columns) -> float:
-            return float(np.log(_prediction_variance(columns, np.exp(log_time) / dt) + 1e-300))
-
-        best = minimize_scalar(cost, bounds=(np.log(least), np.log(most)), method="bounded", options={"xatol": 0.01})
-        # The search never looks at its bounds themselves, and the least window is often the answer.
-        time_s = least if cost(np.log(least)) <= best.fun else float(np.exp(best.x))
-        _, variance_ratio = _steady_state(time_s / dt)
-        noise_variance = _prediction_variance(columns, time_s / dt) / variance_ratio
+        # Twice a grid: the variance can have more than one valley.
+        times = np.geomspace(least, most, _GRID)
+        for _ in range(2):
+            variances = [_prediction_variance(columns, time_s / dt) for time_s in times]
+            best = int(np.argmin(variances))
+            time_s, variance = float(times[best]), variances[best]
+            times = np.geomspace(times[max(best - 1, 0)], times[min(best + 1, _GRID - 1)], _GRID)
+        noise_variance = variance / steady_state(time_s / dt)[1]
         levels.append(Levels(float(np.sqrt(noise_variance)), float(noise_variance * dt / time_s**4), time_s))
     return tuple(levels)
 
@@ -107,7 +106,7 @@ def smooth_runs(values: Floats, axes: Sequence[int], levels: Sequence[Levels], r
     Returns
     -------
     smoothed
-        Shape (n, c); NaN where nothing was measured, and in runs of fewer than four rows.
+        Shape (n, c); NaN where nothing was measured, and in runs of one row.
     slope
         Estimated acceleration of the first three columns, shape (n, 3).
     """
@@ -132,7 +131,7 @@ def smooth_run(values: Floats, time_rows: float) -> Floats:
     Parameters
     ----------
     values
-        Without NaN, shape (n,), at least four.
+        Without NaN, shape (n,), at least two.
     time_rows
         Time constant of the smoother in rows.
     """
@@ -166,27 +165,41 @@ def _prediction_variance(columns: Sequence[Floats], time_rows: float) -> float:
     """Return the mean square of the steady-state filter's one-step prediction errors."""
     from scipy.signal import lfilter
 
-    gain, _ = _steady_state(time_rows)
+    polynomial, _ = steady_state(time_rows)
     total, count = 0.0, 0
     for column in columns:
-        # Prediction error over measurement: (1 - z^-1)² over the filter's characteristic polynomial.
-        error = lfilter([1.0, -2.0, 1.0], [1.0, gain[0] + gain[1] - 2.0, 1.0 - gain[0]], column - column[0])
+        # Starting at zero is wrong by the first value only, and soon forgotten.
+        error = lfilter([1.0, -2.0, 1.0], polynomial, column - column[0])
         settled = error[min(column.size // 2, int(5 * time_rows) + 2) :]
         total += float(settled @ settled)
         count += settled.size
     return total / count
 
 
-def _steady_state(time_rows: float) -> tuple[Floats, float]:
-    """Return the filter's gain, shape (2,), and the prediction error's variance over the measurement noise's."""
-    from scipy.linalg import solve_discrete_are
+def steady_state(time_rows: float) -> tuple[Floats, float]:
+    """Return the steady-state filter: the second difference of the measurement is this polynomial of its prediction error.
 
-    F = np.array([[1.0, 1.0], [0.0, 1.0]])
-    H = np.array([[1.0, 0.0]])
-    Q = np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]) / time_rows**4
-    P = solve_discrete_are(F.T, H.T, Q, np.eye(1))
-    variance = float(P[0, 0]) + 1.0
-    return P[:, 0] / variance, variance
+    The second difference is a moving average of second order, with autocovariances ``6 + 2 e/3, -4 + e/6, 1`` for
+    ``e = T^-4``, over the variance of the measurement noise. The polynomial is its factor with roots inside the unit
+    circle.
+
+    Returns
+    -------
+    polynomial
+        Coefficients, first one 1, shape (3,).
+    variance
+        Variance of the prediction error over that of the measurement noise.
+    """
+    e = time_rows**-4
+    # With w = z + 1/z, autocovariances give w² + (e/6 - 4) w + 4 + 2 e/3 = 0; w - 2 is formed without cancellation.
+    root = np.sqrt(complex(e * e / 144 - e))
+    beyond = np.array([-e / 12 + root, -e / 12 - root])
+    half = np.sqrt(beyond * (beyond + 4.0))
+    inner = 1.0 + beyond / 2 - half / 2
+    outer = 1.0 + beyond / 2 + half / 2
+    roots = np.where(np.abs(inner) < np.abs(outer), inner, outer)
+    polynomial = np.array([1.0, -float(np.sum(roots).real), float(np.prod(roots).real)])
+    return polynomial, 1.0 / float(polynomial[2])
 
 
 def _some(stretches: Sequence[slice]) -> list[slice]:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.signals.track import Track
+from ferryid.vessel.frames import wrap
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 NAVIGATION = ("x", "y", "psi", "phi", "theta", "u", "v", "r", "vel_N", "vel_E")
+VELOCITY = ("u", "v", "r", "vel_N", "vel_E")
 WEATHER = ("wind_speed", "wind_from", "wind_N", "wind_E", "current_N", "current_E")
 _ACTUATOR = ("n_", "alpha_", "delta_", "F_")
 _ORDER = tuple(f"{prefix}cmd_" for prefix in _ACTUATOR)
@@ -24,6 +27,12 @@ _SPIKE_NOISES = 8.0
 _SPIKES_AT_MOST = 0.01
 """With more spikes than this fraction of the samples, the signal is noisy rather than spiked, and is left alone."""
 _MEDIAN_OF = 50_000
+_TURN_STEP = 0.2
+_TURN_SAMPLES = 5
+_TURN_MISSES = 0.6
+"""A resampled wrap: steps above this [rad], at most so many of them, and a full turn but for this [rad]."""
+_REPEATS_AT_MOST = 0.2
+"""With more repeats than this the signal is slow or coarse, and a long run of them says nothing."""
 
 # Steps that no vessel takes from one sample to the next: at any interval, and per second of interval. Generous on
 # purpose: what is removed here must be wrong on a 1 m model and on a ferry.
@@ -60,6 +69,8 @@ class ColumnQuality:
         Number of samples.
     missing
         Samples that are NaN or infinite.
+    through_wrap
+        Samples between 359° and 1° that some tool interpolated through 180°; removed.
     spikes
         Single samples that were removed as implausible.
     jumps
@@ -75,6 +86,7 @@ class ColumnQuality:
     name: str
     count: int
     missing: int = 0
+    through_wrap: int = 0
     spikes: int = 0
     jumps: int = 0
     held: int = 0
@@ -87,6 +99,11 @@ class ColumnQuality:
         said = []
         if self.missing:
             said.append(f"{name}: {self.missing} {of} are missing (NaN); short ones are interpolated.")
+        if self.through_wrap:
+            said.append(
+                f"{name}: {self.through_wrap} {of} were interpolated the wrong way round between 359° and 1°; "
+                "removed and interpolated."
+            )
         if self.spikes:
             said.append(f"{name}: {self.spikes} {of} are single implausible spikes; removed and interpolated.")
         if self.jumps:
@@ -145,22 +162,29 @@ def clean(name: str, time_s: Floats, values: Floats) -> tuple[Floats, ColumnQual
     time_s
         Sample times [s], ascending, shape (n,).
     values
-        Samples in SI units, shape (n,); angles unwrapped. Not changed.
+        Samples in SI units, shape (n,). Not changed.
 
     Returns
     -------
     values
-        Shape (n,), NaN where missing, infinite or removed.
+        Shape (n,), NaN where missing, infinite or removed; angles unwrapped.
     quality
         What was found.
     """
     finite = np.isfinite(values)
     missing = int(values.size - np.count_nonzero(finite))
-    known, times = (values, time_s) if missing == 0 else (values[finite], time_s[finite])
+    through = 0
+    if is_angle(name):
+        between = np.flatnonzero(finite)[_through_wrap(time_s[finite], values[finite])]
+        through = int(between.size)
+        finite[between] = False
+    known, times = (values, time_s) if missing + through == 0 else (values[finite], time_s[finite])
     result = np.where(finite, values, np.nan)
     if known.size < 2:
-        return result, ColumnQuality(name, values.size, missing, constant=known.size == 1)
+        return result, ColumnQuality(name, values.size, missing, through, constant=known.size == 1)
     step = np.diff(known)
+    if is_angle(name):
+        step = wrap(step)
     still = step == 0.0
     constant = bool(still.all())
     held, longest = 0, 0.0
@@ -171,7 +195,9 @@ def clean(name: str, time_s: Floats, values: Floats) -> tuple[Floats, ColumnQual
         single, jumps = _spikes(name, times, known, step)
         spikes = int(single.size)
         result[np.flatnonzero(finite)[single]] = np.nan
-    return result, ColumnQuality(name, values.size, missing, spikes, jumps, held, longest, constant)
+    if is_angle(name):
+        result = unwrapped(result)
+    return result, ColumnQuality(name, values.size, missing, through, spikes, jumps, held, longest, constant)
 
 
 def stale(time_s: Floats, columns: Mapping[str, Floats], longest_s: float) -> Flags:
@@ -180,22 +206,39 @@ def stale(time_s: Floats, columns: Mapping[str, Floats], longest_s: float) -> Fl
     Every column of the stream must stand still at once for longer than `longest_s`, with a velocity that is not zero,
     in a stream that otherwise changes from sample to sample: then the sender repeats itself, and nothing was measured.
     """
-    time_s = np.asarray(time_s, dtype=float)
-    none = np.zeros(time_s.size, dtype=bool)
-    moving = [name for name in ("u", "v", "vel_N", "vel_E", "r") if name in columns]
+    moving = [name for name in VELOCITY if name in columns]
     if not moving or time_s.size < 3 or any(is_actuator(name) or is_order(name) for name in columns):
-        return none
+        return np.zeros(time_s.size, dtype=bool)
     repeats = np.ones(time_s.size - 1, dtype=bool)
     for name in columns:
         repeats &= np.diff(columns[name]) == 0.0
-    if not repeats.any() or repeats.mean() > 0.2:
-        return none
     at_rest = np.all([columns[name][1:] == 0.0 for name in moving], axis=0)
+    return _long_runs(time_s, repeats, at_rest, longest_s)
+
+
+def stuck(time_s: Floats, values: Floats, longest_s: float) -> Flags:
+    """Return which samples of one velocity only repeat an old one for longer than `longest_s`, shape (n,).
+
+    A velocity that is not zero, and finer than to repeat by its resolution, never stands still to its last digit.
+    """
+    if time_s.size < 3:
+        return np.zeros(time_s.size, dtype=bool)
+    old = _long_runs(time_s, np.diff(values) == 0.0, values[1:] == 0.0, longest_s)
+    if old.any() and np.unique(values[~old]).size < 0.5 * np.count_nonzero(~old):
+        return np.zeros(time_s.size, dtype=bool)
+    return old
+
+
+def _long_runs(time_s: Floats, repeats: Flags, at_rest: Flags, longest_s: float) -> Flags:
+    """Return the samples of long runs of repeats, their first excepted; none where repeats are usual."""
+    old = np.zeros(time_s.size, dtype=bool)
+    if not repeats.any() or repeats.mean() > _REPEATS_AT_MOST:
+        return old
     edges = np.flatnonzero(np.diff(np.concatenate([[False], repeats & ~at_rest, [False]]).astype(np.int8)))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         if time_s[last] - time_s[first] > longest_s:
-            none[first + 1 : last + 1] = True
-    return none
+            old[first + 1 : last + 1] = True
+    return old
 
 
 def require_excited(track: Track, nu: Floats, tau: Floats) -> None:
@@ -238,14 +281,14 @@ def cross_checks(track: Track) -> tuple[str, ...]:
     span = max(2, round(2.0 * track.rate_hz))
     said: list[str] = []
     if "psi" in columns and "r" in columns:
-        turned, integrated = _changes(np.diff(columns["psi"]), columns["r"], track, span)
+        turned, integrated = _changes("psi", np.diff(columns["psi"]), columns["r"], track, span)
         said += _compare("yaw rate", "heading", turned, integrated, 0.035, _YAW_RATE_GAINS)
     if {"x", "y", "psi", "u", "v"} <= set(columns):
         north, east = np.diff(columns["x"]), np.diff(columns["y"])
         psi = (columns["psi"][1:] + columns["psi"][:-1]) / 2
         c, s = np.cos(psi), np.sin(psi)
-        ahead, u = _changes(c * north + s * east, columns["u"], track, span)
-        aside, v = _changes(c * east - s * north, columns["v"], track, span)
+        ahead, u = _changes("x", c * north + s * east, columns["u"], track, span)
+        aside, v = _changes("y", c * east - s * north, columns["v"], track, span)
         said += _compare("surge velocity", "position", ahead, u, 0.2, _SPEED_GAINS)
         said += _compare("sway velocity", "position", aside, v, 0.2, _SPEED_GAINS)
     return tuple(said)
@@ -282,7 +325,7 @@ def _compare(
     return []
 
 
-def _changes(step: Floats, rate: Floats, track: Track, span: int) -> tuple[Floats, Floats]:
+def _changes(name: str, step: Floats, rate: Floats, track: Track, span: int) -> tuple[Floats, Floats]:
     """Return changes of a signal and integrals of its rate over windows of `span` rows inside measured data."""
     area = (rate[1:] + rate[:-1]) / (2 * track.rate_hz)
     good = np.isfinite(step) & np.isfinite(area) & track.valid[1:] & track.valid[:-1]
@@ -290,7 +333,26 @@ def _changes(step: Floats, rate: Floats, track: Track, span: int) -> tuple[Float
     whole = good[:count].reshape(-1, span).all(axis=1)
     change = step[:count].reshape(-1, span)[whole].sum(axis=1)
     integral = area[:count].reshape(-1, span)[whole].sum(axis=1)
-    return change, integral
+    # One jump of a position or heading would outweigh hours of agreement; jumps are counted elsewhere.
+    floor, per_second = _IMPLAUSIBLE[name]
+    possible = np.abs(change) < floor + per_second * span / track.rate_hz
+    return change[possible], integral[possible]
+
+
+def _through_wrap(times: Floats, angle: Floats) -> NDArray[np.int64]:
+    """Return the samples inside a full turn that takes a few samples: 359°, 240°, 120°, 1° is a turn of 2° resampled."""
+    step = np.diff(angle)
+    edges = np.flatnonzero(
+        np.diff(np.concatenate([[0.0], np.where(np.abs(step) > _TURN_STEP, np.sign(step), 0.0), [0.0]]))
+    )
+    inside: list[int] = []
+    for first, last in pairwise(edges):
+        turned = abs(float(angle[last] - angle[first]))
+        if 2 <= last - first <= _TURN_SAMPLES and abs(turned - 2 * np.pi) < _TURN_MISSES:
+            rate = _IMPLAUSIBLE["psi"][1]
+            if times[last] - times[first] < 2 * np.pi / rate:
+                inside.extend(range(int(first) + 1, int(last)))
+    return np.array(inside, dtype=np.int64)
 
 
 def _longest(flags: Flags, times: Floats) -> float:
@@ -322,8 +384,9 @@ def _spikes(name: str, times: Floats, known: Floats, step: Floats) -> tuple[NDAr
     if not large.any():
         return np.empty(0, dtype=np.int64), 0
     out, back = step[:-1], step[1:]
-    returns = np.abs(out + back) < 0.5 * np.minimum(np.abs(out), np.abs(back))
-    peaks = np.flatnonzero(large[:-1] & large[1:] & (out * back < 0) & returns) + 1
+    change = wrap(out + back) if is_angle(name) else out + back
+    returns = np.abs(change) < 0.5 * np.minimum(np.abs(out), np.abs(back))
+    peaks = np.flatnonzero(large[:-1] & large[1:] & returns) + 1
     apart = np.diff(peaks, prepend=-10, append=known.size + 10) > 3
     single = peaks[apart[:-1] & apart[1:]]
     if single.size > _SPIKES_AT_MOST * known.size and single.size > 1:

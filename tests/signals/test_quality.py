@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.signals.quality import clean, cross_checks, require_excited, stale, unwrapped
+from ferryid.signals.quality import clean, cross_checks, require_excited, stale, stuck, unwrapped
 from ferryid.signals.track import Track
 
 Floats = NDArray[np.float64]
@@ -185,3 +185,55 @@ def test_constant_signals_are_refused() -> None:
             require_excited(track, flat, tau)
     with pytest.raises(FerryIdError, match=r"trial: constant signal, the applied force never changes.*Fix: "):
         require_excited(track, nu, np.ones_like(nu))
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3])
+def test_a_heading_resampled_the_wrong_way_round_is_taken_out(samples: int) -> None:
+    heading = 0.1 * T
+    wrapped = heading % (2 * np.pi)
+    (last,) = np.flatnonzero(np.diff(wrapped) < -3.0)
+    # What a tool leaves that resampled 359° and 1° linearly.
+    wrong = np.arange(last + 1, last + 1 + samples)
+    after = heading[last + samples + 1] % (2 * np.pi)
+    wrapped[wrong] = np.linspace(wrapped[last], after, samples + 2)[1:-1]
+    result, quality = clean("psi", T, wrapped)
+    assert (quality.through_wrap, quality.spikes, quality.jumps) == (samples, 0, 0)
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(result)), wrong)
+    known = np.isfinite(result)
+    np.testing.assert_allclose(result[known], heading[known], atol=1e-12)
+
+
+def test_honest_turns_are_not_taken_out() -> None:
+    slow = np.arange(200) / 2.0
+    # A full turn in seven seconds at 2 Hz, and an ordinary wrap in one sample.
+    heading = 0.9 * slow
+    result, quality = clean("psi", slow, heading % (2 * np.pi))
+    assert (quality.through_wrap, quality.spikes) == (0, 0)
+    np.testing.assert_allclose(result, heading, atol=1e-12)
+
+
+def test_a_single_wild_heading_is_a_spike_even_across_the_wrap() -> None:
+    heading = 0.1 * T
+    wrapped = heading % (2 * np.pi)
+    (last,) = np.flatnonzero(np.diff(wrapped) < -3.0)
+    for place in (last - 200, last):
+        wild = wrapped.copy()
+        wild[place] = (wild[place] + 1.5) % (2 * np.pi)
+        result, quality = clean("psi", T, wild)
+        assert quality.through_wrap + quality.spikes == 1
+        known = np.isfinite(result)
+        np.testing.assert_allclose(result[known], heading[known], atol=1e-12)
+
+
+def test_a_velocity_that_stands_still_to_the_last_digit_is_stuck() -> None:
+    rng = np.random.default_rng(0)
+    u = rng.normal(1.0, 0.1, T.size)
+    u[100:150] = u[100]
+    u[300:305] = u[300]
+    np.testing.assert_array_equal(np.flatnonzero(stuck(T, u, 0.5)), np.arange(101, 150))
+    # A coarse sensor repeats itself by its resolution, and a vessel at rest has nothing else to say.
+    assert not stuck(T, np.round(np.repeat(u, 2)[: T.size] + 0.001 * np.arange(T.size), 0), 0.5).any()
+    at_rest = u.copy()
+    at_rest[100:150] = 0.0
+    assert not stuck(T, at_rest, 0.5).any()
+    assert not stuck(T[:2], u[:2], 0.5).any()

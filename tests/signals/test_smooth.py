@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy import signal
+from scipy import linalg, signal
 
 from ferryid.errors import FerryIdError
-from ferryid.signals.kalman import WINDOW_PER_TIME, fit_levels, smooth_run
+from ferryid.signals.kalman import WINDOW_PER_TIME, fit_levels, smooth_run, steady_state
 from ferryid.signals.smooth import (
     central_difference,
     correlate,
@@ -308,3 +308,27 @@ def test_the_central_difference_is_exact_on_parabolas() -> None:
     slope = central_difference((3.0 + 2.0 * t - 4.0 * t**2)[:, None], RATE)[:, 0]
     np.testing.assert_allclose(slope[1:-1], (2.0 - 8.0 * t)[1:-1], atol=1e-12)
     assert np.isnan(slope[[0, -1]]).all()
+
+
+@pytest.mark.parametrize("time_rows", [0.3, 1.0, 5.0, 40.0, 300.0])
+def test_the_steady_state_filter_is_the_riccati_equations(time_rows: float) -> None:
+    F, H = np.array([[1.0, 1.0], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+    Q = np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]) / time_rows**4
+    P = linalg.solve_discrete_are(F.T, H.T, Q, np.eye(1))
+    variance = P[0, 0] + 1.0
+    closed = np.linalg.eigvals(F @ (np.eye(2) - P @ H.T @ H / variance))
+    polynomial, ours = steady_state(time_rows)
+    np.testing.assert_allclose(polynomial, np.poly(closed).real, atol=1e-7)
+    assert ours == pytest.approx(variance, rel=1e-7)
+
+
+@pytest.mark.parametrize("smoother", SMOOTHERS)
+def test_valid_rows_are_numbers_however_broken_the_log(smoother: str) -> None:
+    rng = np.random.default_rng(0)
+    u = trial().columns["u"].copy()
+    u[rng.choice(2400, 900, replace=False)] = np.nan
+    u[1500:1700] = 0.5 + 0.1 * np.sin(np.arange(200.0))
+    motion = smooth(trial(u=u), PROFILE, 0.0, smoother)
+    assert motion.valid.sum() > 100
+    for values in (motion.nu, motion.nu_dot, motion.tau):
+        assert np.isfinite(values[motion.valid]).all()
