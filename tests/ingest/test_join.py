@@ -69,6 +69,18 @@ def test_losses_keep_the_name_of_their_part(tmp_path: Path) -> None:
     assert 500 < rows < 1000
 
 
+def test_losses_found_in_reading_are_told_too(tmp_path: Path) -> None:
+    whole, damaged = bag(tmp_path / "a.bag", range(50)), bag(tmp_path / "b.bag", range(50, 100))
+    raw = bytearray(damaged.read_bytes())
+    record = raw.index(struct.pack("<d", 70.0)) - 30
+    raw[record : record + 8] = b"\xff" * 8
+    damaged.write_bytes(raw)
+    reader = open_log(f"{whole}+{damaged}")
+    assert reader.losses == ()
+    assert len(reader.read({"/speed": ["data"]})["/speed"].receive_ns) == 99
+    assert [(loss.file, loss.messages) for loss in reader.losses] == [(str(damaged), 1)]
+
+
 def test_a_topic_with_another_type_in_another_part_is_refused(tmp_path: Path) -> None:
     parts = bag(tmp_path / "a.bag", range(3), ("/speed", "/rpm")), bag(tmp_path / "b.bag", range(3, 6), kind="Float32")
     reader = open_log(f"{parts[0]}+{parts[1]}")
