@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.ingest.clocks import ClockReport
 from ferryid.signals.align import align, segments
+from ferryid.signals.recording import record
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.track import Track
 from ferryid.vessel import load_profile
@@ -255,3 +257,43 @@ def test_segments_are_the_unbroken_stretches() -> None:
     flags = np.array([1, 1, 0, 1, 0, 0, 1, 1, 1], dtype=bool)
     assert segments(flags) == [slice(0, 2), slice(3, 4), slice(6, 9)]
     assert segments(np.zeros(3, dtype=bool)) == []
+
+
+@pytest.mark.parametrize(
+    ("log", "vessel", "rate_hz", "share", "said"),
+    [
+        (
+            "gunnerus/RVG_ManeuveringTests.csv",
+            "gunnerus",
+            2.0,
+            0.9,
+            "interpolated the wrong way round between 359° and 1°",
+        ),
+        ("milliampere1", "milliampere-2025", 20.0, 0.98, "gaps longer than 0.50 s"),
+        (
+            "vtec_usv/48000_2016-02-11-10-52-07.bag",
+            "vtec-usv",
+            9.0,
+            1.0,
+            "averaged over the intervals of the 9 Hz grid",
+        ),
+        ("kvlcc2/HSVA_CPMC_KVLCC2_Z_20_10_P.dat", "kvlcc2-model", 20.0, 1.0, "n_propeller: never changes"),
+        (
+            "esso_osaka/random/random_03-Aug-2020_11_04_37.csv",
+            "esso-osaka",
+            10.0,
+            1.0,
+            "psi: 1296 of 8073 samples repeat",
+        ),
+    ],
+)
+def test_real_recordings_align(
+    shared_data: Callable[[str], Path], log: str, vessel: str, rate_hz: float, share: float, said: str
+) -> None:
+    profile = load_profile(vessel)
+    track = align(record(shared_data(log), profile), profile)
+    assert track.rate_hz == rate_hz
+    assert track.valid.mean() >= share
+    assert any(said in sentence for sentence in track.repairs)
+    for name in ("u", "v", "r"):
+        assert np.isfinite(track.columns[name][track.valid]).all()
