@@ -32,10 +32,10 @@ def _stream(codec: str) -> Any:
 def message_unpacker(codec: str) -> Callable[[bytes], bytes | None]:
     """Return a function that unpacks one message, to None when it is corrupt.
 
-    Raises
-    ------
-    FerryIdError
-        Never by itself: `codec` is one of FORMATS.
+    Parameters
+    ----------
+    codec
+        One of FORMATS.
     """
 
     def unpack(data: bytes) -> bytes | None:

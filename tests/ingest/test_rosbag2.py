@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Reader
 from ferryid.ingest.sqlite_pages import Pages, find_rows
+from ferryid.ingest.unpack import message_unpacker
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 POINT = "geometry_msgs/msg/PointStamped"
@@ -248,16 +249,17 @@ def test_a_truncated_file_yields_what_is_left(tmp_path: Path, part: float) -> No
     assert any("ends after" in loss.what for loss in log.losses)
 
 
-def test_a_cell_that_contradicts_itself_is_left_out(tmp_path: Path) -> None:
-    """The payload size of the first row no longer fits its columns."""
+@pytest.mark.parametrize("change", [1, -1])
+def test_a_cell_that_contradicts_itself_is_left_out(tmp_path: Path, change: int) -> None:
+    """The payload size of one row no longer fits its columns."""
     path = database(tmp_path / "log.db3", points(0, 20))
-    at = path.read_bytes().index(point(0))
     # Before the message: payload size, rowid, header of five bytes, time. The topic, 1, is a constant type.
-    cell = at - 8 - 5 - 2
-    assert path.read_bytes()[cell] == len(point(0)) + 5 + 8
-    log = open_log(damaged(path, cell, b"\x50"))
-    assert xs(log) == list(range(1, 20))
-    assert len(log.losses) == 1
+    cell = path.read_bytes().index(point(7)) - 8 - 5 - 2
+    size = len(point(7)) + 5 + 8
+    assert path.read_bytes()[cell] == size
+    log = open_log(damaged(path, cell, bytes([size + change])))
+    assert xs(log) == [*range(7), *range(8, 20)]
+    assert lost_messages(log) == 1
 
 
 def test_verify_reports_what_sqlite_itself_finds(tmp_path: Path) -> None:
@@ -371,8 +373,7 @@ def test_every_storage_and_compression_gives_the_same_columns(
 
 
 @pytest.mark.parametrize("compress", [zstandard.ZstdCompressor().compress, lz4.frame.compress])
-def test_a_bare_compressed_file_is_read(tmp_path: Path, compress: object) -> None:
-    assert callable(compress)
+def test_a_bare_compressed_file_is_read(tmp_path: Path, compress: Callable[[bytes], bytes]) -> None:
     ending = "lz4" if compress is lz4.frame.compress else "zstd"
     data = database(tmp_path / "log.db3", points(0, 300)).read_bytes()
     packed = tmp_path / f"packed.db3.{ending}"
@@ -405,6 +406,17 @@ def test_messages_compressed_with_lz4(tmp_path: Path) -> None:
     edit(folder, compression_format="brotli")
     with pytest.raises(FerryIdError, match=r"brotli.* Fix: "):
         open_log(folder)
+
+
+@pytest.mark.parametrize(
+    ("codec", "compress"), [("zstd", zstandard.ZstdCompressor().compress), ("lz4", lz4.frame.compress)]
+)
+def test_a_cut_message_is_not_taken_for_a_short_one(codec: str, compress: Callable[[bytes], bytes]) -> None:
+    data = np.random.default_rng(3).bytes(300_000)
+    unpack = message_unpacker(codec)
+    assert unpack(compress(data)) == data
+    assert unpack(compress(data)[:-1]) is None
+    assert unpack(b"") is None
 
 
 def test_a_message_that_cannot_be_unpacked_is_counted(tmp_path: Path) -> None:

@@ -1,0 +1,52 @@
+"""`python -m tests.bench [--quick] [--folder DIR] [--out FILE] [--only NAME]`."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import pkgutil
+import sys
+from functools import partial
+from pathlib import Path
+
+import tests.bench as benches
+from tests.bench.page import page
+
+REPORT = Path(__file__).resolve().parents[2] / "reports" / "benchmarks.md"
+# In the order of the page; every one exposes run(quick) -> Section.
+MODULES = ("ingest", "identify")
+
+
+def main() -> int:
+    """Run the benchmarks and write their page."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench", description=main.__doc__)
+    parser.add_argument("--quick", action="store_true", help="short logs, to see that everything runs")
+    parser.add_argument("--folder", type=Path, help="where the measured logs are kept between runs")
+    parser.add_argument(
+        "--out", type=Path, help="the page to write (default: reports/benchmarks.md; - for a quick run)"
+    )
+    parser.add_argument("--only", choices=MODULES, help="measure one part only")
+    options = parser.parse_args()
+    there = {module.name for module in pkgutil.iter_modules(benches.__path__)}
+    sections = []
+    for name in MODULES:
+        if name in there and options.only in (None, name):
+            run = importlib.import_module(f"tests.bench.{name}").run
+            if name == "ingest" and options.folder:
+                run = partial(run, folder=options.folder)
+            sections.append(run(options.quick))
+    text = page(sections, options.quick)
+    target = options.out or (None if options.quick or options.only else REPORT)
+    if target is None or str(target) == "-":
+        print(text)
+    else:
+        target.write_text(text, encoding="utf-8")
+        print(f"written to {target}")
+    missed = [row.what for section in sections for row in section.rows if row.reached is False]
+    for what in missed:
+        print(f"goal missed: {what}", file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,283 @@
+"""Identification: fit, component sweep and bootstrap, against scikit-learn, ikpls and a bare X'X."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import statistics
+import time
+import tracemalloc
+import warnings
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from ikpls.fast_cross_validation.numpy import PLS as FastCrossValidation
+from ikpls.numpy import PLS as ImprovedKernel
+from numpy.typing import NDArray
+from sklearn.cross_decomposition import PLSRegression
+
+from ferryid.identify.basis import Basis, basis
+from ferryid.identify.bootstrap import Blocks, bootstrap
+from ferryid.identify.cross_products import CrossProducts, Rows
+from ferryid.identify.qr import QrFactor
+from ferryid.identify.simpls import simpls, sweep_components
+from ferryid.signals.smooth import central_difference, moving_mean, odd_rows
+from tests.bench.page import Row, Section, duration, faster, within
+
+Floats = NDArray[np.float64]
+
+COMPONENTS = 12
+MOST = 21
+FOLDS = 5
+RATE_HZ = 100.0
+WINDOWS_S = (0.05, 0.25, 0.5, 1.0, 1.5)
+DRAWS = 1000
+BLOCK_ROWS = 1000
+MASS = np.diag([2390.0, 2448.0, 4862.0])
+
+
+def run(quick: bool) -> Section:
+    """Measure everything; `quick` with a hundredth of the rows."""
+    small = 7_200 if quick else 72_000
+    large = 72_000 if quick else 7_200_000
+    many = 1_000_000 if quick else 100_000_000
+    repeats = 3 if quick else 5
+    rows = [*fits(large, repeats), *sweeps(small, repeats), *bootstraps(small, repeats), fused(many, repeats)]
+    notes = [
+        f"{MOST} regressors, 3 outputs; fits and draws with {COMPONENTS} components. Rivals get the same arrays, of which "
+        "one row is one sample; ferryid's own fits never hold such an array.",
+        "“One by one” draws rows, forms their cross-products and refits, in Python; 20 draws are timed and the time is "
+        f"multiplied by {DRAWS // 20}. scikit-learn's draws: 2, multiplied likewise.",
+        "The sweep is 5 windows × 5 folds × 21 components with smoothing and basis; rivals share ours of those two and "
+        "differ in cross-validation alone. scikit-learn's grid search refits for every number of components; one "
+        "window of it is timed and counted five times.",
+        f"Fit of {large:,} rows: {extra_memory(large) / 1e6:.1f} MB beside the data.",
+        *digits(),
+    ]
+    return Section("Fit, sweep, bootstrap", rows, notes, ("numpy", "scikit-learn", "ikpls"))
+
+
+def fits(n: int, repeats: int) -> Iterator[Row]:
+    X, Y = regression(n)
+
+    def ours() -> None:
+        simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
+
+    yield once(f"fit, {n:,} rows", ours, "scikit-learn", lambda: PLSRegression(COMPONENTS).fit(X, Y), 80)
+    yield faster(f"fit, {n:,} rows", ours, "ikpls", lambda: ImprovedKernel().fit(X, Y, COMPONENTS), 4, repeats)
+    yield faster(f"fit, {n:,} rows", ours, "bare X'X", lambda: X.T @ X, None, repeats)
+    yield faster(
+        f"the same by chunk-wise QR, {n // 10:,} rows",
+        lambda: simpls(QrFactor.from_rows(X[: n // 10], Y[: n // 10]), COMPONENTS),
+        "numpy QR of all rows",
+        lambda: np.linalg.qr(np.hstack([X[: n // 10], Y[: n // 10]]), mode="r"),
+        None,
+        3,
+    )
+
+
+def sweeps(n: int, repeats: int) -> Iterator[Row]:
+    nu, tau = trial(n)
+    function = basis("thesis")
+    X, Y = regression(n)
+
+    def ours() -> None:
+        for window_s in WINDOWS_S:
+            inputs, residual = prepared(nu, tau, window_s)
+            parts = np.linspace(0, len(residual), FOLDS + 1).astype(int)
+            folds = [
+                CrossProducts.of(
+                    Rows(tuple(values[low:high] for values in inputs), residual[low:high], None, function.evaluate)
+                )
+                for low, high in zip(parts[:-1], parts[1:], strict=True)
+            ]
+            sweep_components(folds, MOST)
+
+    def by_ikpls() -> None:
+        for window_s in WINDOWS_S:
+            fast_cross_validation(*matrices(nu, tau, window_s, function))
+
+    def grid(one_window: bool = True) -> None:
+        X, Y = matrices(nu, tau, WINDOWS_S[3], function)
+        every_number_refitted(X, Y)
+
+    what = f"sweep, {len(WINDOWS_S)} windows × {FOLDS} folds × {MOST}, {n:,} rows"
+    yield once(what, ours, "scikit-learn grid search", grid, 1000, times=len(WINDOWS_S))
+    yield faster(what, ours, "ikpls fast cross-validation", by_ikpls, 12, repeats)
+
+    def folds_of_matrix() -> None:
+        parts = np.linspace(0, n, FOLDS + 1).astype(int)
+        cut = zip(parts[:-1], parts[1:], strict=True)
+        sweep_components([CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in cut], MOST)
+
+    yield faster(
+        f"cross-validation, {FOLDS} folds × {MOST}, {n:,} rows",
+        folds_of_matrix,
+        "ikpls fast cross-validation",
+        lambda: fast_cross_validation(X, Y),
+        None,
+        repeats,
+    )
+
+
+def bootstraps(n: int, repeats: int) -> Iterator[Row]:
+    X, Y = regression(n)
+    rows = Rows.of(X, Y)
+    count = n // BLOCK_ROWS
+
+    def ours() -> None:
+        bootstrap(Blocks.of([rows], [RATE_HZ], BLOCK_ROWS / RATE_HZ), COMPONENTS, draws=DRAWS)
+
+    def drawn(number: int, refit: Callable[[Floats, Floats], object]) -> None:
+        random = np.random.default_rng(0)
+        for _ in range(number):
+            chosen = random.integers(0, count, count)
+            picked = (chosen[:, None] * BLOCK_ROWS + np.arange(BLOCK_ROWS)).ravel()
+            refit(X[picked], Y[picked])
+
+    what = f"{DRAWS} block bootstraps, {n:,} rows"
+    yield once(
+        what,
+        ours,
+        "one by one",
+        lambda: drawn(20, lambda x, y: simpls(CrossProducts.from_rows(x, y), COMPONENTS)),
+        300,
+        times=DRAWS // 20,
+        repeats=repeats,
+    )
+    yield once(
+        what, ours, "scikit-learn", lambda: drawn(2, lambda x, y: PLSRegression(COMPONENTS).fit(x, y)), None, DRAWS // 2
+    )
+    blocks = [CrossProducts.from_rows(X[i : i + BLOCK_ROWS], Y[i : i + BLOCK_ROWS]) for i in range(0, n, BLOCK_ROWS)]
+
+    def summed() -> None:
+        random = np.random.default_rng(0)
+        products = np.array([block.shifted(blocks[0].shift).products for block in blocks])
+        for _ in range(20):
+            times = random.multinomial(count, np.full(count, 1.0 / count))
+            whole = np.tensordot(times.astype(float), products, axes=1)
+            simpls(CrossProducts(n, MOST, 3, blocks[0].shift, whole), COMPONENTS)
+
+    yield once(what, ours, "one by one from the blocks' cross-products", summed, None, DRAWS // 20, repeats)
+
+
+def fused(n: int, repeats: int) -> Row:
+    """Basis and cross-products of `n` rows, ten times over a tenth of them."""
+    part = n // 10
+    random = np.random.default_rng(0)
+    nu, nu_dot, residual = (random.standard_normal((part, 3)) for _ in range(3))
+    function = basis("thesis")
+    rows = Rows((nu, nu_dot), residual, None, function.evaluate)
+
+    def ours() -> None:
+        CrossProducts.of(*[rows] * 10)
+
+    def read() -> None:
+        for _ in range(10):
+            for values in (nu, nu_dot, residual):
+                values.sum()
+
+    return within(f"{n:,} rows, basis and cross-products", ours, "one read of the inputs (sum)", read, 6, repeats)
+
+
+def once(
+    what: str,
+    ours: Callable[[], object],
+    name: str,
+    rival: Callable[[], object],
+    goal: float | None,
+    times: int = 1,
+    repeats: int = 1,
+) -> Row:
+    """Row for a rival so slow that a part of it is timed and multiplied; ours runs before and after it."""
+    mine, theirs, ratios = [], [], []
+    for _ in range(repeats):
+        before = statistics.median(timed(ours) for _ in range(3))
+        slow = timed(rival) * times
+        after = statistics.median(timed(ours) for _ in range(3))
+        mine += [before, after]
+        theirs.append(slow)
+        ratios.append(slow / ((before + after) / 2.0))
+    ratio = statistics.median(ratios)
+    took, rival_took = duration(statistics.median(mine)), duration(statistics.median(theirs))
+    if goal is None:
+        return Row(what, took, name, rival_took, ratio)
+    return Row(what, took, name, rival_took, ratio, f"≥ {goal:g}", ratio >= goal)
+
+
+def timed(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def regression(n: int) -> tuple[Floats, Floats]:
+    random = np.random.default_rng(0)
+    X = random.standard_normal((n, MOST))
+    return X, X @ random.standard_normal((MOST, 3)) + random.standard_normal((n, 3))
+
+
+def trial(n: int) -> tuple[Floats, Floats]:
+    """Velocities and forces of a boat that wanders, shape (n, 3) each."""
+    random = np.random.default_rng(0)
+    t = np.arange(n) / RATE_HZ
+    nu = np.column_stack([np.sin(t / 7.0), 0.5 * np.sin(t / 5.0 + 1.0), 0.2 * np.sin(t / 3.0 + 2.0)])
+    return nu + 0.02 * random.standard_normal((n, 3)), 100.0 * random.standard_normal((n, 3))
+
+
+def prepared(nu: Floats, tau: Floats, window_s: float) -> tuple[tuple[Floats, Floats], Floats]:
+    rows = odd_rows(window_s, RATE_HZ)
+    smooth = moving_mean(np.hstack([nu, tau]), rows)
+    slope = central_difference(smooth[:, :3], RATE_HZ)
+    keep = slice(rows // 2 + 1, len(nu) - rows // 2 - 1)
+    return (smooth[keep, :3], slope[keep]), smooth[keep, 3:] - slope[keep] @ MASS
+
+
+def matrices(nu: Floats, tau: Floats, window_s: float, function: Basis) -> tuple[Floats, Floats]:
+    inputs, residual = prepared(nu, tau, window_s)
+    return np.ascontiguousarray(function.evaluate(*inputs)), residual
+
+
+def fast_cross_validation(X: Floats, Y: Floats) -> None:
+    fold = np.minimum(np.arange(len(X)) * FOLDS // len(X), FOLDS - 1)
+    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        FastCrossValidation().cross_validate(
+            X, Y, MOST, fold, lambda true, predicted: np.mean((true - predicted) ** 2, axis=1), n_jobs=1, verbose=0
+        )
+
+
+def every_number_refitted(X: Floats, Y: Floats) -> None:
+    fold = np.minimum(np.arange(len(X)) * FOLDS // len(X), FOLDS - 1)
+    for number in range(FOLDS):
+        train = fold != number
+        for components in range(1, MOST + 1):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                fit = PLSRegression(components).fit(X[train], Y[train])
+            np.mean((Y[~train] - fit.predict(X[~train])) ** 2, axis=0)
+
+
+def extra_memory(n: int) -> int:
+    X, Y = regression(n)
+    tracemalloc.start()
+    simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak
+
+
+def digits() -> Iterator[str]:
+    """Largest error of the coefficients over all numbers of components against 60 digits, per way and condition."""
+    from tests.identify.test_simpls import conditioned, error, reference
+
+    for condition in (40.0, 1.8e6):
+        X, Y = conditioned(200, MOST, 3, condition)
+        want = reference(X, Y, MOST, True)
+        by_products, by_qr = (
+            error(simpls(kind.from_rows(X, Y), MOST), want).max() for kind in (CrossProducts, QrFactor)
+        )
+        yield (
+            f"Largest error of a coefficient at any of {MOST} components, condition {condition:g}, against 60 digits: "
+            f"{by_qr:.0e} by QR, {by_products:.0e} by cross-products."
+        )

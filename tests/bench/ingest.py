@@ -1,0 +1,293 @@
+"""Ingestion: log to Parquet, against rosbags and pandas, rerun-sdk, and the least work conceivable."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import lz4.frame
+import zstandard
+from rosbags.rosbag1 import Reader as Rosbag1Reader
+
+from ferryid.ingest import open_log
+from ferryid.signals import cache
+from ferryid.signals.recording import log_name, read_recording, record
+from ferryid.vessel import load_profile
+from tests.bench import logs, rivals
+from tests.bench.page import Row, Section, faster, within
+
+PROFILE = Path(__file__).with_name("bench.toml")
+PLAIN = (
+    ("mcap", "zstd"),
+    ("mcap", "lz4"),
+    ("mcap", "none"),
+    ("bag", "lz4"),
+    ("bag", "none"),
+    ("db3", "none"),
+)
+NAMES = {"mcap": "MCAP", "bag": "ROS1", "db3": "db3"}
+ROSBAGS = "rosbags → pandas → Parquet"
+
+
+@contextmanager
+def scratch() -> Iterator[Path]:
+    """A folder that is gone afterwards."""
+    folder = Path(tempfile.mkdtemp(prefix="ferryid-bench-"))
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder)
+
+
+def ingest(log: Path) -> None:
+    """All that `ferryid ingest` does with one log: hash, read, clocks, units, Parquet."""
+    with scratch() as out:
+        record(log, load_profile(PROFILE), out)
+
+
+def columns(log: Path) -> None:
+    """Read, put on one clock and convert, without hash or Parquet."""
+    read_recording(open_log(log), "bench", load_profile(PROFILE))
+
+
+def columns_to_parquet(log: Path) -> None:
+    """Read and write, without the hash."""
+    reader = open_log(log)
+    with scratch() as out:
+        recording = read_recording(reader, log_name(log), load_profile(PROFILE))
+        cache.store(out, recording, cache.signatures(reader.paths), verify=False)
+
+
+def by_rosbags(log: Path) -> None:
+    with scratch() as out:
+        rivals.rosbags_to_parquet(log, out)
+
+
+def decompress(log: Path) -> Callable[[], None]:
+    """Return the least that reading a whole log can be: its bytes, decompressed chunk by chunk.
+
+    Where the chunks lie is found out beforehand.
+    """
+    target = next(log.glob("*.db3")) if log.is_dir() else log
+    places: list[tuple[int, int]] = []
+    unpack: Callable[[bytes], bytes] = bytes
+    if log.suffix == ".mcap":
+        from mcap.reader import make_reader
+
+        with log.open("rb") as file:
+            summary = make_reader(file).get_summary()
+        assert summary is not None
+        for chunk in summary.chunk_indexes:
+            # Opcode, length, two times, size, checksum, name of the compression, length of the data.
+            head = 1 + 8 + 8 + 8 + 8 + 4 + 4 + len(chunk.compression) + 8
+            places.append((chunk.chunk_start_offset + head, chunk.compressed_size))
+        codec = summary.chunk_indexes[0].compression
+        unpack = {"": bytes, "zstd": zstandard.ZstdDecompressor().decompress, "lz4": lz4.frame.decompress}[
+            codec
+        ]
+    elif log.suffix == ".bag":
+        with Rosbag1Reader(log) as reader:
+            places = [(chunk.datapos, chunk.datasize) for chunk in reader.chunks.values()]
+            unpack = next(iter(reader.chunks.values())).decompressor
+    else:
+        places = [(start, 1 << 20) for start in range(0, target.stat().st_size, 1 << 20)]
+
+    def work() -> None:
+        with target.open("rb", buffering=0) as file:
+            for start, size in places:
+                file.seek(start)
+                unpack(file.read(size))
+
+    return work
+
+
+def parquet_of(log: Path) -> Callable[[], None]:
+    """Return the Parquet writing of a log's recording alone."""
+    reader = open_log(log)
+    recording = read_recording(reader, log_name(log), load_profile(PROFILE))
+    signatures = cache.signatures(reader.paths)
+
+    def work() -> None:
+        with scratch() as out:
+            cache.store(out, recording, signatures, verify=False)
+
+    return work
+
+
+def against_rosbags(folder: Path, minutes: float, quick: bool) -> list[Row]:
+    """Log → Parquet, whole."""
+    rows = []
+    for kind, compression in PLAIN:
+        log = logs.log(folder, kind, compression, minutes)
+        long = minutes >= 120
+        goal = None if not long else 30.0 if kind == "db3" else 35.0
+        what = f"{minutes:g} min {NAMES[kind]} {compression}: log → Parquet"
+        columns(log)
+        rows.append(
+            faster(what, lambda log=log: ingest(log), ROSBAGS, lambda log=log: by_rosbags(log), goal, 3)
+        )
+    return rows
+
+
+def against_least_work(folder: Path, minutes: float) -> list[Row]:
+    """Read and write, against decompressing everything and writing the same tables."""
+    rows = []
+    for kind, compression in PLAIN[:5]:
+        log = logs.log(folder, kind, compression, minutes)
+        unpack, write = decompress(log), parquet_of(log)
+
+        def limit(unpack: Callable[[], None] = unpack, write: Callable[[], None] = write) -> None:
+            unpack()
+            write()
+
+        rows.append(
+            within(
+                f"{minutes:g} min {NAMES[kind]} {compression}: read + write",
+                lambda log=log: columns_to_parquet(log),
+                "decompress all + write the same Parquet",
+                limit,
+                1.3 if compression == "zstd" else 1.8,
+                5,
+            )
+        )
+    return rows
+
+
+def against_whole_camera_log(folder: Path, minutes: float) -> list[Row]:
+    """A log that is nearly all pictures: reading the signals, against reading or decompressing everything."""
+    rows = []
+    for kind, compression in (("mcap", "none"), ("db3", "none"), ("mcap", "zstd"), ("mcap", "lz4")):
+        log = logs.log(folder, kind, compression, minutes, camera=True)
+        what = f"{minutes:g} min {NAMES[kind]} {compression} with camera: read"
+        columns(log)
+        if compression == "none":
+            file = next(log.glob("*.db3")) if log.is_dir() else log
+            rows.append(
+                faster(what, lambda log=log: columns(log), "cat", lambda file=file: cat(file), 1.0, 5)
+            )
+        else:
+            rows.append(faster(what, lambda log=log: columns(log), "decompress all", decompress(log), 4.0, 5))
+    return rows
+
+
+def cat(file: Path) -> None:
+    subprocess.run(["cat", file], stdout=subprocess.DEVNULL, check=True)
+
+
+def against_rerun(folder: Path, minutes: float) -> list[Row]:
+    """The same fields as NumPy arrays; nothing where rerun-sdk is not installed."""
+    try:
+        import rerun  # noqa: F401
+    except ImportError:
+        return []
+    log = logs.log(folder, "mcap", "zstd", minutes)
+    what = f"{minutes:g} min MCAP zstd: the same fields as arrays"
+    rivals.rerun_columns(log)
+    return [
+        faster(what, lambda: columns(log), "rerun-sdk", lambda: rivals.rerun_columns(log), 2.0, 7),
+    ]
+
+
+OURS = "from ferryid.cli.main import main; main()"
+THEIRS = "from tests.bench.rivals import main; main()"
+PEAK = """
+import atexit, sys
+def peak():
+    line = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
+    print("peak", line.split()[1], file=sys.stderr)
+atexit.register(peak)
+"""
+
+
+def script(code: str, *arguments: str | Path) -> str:
+    """Run a script in a process of its own and return what it said on standard error."""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True
+    )
+    return done.stderr
+
+
+def process(log: Path, before: str = "") -> str:
+    """`ferryid ingest` as a process of its own."""
+    with scratch() as out:
+        return script(before + OURS, "ingest", log, "--vessel", PROFILE, "--out", out)
+
+
+def rival_process(log: Path, before: str = "") -> str:
+    """rosbags and pandas as a process of their own."""
+    with scratch() as out:
+        return script(before + THEIRS, log, out)
+
+
+def as_process(folder: Path, minutes: float) -> list[Row]:
+    """One whole process, start-up included."""
+    return [
+        faster(
+            f"{minutes:g} min {NAMES[kind]} {compression}: whole process",
+            lambda log=log: process(log),
+            "rosbags and pandas in a process",
+            lambda log=log: rival_process(log),
+            10.0,
+            5,
+        )
+        for kind, compression in (("mcap", "zstd"), ("bag", "lz4"), ("db3", "none"))
+        for log in (logs.log(folder, kind, compression, minutes),)
+    ]
+
+
+def peak_mb(said: str) -> float:
+    """Peak resident memory that a process said [MB]."""
+    return int(said.split("peak")[-1]) / 1024
+
+
+def memory(folder: Path, minutes: float) -> list[Row]:
+    """Peak memory of whole processes; only where the system tells it."""
+    if not Path("/proc/self/status").exists():
+        return []
+    rows = []
+    for kind, compression in (("mcap", "zstd"), ("db3", "none")):
+        log = logs.log(folder, kind, compression, minutes)
+        ours, theirs = peak_mb(process(log, PEAK)), peak_mb(rival_process(log, PEAK))
+        what = f"{minutes:g} min {NAMES[kind]} {compression}: peak memory"
+        rows.append(Row(what, f"{ours:.0f} MB", ROSBAGS, f"{theirs:.0f} MB", theirs / ours))
+    return rows
+
+
+def run(quick: bool, folder: Path | None = None) -> Section:
+    """Measure everything about ingestion.
+
+    Parameters
+    ----------
+    quick
+        One-minute logs, to see that it runs.
+    folder
+        Where logs are kept; by default a folder of the system's for temporary files.
+    """
+    folder = folder or Path(tempfile.gettempdir()) / "ferryid-bench-logs"
+    short, long, camera = (1.0, 1.0, 0.2) if quick else (12.0, 120.0, 3.0)
+    rows = against_rosbags(folder, short, quick)
+    if not quick:
+        rows += against_rosbags(folder, long, quick)
+    rows += against_least_work(folder, long)
+    rows += against_whole_camera_log(folder, camera)
+    rows += against_rerun(folder, short)
+    rows += as_process(folder, short)
+    rows += memory(folder, long)
+    return Section(
+        "Ingestion",
+        rows,
+        (
+            "Odometry and Imu at 100 Hz, thruster state at 20 Hz, wind at 10 Hz. Wanted are position, velocity and yaw rate "
+            "of the first, orientation of the second, thruster and wind. Written by rosbags (ROS1, db3) and mcap.",
+            "Log → Parquet is everything that `ferryid ingest` does: content hash, reading, clocks, units, Parquet with "
+            "metadata. The rival deserialises the same topics and writes the same fields.",
+            f"Logs with camera hold raw 1280 x 720 pictures at {logs.CAMERA_HZ:g} Hz, {camera:g} minutes, about "
+            f"{camera * 0.332:.2g} GB (the goal was set on 3.9 GB).",
+        ),
+        ("rosbags", "pandas", "pyarrow", "numpy", "mcap", "zstandard", "lz4", "rerun-sdk"),
+    )
