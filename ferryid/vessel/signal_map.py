@@ -233,7 +233,7 @@ def _numeric(series: Series, path: str, signal: Signal) -> Floats:
             f"{series.topic}: {signal.quantity} needs numbers, found text in {path} ({sample[:40]!r}). "
             f"Fix: name a numeric field on line {signal.line} of the vessel profile"
         )
-    return column.astype(np.float64)
+    return np.asarray(column, dtype=np.float64)
 
 
 def _bare(topic: str) -> str:

@@ -26,5 +26,10 @@ def test_profile_states_units_and_source(name: str) -> None:
 def test_description_names_every_part(name: str) -> None:
     profile = load_profile(name)
     text = describe(profile)
-    for part in (*profile.actuators, *profile.signals):
-        assert (part.name if hasattr(part, "name") else part.quantity) in text
+    lines = [line.strip() for line in text.splitlines()]
+    for start in (f"{part.name}: {part.kind.partition('_')[0]}" for part in profile.actuators):
+        assert any(line.startswith(start) for line in lines)
+    for signal in profile.signals:
+        row = next(line for line in lines if line.startswith(f"{signal.quantity} "))
+        assert signal.topic in row
+        assert signal.unit in row

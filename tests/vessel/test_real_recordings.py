@@ -15,7 +15,7 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Series
 from ferryid.vessel import applied_force, convert, load_profile, resolve, select
-from ferryid.vessel.frames import to_body
+from ferryid.vessel.frames import to_body, wrap, yaw_of_quaternion
 from ferryid.vessel.profile import Floats, Profile
 
 Locate = Callable[[str], Path]
@@ -146,3 +146,20 @@ def test_a_bag_without_navigation_is_refused_in_one_line(shared_data: Locate) ->
     with pytest.raises(FerryIdError, match="position is needed by the profile vtec-usv") as caught:
         select(profile, open_log(path).topics, str(path))
     assert "\n" not in str(caught.value)
+
+
+def test_milliampere_heading_is_clockwise_from_north_beside_an_enu_velocity(shared_data: Locate) -> None:
+    """The receiver's quaternion against the ferry's own navigation, which says that it is NED."""
+    profile = load_profile("milliampere-2025")
+    reader = open_log(shared_data("milliampere1"), profile.table)
+    wanted = select(profile, reader.topics, "milliampere1").wanted
+    pose = [f"pose_orientation_{part}" for part in "xyzw"]
+    series = reader.read({**wanted, "/navigation/pose": pose})
+    receiver, own = series["/vectorVS330/heading"], series["/navigation/pose"]
+    assert receiver.stamp_ns is not None
+    assert own.stamp_ns is not None
+    psi = np.unwrap(convert(profile, receiver)["psi"])
+    start = receiver.stamp_ns[0]
+    at = np.interp((own.stamp_ns - start) * 1e-9, (receiver.stamp_ns - start) * 1e-9, psi)
+    expected = yaw_of_quaternion(*(own.columns[name] for name in pose))
+    assert np.median(np.abs(wrap(at - expected))) < np.radians(3.0)

@@ -54,7 +54,11 @@ def test_starboard_rudder_turns_to_starboard_going_ahead() -> None:
 
 
 def test_going_astern_the_rudder_works_the_other_way() -> None:
-    assert tau(0.2, 0.0, -1.0)[2] < 0.0
+    # No wake and no slipstream at the rudder: u_R = 1.09 · 1 m/s from astern
+    normal = 0.5 * 1000 * 0.0539 * 2.747 * 1.09**2 * math.sin(-0.2)
+    moment = -(-3.5 + 0.312 * -3.248) * normal * math.cos(0.2)
+    assert tau(0.2, 0.0, -1.0)[2] == pytest.approx(moment, rel=1e-12)
+    assert moment < 0.0
 
 
 def test_bollard_slipstream_by_hand() -> None:

@@ -117,7 +117,7 @@ def test_misspelt_topic_gets_a_suggestion() -> None:
 
 
 def test_misspelt_field_gets_a_suggestion() -> None:
-    with pytest.raises(FerryIdError, match=r'no field "r" in /nav \(it has u, v, r_z\)'):
+    with pytest.raises(FerryIdError, match=r'no field "r" in /nav \(it has u, v, r_z\)\. Did you mean "r_z"'):
         select(profile(BODY), [topic("/nav", u="float64", v="float64", r_z="float64"), T1], "a.bag")
 
 
