@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from ferryid.identify.result import AXES, Verdict
 
 Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 IMPROVEMENT = 0.05
 """Fraction by which the mean normalised MSE must fall, thesis 3.2.4."""
@@ -16,20 +15,6 @@ WORSENING = 0.05
 """Fraction by which any one axis may get worse."""
 _NOTHING = 1e-9
 """Root-mean-square error [N, N·m] that counts as none: rounding of forces of thousands of newtons is below it."""
-
-
-def squared_error(measured: Floats, estimated: Floats, rows: Flags) -> tuple[Floats, int]:
-    """Return the sum of squared force errors per axis and the number of rows, so that logs can be added up.
-
-    Parameters
-    ----------
-    measured, estimated
-        Applied force and its estimate [N, N, N·m], shape (n, 3).
-    rows
-        Rows to judge, shape (n,).
-    """
-    error = measured[rows] - estimated[rows]
-    return np.einsum("ij,ij->j", error, error), int(np.count_nonzero(rows))
 
 
 def accept(base_mse: Floats, model_mse: Floats) -> Verdict:

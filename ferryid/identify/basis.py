@@ -176,18 +176,6 @@ class Basis:
         """True where a function depends on the velocity through the water."""
         return self._needs("rc")
 
-    @property
-    def duplicates(self) -> dict[str, str]:
-        """Terms that are the same column as an earlier one, ``{"|u|u": "sgn(u)u^2", ...}``."""
-        first: dict[tuple[str, ...], str] = {}
-        same: dict[str, str] = {}
-        for term in self.functions:
-            key = tuple(sorted(term.factors))
-            if key in first:
-                same[term.name] = first[key]
-            first.setdefault(key, term.name)
-        return same
-
     def _needs(self, flow: str) -> bool:
         return any(factor.endswith(f"_{flow}") for term in self.functions for factor in term.factors)
 

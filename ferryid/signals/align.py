@@ -136,7 +136,7 @@ def segments(valid: Flags) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def usual_period(time_s: Floats) -> float:
+def _usual_period(time_s: Floats) -> float:
     """Return the mean interval [s] of a stream without its gaps.
 
     The mean, since messages that are received in bursts leave a median that says nothing.
@@ -169,7 +169,7 @@ def _round_rate(rate_hz: float) -> float:
 def _source(stream: Stream, repairs: list[str]) -> _Source:
     time_ns = np.asarray(stream.time_ns)
     time_s = (time_ns - time_ns[0]) * 1e-9
-    period = usual_period(time_s)
+    period = _usual_period(time_s)
     on_change = _on_change(time_s, stream.columns)
     bridge = max(GAP_PERIODS * period, GAP_LEAST_S)
     columns: dict[str, Floats] = {}

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ferryid.identify.accept import accept, squared_error
+from ferryid.identify.accept import accept
 
 
 def judge(*ratios: float) -> tuple[bool, tuple[str, ...]]:
@@ -76,15 +76,3 @@ def test_an_error_that_is_no_number_rejects(wrong: float) -> None:
         verdict = accept(np.array(base), np.array(model))
         assert not verdict.accepted
         assert any("is not a finite number" in reason for reason in verdict.reasons)
-
-
-def test_squared_errors_of_several_logs_add_up() -> None:
-    rng = np.random.default_rng(0)
-    measured, estimated = rng.normal(size=(100, 3)), rng.normal(size=(100, 3))
-    rows = rng.random(100) < 0.5
-    measured[~rows] = np.nan
-    total, count = squared_error(measured, estimated, rows)
-    parts = [squared_error(measured[part], estimated[part], rows[part]) for part in (slice(0, 40), slice(40, None))]
-    np.testing.assert_allclose(total, sum(part[0] for part in parts))
-    assert count == sum(part[1] for part in parts) == rows.sum()
-    np.testing.assert_allclose(total / count, np.mean((measured - estimated)[rows] ** 2, axis=0))
