@@ -66,11 +66,15 @@ class Rows:
 
 @dataclass(frozen=True)
 class Damage:
-    """Rows with ``low < rowid <= high`` that stood on a page that is lost; `high` is LAST_ROWID where it is hidden."""
+    """Rows with ``low < rowid <= high`` that stood on a damaged or missing page.
+
+    `high` is LAST_ROWID where the damage hides it. `rows` is how many are lost where the page itself still tells.
+    """
 
     low: int
     high: int
     where: str
+    rows: int | None = None
 
 
 class Pages:
@@ -336,7 +340,9 @@ def find_rows(pages: Pages, root: int, topics: set[int]) -> tuple[Rows, list[Dam
     rows = _Table()
     bad = _visit(pages, numbers, rows)
     damages += [
-        Damage(int(low[i]), int(high[i]), f"page {numbers[i]} is damaged")
+        Damage(
+            int(low[i]), int(high[i]), f"page {numbers[i]} is damaged", int(bad[i]) if bad[i] > 0 else None
+        )
         for i in np.flatnonzero(bad).tolist()
     ]
     found = rows.rows()

@@ -198,16 +198,21 @@ class Sqlite3Log:
             if merged and damage.low <= merged[-1].high:
                 last = merged.pop()
                 where = last.where if last.where.endswith("others") else f"{last.where} and others"
-                damage = Damage(last.low, max(damage.high, last.high), where)
+                counts = (last.rows, damage.rows)
+                count = None if counts[0] is None or counts[1] is None else counts[0] + counts[1]
+                damage = Damage(last.low, max(damage.high, last.high), where, count)
             merged.append(damage)
-        rows = self._rows
+        rows, told = self._rows, 0
         for damage in merged:
             first, last = np.searchsorted(rows.rowid, [damage.low, damage.high], "right")
-            lost: int | None = damage.high - damage.low - int(last - first)
-            if damage.high == LAST_ROWID:
-                lost = None if self._storage.messages is None else self._storage.messages - len(rows)
+            lost = damage.rows
+            if lost is None and damage.high != LAST_ROWID:
+                lost = damage.high - damage.low - int(last - first)
+            elif lost is None and self._storage.messages is not None:
+                lost = max(0, self._storage.messages - len(rows) - told)
             if lost == 0:
                 continue
+            told += lost or 0
             yield Loss(
                 str(self.paths[0]),
                 "; ".join(filter(None, (cut, damage.where))),
