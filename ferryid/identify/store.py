@@ -24,8 +24,8 @@ class Stored:
     current: bool
 
 
-def save(model: Model, out: Path) -> Stored:
-    """Store a model as the next version of its name; an accepted one becomes current.
+def numbered(model: Model, out: Path) -> Model:
+    """Return a model with the version that it will be stored under: the next one of its name.
 
     A fit that gives, timestamps apart, the same model as a stored version is that version again.
     """
@@ -33,13 +33,18 @@ def save(model: Model, out: Path) -> Stored:
     present = _versions(folder)
     plain = _undated(model)
     for number in present:
-        path = folder / f"{number}.json"
-        if _undated(load_file(path)) == plain:
-            model = replace(model, version=number)
-            break
-    else:
-        model = replace(model, version=max(present, default=0) + 1)
-        path = folder / f"{model.version}.json"
+        stored = load_file(folder / f"{number}.json")
+        if _undated(stored) == plain:
+            return stored
+    return replace(model, version=max(present, default=0) + 1)
+
+
+def save(model: Model, out: Path) -> Stored:
+    """Store a model under its next version; an accepted one becomes current."""
+    model = numbered(model, out)
+    folder = _folder(out) / model.name
+    path = folder / f"{model.version}.json"
+    if not path.exists():
         write_text(path, dump_json(to_json(model)))
     if model.accepted:
         write_text(folder / "current", f"{model.version}\n")

@@ -46,7 +46,7 @@ def _canvas(rows: int, height: float, *, share_x: bool = True) -> tuple[Figure, 
 
 def _svg(figure: Figure) -> str:
     text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     drawing = text.getvalue()
     return drawing[drawing.index("<svg") :]
 

@@ -12,7 +12,7 @@ from ferryid.identify.fit import fit, quiet
 from ferryid.identify.result import AXES, FitResult
 from ferryid.identify.scores import free_run_plain
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.store import Stored, save
+from ferryid.identify.store import Stored, numbered, save
 from ferryid.report.page import headline, render
 from ferryid.vessel.profile import Profile
 
@@ -68,13 +68,15 @@ def fit_and_report(
     """
     result = fit(logs, profile, settings, out, name=name, verify=verify, progress=progress)
     progress("writing the report")
-    stored = save(result.model, out)
-    result = replace(result, model=stored.model)
-    folder = out / "reports" / f"{stored.model.name}-v{stored.model.version}"
-    plain = as_json(result, stored, folder / "report.html")
+    result = replace(result, model=numbered(result.model, out))
+    folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
+    page = render(result)
+    # The model is stored last but one: whoever interrupts before finds neither a model without a report nor a rest.
     with replacing(folder) as temporary:
         temporary.mkdir()
-        (temporary / "report.html").write_text(render(result), encoding="utf-8")
+        (temporary / "report.html").write_text(page, encoding="utf-8")
+        stored = save(result.model, out)
+        plain = as_json(result, stored, folder / "report.html")
         (temporary / "fit.json").write_text(dump_json(plain), encoding="utf-8")
     progress("")
     return Outcome(stored, folder / "report.html", plain, as_text(result, stored, folder / "report.html"))

@@ -1,0 +1,136 @@
+"""Bad input gets one line that names file, cause and remedy, exit code 2, and leaves nothing half-written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+def refused(run, *parts: str) -> None:
+    """Check exit code and form of a refusal, and that it says `parts`."""
+    assert run.code == 2, run.out + run.err
+    lines = run.err.strip().splitlines()
+    assert len(lines) == 1, run.err
+    assert lines[0].startswith("ferryid: ")
+    assert "Fix:" in lines[0]
+    assert "Traceback" not in run.err
+    for part in parts:
+        assert part in lines[0], lines[0]
+
+
+@pytest.mark.parametrize("command", ["inspect", "ingest", "fit"])
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("missing.bag", None), ("empty.mcap", b""), ("noise.bag", bytes(range(256)) * 40), ("photo.png", b"\x89PNG\r\n\x1a\n")],
+)
+def test_what_is_not_a_log(ferryid, tmp_path: Path, command: str, name: str, content: bytes | None) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    vessel = () if command == "inspect" else ("--vessel", "milliampere", "--out", tmp_path / "out")
+    refused(ferryid(command, path, *vessel), name)
+    assert not list((tmp_path / "out").rglob("*.parquet"))
+
+
+def test_an_empty_folder(ferryid, tmp_path: Path) -> None:
+    refused(ferryid("inspect", tmp_path), str(tmp_path))
+
+
+def test_a_misspelt_vessel(ferryid, fixtures: Path) -> None:
+    refused(ferryid("fit", fixtures / "short.mcap", "--vessel", "miliampere"), "milliampere")
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--basis", "thesys"), 'Did you mean "thesis"'),
+        (("--structure", "coupld"), 'Did you mean "coupled"'),
+        (("--smoother", "squre"), 'Did you mean "square"'),
+        (("--split", "block"), 'Did you mean "blocks"'),
+        (("--components", "many"), "auto"),
+        (("--window", "-1"), "window"),
+        (("--window", "50"), "short.mcap"),
+        (("--rate", "0"), "rate"),
+        (("--zeta", "0"), "zeta"),
+        (("--split", "logs"), "two"),
+    ],
+)
+def test_settings_that_cannot_be(ferryid, fixtures: Path, tmp_path: Path, options: tuple[str, str], told: str) -> None:
+    log = fixtures / "short.mcap"
+    refused(ferryid("fit", log, "--vessel", "milliampere", "--out", tmp_path, *options), told.replace("short.mcap", "short"))
+    assert not (tmp_path / "models").exists()
+
+
+def profile_with(tmp_path: Path, old: str, new: str) -> Path:
+    """Return a copy of the milliAmpère profile with one change."""
+    from ferryid.vessel import load_profile
+
+    text = load_profile("milliampere").text
+    assert old in text
+    path = tmp_path / "boat.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("/navigation/odometry", "/navigation/odometri", 'Did you mean "/navigation/odometry"'),
+        ("twist.twist.linear.x", "twist.twist.linear.q", "twist.twist.linear"),
+        ('unit = "m/s"', 'unit = "furlong/s"', "furlong/s"),
+    ],
+)
+def test_a_profile_that_does_not_fit_the_log(
+    ferryid, fixtures: Path, tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    profile = profile_with(tmp_path, old, new)
+    refused(ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out"), told)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_an_output_folder_without_permission(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    refused(ferryid("ingest", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out"), "written")
+
+
+def test_an_output_folder_that_is_a_file(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("", encoding="utf-8")
+    refused(
+        ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out"), "cannot be written"
+    )
+
+
+def test_a_full_disk(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    if not os.path.exists("/dev/full"):
+        pytest.skip("no /dev/full on this machine")
+    run = ferryid("inspect", fixtures / "short.mcap", "--json", "/dev/full/x")
+    refused(run, "/dev/full")
+
+
+def test_an_interrupt_exits_with_130_and_leaves_nothing(
+    ferryid, fixtures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import ferryid.report.fit_report as fit_report
+
+    def interrupted(*_: object) -> str:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fit_report, "render", interrupted)
+    run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out")
+    assert run.code == 130
+    assert not list((tmp_path / "out").rglob("*.part"))
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["logs"]
+
+
+def test_a_bug_of_ours_exits_with_1_and_asks_for_a_report(ferryid, fixtures: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import ferryid.signals.inspect as module
+
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr(module, "inspect", broken)
+    run = ferryid("inspect", fixtures / "short.mcap")
+    assert run.code == 1
+    assert "report it" in run.err

@@ -1,0 +1,124 @@
+"""Every command: help, documentation, and JSON output that keeps to its published schema."""
+
+from __future__ import annotations
+
+import json
+import pkgutil
+import re
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import ferryid.cli
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMANDS = sorted(
+    module.name.removeprefix("cmd_") for module in pkgutil.iter_modules(ferryid.cli.__path__) if module.name[:4] == "cmd_"
+)
+SCALE = ("--delta", "0.4", "--sigma", "0.4")
+
+
+def conforms(text: str) -> dict:
+    """Check a JSON result against the schema that it names."""
+    data = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+    name = data["schema"].removeprefix("ferryid.").removesuffix("/1")
+    schema = json.loads(files("ferryid.schemas").joinpath(f"{name}.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(data, schema)
+    return data
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_has_help_and_is_documented(ferryid, command: str) -> None:
+    run = ferryid(command, "--help")
+    assert run.code == 0
+    assert len(run.out.split("\n\n")[0]) > 20
+    assert f"ferryid {command}" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("log", ["short.mcap", "short.bag", "short_ros2", "short_ros2_mcap", "truncated.mcap", "short.csv"])
+@pytest.mark.parametrize("vessel", [(), ("--vessel", "milliampere")])
+def test_inspect(ferryid, fixtures: Path, log: str, vessel: tuple[str, ...]) -> None:
+    run = ferryid("inspect", fixtures / log, *vessel, "--json", "-")
+    assert run.code == 0, run.err
+    assert conforms(run.out)["messages"] > 0
+
+
+def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    log, other, out = fixtures / "short.mcap", fixtures / "short.bag", tmp_path / "out"
+
+    run = ferryid("ingest", log, "--vessel", "milliampere", "--out", out, "--json", "-")
+    tables = conforms(run.out)["logs"][0]
+    assert {table["topic"] for table in tables["tables"]} >= {"/navigation/odometry", "/thruster1/state"}
+    assert len(list(Path(tables["folder"]).glob("*.parquet"))) == len(tables["tables"])
+
+    run = ferryid("fit", log, "--vessel", "milliampere", *SCALE, "--out", out, "--json", "-")
+    fit = conforms(run.out)
+    assert run.code == 0
+    assert fit["model"]["accepted"], fit["reasons"]
+    page = Path(fit["report"]).read_text(encoding="utf-8")
+    assert page.count("<svg") > 8
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page), "the report must not need another file or a network"
+    conforms(Path(fit["model"]["path"]).read_text(encoding="utf-8"))
+    conforms((Path(fit["report"]).parent / "fit.json").read_text(encoding="utf-8"))
+
+    run = ferryid("fit", log, "--vessel", "milliampere", *SCALE, "--basis", "thesis", "--structure", "coupled", "--out", out)
+    assert run.code == 0
+
+    evaluation = conforms(ferryid("evaluate", "milliampere@1", other, "--out", out, "--json", "-").out)
+    assert evaluation["logs"][0]["normalised_mse"] < 1.0
+    assert evaluation["logs"][0]["per_axis"] == evaluation["pooled"]["per_axis"]
+
+    comparison = conforms(
+        ferryid("compare", "milliampere@1", "milliampere@2", "--on", other, "--out", out, "--json", "-").out
+    )
+    assert len(comparison["coefficients"]) == 21 + 3  # the wind basis joins, as the log has an anemometer
+
+    models = conforms(ferryid("models", "--out", out, "--json", "-").out)["models"]
+    assert [model["version"] for model in models] == [1, 2]
+    assert sum(model["current"] for model in models) == 1
+    conforms(ferryid("models", "milliampere@1", "--out", out, "--json", "-").out)
+
+
+def test_two_fits_of_one_log_are_the_same_file(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    texts = []
+    for name in ("a", "b"):
+        run = ferryid(
+            "fit", fixtures / "short.mcap", "--vessel", "milliampere", *SCALE, "--out", tmp_path / name, "--json", "-"
+        )
+        model = Path(json.loads(run.out)["model"]["path"]).read_text(encoding="utf-8")
+        texts.append("\n".join(line for line in model.splitlines() if '"created"' not in line))
+    assert texts[0] == texts[1]
+
+
+def test_simulate_and_list(ferryid, tmp_path: Path) -> None:
+    scenario = ROOT / "fixtures" / "short.toml"
+    run = ferryid("simulate", scenario, "--out", tmp_path / "t.bag", "--json", "-")
+    assert run.code == 0, run.err
+    conforms(run.out)
+    assert "twelve-corner" in ferryid("simulate", "--list").out
+
+
+def test_vessel_check_show_and_list(ferryid, tmp_path: Path) -> None:
+    assert "milliampere" in ferryid("vessel", "list").out
+    assert ferryid("vessel", "show", "milliampere").code == 0
+    assert ferryid("vessel", "check", "milliampere").code == 0
+    wrong = tmp_path / "boat.toml"
+    wrong.write_text('schema = "ferryid.vessel/1"\nname = "boat"\n[hull]\nmass_kg = -3\n', encoding="utf-8")
+    run = ferryid("vessel", "check", wrong, "--json", "-")
+    assert run.code == 2
+    assert any(fault["line"] == 4 for fault in conforms(run.out)["faults"])
+
+
+def test_require_accept_exits_with_3(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    # The true model cannot be improved by 5 %.
+    run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path, "--require-accept")
+    assert run.code == 3
+    assert "Not accepted" in run.out
+    assert "rejected" in ferryid("models", "--out", tmp_path).out
+
+
+def test_version(ferryid) -> None:
+    assert ferryid("--version").out.startswith("ferryid 0.")
