@@ -9,6 +9,7 @@ import time
 import tracemalloc
 import warnings
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import numpy as np
 from ikpls.fast_cross_validation.numpy import PLS as FastCrossValidation
@@ -89,7 +90,7 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
                 CrossProducts.of(
                     Rows(tuple(values[low:high] for values in inputs), residual[low:high], None, function.evaluate)
                 )
-                for low, high in zip(parts[:-1], parts[1:], strict=True)
+                for low, high in pairwise(parts)
             ]
             sweep_components(folds, MOST)
 
@@ -97,9 +98,8 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
         for window_s in WINDOWS_S:
             fast_cross_validation(*matrices(nu, tau, window_s, function))
 
-    def grid(one_window: bool = True) -> None:
-        X, Y = matrices(nu, tau, WINDOWS_S[3], function)
-        every_number_refitted(X, Y)
+    def grid() -> None:
+        every_number_refitted(*matrices(nu, tau, WINDOWS_S[3], function))
 
     what = f"sweep, {len(WINDOWS_S)} windows × {FOLDS} folds × {MOST}, {n:,} rows"
     yield once(what, ours, "scikit-learn grid search", grid, 1000, times=len(WINDOWS_S))
@@ -107,8 +107,7 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
 
     def folds_of_matrix() -> None:
         parts = np.linspace(0, n, FOLDS + 1).astype(int)
-        cut = zip(parts[:-1], parts[1:], strict=True)
-        sweep_components([CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in cut], MOST)
+        sweep_components([CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in pairwise(parts)], MOST)
 
     yield faster(
         f"cross-validation, {FOLDS} folds × {MOST}, {n:,} rows",
@@ -148,7 +147,10 @@ def bootstraps(n: int, repeats: int) -> Iterator[Row]:
     yield once(
         what, ours, "scikit-learn", lambda: drawn(2, lambda x, y: PLSRegression(COMPONENTS).fit(x, y)), None, DRAWS // 2
     )
-    blocks = [CrossProducts.from_rows(X[i : i + BLOCK_ROWS], Y[i : i + BLOCK_ROWS]) for i in range(0, n, BLOCK_ROWS)]
+    blocks = [
+        CrossProducts.from_rows(X[i : i + BLOCK_ROWS], Y[i : i + BLOCK_ROWS])
+        for i in range(0, count * BLOCK_ROWS, BLOCK_ROWS)
+    ]
 
     def summed() -> None:
         random = np.random.default_rng(0)

@@ -138,7 +138,7 @@ def test_a_value_that_is_not_finite_is_named(kind, value: float) -> None:
         kind.from_rows(X, Y, names=("u", "v", "|v|v", "r"), where="trial.mcap")
     message = str(error.value)
     assert message.startswith('trial.mcap: basis term "|v|v"')
-    assert "in 1 of 50 rows" in message
+    assert f"found {value} in 1 of 50 rows" in message
     assert "Fix:" in message
     assert "\n" not in message
     Y[3:5, 1] = value
