@@ -177,5 +177,5 @@ def allocate(tau_d: Force, fore: Azimuth, aft: Azimuth, before: tuple[Order, Ord
         angle = last.angle
         if size > HELD_BELOW_N:
             angle += shorter_way(atan2(Y, 0.5 * X_d) - last.angle)
-        orders.append(Order(thruster.table.speed(min(size, largest) / thruster.units), angle))
+        orders.append(Order(thruster.table.speed(size / thruster.units), angle))
     return orders[0], orders[1], saturated
