@@ -13,6 +13,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from ferryid.identify.result import AXES, ComponentCurve, Excitation, FreeRun, LogFit
@@ -20,8 +21,11 @@ from ferryid.report.structure import autocorrelation, envelope, spectrum
 
 Floats = NDArray[np.float64]
 
+WIDTH = 6.0
 MEASURED, BASE, NEW, SHADE = "#222222", "#d55e00", "#0072b2", "#e8eef4"
 UNITS = ("N", "N", "N·m")
+REACH = 8.0
+"""Where the axis of the coefficient figure ends; a coefficient this far from zero is beyond doubt anyway."""
 SYMBOLS = ("X", "Y", "N")
 STYLE: dict[Any, Any] = {
     "font.size": 9,
@@ -38,10 +42,44 @@ STYLE: dict[Any, Any] = {
 }
 
 
-def _canvas(rows: int, height: float, *, share_x: bool = True) -> tuple[Figure, list[Axes]]:
-    figure = Figure(figsize=(6.0, height), layout="constrained")
-    axes = figure.subplots(rows, 1, sharex=share_x, squeeze=False)
+def _figure(
+    height: float, *, top: float = 0.15, left: float = 0.85, between: tuple[float, float] = (0.25, 0.15)
+) -> Figure:
+    """Return an empty figure with margins in inches; fixed ones, since measuring all text takes longer than drawing it."""
+    figure = Figure(figsize=(WIDTH, height))
+    figure.subplots_adjust(
+        left=left / WIDTH,
+        right=1.0 - 0.12 / WIDTH,
+        bottom=0.5 / height,
+        top=1.0 - top / height,
+        wspace=between[0],
+        hspace=between[1],
+    )
+    return figure
+
+
+def _canvas(rows: int, height: float, *, top: float = 0.35) -> tuple[Figure, list[Axes]]:
+    figure = _figure(height, top=top)
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
+    for ax in axes[:, 0]:
+        ax.yaxis.set_label_coords(-0.115, 0.5)
     return figure, list(axes[:, 0])
+
+
+def _legend(figure: Figure, ax: Axes, columns: int, title: str = "") -> None:
+    """Put one legend for the whole figure along its upper edge."""
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper center", ncols=columns, title=title, borderaxespad=0.1)
+
+
+def _plain_log(ax: Axes, *, x: bool, y: bool) -> None:
+    """Label logarithmic axes as 1e-3, 1e0: typeset exponents take longer than all else on the page."""
+    for wanted, axis in ((x, ax.xaxis), (y, ax.yaxis)):
+        if wanted:
+            axis.set_major_formatter(
+                FuncFormatter(lambda value, _: f"{value:.0e}".replace("e+0", "e").replace("e-0", "e-"))
+            )
+            axis.set_minor_formatter(NullFormatter())
 
 
 def _svg(figure: Figure) -> str:
@@ -67,11 +105,11 @@ def forces(log: LogFit, first_s: float | None = None, last_s: float | None = Non
                 (log.tau_model, NEW, "new model"),
             ):
                 x, y = envelope(t[rows], (values * shown)[rows, j])
-                ax.plot(x, y, color=colour, label=label, alpha=0.9)
+                ax.plot(x, y, color=colour, label=label, alpha=0.9, linewidth=1.8 if colour == MEASURED else 1.1)
             _limits(ax, log, rows, j)
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")
-        axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, 1.28), ncols=3)
+        _legend(figure, axes[0], 3)
         return _svg(figure)
 
 
@@ -104,8 +142,9 @@ def residual_spectrum(logs: Sequence[LogFit]) -> str:
                             frequency[1:], density[1:], color=colour, alpha=0.8, label=label if i == 0 else "_nolegend_"
                         )
             ax.set_ylabel(f"{AXES[j]} [({UNITS[j]})²/Hz]")
+            _plain_log(ax, x=True, y=True)
         axes[-1].set_xlabel("frequency [Hz]")
-        axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, 1.28), ncols=2)
+        _legend(figure, axes[0], 2)
         return _svg(figure)
 
 
@@ -126,14 +165,14 @@ def residual_autocorrelation(logs: Sequence[LogFit]) -> str:
             ax.set_ylabel(AXES[j])
             ax.set_ylim(-1.05, 1.05)
         axes[-1].set_xlabel("lag [s]")
-        axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, 1.32), ncols=2)
+        _legend(figure, axes[0], 2)
         return _svg(figure)
 
 
 def components(curve: ComponentCurve) -> str:
     """Normalised MSE against the number of components, training and validation."""
     with mpl.rc_context(STYLE):
-        figure, (ax,) = _canvas(1, 3.2)
+        figure, (ax,) = _canvas(1, 3.2, top=0.55)
         for j, (axis, colour) in enumerate(zip(AXES, ("#0072b2", "#009e73", "#cc79a7"), strict=True)):
             ax.plot(curve.components, curve.validation[:, j], color=colour, marker="o", markersize=3, label=axis)
             ax.plot(curve.components, curve.training[:, j], color=colour, linestyle=":", linewidth=1.0)
@@ -143,14 +182,15 @@ def components(curve: ComponentCurve) -> str:
         ax.set_ylim(0, min(max(1.1, 1.1 * top), 3.0))
         ax.set_xlabel(f"number of components (chosen: {curve.chosen})")
         ax.set_ylabel("MSE over the base model's [-]")
-        ax.legend(title="validation; training dotted", ncols=3, loc="upper center", bbox_to_anchor=(0.5, 1.3))
+        _legend(figure, ax, 3, "validation; training dotted")
         return _svg(figure)
 
 
 def coefficient_intervals(terms: Sequence[str], theta: Floats, low: Floats, high: Floats) -> str:
     """Coefficients with 95 % intervals, each in units of its own interval's half width, so that all fit one axis."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.0, 1.2 + 0.2 * len(terms)), layout="constrained")
+        left = 0.35 + 0.07 * max(len(term) for term in terms)
+        figure = _figure(1.0 + 0.2 * len(terms), top=0.3, left=left, between=(0.08, 0.1))
         columns = figure.subplots(1, 3, sharey=True)
         place = np.arange(len(terms))[::-1]
         for j, ax in enumerate(columns):
@@ -158,24 +198,26 @@ def coefficient_intervals(terms: Sequence[str], theta: Floats, low: Floats, high
             with np.errstate(divide="ignore", invalid="ignore"):
                 significance = np.where(half > 0, theta[:, j] / half, 0.0)
             clear = np.abs(significance) > 1
+            significance = np.clip(significance, -REACH, REACH)
             for mask, colour in ((clear, NEW), (~clear, "#aaaaaa")):
                 ax.barh(place[mask], significance[mask], color=colour, height=0.6)
             ax.axvspan(-1, 1, color=SHADE, linewidth=0, zorder=0)
-            ax.set_xscale("symlog", linthresh=2)
+            ax.set_xlim(-REACH, REACH)
             ax.set_title(AXES[j], fontsize=9)
         columns[0].set_yticks(place, terms)
-        columns[1].set_xlabel("coefficient over half the width of its 95 % interval; inside the shade it may be zero")
+        columns[1].set_xlabel("coefficient over half the width of its 95 % interval")
         return _svg(figure)
 
 
 def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
     """Singular values of the standardised basis, and where the velocities were."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.0, 5.4), layout="constrained")
+        figure = _figure(5.6, between=(0.38, 0.3))
         grid = figure.subplots(2, 2)
         values = result.singular_values
         values = values / values[0] if values.size and values[0] > 0 else values
         grid[0, 0].semilogy(np.arange(1, len(values) + 1), np.maximum(values, 1e-17), "o-", color=NEW, markersize=3)
+        _plain_log(grid[0, 0], x=False, y=True)
         grid[0, 0].set_xlabel("index")
         grid[0, 0].set_ylabel("singular value over largest [-]")
         pairs = ((0, 1, "u [m/s]", "v [m/s]"), (0, 2, "u [m/s]", "r [deg/s]"), (1, 2, "v [m/s]", "r [deg/s]"))
@@ -194,7 +236,7 @@ def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
 def free_run_errors(base: FreeRun, new: FreeRun) -> str:
     """Free-run error against horizon, base and new model."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.0, 4.6), layout="constrained")
+        figure = _figure(4.6, between=(0.3, 0.15))
         grid = figure.subplots(2, 2, sharex=True)
         for ax, name, label, factor in (
             (grid[0, 0], "position_m", "position [m]", 1.0),
@@ -231,14 +273,14 @@ def free_run_example(base: FreeRun, new: FreeRun) -> str:
                     )
             ax.set_ylabel(label)
         axes[-1].set_xlabel("time since the start of the run [s]")
-        axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, 1.32), ncols=3)
+        _legend(figure, axes[0], 3)
         return _svg(figure)
 
 
 def track(logs: Sequence[LogFit]) -> str:
     """Where the vessel went, north up."""
     with mpl.rc_context(STYLE):
-        figure, (ax,) = _canvas(1, 4.0)
+        figure, (ax,) = _canvas(1, 4.0, top=0.15)
         for log in logs:
             eta = np.where(log.motion.valid[:, None], log.motion.eta, np.nan)
             step = max(1, len(eta) // 2000)
