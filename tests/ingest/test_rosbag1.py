@@ -381,6 +381,21 @@ def test_a_definition_that_cannot_be_parsed_is_told_and_refused(tmp_path: Path) 
     assert len(reader.read({"/force": []})["/force"].receive_ns) == 2
 
 
+def test_two_definitions_of_one_inner_type_stay_apart(tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    writer = Writer(path)
+    writer.open()
+    for name, inner, data in (("A", "uint8 level", b"\5"), ("B", "uint16 level\nuint8 extra", b"\6\1\0")):
+        store = get_typestore(Stores.ROS1_NOETIC)
+        store.register(get_types_from_msg("Mode mode\n", f"ferry_msgs/msg/{name}"))
+        store.register(get_types_from_msg(inner + "\n", "ferry_msgs/msg/Mode"))
+        writer.write(writer.add_connection(f"/{name}", f"ferry_msgs/msg/{name}", typestore=store), START, data)
+    writer.close()
+    series = open_log(path).read({"/A": ["mode.level"], "/B": ["mode.level"]})
+    assert series["/A"].columns["mode.level"].tolist() == [5]
+    assert series["/B"].columns["mode.level"].tolist() == [262]
+
+
 @pytest.mark.parametrize(
     ("content", "says"),
     [

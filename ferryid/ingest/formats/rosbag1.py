@@ -92,6 +92,8 @@ class Rosbag1Reader:
         self._by_topic: dict[str, list[Connection]] = {}
         for connection in connections:
             self._by_topic.setdefault(connection.topic, []).append(connection)
+        # Shared, because rosbags compiles code for every type that a store holds.
+        self._store = get_typestore(Stores.EMPTY)
         self._definitions: dict[tuple[str, str], Mapping[str, Any]] = {}
         self.topics: tuple[Topic, ...] = tuple(self._topic(name) for name in sorted(self._by_topic))
         self.losses: tuple[Loss, ...] = tuple(self._opening)
@@ -255,14 +257,7 @@ class Rosbag1Reader:
                 f"{file}: topic {name} cannot be read, found it recorded with different types or definitions "
                 f"({topic.type}). Fix: record the publishers under topics of their own"
             )
-        store = get_typestore(Stores.EMPTY)
-        try:
-            store.register(dict(self._parsed(connection)))
-        except (TypesysError, KeyError, SyntaxError) as error:
-            raise FerryIdError(
-                f"{file}: topic {name} cannot be decoded, found a definition of {topic.type} that is no valid message "
-                f"({str(error).splitlines()[0]}). Fix: correct the message file and record again"
-            ) from error
+        store = self._registered(connection, topic)
         if topic.type not in store.fielddefs:
             raise FerryIdError(
                 f"{file}: topic {name} cannot be decoded, found no readable definition of {topic.type}. "
@@ -272,6 +267,23 @@ class Rosbag1Reader:
             what = f"the definition of {topic.type} does not match its checksum: values of {name} may be misread"
             losses.append(Loss(str(file), what, name, 0))
         return decoder_for("ros1", store, topic.type, name, paths, topic.count, where=str(file))
+
+    def _registered(self, connection: Connection, topic: Topic) -> Any:
+        """Return a typestore with a connection's definitions: the shared one, unless another's differ from them."""
+        definitions = dict(self._parsed(connection))
+        try:
+            try:
+                self._store.register(definitions)
+                return self._store
+            except TypesysError:
+                store = get_typestore(Stores.EMPTY)
+                store.register(definitions)
+                return store
+        except (TypesysError, KeyError, SyntaxError) as error:
+            raise FerryIdError(
+                f"{self.paths[0]}: topic {topic.name} cannot be decoded, found a definition of {topic.type} that is no "
+                f"valid message ({str(error).splitlines()[0]}). Fix: correct the message file and record again"
+            ) from error
 
     def _decompressed(self, chunks: Sequence[Chunk], verify: bool) -> Iterator[tuple[Any, str]]:
         """Yield what each chunk holds, and what is wrong with it."""
