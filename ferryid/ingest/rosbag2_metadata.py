@@ -58,7 +58,7 @@ class Metadata:
 def read_metadata(path: Path) -> Metadata | str:
     """Read a metadata.yaml, or return what is wrong with it as the end of a sentence."""
     try:
-        document = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8", errors="replace"))
+        document = YAML(typ="safe").load(path.read_text(encoding="utf-8", errors="replace"))
     except (YAMLError, ValueError) as error:
         return f"is no YAML ({' '.join(str(error).split())[:120]})"
     try:
