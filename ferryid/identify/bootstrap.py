@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, Rows, gram
 from ferryid.identify.qr import standard_deviations
-from ferryid.identify.simpls import extract, group_outputs, simpls
+from ferryid.identify.recurrence import extract
+from ferryid.identify.simpls import group_outputs, simpls
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

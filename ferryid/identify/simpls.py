@@ -3,15 +3,12 @@
 The rows enter only through their cross-products, or through the triangle of their QR factorisation. The centred,
 scaled basis is first turned into its principal axes, where X'X is diagonal: SIMPLS does not depend on such a rotation,
 directions without any variance drop out (so that dependent columns get the minimum-norm solution), and products of
-small numbers keep their digits. De Jong's recurrence is then followed literally, with one step added: each weight
-vector is orthogonalised again in the metric of X'X, ``r -= R (P'r)`` - the same as ``t -= T (T't)`` on the scores,
-because ``P = X'T`` and ``T = X R``. Without it the scores lose their orthogonality, and the coefficients their digits,
-component by component.
+small numbers keep their digits. The recurrence itself stands in `ferryid.identify.recurrence`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
@@ -23,13 +20,11 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.identify.cross_products import CrossProducts
 from ferryid.identify.qr import QrFactor, standard_deviations
+from ferryid.identify.recurrence import extract
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Source = TypeVar("Source", CrossProducts, QrFactor)
-
-EXHAUSTED = 1e-15
-"""Stop when the deflated covariance S has fallen to this part of its first norm: what is left is rounding noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,64 +268,6 @@ def _assemble(
     )
 
 
-def extract(
-    gram: Callable[[Floats], Floats], S: Floats, components: int
-) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
-    """De Jong's recurrence for B problems side by side.
-
-    Parameters
-    ----------
-    gram
-        Returns ``X'X r`` for r of shape (B, k).
-    S
-        Covariance ``X'Y``, shape (B, k, g).
-    components
-        A.
-
-    Returns
-    -------
-    tuple
-        R (B, k, A), P (B, k, A), Q (B, g, A) and the number of components found, shape (B,); the rest is zero.
-    """
-    B, k, g = S.shape
-    R, P, V = np.zeros((B, components, k)), np.zeros((B, components, k)), np.zeros((B, components, k))
-    Q = np.zeros((B, components, g))
-    found = np.zeros(B, dtype=np.int64)
-    first = S
-    norm = np.sqrt(np.einsum("bkg,bkg->b", S, S))
-    alive = norm > 0.0
-    for a in range(min(components, k) if g else 0):
-        alive = alive & (np.sqrt(np.einsum("bkg,bkg->b", S, S)) > EXHAUSTED * norm)
-        if not alive.any():
-            break
-        r = _times(S, dominant(S.transpose(0, 2, 1) @ S))
-        if a:
-            # Scores orthogonal to the earlier ones: t - T (T't) = X (r - R (P'r)).
-            r -= _combine(R[:, :a], _times(P[:, :a], r))
-        p = gram(r)
-        length = np.sqrt(np.maximum(np.einsum("bk,bk->b", r, p), 0.0))
-        alive = alive & (length > 0.0)
-        norm_t = np.where(alive, length, np.inf)[:, None]
-        r, p = r / norm_t, p / norm_t
-        v = p.copy()
-        for _ in range(2 if a else 0):
-            v -= _combine(V[:, :a], _times(V[:, :a], v))
-        length = np.sqrt(np.einsum("bk,bk->b", v, v))
-        v /= np.where(length > 0.0, length, np.inf)[:, None]
-        S = S - v[:, :, None] * (v[:, None, :] @ S)
-        R[:, a], P[:, a], V[:, a] = r, p, v
-        Q[:, a] = (r[:, None, :] @ first)[:, 0]
-        found += alive
-    return R.transpose(0, 2, 1), P.transpose(0, 2, 1), Q.transpose(0, 2, 1), found
-
-
-def dominant(M: Floats) -> Floats:
-    """Unit eigenvector of the largest eigenvalue of each symmetric matrix, (B, g, g) to (B, g)."""
-    if M.shape[-1] == 1:
-        return np.ones(M.shape[:-1])
-    return np.asarray(np.linalg.eigh(M)[1][:, :, -1])
-
-
 def group_outputs(allowed: Flags | None, K: int, m: int) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Return (columns, outputs) of the outputs that may use the same columns."""
     if allowed is None:
@@ -408,11 +345,3 @@ def one_standard_error(mse: Floats, standard_error: Floats) -> int:
     band = (standard_error / unit).mean(axis=1)
     lowest = int(np.argmin(curve))
     return int(np.argmax(curve <= curve[lowest] + band[lowest])) + 1
-
-
-def _times(matrix: Floats, vector: Floats) -> Floats:
-    return np.asarray((matrix @ vector[:, :, None])[:, :, 0])
-
-
-def _combine(rows: Floats, weights: Floats) -> Floats:
-    return np.asarray((weights[:, None, :] @ rows)[:, 0])

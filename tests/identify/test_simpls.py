@@ -13,6 +13,7 @@ from sklearn.cross_decomposition import PLSRegression
 from ferryid.errors import FerryIdError
 from ferryid.identify.cross_products import CrossProducts
 from ferryid.identify.qr import QrFactor
+from ferryid.identify.recurrence import dominant
 from ferryid.identify.simpls import (
     Simpls,
     one_standard_error,
@@ -405,3 +406,20 @@ def test_the_same_rows_give_the_same_bits() -> None:
     X, Y = conditioned(300, 8, 3, 30.0)
     one, two = (simpls(CrossProducts.from_rows(X, Y), 8) for _ in range(2))
     np.testing.assert_array_equal(one.coefficients, two.coefficients)
+
+
+@pytest.mark.parametrize("kind", ["any", "rank one", "near tie", "diagonal", "nothing", "tiny", "huge"])
+def test_dominant_eigenvectors_of_many_matrices(kind: str) -> None:
+    A = np.random.default_rng(0).standard_normal((200, 21, 3))
+    if kind == "rank one":
+        A = A[:, :, :1] * A[:, :1, :]
+    if kind == "near tie":
+        A = np.linalg.qr(A)[0] * [1.0, 1.0 - 1e-5, 0.3]
+    if kind == "diagonal":
+        A[:] = 0.0
+        A[:, [0, 1, 2], [0, 1, 2]] = [2.0, 1.0, 3.0]
+    A = A * {"nothing": 0.0, "tiny": 1e-70, "huge": 1e70}.get(kind, 1.0)
+    M = A.transpose(0, 2, 1) @ A
+    got, want = dominant(M), np.linalg.eigh(M)[1][:, :, -1]
+    np.testing.assert_allclose(np.linalg.norm(got, axis=1), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(got * np.sign(np.sum(got * want, axis=1, keepdims=True)), want, atol=1e-10)
