@@ -15,18 +15,18 @@ File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name
 
 @app.command()
 def check(file: File, json: Json = None) -> None:
-    """Explain every fault of a profile with its line."""
+    """Explain every fault of a profile with its line; warnings alone do not fail it."""
     from ferryid.vessel import check_profile
 
     faults = check_profile(file)
     result = {
         "schema": "ferryid.vessel-check/1",
         "file": file,
-        "faults": [{"line": fault.line, "message": fault.message} for fault in faults],
+        "faults": [{"line": fault.line, "message": fault.message, "warning": fault.warning} for fault in faults],
     }
-    lines = [f"{file}:{fault.line}: {fault.message}" for fault in faults]
+    lines = [f"{file}:{fault.line}: {'warning: ' if fault.warning else ''}{fault.message}" for fault in faults]
     emit(result, "\n".join(lines) if lines else f"{file}: no faults", json)
-    if faults:
+    if any(not fault.warning for fault in faults):
         raise typer.Exit(2)
 
 

@@ -24,7 +24,7 @@ from ferryid.identify.inertia import effective_mass, reason, unbelievable, unfor
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.qr import QrFactor, factorise
 from ferryid.identify.residual import residual
-from ferryid.identify.result import ComponentCurve, Excitation, FitResult, LogFit
+from ferryid.identify.result import ComponentCurve, Excitation, FitResult, FreeRun, LogFit
 from ferryid.identify.scores import force_scores, usable
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.simpls import Simpls, one_standard_error, simpls, sse, sweep_components
@@ -153,7 +153,12 @@ def fit(
         accepted=verdict.accepted,
     )
     curve = _curve(model_fit, training, validation, scores, chosen)
-    warnings = (*held, *_warnings(settings, parts, known, prepared, motions), *spread.notes)
+    warnings = (
+        *held,
+        *_warnings(settings, parts, known, prepared, motions),
+        *_drift(free_base, free_new),
+        *spread.notes,
+    )
     return FitResult(model, verdict, tuple(fitted), curve, known, free_base, free_new, warnings)
 
 
@@ -355,4 +360,24 @@ def _warnings(
     for one in prepared:
         if one.recording.losses:
             warnings.append(f"{one.recording.name}: parts of the log could not be read; see data quality.")
+    return tuple(warnings)
+
+
+def _drift(base: FreeRun, new: FreeRun) -> tuple[str, ...]:
+    """Say where the new model runs free worse than the base model, which its force error does not show."""
+    if base.starts and not new.starts:
+        return (f"The new model cannot be run free: {new.note}.",)
+    warnings = []
+    for name, label, unit, factor in (
+        ("position_m", "position", "m", 1.0),
+        ("heading_rad", "heading", "deg", float(np.degrees(1.0))),
+    ):
+        before, after = getattr(base, name), getattr(new, name)
+        worse = np.flatnonzero(after > 1.05 * before)
+        if worse.size:
+            k = int(worse[-1])
+            warnings.append(
+                f"Run free for {new.horizons_s[k]:g} s the new model's {label} is worse than the base model's "
+                f"({after[k] * factor:.3g} against {before[k] * factor:.3g} {unit}): do not simulate with it unchecked."
+            )
     return tuple(warnings)

@@ -13,7 +13,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from ferryid.identify.result import AXES, ComponentCurve, Excitation, FreeRun, LogFit
@@ -32,6 +32,7 @@ STYLE: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.axisbelow": True,
     "grid.color": "#e4e4e4",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.1,
@@ -180,6 +181,7 @@ def components(curve: ComponentCurve) -> str:
         ax.axhline(1.0, color=BASE, linewidth=0.8)
         top = float(np.nanmax(np.concatenate([curve.validation[max(0, curve.chosen - 2) :].ravel(), [1.0]])))
         ax.set_ylim(0, min(max(1.1, 1.1 * top), 3.0))
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set_xlabel(f"number of components (chosen: {curve.chosen})")
         ax.set_ylabel("MSE over the base model's [-]")
         _legend(figure, ax, 3, "validation; training dotted")

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment
 
+from ferryid.identify.inertia import effective_mass
 from ferryid.identify.result import AXES, FitResult, LogFit
 from ferryid.report import figures
 from ferryid.report.structure import worst_and_best_minute
 from ferryid.vessel import parse_profile
+from ferryid.vessel.parse_hull import rigid_mass
 
 MAX_LOGS = 6
 """Logs whose forces are drawn; the page stays below ten megabytes and readable."""
@@ -89,6 +91,7 @@ def _context(result: FitResult) -> dict[str, Any]:
             },
         ],
         "coefficients": _coefficients(result),
+        "inertia": _inertia(result),
         "excitation_lines": _excitation_lines(result),
         "undetermined": sorted(result.excitation.undetermined.items()),
         "excitation_figure": figures.excitation(result.excitation, drawn),
@@ -170,6 +173,10 @@ def _coefficients(result: FitResult) -> list[dict[str, Any]]:
                 else (model.theta[k, j], model.low[k, j], model.high[k, j])
             )
             unit = ("N·m" if axis == "yaw" else "N") if constant else model.units[k][j]
+            if value == low == high == 0.0:
+                # Not in the structure on this axis, or not varying in this log.
+                cells.append({"value": "–", "low": "", "high": "", "unit": "", "faint": True})
+                continue
             cells.append(
                 {
                     "value": f"{value:.4g}",
@@ -181,6 +188,25 @@ def _coefficients(result: FitResult) -> list[dict[str, Any]]:
             )
         rows.append({"term": term, "cells": cells})
     return rows
+
+
+def _inertia(result: FitResult) -> list[dict[str, str]]:
+    """Return the inertias that base and new model imply, beside those of the rigid body."""
+    model = result.model
+    profile = parse_profile(model.profile_text, model.name)
+    base = effective_mass(profile, model.scale, (), np.empty((0, 3)))
+    new = effective_mass(profile, model.scale, model.terms, model.theta)
+    rigid = rigid_mass(profile.hull.mass_kg, profile.hull.x_g_m, profile.hull.inertia_z)
+    return [
+        {
+            "name": f"m{i + 1}{j + 1}",
+            "rigid": f"{rigid[i, j]:.5g}",
+            "base": f"{base[i, j]:.5g}",
+            "new": f"{new[i, j]:.5g}",
+            "unit": ("kg", "kg·m", "kg·m²")[(i == 2) + (j == 2)],
+        }
+        for i, j in ((0, 0), (1, 1), (1, 2), (2, 1), (2, 2))
+    ]
 
 
 def _excitation_lines(result: FitResult) -> list[str]:
