@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
@@ -95,6 +96,18 @@ def test_same_seed_same_bytes(trial, tmp_path, name):
         hashes.append({str(p.relative_to(tmp_path / folder)): hashlib.sha256(p.read_bytes()).digest() for p in files})
     assert hashes[0] == hashes[1]
     assert len(hashes[0]) >= 1
+
+
+def test_messages_stand_in_the_order_of_their_receipt(trial, tmp_path):
+    write_log(trial, tmp_path / "t.mcap")
+    with (tmp_path / "t.mcap").open("rb") as file:
+        times = [message.log_time for _, _, message in make_reader(file).iter_messages(log_time_order=False)]
+    assert times == sorted(times)
+    write_log(trial, tmp_path / "t")
+    with sqlite3.connect(tmp_path / "t" / "t.db3") as database:
+        times = [when for (when,) in database.execute("SELECT timestamp FROM messages ORDER BY id")]
+    database.close()
+    assert times == sorted(times)
 
 
 def test_folder_and_storage_carry_the_name_asked_for(trial, tmp_path):

@@ -11,7 +11,7 @@ import pytest
 from ferryid.errors import FerryIdError
 from ferryid.simulate import list_scenarios, load_scenario, simulate
 from ferryid.simulate.scenario import Noise, Thrusters
-from ferryid.simulate.sensors import apparent_wind
+from ferryid.simulate.sensors import Link, _times, apparent_wind
 from ferryid.simulate.trial import perturbed
 from ferryid.vessel.hull import inverse_dynamics
 from ferryid.vessel.load import load_profile
@@ -233,3 +233,33 @@ def test_a_wild_scenario_still_gives_finite_numbers():
     assert simulation.control.saturated.any()
     for values in (*vars(simulation.truth).values(), simulation.control.tau_d):
         assert np.isfinite(values).all()
+
+
+def test_imu_feels_the_acceleration_over_ground(calm):
+    """Its horizontal reading, turned to NED and averaged, is the slope of the true velocity over ground."""
+    imu, truth = stream(calm, "/imu/data"), calm.truth
+    c, s = np.cos(truth.eta[:, 2]), np.sin(truth.eta[:, 2])
+    velocity = np.column_stack((c * truth.nu[:, 0] - s * truth.nu[:, 1], s * truth.nu[:, 0] + c * truth.nu[:, 1]))
+    slope = np.gradient(velocity, truth.t, axis=0)
+    body = np.column_stack((c * slope[:, 0] + s * slope[:, 1], c * slope[:, 1] - s * slope[:, 0]))
+    for axis, expected in zip(("x", "y"), body.T, strict=True):
+        error = imu.columns[f"linear_acceleration.{axis}"] - at(calm, expected, imu.stamp_ns)
+        moved = np.abs(at(calm, truth.nu[:, 2], imu.stamp_ns)) > 0.08
+        assert moved.sum() > 500
+        assert abs(error[moved].mean()) < 0.005
+        assert np.corrcoef(error[moved], at(calm, truth.nu[:, 2] * truth.nu[:, 0], imu.stamp_ns)[moved])[0, 1] < 0.2
+
+
+def test_a_topic_never_arrives_out_of_order():
+    stamp, receive = _times(load_scenario("four-corner"), 1, "late", Link(0.0, 0.1, 0.5), np.arange(200) * 0.01)
+    assert (np.diff(stamp) > 0).all()
+    assert (np.diff(receive) >= 0).all()
+    assert (receive > stamp).all()
+
+
+def test_the_controller_uses_the_scaled_model():
+    """The reference does not depend on the model, so that the feedforward scales with delta = sigma."""
+    scenario = replace(load_scenario("twelve-corner"), duration_s=10.0)
+    one, half = (simulate(replace(scenario, delta=k, sigma=k)).control.feedforward for k in (1.0, 0.5))
+    assert np.abs(one).max() > 100.0
+    np.testing.assert_allclose(half, 0.5 * one, rtol=1e-12, atol=1e-12)
