@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
@@ -49,8 +49,9 @@ def normalized(msgtype: str) -> str:
     return msgtype if "/" in name or not name else f"{package}/msg/{name}"
 
 
+@lru_cache(maxsize=4096)
 def define(msgtype: str, recorded: RecordedText | None, digest: str, distro: str) -> Definition:
-    """Find the definition of a message type.
+    """Find the definition of a message type; remembered, for the parts of a recording define the same types.
 
     Parameters
     ----------

@@ -65,7 +65,9 @@ def fits(n: int, repeats: int) -> Iterator[Row]:
         simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
 
     yield once(f"fit, {n:,} rows", ours, "scikit-learn", lambda: PLSRegression(COMPONENTS).fit(X, Y), 80)
-    yield faster(f"fit, {n:,} rows", ours, "ikpls", lambda: ImprovedKernel().fit(X, Y, COMPONENTS), 4, repeats)
+    yield faster(
+        f"fit, {n:,} rows", ours, "ikpls", lambda: ImprovedKernel().fit(X, Y, COMPONENTS), 4, repeats
+    )
     yield faster(f"fit, {n:,} rows", ours, "bare X'X", lambda: X.T @ X, None, repeats)
     yield faster(
         f"the same by chunk-wise QR, {n // 10:,} rows",
@@ -88,7 +90,12 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
             parts = np.linspace(0, len(residual), FOLDS + 1).astype(int)
             folds = [
                 CrossProducts.of(
-                    Rows(tuple(values[low:high] for values in inputs), residual[low:high], None, function.evaluate)
+                    Rows(
+                        tuple(values[low:high] for values in inputs),
+                        residual[low:high],
+                        None,
+                        function.evaluate,
+                    )
                 )
                 for low, high in pairwise(parts)
             ]
@@ -107,7 +114,9 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
 
     def folds_of_matrix() -> None:
         parts = np.linspace(0, n, FOLDS + 1).astype(int)
-        sweep_components([CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in pairwise(parts)], MOST)
+        sweep_components(
+            [CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in pairwise(parts)], MOST
+        )
 
     yield faster(
         f"cross-validation, {FOLDS} folds × {MOST}, {n:,} rows",
@@ -145,7 +154,12 @@ def bootstraps(n: int, repeats: int) -> Iterator[Row]:
         repeats=repeats,
     )
     yield once(
-        what, ours, "scikit-learn", lambda: drawn(2, lambda x, y: PLSRegression(COMPONENTS).fit(x, y)), None, DRAWS // 2
+        what,
+        ours,
+        "scikit-learn",
+        lambda: drawn(2, lambda x, y: PLSRegression(COMPONENTS).fit(x, y)),
+        None,
+        DRAWS // 2,
     )
     blocks = [
         CrossProducts.from_rows(X[i : i + BLOCK_ROWS], Y[i : i + BLOCK_ROWS])
@@ -179,7 +193,9 @@ def fused(n: int, repeats: int) -> Row:
             for values in (nu, nu_dot, residual):
                 values.sum()
 
-    return within(f"{n:,} rows, basis and cross-products", ours, "one read of the inputs (sum)", read, 6, repeats)
+    return within(
+        f"{n:,} rows, basis and cross-products", ours, "one read of the inputs (sum)", read, 6, repeats
+    )
 
 
 def once(
@@ -245,7 +261,13 @@ def fast_cross_validation(X: Floats, Y: Floats) -> None:
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         FastCrossValidation().cross_validate(
-            X, Y, MOST, fold, lambda true, predicted: np.mean((true - predicted) ** 2, axis=1), n_jobs=1, verbose=0
+            X,
+            Y,
+            MOST,
+            fold,
+            lambda true, predicted: np.mean((true - predicted) ** 2, axis=1),
+            n_jobs=1,
+            verbose=0,
         )
 
 

@@ -35,20 +35,10 @@ class Section:
     packages: Sequence[str] = field(default=())
 
 
-def alternate(
-    ours: Callable[[], object], rival: Callable[[], object], repeats: int
-) -> tuple[float, float, list[tuple[float, float]]]:
-    """Time two things in turn.
-
-    Returns
-    -------
-    tuple
-        Medians of ours and of the rival [s], and all pairs.
-    """
-    pairs = []
-    for _ in range(repeats):
-        pairs.append((seconds(ours), seconds(rival)))
-    return statistics.median(a for a, _ in pairs), statistics.median(b for _, b in pairs), pairs
+def in_turn(works: Sequence[Callable[[], object]], repeats: int) -> list[list[float]]:
+    """Time several things in turn: for each of them one time [s] per round."""
+    rounds = [[seconds(work) for work in works] for _ in range(repeats)]
+    return [list(times) for times in zip(*rounds, strict=True)]
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -59,6 +49,15 @@ def seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
+def faster_row(
+    what: str, ours: Sequence[float], name: str, rival: Sequence[float], goal: float | None
+) -> Row:
+    """Row of how many times faster ours is, of times of the same rounds [s]: the median of their ratios."""
+    ratio = statistics.median(theirs / mine for mine, theirs in zip(ours, rival, strict=True))
+    values = duration(statistics.median(ours)), name, duration(statistics.median(rival)), ratio
+    return Row(what, *values) if goal is None else Row(what, *values, f"≥ {goal:g}", ratio >= goal)
+
+
 def faster(
     what: str,
     ours: Callable[[], object],
@@ -67,21 +66,19 @@ def faster(
     goal: float | None,
     repeats: int,
 ) -> Row:
-    """Row of how many times faster ours is: the median of the ratios of neighbouring runs."""
-    a, b, pairs = alternate(ours, rival, repeats)
-    ratio = statistics.median(theirs / mine for mine, theirs in pairs)
-    if goal is None:
-        return Row(what, duration(a), name, duration(b), ratio)
-    return Row(what, duration(a), name, duration(b), ratio, f"≥ {goal:g}", ratio >= goal)
+    """Measure how many times faster ours is."""
+    mine, theirs = in_turn((ours, rival), repeats)
+    return faster_row(what, mine, name, theirs, goal)
 
 
 def within(
     what: str, ours: Callable[[], object], name: str, limit: Callable[[], object], goal: float, repeats: int
 ) -> Row:
-    """Row of how many times as long ours takes as the least work conceivable."""
-    a, b, pairs = alternate(ours, limit, repeats)
-    ratio = statistics.median(mine / theirs for mine, theirs in pairs)
-    return Row(what, duration(a), name, duration(b), ratio, f"≤ {goal:g}", ratio <= goal)
+    """Measure how many times as long ours takes as the least work conceivable."""
+    mine, least = in_turn((ours, limit), repeats)
+    ratio = statistics.median(a / b for a, b in zip(mine, least, strict=True))
+    values = duration(statistics.median(mine)), name, duration(statistics.median(least)), ratio
+    return Row(what, *values, f"≤ {goal:g}", ratio <= goal)
 
 
 def duration(value_s: float) -> str:
