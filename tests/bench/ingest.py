@@ -291,7 +291,7 @@ def run(quick: bool, folder: Path | None = None) -> Section:
             "Odometry and Imu at 100 Hz, thruster state at 20 Hz, wind at 10 Hz. Wanted are position, velocity and yaw rate "
             "of the first, orientation of the second, thruster and wind. Written by rosbags (ROS1, db3) and mcap.",
             "Log → Parquet is reading, clocks, units and Parquet with metadata; the rival deserialises the same topics and "
-            "writes the same fields. `ferryid ingest` also hashes the log (SHA-256, in a thread beside), as its whole process does.",
+            "writes the same fields. `ferryid ingest` also hashes the log, in a thread beside; so do the whole processes.",
             f"Logs with camera hold raw 1280 x 720 pictures at {logs.CAMERA_HZ:g} Hz, {camera:g} minutes, about "
             f"{camera * 0.332:.2g} GB (the goal was set on 3.9 GB).",
         ),
