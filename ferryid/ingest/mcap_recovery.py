@@ -38,6 +38,8 @@ from ferryid.ingest.mcap_index import (
 _CANDIDATE = re.compile(rb"[\x05\x06](?=.{5}\x00{3})", re.DOTALL)
 _CHAIN = 3
 """Records behind a candidate that must look like records too."""
+_SUSPECTS = 4
+"""Messages before a damaged place whose length may have led there."""
 _DAMAGE = 0
 """Stands among the opcodes of a walk where the walk was broken."""
 
@@ -137,12 +139,17 @@ def scan(file: memoryview, name: str) -> Index:
             others += [(CHUNK, end, len(file) - end - RECORD_HEADER), (_DAMAGE, end, 0)]
         elif not finished:
             end = _end_of_sound_records(messages, others, end)
-            suspect = messages[-1] if messages and (not others or messages[-1] > others[-1][1]) else end
-            position = _next_record(file, suspect + 1, index.channels)
-            if position is not None and position < end:
-                # The length of the last message was wrong: it reached past the record found now.
-                messages.pop()
-                end = suspect
+            for suspect in messages[-_SUSPECTS:]:
+                reach = suspect + RECORD_HEADER + record_header(file, suspect)[1]
+                position = _next_record(file, suspect + 1, reach, index.channels)
+                if position is not None:
+                    # The length of that message is wrong: it reaches past the record found in it.
+                    end = suspect
+                    messages = [start for start in messages if start < end]
+                    others = [record for record in others if record[1] < end]
+                    break
+            else:
+                position = _next_record(file, end + 1, len(file), index.channels)
             others.append((_DAMAGE, end, 0))
             gaps.append((end, len(file) if position is None else position))
         offsets += messages
@@ -177,9 +184,11 @@ def _sane_chunk(file: memoryview, offset: int) -> bool:
     return True
 
 
-def _next_record(file: memoryview, start: int, channels: Container[int]) -> int | None:
-    """Return where the next chunk, or message of a known channel, begins at or behind `start`."""
+def _next_record(file: memoryview, start: int, stop: int, channels: Container[int]) -> int | None:
+    """Return where the first chunk, or message of a known channel, begins between `start` and `stop`."""
     for match in _CANDIDATE.finditer(file, start):
+        if match.start() >= stop:
+            return None
         position = match.start()
         if len(file) - position < MESSAGE_HEADER:
             return None

@@ -296,7 +296,10 @@ def test_a_flipped_byte_outside_chunks_costs_one_message(data: st.DataObject) ->
         got, whole = Counter(values(log, topic, verify=True)), Counter(expected(samples, topic))
         wrong += sum((whole - got).values())
         assert log.losses
-    assert wrong <= 2
+    begins = [content.index(record_bytes(sample, number)) for number, sample in enumerate(samples)]
+    within = place - max(begin for begin in begins if begin <= place)
+    # A wrong length may by chance lead to the start of a later record, over whole messages; all else costs one.
+    assert wrong <= 1 or 1 <= within <= 8
 
 
 def image_log(compression: CompressionType) -> tuple[list[Sample], bytes]:
@@ -380,6 +383,82 @@ def test_a_damaged_message_index_is_replaced_by_a_walk() -> None:
     (loss,) = log.losses
     assert loss.messages == 0
     assert "walked" in loss.what
+
+
+def test_an_index_in_order_of_time_gives_the_order_of_the_file() -> None:
+    samples, content = plain_log(chunk_size=1500)
+    summary = make_reader(io.BytesIO(content)).get_summary()
+    assert summary is not None
+    swapped = bytearray(content)
+    first = summary.chunk_indexes[0].message_index_offsets[1] + 15
+    swapped[first : first + 32] = content[first + 16 : first + 32] + content[first : first + 16]
+    log = opened(bytes(swapped))
+    assert values(log, "/point") == expected(samples, "/point")
+    assert log.losses == ()
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_a_file_cut_between_the_message_indexes_of_a_chunk(compression: CompressionType) -> None:
+    samples, content = plain_log(chunk_size=1500, compression=compression)
+    summary = make_reader(io.BytesIO(content)).get_summary()
+    assert summary is not None
+    chunk = summary.chunk_indexes[1]
+    places = sorted(chunk.message_index_offsets.values())
+    assert len(places) == 2
+    complete = in_whole_chunks(content, places[1])
+    for cut in (places[0], places[1], places[1] + 5):
+        log = opened(content[:cut])
+        for topic in PATHS:
+            assert values(log, topic) == expected(samples, topic)[: complete[topic]]
+        assert "without its end record" in said(log)
+
+
+def test_a_wrong_time_in_a_message_without_checksum_is_told() -> None:
+    samples, content = plain_log(enable_crcs=False)
+    damaged = bytearray(content)
+    damaged[content.index(record_bytes(samples[4], 4)) + 15] ^= 1
+    log = opened(bytes(damaged))
+    assert len(values(log, "/point")) == len(expected(samples, "/point"))
+    assert "disagree" in said(log)
+
+
+def test_a_wrong_length_outside_chunks_costs_its_message_only() -> None:
+    samples, content = plain_log(use_chunking=False)
+    damaged = bytearray(content)
+    damaged[content.index(record_bytes(samples[4], 4)) + 1] ^= 0x40
+    log = opened(bytes(damaged))
+    assert values(log, "/point") == [
+        value for value in expected(samples, "/point") if value != samples[4].value
+    ]
+    assert values(log, "/number") == expected(samples, "/number")
+    told = [loss for loss in log.losses if "damaged bytes" in loss.what]
+    assert [(loss.start_ns, loss.end_ns) for loss in told] == [(samples[3].time_ns, samples[5].time_ns)]
+
+
+def test_definitions_in_a_damaged_summary_are_not_believed() -> None:
+    samples, content = plain_log(compression=CompressionType.ZSTD)
+    place = content.rindex(b"geometry_msgs/Point\nfloat64 x")
+    damaged = content[:place] + b"f" + content[place + 1 :]
+    log = opened(damaged)
+    assert values(log, "/point") == expected(samples, "/point")
+    (loss,) = log.losses
+    assert loss.messages == 0
+    assert "summary is wrong" in loss.what
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_small_chunks_are_always_checked(compression: CompressionType) -> None:
+    samples = [Sample("/number", T0, 1.0), Sample("/image", T0 + 1, 20_000.0)]
+    content = written(samples, compression=compression)
+    summary = make_reader(io.BytesIO(content)).get_summary()
+    assert summary is not None
+    damaged = bytearray(content)
+    (chunk,) = summary.chunk_indexes
+    damaged[chunk.chunk_start_offset + chunk.chunk_length - 100] ^= 1
+    log = opened(bytes(damaged))
+    assert values(log, "/number") == []
+    (loss,) = log.losses
+    assert (loss.topic, loss.messages) == ("/number", 1)
 
 
 def test_statistics_that_count_more_than_the_file_holds() -> None:
