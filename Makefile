@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test demo bench real fixtures wheel-check lint clean
+.PHONY: test demo picture bench real fixtures wheel-check lint clean
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .
@@ -15,6 +15,11 @@ test: $(VENV)/installed
 demo: $(VENV)/installed
 	$(BIN)/ferryid simulate twelve-corner --out $(DEMO)/twelve-corner.mcap --overwrite
 	$(BIN)/ferryid fit $(DEMO)/twelve-corner.mcap --vessel milliampere --delta 0.4 --sigma 0.4 --out $(DEMO)
+
+# The picture in the README.
+picture: demo
+	mkdir -p reports/demo
+	cp $(DEMO)/reports/milliampere-v1/forces-twelve-corner-worst-minute.svg reports/demo/forces.svg
 
 bench: $(VENV)/installed $(VENV)/bench-installed
 	$(BIN)/python -m tests.bench

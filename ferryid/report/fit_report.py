@@ -70,11 +70,13 @@ def fit_and_report(
     progress("writing the report")
     result = replace(result, model=numbered(result.model, out))
     folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
-    page = render(result)
+    page, drawings = render(result)
     # The model is stored last but one: whoever interrupts before finds neither a model without a report nor a rest.
     with replacing(folder) as temporary:
         temporary.mkdir()
         (temporary / "report.html").write_text(page, encoding="utf-8")
+        for file, drawing in drawings.items():
+            (temporary / f"{file}.svg").write_text(drawing, encoding="utf-8")
         stored = save(result.model, out)
         plain = as_json(result, stored, folder / "report.html")
         (temporary / "fit.json").write_text(dump_json(plain), encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from typing import Any
 
@@ -22,11 +22,25 @@ MAX_LOGS = 6
 RANGE_UNITS = {"u": "m/s", "v": "m/s", "r": "rad/s", "u_dot": "m/s²", "v_dot": "m/s²", "r_dot": "rad/s²", "U": "m/s"}
 
 
-def render(result: FitResult) -> str:
-    """Return the report of a fit as HTML; the drawings are inside."""
+def render(result: FitResult) -> tuple[str, dict[str, str]]:
+    """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name."""
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     source = files("ferryid.report").joinpath("templates", "fit.html").read_text(encoding="utf-8")
-    return environment.from_string(source).render(_context(result))
+    context = _context(result)
+    return environment.from_string(source).render(context), dict(_drawings(context))
+
+
+def _drawings(part: Any) -> Iterator[tuple[str, str]]:
+    """Yield name and drawing of every figure of a context."""
+    if isinstance(part, dict):
+        if "svg" in part:
+            yield part["file"], part["svg"]
+        else:
+            for value in part.values():
+                yield from _drawings(value)
+    elif isinstance(part, list):
+        for value in part:
+            yield from _drawings(value)
 
 
 def headline(result: FitResult) -> str:
@@ -68,11 +82,13 @@ def _context(result: FitResult) -> dict[str, Any]:
         "free_run_figures": _free_run_figures(result),
         "residual_figures": [
             {
+                "file": "residual-spectrum",
                 "svg": figures.residual_spectrum(drawn),
                 "caption": "Power spectral density of measured minus estimated force. A peak at some tenths of a hertz "
                 "is mostly waves; what stays at the lowest frequencies is wind, current or a wrong model.",
             },
             {
+                "file": "residual-autocorrelation",
                 "svg": figures.residual_autocorrelation(drawn),
                 "caption": "Autocorrelation of the same residual. White noise would stay inside the dashed band; a slow "
                 "decay says that something with a memory was left out, and that neighbouring samples are no independent "
@@ -81,10 +97,12 @@ def _context(result: FitResult) -> dict[str, Any]:
         ],
         "model_figures": [
             {
+                "file": "components",
                 "svg": figures.components(result.curve),
                 "caption": "Force error over the base model's (orange line at 1) against the number of SIMPLS components.",
             },
             {
+                "file": "coefficients",
                 "svg": figures.coefficient_intervals(model.terms, model.theta, model.low, model.high),
                 "caption": "Coefficients of the correction, each over half the width of its own 95 % block-bootstrap "
                 "interval. Grey ones are not told apart from zero.",
@@ -94,8 +112,20 @@ def _context(result: FitResult) -> dict[str, Any]:
         "inertia": _inertia(result),
         "excitation_lines": _excitation_lines(result),
         "undetermined": sorted(result.excitation.undetermined.items()),
-        "excitation_figure": figures.excitation(result.excitation, drawn),
-        "track_figure": figures.track(result.logs),
+        "excitation_figures": [
+            {
+                "file": "excitation",
+                "svg": figures.excitation(result.excitation, drawn),
+                "caption": "Top left: singular values of the standardised basis; a value near zero is a combination of "
+                "terms that this trial cannot tell apart. The rest: velocities in the training rows, each pair against "
+                "the other; a model is only as good as the cloud it saw.",
+            },
+            {
+                "file": "track",
+                "svg": figures.track(result.logs),
+                "caption": "Where the vessel went. Gaps are stretches without data.",
+            },
+        ],
         "ranges": [
             {"name": name, "low": f"{low:.4g}", "high": f"{high:.4g}", "unit": RANGE_UNITS.get(name, "")}
             for name, (low, high) in model.ranges.items()
@@ -122,6 +152,7 @@ def _score_rows(scores: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _force_figures(log: LogFit) -> list[dict[str, str]]:
     shown = [
         {
+            "file": f"forces-{log.motion.log}",
             "svg": figures.forces(log),
             "caption": "Applied force as measured at the actuators, and as each model estimates it from the motion. "
             "Shaded: validation, which the new model did not see.",
@@ -132,6 +163,7 @@ def _force_figures(log: LogFit) -> list[dict[str, str]]:
         for start, word in zip(minutes, ("worst", "best"), strict=True):
             shown.append(
                 {
+                    "file": f"forces-{log.motion.log}-{word}-minute",
                     "svg": figures.forces(log, start, start + 60.0),
                     "caption": f"The {word} minute of the new model, from {start:.0f} s.",
                 }
@@ -145,6 +177,7 @@ def _free_run_figures(result: FitResult) -> list[dict[str, str]]:
     if base.starts or new.starts:
         shown.append(
             {
+                "file": "free-run-errors",
                 "svg": figures.free_run_errors(base, new),
                 "caption": f"Root-mean-square error of {max(base.starts, new.starts)} runs on validation rows: each takes "
                 "the measured state once and then only the measured actuator forces.",
@@ -153,6 +186,7 @@ def _free_run_figures(result: FitResult) -> list[dict[str, str]]:
     if base.example or new.example:
         shown.append(
             {
+                "file": "free-run",
                 "svg": figures.free_run_example(base, new),
                 "caption": "One of these runs, over the longest stretch there is.",
             }
