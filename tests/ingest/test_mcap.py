@@ -422,10 +422,11 @@ def test_a_wrong_time_in_a_message_without_checksum_is_told() -> None:
     assert "disagree" in said(log)
 
 
-def test_a_wrong_length_outside_chunks_costs_its_message_only() -> None:
+@pytest.mark.parametrize("change", [-30, -1, 1, 30, 100])
+def test_a_wrong_length_outside_chunks_costs_its_message_only(change: int) -> None:
     samples, content = plain_log(use_chunking=False)
     damaged = bytearray(content)
-    damaged[content.index(record_bytes(samples[4], 4)) + 1] ^= 0x40
+    damaged[content.index(record_bytes(samples[4], 4)) + 1] += change
     log = opened(bytes(damaged))
     assert values(log, "/point") == [
         value for value in expected(samples, "/point") if value != samples[4].value
