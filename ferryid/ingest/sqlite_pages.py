@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -164,6 +165,30 @@ def runs(numbers: Integers, page_size: int) -> Iterator[tuple[int, int]]:
             last = first + int(np.searchsorted(numbers[first:end], limit))
             yield first, last
             first = last
+
+
+def read_runs(pages: Pages, numbers: Integers) -> Iterator[tuple[int, int, Bytes, int]]:
+    """Read pages run by run, each while the caller still works on the one before.
+
+    Yields
+    ------
+    tuple
+        The run as [first, last) of `numbers`; a buffer that holds it, followed by a margin, until the next is asked for;
+        and where in the file the buffer begins.
+    """
+    buffers = [np.zeros(max(RUN_BYTES, pages.size) + MARGIN, np.uint8) for _ in range(2)]
+    spans = []
+    for first, last in runs(numbers, pages.size):
+        start = (int(numbers[first]) - 1) * pages.size
+        spans.append((first, last, start, int(numbers[last - 1]) * pages.size - start))
+    with ThreadPoolExecutor(1) as pool:
+        reading = [pool.submit(pages.fill, buffers[0], *span[2:]) for span in spans[:1]]
+        for k, (first, last, start, _) in enumerate(spans):
+            reading.pop().result()
+            reading += [
+                pool.submit(pages.fill, buffers[(k + 1) % 2], *span[2:]) for span in spans[k + 1 : k + 2]
+            ]
+            yield first, last, buffers[k % 2], start
 
 
 def words(buffer: Bytes, at: Integers) -> Integers:
@@ -365,10 +390,7 @@ def find_rows(pages: Pages, root: int, topics: set[int]) -> tuple[Rows, list[Dam
 def _visit(pages: Pages, numbers: Integers, rows: _Table) -> Integers:
     """Add the rows of leaf pages to `rows`; return what `read_rows` says of each page."""
     bad = np.zeros(numbers.size, np.int64)
-    buffer = np.zeros(max(RUN_BYTES, pages.size) + MARGIN, np.uint8)
-    for first, last in runs(numbers, pages.size):
-        start = (int(numbers[first]) - 1) * pages.size
-        pages.fill(buffer, start, int(numbers[last - 1]) * pages.size - start)
+    for first, last, buffer, start in read_runs(pages, numbers):
         part, bad[first:last] = read_rows(
             pages, buffer, (numbers[first:last] - 1) * pages.size - start, start
         )

@@ -191,6 +191,20 @@ def test_messages_larger_than_a_page_keep_their_order(tmp_path: Path) -> None:
     assert (topics["/point"].start_ns, topics["/point"].end_ns) == (START, START + 490_000_000)
 
 
+def test_an_empty_message_at_the_end_of_the_file_is_a_corrupt_one(tmp_path: Path) -> None:
+    """SQLite fills a page from its end: the first row's data, of no bytes, stand behind the file's last byte."""
+    path = database(tmp_path / "log.db3", points(0, 10))
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("DROP TABLE messages")
+        connection.execute("VACUUM")
+        connection.executescript(SCHEMA[SCHEMA.index("CREATE TABLE messages") : SCHEMA.index("CREATE INDEX")])
+        insert(connection, [(1, START, b""), *points(0, 5)])
+    assert root_page(path) == path.stat().st_size // 4096
+    log = open_log(path)
+    assert xs(log) == list(range(5))
+    assert lost_messages(log) == 1
+
+
 # Damage
 
 

@@ -18,12 +18,11 @@ from ferryid.ingest.ros2_types import Definition, RecordedText, define, normaliz
 from ferryid.ingest.sqlite_pages import (
     LAST_ROWID,
     MAGIC,
-    RUN_BYTES,
     Damage,
     Pages,
     Rows,
     find_rows,
-    runs,
+    read_runs,
 )
 from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file, working_folder
 
@@ -306,19 +305,18 @@ class Sqlite3Log:
             rows = rows.take(np.isin(rows.topic_id, sorted(ids)))
         dropped = dict.fromkeys(decoders, 0)
         with Pages(self._file) as pages:
-            buffer = np.zeros(max(RUN_BYTES, pages.size), np.uint8)
-            numbers = rows.start // pages.size
-            for first, last in runs(numbers, pages.size):
+            # A message never begins its page, though an empty one may stand behind its last byte.
+            numbers = (rows.start - 1) // pages.size + 1
+            for first, last, buffer, base in read_runs(pages, numbers):
                 part = rows.take(slice(first, last))
-                base = int(numbers[first]) * pages.size
-                span = (int(numbers[last - 1]) + 1) * pages.size - base
-                pages.fill(buffer, base, span)
+                one_by_one = self._storage.codec or (part.local < part.size).any()
                 for number, name in ids.items():
-                    mine = part.take(part.topic_id == number)
-                    if self._storage.codec or (mine.local < mine.size).any():
-                        dropped[name] += self._add_one_by_one(pages, mine, decoders[name])
+                    mine = np.flatnonzero(part.topic_id == number)
+                    if one_by_one:
+                        dropped[name] += self._add_one_by_one(pages, part.take(mine), decoders[name])
                     else:
-                        decoders[name].add(buffer[:span], mine.start - base, mine.size, mine.time_ns)
+                        starts = part.start[mine] - base
+                        decoders[name].add(buffer, starts, part.size[mine], part.time_ns[mine])
         return dropped
 
     def _add_one_by_one(self, pages: Pages, rows: Rows, decoder: Decoder) -> int:
