@@ -167,14 +167,19 @@ class Rows:
     mask
         Rows to use, shape (n,); None: all.
     evaluate
-        ``evaluate(*inputs)`` returns the basis (rows, K) for a slice of the inputs. Fastest when that is the transpose
-        of an array with one basis term a row.
+        ``evaluate(*inputs)`` returns the basis (rows, K) for a slice of the inputs.
+    fill
+        ``fill(out, *inputs)`` writes the basis into `out` (K, rows) instead: the fastest way, nothing is copied.
+    terms
+        K, needed with `fill`.
     """
 
     inputs: tuple[Floats | None, ...]
     Y: Floats
     mask: Flags | None = None
     evaluate: Evaluate | None = None
+    fill: Callable[..., None] | None = None
+    terms: int = 0
 
     @classmethod
     def of(cls, X: Floats, Y: Floats, mask: Flags | None = None, where: str = "fit") -> Rows:
@@ -195,13 +200,20 @@ class Rows:
             )
         return cls((X,), Y, mask)
 
-    def chunk(self, low: int, high: int) -> tuple[Floats, Floats]:
-        """Return basis (rows, K) and outputs (rows, m) of the rows in use from `low` up to `high`."""
+    def chunk(self, low: int, high: int, buffer: Floats | None = None) -> tuple[Floats, Floats]:
+        """Return basis (rows, K) and outputs (rows, m) of the rows in use from `low` up to `high`.
+
+        With `fill` the basis is a part of `buffer` (K, at least as many rows), where that is given.
+        """
         pieces = [None if values is None else values[low:high] for values in self.inputs]
         outputs = self.Y[low:high]
         if self.mask is not None and not (keep := self.mask[low:high]).all():
             pieces = [None if piece is None else piece[keep] for piece in pieces]
             outputs = outputs[keep]
+        if self.fill is not None:
+            out = np.empty((self.terms, len(outputs))) if buffer is None else buffer[:, : len(outputs)]
+            self.fill(out, *pieces)
+            return out.T, outputs
         if self.evaluate is not None:
             return self.evaluate(*pieces), outputs
         assert pieces[0] is not None
@@ -278,16 +290,16 @@ class Accumulator:
     def _segment(self, rows: Rows, shift: Floats, start: int, stop: int) -> tuple[int, Floats]:
         K, width = self._K, self._K + self._m + 1
         products = np.zeros((width, width))
-        scratch: Floats | None = None
+        flat = np.empty(width * min(CHUNK_ROWS, stop - start))
+        # Row-major [bases; outputs; ones] when the basis comes that way, else rows as they lie.
+        scratch = flat.reshape(width, -1).T
+        if rows.fill is None:
+            X, _ = rows.chunk(start, min(start + 2, stop))
+            scratch = scratch if X.strides[0] < X.strides[1] else flat.reshape(-1, width)
+        scratch[:, -1] = 1.0
         count = 0
         for low in range(start, stop, CHUNK_ROWS):
-            X, Y = rows.chunk(low, min(low + CHUNK_ROWS, stop))
-            if scratch is None:
-                # Row-major [bases; outputs; ones] when the basis comes that way, else rows as they lie.
-                flat = np.empty(width * min(CHUNK_ROWS, stop - start))
-                by_term = X.strides[0] < X.strides[1]
-                scratch = flat.reshape(width, -1).T if by_term else flat.reshape(-1, width)
-                scratch[:, -1] = 1.0
+            X, Y = rows.chunk(low, min(low + CHUNK_ROWS, stop), scratch.T[:K])
             filled = scratch[: len(Y)]
             with np.errstate(all="ignore"):
                 np.subtract(X, shift[:K], out=filled[:, :K])

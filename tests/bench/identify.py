@@ -65,9 +65,7 @@ def fits(n: int, repeats: int) -> Iterator[Row]:
         simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
 
     yield once(f"fit, {n:,} rows", ours, "scikit-learn", lambda: PLSRegression(COMPONENTS).fit(X, Y), 80)
-    yield faster(
-        f"fit, {n:,} rows", ours, "ikpls", lambda: ImprovedKernel().fit(X, Y, COMPONENTS), 4, repeats
-    )
+    yield faster(f"fit, {n:,} rows", ours, "ikpls", lambda: ImprovedKernel().fit(X, Y, COMPONENTS), 4, repeats)
     yield faster(f"fit, {n:,} rows", ours, "bare X'X", lambda: X.T @ X, None, repeats)
     yield faster(
         f"the same by chunk-wise QR, {n // 10:,} rows",
@@ -89,14 +87,7 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
             inputs, residual = prepared(nu, tau, window_s)
             parts = np.linspace(0, len(residual), FOLDS + 1).astype(int)
             folds = [
-                CrossProducts.of(
-                    Rows(
-                        tuple(values[low:high] for values in inputs),
-                        residual[low:high],
-                        None,
-                        function.evaluate,
-                    )
-                )
+                CrossProducts.of(of_motion(tuple(values[low:high] for values in inputs), residual[low:high], function))
                 for low, high in pairwise(parts)
             ]
             sweep_components(folds, MOST)
@@ -114,9 +105,7 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
 
     def folds_of_matrix() -> None:
         parts = np.linspace(0, n, FOLDS + 1).astype(int)
-        sweep_components(
-            [CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in pairwise(parts)], MOST
-        )
+        sweep_components([CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in pairwise(parts)], MOST)
 
     yield faster(
         f"cross-validation, {FOLDS} folds × {MOST}, {n:,} rows",
@@ -183,7 +172,7 @@ def fused(n: int, repeats: int) -> Row:
     random = np.random.default_rng(0)
     nu, nu_dot, residual = (random.standard_normal((part, 3)) for _ in range(3))
     function = basis("thesis")
-    rows = Rows((nu, nu_dot), residual, None, function.evaluate)
+    rows = of_motion((nu, nu_dot), residual, function)
 
     def ours() -> None:
         CrossProducts.of(*[rows] * 10)
@@ -193,9 +182,7 @@ def fused(n: int, repeats: int) -> Row:
             for values in (nu, nu_dot, residual):
                 values.sum()
 
-    return within(
-        f"{n:,} rows, basis and cross-products", ours, "one read of the inputs (sum)", read, 6, repeats
-    )
+    return within(f"{n:,} rows, basis and cross-products", ours, "one read of the inputs (sum)", read, 6, repeats)
 
 
 def once(
@@ -249,6 +236,10 @@ def prepared(nu: Floats, tau: Floats, window_s: float) -> tuple[tuple[Floats, Fl
     slope = central_difference(smooth[:, :3], RATE_HZ)
     keep = slice(rows // 2 + 1, len(nu) - rows // 2 - 1)
     return (smooth[keep, :3], slope[keep]), smooth[keep, 3:] - slope[keep] @ MASS
+
+
+def of_motion(inputs: tuple[Floats, ...], residual: Floats, function: Basis) -> Rows:
+    return Rows(inputs, residual, fill=function.fill, terms=len(function.terms))
 
 
 def matrices(nu: Floats, tau: Floats, window_s: float, function: Basis) -> tuple[Floats, Floats]:

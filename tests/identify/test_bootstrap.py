@@ -50,6 +50,10 @@ def test_every_draw_is_a_fit_to_the_rows_drawn(allowed) -> None:
     np.testing.assert_allclose(got.high, theta.max(axis=0), atol=1e-9)
     np.testing.assert_allclose(got.intercept_low, intercept.min(axis=0), rtol=1e-8)
     np.testing.assert_allclose(got.intercept_high, intercept.max(axis=0), rtol=1e-8)
+    # Hesterberg's expanded percentiles for 12 blocks: Φ(sqrt(12/11) t) with t = -2.2010 for 11 degrees, 1.0757 %.
+    usual = bootstrap(blocks, 3, draws=40, seed=7, **options)
+    np.testing.assert_allclose(usual.low, np.quantile(theta, 0.0107566, axis=0), rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(usual.high, np.quantile(theta, 1.0 - 0.0107566, axis=0), rtol=1e-4, atol=1e-6)
     for output in range(2):
         joint = np.hstack([theta[:, :, output], intercept[:, output, None]])
         np.testing.assert_allclose(got.covariance[output], np.cov(joint, rowvar=False) * 12 / 11, rtol=1e-6, atol=1e-10)

@@ -79,8 +79,13 @@ def test_chunks_layout_mask_and_evaluation_do_not_matter(kind, order: str, monke
     laid = np.asarray(X, order=order)
     whole = Rows((laid,), Y, mask)
     fused = Rows((X[:, :2], None, X[:, 2:]), Y, mask, lambda a, _, b: np.asarray(np.hstack([a, b]), order=order))
+
+    def write(out: Floats, a: Floats, _: None, b: Floats) -> None:
+        out[:2], out[2:] = a.T, b.T
+
+    filled = Rows((X[:, :2], None, X[:, 2:]), Y, mask, fill=write, terms=4)
     two = (Rows((laid[:1500],), Y[:1500], mask[:1500]), Rows((laid[1500:],), Y[1500:], mask[1500:]))
-    for parts in ((whole,), (fused,), two):
+    for parts in ((whole,), (fused,), (filled,), two):
         got = kind.of(*parts)
         assert got.n == mask.sum()
         for one, other in zip(got.moments(), want.moments(), strict=True):

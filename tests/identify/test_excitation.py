@@ -72,6 +72,19 @@ def test_an_exact_dependence_names_all_who_share_it(kind) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_a_duplicate_is_not_counted_again_in_a_dependence(kind) -> None:
+    X = independent()
+    X[:, 3], X[:, 4] = X[:, 0], X[:, 0] - 2.0 * X[:, 2]
+    found = undetermined(source(kind, X), TERMS)
+    assert found == {
+        "a": "same column as d in this log",
+        "c": "linear combination of a, e in this log",
+        "d": "same column as a in this log",
+        "e": "linear combination of a, c in this log",
+    }
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_near_dependence_is_named_above_the_limit_alone(kind) -> None:
     X = independent()
     X[:, 4] = X[:, 1] + 1e-3 * X[:, 4]
