@@ -179,3 +179,14 @@ def test_one_block_is_refused() -> None:
         bootstrap([CrossProducts.from_rows(X, Y)], 2, where="trial")
     with pytest.raises(FerryIdError, match="no rows to draw from"):
         Blocks.of([Rows.of(X[:0], Y[:0])], [10.0], 1.0)
+
+
+def test_a_term_excited_in_one_block_alone_is_as_uncertain_as_that() -> None:
+    """Draws without the block cannot tell the term: they give zero, never NaN, and the interval reaches it."""
+    X, Y, _ = trial(0, n=1200)
+    once = np.zeros((1200, 1))
+    once[50:60] = np.random.default_rng(0).standard_normal((10, 1))
+    got = bootstrap_rows([Rows.of(np.hstack([X, once]), Y + 30.0 * once)], [10.0], 4, draws=400, block_s=10.0)
+    assert np.isfinite(got.covariance).all()
+    assert got.low[3, 0] <= 1e-9
+    assert got.high[3, 0] > 25.0
