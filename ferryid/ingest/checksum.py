@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 # ISA-L folds 128-bit lanes where the processor can: some 10 times zlib's speed, the same value.
-try:
-    from isal.isal_zlib import crc32
-except ImportError:
-    from zlib import crc32
+from isal.isal_zlib import crc32
 
 __all__ = ["crc32"]
