@@ -44,5 +44,7 @@ def test_a_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
 
 
 def test_json_has_no_nan_and_plain_numbers() -> None:
-    text = dump_json({"a": np.array([1.0, np.nan, np.inf]), "b": np.float64(2.5), "c": np.int64(3), "d": np.bool_(True)})
+    text = dump_json(
+        {"a": np.array([1.0, np.nan, np.inf]), "b": np.float64(2.5), "c": np.int64(3), "d": np.bool_(True)}
+    )
     assert text == '{\n "a": [\n  1.0,\n  null,\n  null\n ],\n "b": 2.5,\n "c": 3,\n "d": true\n}\n'

@@ -70,9 +70,9 @@ def test_importing_the_package_and_its_command_line_is_light() -> None:
 
 def test_every_package_is_in_the_wheel() -> None:
     listed = set(tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"])
-    present = {
-        ".".join(path.parent.relative_to(ROOT).parts) for path in (ROOT / "ferryid").rglob("__init__.py")
-    } | {"ferryid.cli"}
+    present = {".".join(path.parent.relative_to(ROOT).parts) for path in (ROOT / "ferryid").rglob("__init__.py")} | {
+        "ferryid.cli"
+    }
     assert listed == present
 
 

@@ -98,9 +98,7 @@ class JsonDecoder:
         self._rows = RowColumns(topic, paths, {})
         self._fields: dict[str, str] = {}
 
-    def add(
-        self, buffer: Any, starts: NDArray[np.int64], sizes: NDArray[np.int64], receive_ns: Nanoseconds
-    ) -> None:
+    def add(self, buffer: Any, starts: NDArray[np.int64], sizes: NDArray[np.int64], receive_ns: Nanoseconds) -> None:
         """Take the messages that lie in `buffer` at `starts` with `sizes` [bytes]; the buffer is not kept."""
         view = memoryview(buffer).cast("B")
         for start, size, time in zip(starts.tolist(), sizes.tolist(), receive_ns.tolist(), strict=True):

@@ -209,8 +209,7 @@ def walk_chunk(
         loss = Loss(name, what, None, None, min(reached, chunk.end_ns), chunk.end_ns)
     view = data.data
     definitions = [
-        (opcode, view[start + RECORD_HEADER : start + RECORD_HEADER + length])
-        for opcode, start, length in others
+        (opcode, view[start + RECORD_HEADER : start + RECORD_HEADER + length]) for opcode, start, length in others
     ]
     return replace(chunk, table=table), definitions, loss
 

@@ -264,9 +264,7 @@ def _chunk_from_index(content: memoryview) -> Chunk:
     name = bytes(content[48 + size : 48 + size + name_length]).decode("ascii")
     stored, unpacked = struct.unpack_from("<QQ", content, 48 + size + name_length)
     ends = [place for place, _ in [*places, (offset + length + index_length, 0)][1:]]
-    indexed = {
-        channel: (place, (end - place - 15) // 16) for (place, channel), end in zip(places, ends, strict=True)
-    }
+    indexed = {channel: (place, (end - place - 15) // 16) for (place, channel), end in zip(places, ends, strict=True)}
     if length != 49 + name_length + stored or any(count < 0 for _, count in indexed.values()):
         raise DamagedRecord("a chunk index contradicts itself")
     return Chunk(offset, start_ns, end_ns, name, offset + 49 + name_length, stored, unpacked, indexed or None)

@@ -76,9 +76,7 @@ def _needs_walk(index: Index) -> bool:
     if index.statistics is None or index.statistics.chunk_count != len(index.chunks):
         return True
     indexed = sum(index.counts().values())
-    return index.statistics.message_count > indexed and all(
-        chunk.indexed is not None for chunk in index.chunks
-    )
+    return index.statistics.message_count > indexed and all(chunk.indexed is not None for chunk in index.chunks)
 
 
 def _walked(index: Index, file: memoryview, whole_file: Bytes, name: str) -> Index:

@@ -133,14 +133,10 @@ class ProtobufDecoder:
         descriptor = self._class.DESCRIPTOR
         resolved = {path: _resolve(descriptor, path, where) for path in dict.fromkeys(paths)}
         self._wanted = {path: getter for path, (getter, _) in resolved.items()}
-        self._stamp = next(
-            (path_steps(path) for path in STAMP_PATHS if _is_timestamp(descriptor, path)), None
-        )
+        self._stamp = next((path_steps(path) for path in STAMP_PATHS if _is_timestamp(descriptor, path)), None)
         self._rows = RowColumns(topic, paths, {path: primitive for path, (_, primitive) in resolved.items()})
 
-    def add(
-        self, buffer: Any, starts: NDArray[np.int64], sizes: NDArray[np.int64], receive_ns: Nanoseconds
-    ) -> None:
+    def add(self, buffer: Any, starts: NDArray[np.int64], sizes: NDArray[np.int64], receive_ns: Nanoseconds) -> None:
         """Take the messages that lie in `buffer` at `starts` with `sizes` [bytes]; the buffer is not kept."""
         view = memoryview(buffer).cast("B")
         for start, size, time in zip(starts.tolist(), sizes.tolist(), receive_ns.tolist(), strict=True):

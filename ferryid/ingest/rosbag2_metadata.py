@@ -68,9 +68,7 @@ def read_metadata(path: Path) -> Metadata | str:
             files=_files(stated),
             topics=topics,
             digests={
-                entry["topic_metadata"]["name"]: str(
-                    entry["topic_metadata"].get("type_description_hash") or ""
-                )
+                entry["topic_metadata"]["name"]: str(entry["topic_metadata"].get("type_description_hash") or "")
                 for entry in stated.get("topics_with_message_count") or ()
             },
             mode=str(stated.get("compression_mode") or "").lower().replace("none", ""),

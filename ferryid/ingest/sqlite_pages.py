@@ -185,9 +185,7 @@ def read_runs(pages: Pages, numbers: Integers) -> Iterator[tuple[int, int, Bytes
         reading = [pool.submit(pages.fill, buffers[0], *span[2:]) for span in spans[:1]]
         for k, (first, last, start, _) in enumerate(spans):
             reading.pop().result()
-            reading += [
-                pool.submit(pages.fill, buffers[(k + 1) % 2], *span[2:]) for span in spans[k + 1 : k + 2]
-            ]
+            reading += [pool.submit(pages.fill, buffers[(k + 1) % 2], *span[2:]) for span in spans[k + 1 : k + 2]]
             yield first, last, buffers[k % 2], start
 
 
@@ -366,9 +364,7 @@ def find_rows(pages: Pages, root: int, topics: set[int]) -> tuple[Rows, list[Dam
     rows = _Table()
     bad = _visit(pages, numbers, rows)
     damages += [
-        Damage(
-            int(low[i]), int(high[i]), f"page {numbers[i]} is damaged", int(bad[i]) if bad[i] > 0 else None
-        )
+        Damage(int(low[i]), int(high[i]), f"page {numbers[i]} is damaged", int(bad[i]) if bad[i] > 0 else None)
         for i in np.flatnonzero(bad).tolist()
     ]
     found = rows.rows()
@@ -391,9 +387,7 @@ def _visit(pages: Pages, numbers: Integers, rows: _Table) -> Integers:
     """Add the rows of leaf pages to `rows`; return what `read_rows` says of each page."""
     bad = np.zeros(numbers.size, np.int64)
     for first, last, buffer, start in read_runs(pages, numbers):
-        part, bad[first:last] = read_rows(
-            pages, buffer, (numbers[first:last] - 1) * pages.size - start, start
-        )
+        part, bad[first:last] = read_rows(pages, buffer, (numbers[first:last] - 1) * pages.size - start, start)
         rows.add(part, numbers.size / last)
     return bad
 

@@ -24,9 +24,7 @@ FAULTS: tuple[type[Exception], ...] = (zstandard.ZstdError, RuntimeError, EOFErr
 
 def _stream(codec: str) -> Any:
     """Return an object that unpacks one frame piece by piece."""
-    return (
-        zstandard.ZstdDecompressor().decompressobj() if codec == "zstd" else lz4.frame.LZ4FrameDecompressor()
-    )
+    return zstandard.ZstdDecompressor().decompressobj() if codec == "zstd" else lz4.frame.LZ4FrameDecompressor()
 
 
 def message_unpacker(codec: str) -> Callable[[bytes], bytes | None]:
@@ -97,11 +95,7 @@ def unpack_file(path: Path, folder: Path) -> tuple[Path, tuple[Loss, ...]]:
                     stream = _stream(codec)
                 data = data or source.read(PIECE_BYTES)
         except FAULTS as error:
-            return target, (
-                Loss(str(path), f"cannot be unpacked from byte {done} on ({error}): the rest is lost"),
-            )
+            return target, (Loss(str(path), f"cannot be unpacked from byte {done} on ({error}): the rest is lost"),)
     if not stream.eof:
-        return target, (
-            Loss(str(path), f"the compressed file is cut off after {done} bytes: the rest is lost"),
-        )
+        return target, (Loss(str(path), f"the compressed file is cut off after {done} bytes: the rest is lost"),)
     return target, ()

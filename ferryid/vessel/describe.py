@@ -10,9 +10,7 @@ from ferryid.vessel.signal_map import canonical_columns
 
 def describe(profile: Profile) -> str:
     """Return a plain-text page on a profile: hull, actuators, wind and signal map, with units."""
-    return "\n".join(
-        [*_heading(profile), *_hull(profile), *_actuators(profile), *_wind(profile), *_signals(profile)]
-    )
+    return "\n".join([*_heading(profile), *_hull(profile), *_actuators(profile), *_wind(profile), *_signals(profile)])
 
 
 def _heading(profile: Profile) -> list[str]:
@@ -54,9 +52,7 @@ def _actuator(actuator: Actuator) -> str:
         reach = f", {low:g} to {high:g} {actuator.thrust.input_unit}" if math.isfinite(low + high) else ""
         text += f", thrust by {actuator.thrust.kind.replace('_', ' ')}{reach}"
     if actuator.inflow:
-        text += ", " + ", ".join(
-            f"{key.removesuffix('_m')} {value:g}" for key, value in actuator.inflow.items()
-        )
+        text += ", " + ", ".join(f"{key.removesuffix('_m')} {value:g}" for key, value in actuator.inflow.items())
     if actuator.rudder:
         text += f", rudder {actuator.rudder['area_m2']:g} m² at x = {actuator.rudder['x_m']:g} m"
     return text

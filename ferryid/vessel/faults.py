@@ -38,9 +38,7 @@ class TableReader:
         Shared list to which faults are added.
     """
 
-    def __init__(
-        self, data: Mapping[str, Any], path: KeyPath, lines: dict[KeyPath, int], faults: list[Fault]
-    ) -> None:
+    def __init__(self, data: Mapping[str, Any], path: KeyPath, lines: dict[KeyPath, int], faults: list[Fault]) -> None:
         self.data = data
         self.path = path
         self._lines = lines
@@ -75,8 +73,7 @@ class TableReader:
             self.fault(f'"{key}" must be an array of tables. Fix: head each entry with [[{key}]]', key)
             return []
         return [
-            TableReader(entry, (*self.path, key, index), self._lines, self._faults)
-            for index, entry in enumerate(value)
+            TableReader(entry, (*self.path, key, index), self._lines, self._faults) for index, entry in enumerate(value)
         ]
 
     def table(self, key: str, *, required: bool = False, needs: str = "") -> TableReader | None:
@@ -89,9 +86,7 @@ class TableReader:
             return None
         return TableReader(value, (*self.path, key), self._lines, self._faults)
 
-    def text(
-        self, key: str, default: str = "", *, required: bool = False, options: Collection[str] = ()
-    ) -> str:
+    def text(self, key: str, default: str = "", *, required: bool = False, options: Collection[str] = ()) -> str:
         """Return a string, one of `options` where there are any."""
         value = self._take(key, required=required)
         if value is None:
@@ -101,9 +96,7 @@ class TableReader:
             return default
         if options and value not in options:
             hint = did_you_mean(value, options)
-            self.fault(
-                f'"{key}" cannot be "{value}".{hint} Fix: use one of {", ".join(sorted(options))}', key
-            )
+            self.fault(f'"{key}" cannot be "{value}".{hint} Fix: use one of {", ".join(sorted(options))}', key)
             return default
         return value
 
@@ -156,9 +149,7 @@ class TableReader:
         value = self._take(key, required=required)
         if value is None:
             return ()
-        if not isinstance(value, list) or not all(
-            _is_number(entry) and math.isfinite(entry) for entry in value
-        ):
+        if not isinstance(value, list) or not all(_is_number(entry) and math.isfinite(entry) for entry in value):
             self.fault(f'"{key}" must be an array of finite numbers, found {_kind(value)}', key)
             return ()
         if count is not None and len(value) != count:

@@ -151,9 +151,7 @@ def _syntax_fault(text: str, message: str) -> Fault:
     match = re.search(r"line (\d+)", message)
     line = int(match.group(1)) if match else max(1, len(text.splitlines()))
     plain = re.sub(r"\s*\(at .*\)$", "", message)
-    return Fault(
-        line, f"not valid TOML: {plain[:1].lower()}{plain[1:]}. Fix: correct this line or the one above"
-    )
+    return Fault(line, f"not valid TOML: {plain[:1].lower()}{plain[1:]}. Fix: correct this line or the one above")
 
 
 def _parse_table(reader: TableReader | None) -> TableLayout | None:
@@ -166,9 +164,7 @@ def _parse_table(reader: TableReader | None) -> TableLayout | None:
     skip_rows = reader.whole("skip_rows", 0)
     separator = reader.text("separator", ",")
     if separator not in (",", ";", "\t", "|", "whitespace"):
-        reader.fault(
-            f'"separator" cannot be {separator!r}. Fix: use ",", ";", "\\t", "|" or "whitespace"', "separator"
-        )
+        reader.fault(f'"separator" cannot be {separator!r}. Fix: use ",", ";", "\\t", "|" or "whitespace"', "separator")
     encoding = reader.text("encoding", "utf-8")
     try:
         "".encode(encoding)

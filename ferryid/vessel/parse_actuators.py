@@ -20,9 +20,7 @@ def parse_actuators(top: TableReader) -> tuple[Actuator, ...]:
     """Read every ``[[actuator]]``, noting faults."""
     readers = top.tables("actuator")
     if not readers:
-        top.fault(
-            "the file lists no actuator, so the applied force is not known. Fix: add at least one [[actuator]]"
-        )
+        top.fault("the file lists no actuator, so the applied force is not known. Fix: add at least one [[actuator]]")
     actuators = []
     seen: dict[str, int] = {}
     for reader in readers:
@@ -143,9 +141,7 @@ def _valid(reader: TableReader, *, required: bool) -> tuple[float, float] | None
     if not valid:
         return None
     if valid[0] >= valid[1]:
-        reader.fault(
-            f'"valid" is reversed: [{valid[0]:g}, {valid[1]:g}]. Fix: write [lowest, highest]', "valid"
-        )
+        reader.fault(f'"valid" is reversed: [{valid[0]:g}, {valid[1]:g}]. Fix: write [lowest, highest]', "valid")
         return None
     if not valid[0] <= 0.0 <= valid[1]:
         reader.fault(f'"valid" = [{valid[0]:g}, {valid[1]:g}] leaves out a stopped propeller', "valid")
@@ -190,9 +186,7 @@ def _table_curve(reader: TableReader, unit: str, valid: tuple[float, float] | No
         )
     limits = valid or (speeds[0], speeds[-1])
     if limits[0] < speeds[0] or limits[1] > speeds[-1]:
-        reader.fault(
-            f'"valid" reaches beyond the table, which covers {speeds[0]:g} to {speeds[-1]:g}', "valid"
-        )
+        reader.fault(f'"valid" reaches beyond the table, which covers {speeds[0]:g} to {speeds[-1]:g}', "valid")
     return ThrustCurve("table", unit, limits, table=(speeds, tuple(force / per for force in forces)))
 
 

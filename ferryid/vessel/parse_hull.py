@@ -56,9 +56,7 @@ def parse_hull(reader: TableReader | None) -> Hull | None:
     return Hull(length_m, beam_m, draught_m, mass_kg, inertia_z, x_g_m, total, damping)
 
 
-def rigid_mass(
-    mass_kg: float, x_g_m: float, inertia_z: float
-) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def rigid_mass(mass_kg: float, x_g_m: float, inertia_z: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """Return the rigid-body mass matrix about the body origin, shape (3, 3); Fossen (2021), section 3.3."""
     return np.array(
         [

@@ -59,9 +59,7 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         fields = (table.text("field", required=True),)
         kind = "rate" if quantity == "yaw_rate" else "angle"
         unit = _unit(table, kind)
-        frames = {"heading": WORLD_FRAMES, "yaw_rate": (*BODY_FRAMES, *WORLD_FRAMES)}.get(
-            quantity, BODY_FRAMES
-        )
+        frames = {"heading": WORLD_FRAMES, "yaw_rate": (*BODY_FRAMES, *WORLD_FRAMES)}.get(quantity, BODY_FRAMES)
         frame = _frame(table, frames, quantity)
         sign, offset = _sign(table), table.number("offset", 0.0)
     elif quantity == "position":
@@ -180,9 +178,7 @@ def _frame(table: TableReader, frames: tuple[str, ...], quantity: str) -> str:
     usable = ", ".join(f'"{name}" ({meanings[name]})' for name in frames)
     if not frame:
         if "frame" not in table.data:
-            table.fault(
-                f'{table.title} lacks "frame", so its signs are not known. Fix: add frame = one of {usable}'
-            )
+            table.fault(f'{table.title} lacks "frame", so its signs are not known. Fix: add frame = one of {usable}')
         return ""
     if frame not in frames:
         why = f'frame "{frame}" is not one that {quantity} can be in'

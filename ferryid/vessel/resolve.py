@@ -11,9 +11,7 @@ from ferryid.vessel.frames import derivative, to_body, to_world
 from ferryid.vessel.profile import Floats, Profile, Signal
 
 
-def resolve(
-    profile: Profile, columns: Mapping[str, Floats], rate_hz: float | None = None
-) -> dict[str, Floats]:
+def resolve(profile: Profile, columns: Mapping[str, Floats], rate_hz: float | None = None) -> dict[str, Floats]:
     """Complete aligned columns: `u, v, r` and true wind, at the body origin.
 
     Where the log has no yaw rate it is the slope of the heading, and where it has no velocity that of the position;
@@ -60,9 +58,7 @@ def resolve_notes(profile: Profile, columns: Collection[str]) -> tuple[str, ...]
     if "r" not in columns and "psi" in columns:
         notes.append("Yaw rate is the slope of the heading: the log has no yaw rate.")
     if "u" not in columns and "vel_N" not in columns and "x" in columns:
-        notes.append(
-            "Surge and sway are the slope of the position turned by the heading: the log has no velocity."
-        )
+        notes.append("Surge and sway are the slope of the position turned by the heading: the log has no velocity.")
     elif "u" not in columns and "vel_N" in columns:
         notes.append("Surge and sway are the velocity over ground turned by the heading.")
     wind = next((signal for signal in profile.signals if signal.quantity == "wind"), None)

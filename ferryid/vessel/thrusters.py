@@ -210,9 +210,7 @@ def applied_force(
     return tau, (*notes, *more)
 
 
-def _strength(
-    profile: Profile, actuator: Actuator, signals: Mapping[str, Floats], nu: Floats
-) -> tuple[Floats, str]:
+def _strength(profile: Profile, actuator: Actuator, signals: Mapping[str, Floats], nu: Floats) -> tuple[Floats, str]:
     for role in ("force", "thrust"):
         if role in signals:
             return signals[role], ""

@@ -87,9 +87,7 @@ def decompress(log: Path) -> Callable[[], None]:
             head = 1 + 8 + 8 + 8 + 8 + 4 + 4 + len(chunk.compression) + 8
             places.append((chunk.chunk_start_offset + head, chunk.compressed_size))
         codec = summary.chunk_indexes[0].compression
-        unpack = {"": bytes, "zstd": zstandard.ZstdDecompressor().decompress, "lz4": lz4.frame.decompress}[
-            codec
-        ]
+        unpack = {"": bytes, "zstd": zstandard.ZstdDecompressor().decompress, "lz4": lz4.frame.decompress}[codec]
     elif log.suffix == ".bag":
         with Rosbag1Reader(log) as reader:
             places = [(chunk.datapos, chunk.datasize) for chunk in reader.chunks.values()]
@@ -173,9 +171,7 @@ def against_whole_camera_log(folder: Path, minutes: float) -> list[Row]:
         columns(log)
         if compression == "none":
             file = next(log.glob("*.db3")) if log.is_dir() else log
-            rows.append(
-                faster(what, lambda log=log: columns(log), "cat", lambda file=file: cat(file), 1.0, 5)
-            )
+            rows.append(faster(what, lambda log=log: columns(log), "cat", lambda file=file: cat(file), 1.0, 5))
         else:
             rows.append(faster(what, lambda log=log: columns(log), "decompress all", decompress(log), 4.0, 5))
     return rows
@@ -212,9 +208,7 @@ atexit.register(peak)
 
 def script(code: str, *arguments: str | Path) -> str:
     """Run a script in a process of its own and return what it said on standard error."""
-    done = subprocess.run(
-        [sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True)
     return done.stderr
 
 

@@ -182,9 +182,7 @@ def merged(streams: list[Messages]) -> Iterator[tuple[int, int, bytes]]:
     index = np.concatenate([np.arange(s.time_ns.size) for s in streams])
     time_ns = np.concatenate([s.time_ns for s in streams])
     order = np.argsort(time_ns, kind="stable")
-    for stream, row, time in zip(
-        which[order].tolist(), index[order].tolist(), time_ns[order].tolist(), strict=True
-    ):
+    for stream, row, time in zip(which[order].tolist(), index[order].tolist(), time_ns[order].tolist(), strict=True):
         yield stream, time, streams[stream][row]
 
 

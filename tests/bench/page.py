@@ -49,9 +49,7 @@ def seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def faster_row(
-    what: str, ours: Sequence[float], name: str, rival: Sequence[float], goal: float | None
-) -> Row:
+def faster_row(what: str, ours: Sequence[float], name: str, rival: Sequence[float], goal: float | None) -> Row:
     """Row of how many times faster ours is, of times of the same rounds [s]: the median of their ratios."""
     ratio = statistics.median(theirs / mine for mine, theirs in zip(ours, rival, strict=True))
     values = duration(statistics.median(ours)), name, duration(statistics.median(rival)), ratio

@@ -56,9 +56,7 @@ def rerun_columns(log: Path) -> dict[str, dict[str, Any]]:
             continue
         batch = chunk.to_record_batch()
         found = parts[chunk.entity_path]
-        found.setdefault("time_ns", []).append(
-            batch.column("message_log_time").to_numpy(zero_copy_only=False)
-        )
+        found.setdefault("time_ns", []).append(batch.column("message_log_time").to_numpy(zero_copy_only=False))
         (name,) = (name for name in batch.schema.names if name.endswith(":message"))
         messages = batch.column(name).flatten()
         for path in (*STAMP, *FIELDS[chunk.entity_path]):
@@ -67,8 +65,7 @@ def rerun_columns(log: Path) -> dict[str, dict[str, Any]]:
                 column = column.field(step)
             found.setdefault(path, []).append(column.to_numpy(zero_copy_only=False))
     return {
-        topic: {path: np.concatenate(pieces) for path, pieces in columns.items()}
-        for topic, columns in parts.items()
+        topic: {path: np.concatenate(pieces) for path, pieces in columns.items()} for topic, columns in parts.items()
     }
 
 

@@ -23,7 +23,12 @@ def refused(run, *parts: str) -> None:
 @pytest.mark.parametrize("command", ["inspect", "ingest", "fit"])
 @pytest.mark.parametrize(
     ("name", "content"),
-    [("missing.bag", None), ("empty.mcap", b""), ("noise.bag", bytes(range(256)) * 40), ("photo.png", b"\x89PNG\r\n\x1a\n")],
+    [
+        ("missing.bag", None),
+        ("empty.mcap", b""),
+        ("noise.bag", bytes(range(256)) * 40),
+        ("photo.png", b"\x89PNG\r\n\x1a\n"),
+    ],
 )
 def test_what_is_not_a_log(ferryid, tmp_path: Path, command: str, name: str, content: bytes | None) -> None:
     path = tmp_path / name
@@ -59,7 +64,9 @@ def test_a_misspelt_vessel(ferryid, fixtures: Path) -> None:
 )
 def test_settings_that_cannot_be(ferryid, fixtures: Path, tmp_path: Path, options: tuple[str, str], told: str) -> None:
     log = fixtures / "short.mcap"
-    refused(ferryid("fit", log, "--vessel", "milliampere", "--out", tmp_path, *options), told.replace("short.mcap", "short"))
+    refused(
+        ferryid("fit", log, "--vessel", "milliampere", "--out", tmp_path, *options), told.replace("short.mcap", "short")
+    )
     assert not (tmp_path / "models").exists()
 
 
@@ -98,7 +105,8 @@ def test_an_output_folder_without_permission(ferryid, fixtures: Path, tmp_path: 
 def test_an_output_folder_that_is_a_file(ferryid, fixtures: Path, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("", encoding="utf-8")
     refused(
-        ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out"), "cannot be written"
+        ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out"),
+        "cannot be written",
     )
 
 
@@ -124,7 +132,9 @@ def test_an_interrupt_exits_with_130_and_leaves_nothing(
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["logs"]
 
 
-def test_a_bug_of_ours_exits_with_1_and_asks_for_a_report(ferryid, fixtures: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_of_ours_exits_with_1_and_asks_for_a_report(
+    ferryid, fixtures: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import ferryid.signals.inspect as module
 
     def broken(*_: object, **__: object) -> None:

@@ -15,7 +15,9 @@ import ferryid.cli
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = sorted(
-    module.name.removeprefix("cmd_") for module in pkgutil.iter_modules(ferryid.cli.__path__) if module.name[:4] == "cmd_"
+    module.name.removeprefix("cmd_")
+    for module in pkgutil.iter_modules(ferryid.cli.__path__)
+    if module.name[:4] == "cmd_"
 )
 SCALE = ("--delta", "0.4", "--sigma", "0.4")
 
@@ -38,7 +40,9 @@ def test_has_help_and_is_documented(ferryid, command: str) -> None:
     assert f"ferryid {command}" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("log", ["short.mcap", "short.bag", "short_ros2", "short_ros2_mcap", "truncated.mcap", "short.csv"])
+@pytest.mark.parametrize(
+    "log", ["short.mcap", "short.bag", "short_ros2", "short_ros2_mcap", "truncated.mcap", "short.csv"]
+)
 @pytest.mark.parametrize("vessel", [(), ("--vessel", "milliampere")])
 def test_inspect(ferryid, fixtures: Path, log: str, vessel: tuple[str, ...]) -> None:
     run = ferryid("inspect", fixtures / log, *vessel, "--json", "-")
@@ -60,11 +64,15 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     assert fit["model"]["accepted"], fit["reasons"]
     page = Path(fit["report"]).read_text(encoding="utf-8")
     assert page.count("<svg") > 8
-    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page), "the report must not need another file or a network"
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page), (
+        "the report must not need another file or a network"
+    )
     conforms(Path(fit["model"]["path"]).read_text(encoding="utf-8"))
     conforms((Path(fit["report"]).parent / "fit.json").read_text(encoding="utf-8"))
 
-    run = ferryid("fit", log, "--vessel", "milliampere", *SCALE, "--basis", "thesis", "--structure", "coupled", "--out", out)
+    run = ferryid(
+        "fit", log, "--vessel", "milliampere", *SCALE, "--basis", "thesis", "--structure", "coupled", "--out", out
+    )
     assert run.code == 0
 
     evaluation = conforms(ferryid("evaluate", "milliampere@1", other, "--out", out, "--json", "-").out)

@@ -12,9 +12,7 @@ from ferryid.ingest import open_log
 
 ROOT = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "conformance"
 FILES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*") if path.is_file())
-FOLDERS = sorted(
-    {Path(name).parent.as_posix() for name in FILES if name.endswith((".db3", ".mcap", ".yaml"))}
-)
+FOLDERS = sorted({Path(name).parent.as_posix() for name in FILES if name.endswith((".db3", ".mcap", ".yaml"))})
 READABLE = (".bag", ".mcap", ".db3", ".yaml")
 # What cannot be used, and the word that its refusal must contain.
 REFUSED = {
@@ -24,9 +22,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", [*FILES, *FOLDERS] or ["."])
-def test_every_published_bag_is_listed_or_refused_in_one_line(
-    name: str, shared_data: Callable[[str], Path]
-) -> None:
+def test_every_published_bag_is_listed_or_refused_in_one_line(name: str, shared_data: Callable[[str], Path]) -> None:
     path = shared_data(f"conformance/{name}")
     refusal = REFUSED.get(path.parent.name if path.name == "metadata.yaml" else path.name)
     try:

@@ -175,9 +175,7 @@ def test_same_answer_as_the_mcap_package(
     present = {topic: PATHS[topic] for topic in PATHS if theirs[topic]}
     series = log.read(present, verify=verify)
     assert log.losses == ()
-    assert {topic.name: topic.count for topic in log.topics} == {
-        topic: len(theirs[topic]) for topic in present
-    }
+    assert {topic.name: topic.count for topic in log.topics} == {topic: len(theirs[topic]) for topic in present}
     for topic in log.topics:
         times = [time for time, _ in theirs[topic.name]]
         assert (topic.start_ns, topic.end_ns) == (min(times), max(times))
@@ -189,9 +187,7 @@ def test_same_answer_as_the_mcap_package(
         else:
             decoded = [message for _, message in theirs["/point"]]
             assert ours.columns["point.x"].tolist() == [message.point.x for message in decoded]
-            assert ours.columns["header.frame_id"].tolist() == [
-                message.header.frame_id for message in decoded
-            ]
+            assert ours.columns["header.frame_id"].tolist() == [message.header.frame_id for message in decoded]
             assert ours.stamp_ns is not None
             assert ours.stamp_ns.tolist() == times
 
@@ -218,9 +214,7 @@ def test_a_file_cut_anywhere_yields_every_intact_message(
         assert len(got) >= complete[topic]
         if not chunked or compression == CompressionType.NONE:
             intact = [
-                record_bytes(sample, number) in part
-                for number, sample in enumerate(samples)
-                if sample.topic == topic
+                record_bytes(sample, number) in part for number, sample in enumerate(samples) if sample.topic == topic
             ]
             assert len(got) == sum(intact)
     assert log.losses
@@ -234,9 +228,7 @@ def in_whole_chunks(content: bytes, cut: int) -> Counter[str]:
     assert summary is not None
     ends = sorted(chunk.chunk_start_offset + chunk.chunk_length for chunk in summary.chunk_indexes)
     chunks = [
-        record
-        for record in StreamReader(io.BytesIO(content), emit_chunks=True).records
-        if isinstance(record, Chunk)
+        record for record in StreamReader(io.BytesIO(content), emit_chunks=True).records if isinstance(record, Chunk)
     ]
     return Counter(
         summary.channels[message.channel_id].topic
@@ -329,9 +321,7 @@ def test_only_what_is_wanted_is_read(compression: CompressionType) -> None:
     # Reading all of it finds the damage, and the messages of that chunk cannot be trusted any more.
     assert values(log, "/point", verify=True) == [float(n) for n in range(12) if n != 3]
     assert {(loss.topic, loss.messages) for loss in log.losses} == {("/point", 1), ("/image", 1)}
-    assert all(
-        loss.start_ns is not None and abs(loss.start_ns - T0 - 300_000_000) <= 1 for loss in log.losses
-    )
+    assert all(loss.start_ns is not None and abs(loss.start_ns - T0 - 300_000_000) <= 1 for loss in log.losses)
 
 
 @pytest.mark.parametrize("compression", list(CompressionType))
@@ -429,9 +419,7 @@ def test_a_wrong_length_outside_chunks_costs_its_message_only(change: int) -> No
     damaged[content.index(record_bytes(samples[4], 4)) + 1] += change
     log = opened(bytes(damaged))
     assert values(log, "/number") == expected(samples, "/number")
-    assert values(log, "/point") == [
-        value for value in expected(samples, "/point") if value != samples[4].value
-    ]
+    assert values(log, "/point") == [value for value in expected(samples, "/point") if value != samples[4].value]
     told = [loss for loss in log.losses if "damaged bytes" in loss.what]
     # One that is too short still counts as a message, and as one that its decoder refuses.
     before = samples[3 if change > 0 else 4]
@@ -500,9 +488,7 @@ def test_channels_of_one_topic_merge_in_file_order() -> None:
     log = opened(several_channels(NUMBER))
     (topic,) = log.topics
     assert (topic.count, topic.note) == (20, "")
-    assert log.read({"/a": ["data"]})["/a"].columns["data"].tolist() == [
-        float(number) for number in range(20)
-    ]
+    assert log.read({"/a": ["data"]})["/a"].columns["data"].tolist() == [float(number) for number in range(20)]
 
 
 def test_two_definitions_on_one_topic() -> None:

@@ -81,9 +81,7 @@ for each in reversed(SET.file):
 STATE: Any = message_factory.GetMessageClass(POOL.FindMessageTypeByName("nav.State"))
 
 
-def log_of(
-    encoding: str, schema: tuple[str, str, bytes] | None, messages: list[bytes]
-) -> tuple[bytes, McapLog]:
+def log_of(encoding: str, schema: tuple[str, str, bytes] | None, messages: list[bytes]) -> tuple[bytes, McapLog]:
     output = io.BytesIO()
     writer = Writer(output, chunk_size=300)
     writer.start("", "test")
@@ -288,7 +286,5 @@ def test_bad_json() -> None:
     assert log.read({"/a": ["v"]})["/a"].columns["v"].tolist() == [1, 2]
     (loss,) = log.losses
     assert (loss.topic, loss.messages) == ("/a", 2)
-    with pytest.raises(
-        FerryIdError, match=r'no JSON message has a value at \'w.v\'.*Fix: .*Did you mean "v"'
-    ):
+    with pytest.raises(FerryIdError, match=r'no JSON message has a value at \'w.v\'.*Fix: .*Did you mean "v"'):
         log.read({"/a": ["w.v"]})

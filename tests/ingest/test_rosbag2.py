@@ -113,9 +113,7 @@ def xs(log: Reader) -> list[int]:
         st.tuples(
             st.sampled_from([0, 1, 2, 127, 300, 70_000, 2**31, -5]),
             st.sampled_from([0, 1, 255, -1, 2**15, 2**31, 2**47, START, 2**63 - 1, -(2**62)]),
-            st.sampled_from(
-                [0, 1, 10, 57, 58, 130, 400, 477, 478, 979, 3000, 4050, 4061, 4062, 9000, 70_000]
-            ),
+            st.sampled_from([0, 1, 10, 57, 58, 130, 400, 477, 478, 979, 3000, 4050, 4061, 4062, 9000, 70_000]),
         ),
         max_size=120,
     ),
@@ -133,17 +131,11 @@ def test_every_row_is_found_as_sql_finds_it(
             connection.executescript(SCHEMA)
             for i, (topic, time, size) in enumerate(rows * repeat):
                 data = bytes([i % 256]) * size
-                connection.execute(
-                    "INSERT INTO messages VALUES (?, ?, ?, ?)", (first_id + i, topic, time, data)
-                )
+                connection.execute("INSERT INTO messages VALUES (?, ?, ?, ?)", (first_id + i, topic, time, data))
             connection.executemany("DELETE FROM messages WHERE id=?", [(first_id + i,) for i in deleted])
             connection.commit()
-            expected = connection.execute(
-                "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id"
-            ).fetchall()
-            (root,) = connection.execute(
-                "SELECT rootpage FROM sqlite_master WHERE name='messages'"
-            ).fetchone()
+            expected = connection.execute("SELECT id, topic_id, timestamp, data FROM messages ORDER BY id").fetchall()
+            (root,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name='messages'").fetchone()
         with Pages(path) as pages:
             found, damages = find_rows(pages, root, set())
             blobs = [pages.blob(found, i) for i in range(len(found))]
@@ -282,9 +274,7 @@ def test_verify_reports_what_sqlite_itself_finds(tmp_path: Path) -> None:
     log.read({"/point": []}, verify=True)
     assert log.losses == ()
     with closing(sqlite3.connect(path)) as connection:
-        (index,) = connection.execute(
-            "SELECT rootpage FROM sqlite_master WHERE name='timestamp_idx'"
-        ).fetchone()
+        (index,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name='timestamp_idx'").fetchone()
     log = open_log(damaged(path, (index - 1) * 4096, b"\x0a" + bytes(200)))
     log.read({"/point": []}, verify=True)
     assert any("integrity check" in loss.what for loss in log.losses)
@@ -333,9 +323,7 @@ def test_an_unfinished_transaction_is_rolled_back(tmp_path: Path) -> None:
     path = database(live / "log.db3", points(0, 300))
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("PRAGMA cache_size=1")
-        connection.executemany(
-            "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", points(300, 900)
-        )
+        connection.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", points(300, 900))
         for file in live.iterdir():
             shutil.copy(file, copy)
         connection.rollback()
@@ -507,9 +495,7 @@ def test_a_file_that_the_metadata_does_not_name_is_told(tmp_path: Path) -> None:
     database(folder / "other.db3", points(0, 10))
     log = open_log(folder)
     assert xs(log) == list(range(500))
-    assert [(loss.file, "not named" in loss.what) for loss in log.losses] == [
-        (str(folder / "other.db3"), True)
-    ]
+    assert [(loss.file, "not named" in loss.what) for loss in log.losses] == [(str(folder / "other.db3"), True)]
 
 
 @pytest.mark.parametrize(
@@ -599,9 +585,7 @@ def test_the_type_hash_decides_whether_a_definition_stands_in(tmp_path: Path, di
 def test_an_unknown_type_is_listed_and_refused_only_when_wanted(tmp_path: Path, text: str | None) -> None:
     path = database(tmp_path / "log.db3", points(0, 10))
     with closing(sqlite3.connect(path)) as connection:
-        connection.execute(
-            "INSERT INTO topics VALUES (3, '/mystery', 'ferry_msgs/msg/Mystery', 'cdr', '', '')"
-        )
+        connection.execute("INSERT INTO topics VALUES (3, '/mystery', 'ferry_msgs/msg/Mystery', 'cdr', '', '')")
         if text is not None:
             connection.execute(
                 "INSERT INTO message_definitions VALUES (9, 'ferry_msgs/msg/Mystery', 'ros2msg', ?, '')",
@@ -613,9 +597,7 @@ def test_an_unknown_type_is_listed_and_refused_only_when_wanted(tmp_path: Path, 
     assert (topic.count, topic.fields) == (1, {})
     assert "cannot be decoded" in topic.note
     assert xs(log) == list(range(10))
-    with pytest.raises(
-        FerryIdError, match=r"/mystery of type ferry_msgs/msg/Mystery cannot be decoded.* Fix: "
-    ):
+    with pytest.raises(FerryIdError, match=r"/mystery of type ferry_msgs/msg/Mystery cannot be decoded.* Fix: "):
         log.read({"/mystery": []})
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -92,6 +92,7 @@ def test_samples_of_a_regular_stream_are_kept_bit_for_bit() -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), gaps=st.lists(st.tuples(st.floats(2, 40), st.floats(0.1, 4)), max_size=3))
+@example(seed=0, gaps=[(10.0, 0.25), (20.0, 0.6), (30.0, 1.5)])
 def test_no_row_is_valid_inside_a_gap_and_every_other_is(seed: int, gaps: list[tuple[float, float]]) -> None:
     rng = np.random.default_rng(seed)
     kept = {}
@@ -211,6 +212,15 @@ def test_a_navigation_that_repeats_itself_while_moving_is_no_measurement() -> No
     assert not track.valid[205:228].any()
     assert track.valid[:200].all()
     assert any("29 of 600 messages repeat an old measurement" in said for said in track.repairs)
+
+
+def test_one_velocity_that_is_stuck_is_no_measurement() -> None:
+    t = np.arange(0, 60, 0.1)
+    u = 0.5 + 0.2 * np.sin(t)
+    u[200:250] = u[200]
+    track = align(recording(navigation(t, u=u), thrusters(t)), PROFILE)
+    assert not track.valid[202:248].any()
+    assert any("u: 49 of 600 samples repeat an old one to the last digit" in said for said in track.repairs)
 
 
 def test_missing_numbers_are_bridged_when_short_and_left_out_when_long() -> None:

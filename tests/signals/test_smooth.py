@@ -189,8 +189,10 @@ def test_rows_whose_window_meets_a_gap_are_not_valid(smoother: str, window_s: fl
 def test_force_and_motion_pass_through_the_same_filter(smoother: str) -> None:
     track = trial()
     measured = measure(track, PROFILE)
-    same = replace(measured, tau=measured.nu.copy(), tau_d=measured.nu.copy())
-    motion = smooth_measured(same, 1.0, smoother)
+    # Noise of another size in each axis, so that each has a Kalman smoother of its own.
+    nu = measured.nu + np.random.default_rng(0).normal(0, [0.1, 0.02, 0.002], measured.nu.shape)
+    same = replace(measured, nu=nu, tau=nu.copy(), tau_d=nu.copy())
+    motion = smooth_measured(same, 0.25, smoother)
     assert motion.tau_d is not None
     np.testing.assert_allclose(motion.tau, motion.nu, atol=1e-12)
     np.testing.assert_allclose(motion.tau_d, motion.nu, atol=1e-12)

@@ -62,13 +62,9 @@ def test_wrap_keeps_half_a_turn_positive() -> None:
 def test_metres_of_an_arc_minute(latitude: float, meridian_m: float, prime_vertical_m: float) -> None:
     minute = math.radians(1 / 60)
     start = math.radians(latitude)
-    north, east = local_north_east(
-        np.array([start, start + minute, start]), np.array([0.1, 0.1, 0.1 + minute])
-    )
+    north, east = local_north_east(np.array([start, start + minute, start]), np.array([0.1, 0.1, 0.1 + minute]))
     np.testing.assert_allclose(north, [0.0, meridian_m * minute, 0.0], rtol=1e-9, atol=1e-6)
-    np.testing.assert_allclose(
-        east, [0.0, 0.0, prime_vertical_m * math.cos(start) * minute], rtol=1e-9, atol=1e-6
-    )
+    np.testing.assert_allclose(east, [0.0, 0.0, prime_vertical_m * math.cos(start) * minute], rtol=1e-9, atol=1e-6)
 
 
 def test_crossing_the_date_line_and_starting_without_a_fix() -> None:

@@ -85,9 +85,7 @@ def test_flow_straightening_by_side() -> None:
 
 @given(st.floats(-0.6, 0.6), st.floats(-40, 80), st.floats(-1, 2))
 def test_mirror(delta: float, thrust: float, u: float) -> None:
-    np.testing.assert_allclose(
-        tau(-delta, thrust, u), tau(delta, thrust, u) * [1.0, -1.0, -1.0], rtol=1e-9, atol=1e-12
-    )
+    np.testing.assert_allclose(tau(-delta, thrust, u), tau(delta, thrust, u) * [1.0, -1.0, -1.0], rtol=1e-9, atol=1e-12)
 
 
 def test_propeller_and_rudder_together() -> None:
@@ -102,9 +100,7 @@ def test_thrust_from_the_open_water_curve_where_it_was_not_measured() -> None:
     columns = {"n_propeller": np.array([600.0]), "delta_propeller": np.array([0.0])}
     # Ahead at 1 m/s: J = 0.6/(10·0.204) = 0.29412, K_T = 0.261 - (0.016)(0.04412/0.05) = 0.246882
     expected = 0.78 * 1000 * 100 * 0.204**4 * 0.2468816
-    assert applied_force(PROFILE, columns, np.array([[1.0, 0, 0]]))[0][0, 0] == pytest.approx(
-        expected, rel=1e-5
-    )
+    assert applied_force(PROFILE, columns, np.array([[1.0, 0, 0]]))[0][0, 0] == pytest.approx(expected, rel=1e-5)
     # Astern the wake is not at the propeller: J is clipped at 0 here, K_T 0.323
     astern = applied_force(PROFILE, columns, np.array([[-0.5, 0, 0]]))[0][0, 0]
     assert astern == pytest.approx(0.78 * 1000 * 100 * 0.204**4 * 0.323, rel=1e-9)

@@ -148,9 +148,7 @@ def test_array_index_must_be_inside() -> None:
 def test_order_stands_in_for_missing_feedback() -> None:
     angle_only = Topic("/t1", "x/T", "cdr", 10, 0, 1, {"angle[2]": "float64"})
     selection = select(profile(BODY), [NAV, angle_only, topic("/t1/order", rpm="float64")], "a.bag")
-    assert selection.notes == (
-        "The speed of t1 is the order, as there is no feedback: its lag stays in the residual.",
-    )
+    assert selection.notes == ("The speed of t1 is the order, as there is no feedback: its lag stays in the residual.",)
     with pytest.raises(FerryIdError, match=r"t1\.speed is needed"):
         select(profile(BODY), [NAV, angle_only], "a.bag")
 
@@ -197,8 +195,7 @@ def test_world_frame_east_first() -> None:
 
 def test_sign_then_offset_then_unit() -> None:
     text = (
-        BODY
-        + '[signals.heading]\ntopic = "/nav"\nfield = "h"\nunit = "deg"\nframe = "NED"\nsign = -1\noffset = 10.0\n'
+        BODY + '[signals.heading]\ntopic = "/nav"\nfield = "h"\nunit = "deg"\nframe = "NED"\nsign = -1\noffset = 10.0\n'
     )
     columns = convert(profile(text), series("/nav", h=[30.0]))
     assert columns["psi"] == pytest.approx([math.radians(-20.0)])
@@ -226,9 +223,7 @@ def test_commanded_force_in_kilonewtons_and_flu() -> None:
 
 
 def test_throttle_in_per_cent() -> None:
-    text = (HEAD + BODY).replace(
-        'field = "rpm"\nunit = "rpm"', 'field = "rpm"\nunit = "%"\nfull_rpm = 1200.0', 1
-    )
+    text = (HEAD + BODY).replace('field = "rpm"\nunit = "rpm"', 'field = "rpm"\nunit = "%"\nfull_rpm = 1200.0', 1)
     columns = convert(parse_profile(text, "boat.toml"), series("/t1", rpm=[-50.0], **{"angle[1]": [180.0]}))
     assert columns["n_t1"] == pytest.approx([-600.0])
     assert columns["alpha_t1"] == pytest.approx([math.pi])
@@ -307,9 +302,7 @@ def test_nothing_to_derive_from() -> None:
         (("north", "apparent"), 3.0, 0.0, (-3.0, 5.0)),
     ],
 )
-def test_true_wind(
-    options: tuple[str, str], speed: float, direction: float, expected: tuple[float, float]
-) -> None:
+def test_true_wind(options: tuple[str, str], speed: float, direction: float, expected: tuple[float, float]) -> None:
     text = WIND.replace('"bow"', f'"{options[0]}"').replace('"apparent"', f'"{options[1]}"')
     heading = '[signals.heading]\ntopic = "/nav"\nfield = "h"\nunit = "rad"\nframe = "NED"\n'
     given = columns(u=5.0, v=0.0, r=0.0, psi=math.pi / 2, wind_speed=speed, wind_from=direction)
@@ -329,12 +322,8 @@ def test_wind_units_and_vector_form() -> None:
 
 
 def test_wind_without_a_heading_is_left_out_and_said(boat: Callable[..., Profile]) -> None:
-    heading = (
-        '[signals.heading]\ntopic = "/nav"\nfield = "h"\nunit = "rad"\nframe = "NED"\nrequired = false\n'
-    )
+    heading = '[signals.heading]\ntopic = "/nav"\nfield = "h"\nunit = "rad"\nframe = "NED"\nrequired = false\n'
     windy = profile(BODY + heading + WIND)
     given = columns(u=5.0, v=0.0, r=0.0, wind_speed=1.0, wind_from=0.0)
     assert "wind_N" not in resolve(windy, given)
-    assert resolve_notes(windy, given) == (
-        "The wind was left out: without a heading it cannot be turned to north.",
-    )
+    assert resolve_notes(windy, given) == ("The wind was left out: without a heading it cannot be turned to north.",)

@@ -51,9 +51,7 @@ def test_clipping_is_said() -> None:
         "alpha_thruster2": np.zeros(3),
     }
     notes = applied_force(MILLIAMPERE, columns, np.zeros((3, 3)))[1]
-    assert notes == (
-        "thruster1: 2 of 3 rows lie outside the thrust curve's -1050 to 1050 rpm and were clipped.",
-    )
+    assert notes == ("thruster1: 2 of 3 rows lie outside the thrust curve's -1050 to 1050 rpm and were clipped.",)
 
 
 def test_quadratic_in_turns_per_second() -> None:
@@ -69,9 +67,7 @@ def test_table_of_two_thrusters_gives_half() -> None:
 
 
 def test_open_water_by_hand() -> None:
-    curve = ThrustCurve(
-        "open_water", "rps", (-math.inf, math.inf), table=((0.0, 1.0), (0.3, 0.1)), astern=0.2
-    )
+    curve = ThrustCurve("open_water", "rps", (-math.inf, math.inf), table=((0.0, 1.0), (0.3, 0.1)), astern=0.2)
     # 10 rps, D 0.2 m, 1 m/s: J = 0.5, K_T = 0.2, T = 1000·100·0.0016·0.2 = 32 N; bollard 48 N; astern -32 N
     value = thrust(curve, np.array([600.0]), advance_mps=np.array([1.0]), diameter_m=0.2)[0]
     assert value == pytest.approx([32.0])
@@ -154,9 +150,7 @@ def test_feedback_is_preferred_and_orders_stand_in_with_a_note() -> None:
     tau, notes = applied_force(MILLIAMPERE, columns, np.zeros((1, 3)))
     expected = thrust(CURVE, np.array([500.0, 300.0]))[0].sum()
     assert tau[0, 0] == pytest.approx(expected)
-    assert notes == (
-        "The speed of thruster2 is the order, as there is no feedback: its lag stays in the residual.",
-    )
+    assert notes == ("The speed of thruster2 is the order, as there is no feedback: its lag stays in the residual.",)
     ordered = applied_force(MILLIAMPERE, columns, np.zeros((1, 3)), measured=False)[0]
     assert ordered[0, 0] == pytest.approx(thrust(CURVE, np.array([800.0, 300.0]))[0].sum())
 

@@ -67,9 +67,7 @@ def test_key_inside_an_inline_table_has_the_line_of_the_key_that_holds_it() -> N
 
 
 KEYS = st.text(alphabet="abcxyz_|.=[]# ", min_size=1, max_size=6)
-VALUES = st.sampled_from(
-    ["1", '"a"', "[1, 2]", "[\n  1,\n  2,\n]", '"""\n[x]\ny = 1\n"""', "'#['", "{ a = 1 }"]
-)
+VALUES = st.sampled_from(["1", '"a"', "[1, 2]", "[\n  1,\n  2,\n]", '"""\n[x]\ny = 1\n"""', "'#['", "{ a = 1 }"])
 
 
 @given(st.dictionaries(KEYS, st.dictionaries(KEYS, VALUES, max_size=4), max_size=4))

@@ -60,9 +60,7 @@ def test_drifting_with_the_wind_gives_no_load() -> None:
 def test_mirror_and_rotation(north: float, east: float, psi: float) -> None:
     mirrored = load(north, -east) * [1.0, -1.0, -1.0]
     np.testing.assert_allclose(load(north, east), mirrored, rtol=1e-9, atol=1e-9)
-    turned = load(
-        north * math.cos(psi) - east * math.sin(psi), north * math.sin(psi) + east * math.cos(psi), psi
-    )
+    turned = load(north * math.cos(psi) - east * math.sin(psi), north * math.sin(psi) + east * math.cos(psi), psi)
     # The moment's |gamma| has a kink, not a jump, so rounding may only change the load by rounding.
     np.testing.assert_allclose(turned, load(north, east), rtol=1e-6, atol=1e-6)
 

@@ -208,9 +208,7 @@ class McapLog:
         """Yield the wanted messages in file order; when verifying, what is lost of all others too."""
         wanted = frozenset(ids)
         counted = frozenset(self._index.channels) if verify else wanted
-        for loaded in batches(
-            self._file, self._bytes, self._index, counted, self._name, self._topic_of, verify
-        ):
+        for loaded in batches(self._file, self._bytes, self._index, counted, self._name, self._topic_of, verify):
             messages = {channel: rows for channel, rows in loaded.messages.items() if channel in wanted}
             yield replace(loaded, messages=messages)
 
@@ -224,9 +222,7 @@ class McapLog:
         crc = int.from_bytes(self._file[at + RECORD_HEADER : at + RECORD_HEADER + 4], "little")
         if crc == 0 or crc32(self._file[:at]) == crc:
             return []
-        return [
-            Loss(self._name, "the checksum of the whole data section is wrong: a part of the file is damaged")
-        ]
+        return [Loss(self._name, "the checksum of the whole data section is wrong: a part of the file is damaged")]
 
     def _shortfall(self, found: Mapping[int, int], losses: Sequence[Loss]) -> list[Loss]:
         """Say where the statistics count more messages than were found and told as lost."""
@@ -286,10 +282,7 @@ def _one_series(pieces: Sequence[Series]) -> Series:
         topic=pieces[0].topic,
         receive_ns=receive[order],
         stamp_ns=np.concatenate(stamps)[order] if len(stamps) == len(pieces) else None,
-        columns={
-            path: np.concatenate([piece.columns[path] for piece in pieces])[order]
-            for path in pieces[0].columns
-        },
+        columns={path: np.concatenate([piece.columns[path] for piece in pieces])[order] for path in pieces[0].columns},
     )
 
 

@@ -44,9 +44,7 @@ class FolderLog:
         stated = read_metadata(folder / NAME)
         losses: list[Loss] = []
         if isinstance(stated, str):
-            losses.append(
-                Loss(str(folder / NAME), f"{stated}: the files beside it were read without it", messages=0)
-            )
+            losses.append(Loss(str(folder / NAME), f"{stated}: the files beside it were read without it", messages=0))
             stated = Metadata((), (), {}, "", "", "")
         if stated.mode and stated.codec not in FORMATS:
             raise FerryIdError(
@@ -79,9 +77,7 @@ class FolderLog:
     def _files(self) -> tuple[list[tuple[Path, File]], list[Loss]]:
         """Return the files to read, and what is missing or left out."""
         there = {
-            file.name: file
-            for file in sorted(self._folder.iterdir())
-            if file.name.endswith(ENDINGS) and file.is_file()
+            file.name: file for file in sorted(self._folder.iterdir()) if file.name.endswith(ENDINGS) and file.is_file()
         }
         found: list[tuple[Path, File]] = []
         losses: list[Loss] = []

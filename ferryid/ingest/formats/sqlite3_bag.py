@@ -86,11 +86,7 @@ class Sqlite3Log:
         self._file, losses = self._settled(path)
         self._ids: dict[str, list[int]] = {}
         with Pages(self._file) as pages:
-            cut = (
-                f"the file ends after {pages.bytes} bytes of {pages.stated}"
-                if pages.bytes < pages.stated
-                else ""
-            )
+            cut = f"the file ends after {pages.bytes} bytes of {pages.stated}" if pages.bytes < pages.stated else ""
             recorded = self._recorded(cut)
             for number, name, *_ in recorded.topics:
                 self._ids.setdefault(name, []).append(number)
@@ -99,11 +95,7 @@ class Sqlite3Log:
         losses += tuple(self._told(damages, cut))
         foreign = ~np.isin(self._rows.topic_id, sorted(known))
         if foreign.any():
-            losses += (
-                Loss(
-                    str(path), "messages of topics that the file does not list", messages=int(foreign.sum())
-                ),
-            )
+            losses += (Loss(str(path), "messages of topics that the file does not list", messages=int(foreign.sum())),)
         self._definitions: dict[str, Definition] = {}
         self.topics: tuple[Topic, ...] = tuple(self._topics(recorded))
         self.losses: tuple[Loss, ...] = losses
@@ -130,9 +122,7 @@ class Sqlite3Log:
                 connection.execute("SELECT count(*) FROM sqlite_master").fetchall()
         except sqlite3.DatabaseError as error:
             names = " and ".join(log.name for log in logs)
-            return path, (
-                Loss(str(path), f"{names} cannot be applied ({error}): the last messages are lost"),
-            )
+            return path, (Loss(str(path), f"{names} cannot be applied ({error}): the last messages are lost"),)
         return copy, losses
 
     def _connect(self) -> sqlite3.Connection:
@@ -148,9 +138,7 @@ class Sqlite3Log:
         try:
             with closing(self._connect()) as connection:
                 tables = dict(
-                    connection.execute(
-                        "SELECT name, rootpage FROM sqlite_master WHERE type='table'"
-                    ).fetchall()
+                    connection.execute("SELECT name, rootpage FROM sqlite_master WHERE type='table'").fetchall()
                 )
                 columns = {
                     name: [row[1] for row in connection.execute(f"PRAGMA table_info('{name}')")]
@@ -167,9 +155,7 @@ class Sqlite3Log:
                         f"{path}: an SQLite database but not one of rosbag2, found the tables: {found}. "
                         "Fix: give the .db3 file that rosbag2 recorded"
                     )
-                serialization = (
-                    "serialization_format" if "serialization_format" in columns["topics"] else "'cdr'"
-                )
+                serialization = "serialization_format" if "serialization_format" in columns["topics"] else "'cdr'"
                 digest = "type_description_hash" if "type_description_hash" in columns["topics"] else "''"
                 topics = connection.execute(
                     f"SELECT id, name, type, {serialization}, {digest} FROM topics ORDER BY id"
@@ -229,13 +215,9 @@ class Sqlite3Log:
             encoding = self._storage.encodings.get(name, own_encoding)
             times = self._rows.time_ns[np.isin(self._rows.topic_id, numbers)]
             if encoding != "cdr":
-                found = Definition(
-                    None, {}, f'cannot be decoded: serialised as "{encoding}", only cdr is supported'
-                )
+                found = Definition(None, {}, f'cannot be decoded: serialised as "{encoding}", only cdr is supported')
             elif len(types) > 1:
-                found = Definition(
-                    None, {}, f"cannot be decoded: recorded with the types {' and '.join(types)}"
-                )
+                found = Definition(None, {}, f"cannot be decoded: recorded with the types {' and '.join(types)}")
             else:
                 digest = digest or self._storage.digests.get(name, "")
                 found = define(types[0], recorded.definitions.get(types[0]), digest, distro)
@@ -268,9 +250,7 @@ class Sqlite3Log:
                     f"{path}: {name} of type {topic.type} {definition.note}. "
                     "Fix: record with a newer rosbag2, which stores definitions, as cdr, or map another topic"
                 )
-            decoders[name] = decoder_for(
-                "cdr", definition.typestore, topic.type, name, fields, topic.count, str(path)
-            )
+            decoders[name] = decoder_for("cdr", definition.typestore, topic.type, name, fields, topic.count, str(path))
         return decoders
 
     def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
