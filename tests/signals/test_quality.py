@@ -114,6 +114,12 @@ def test_a_lasting_step_is_reported_and_kept() -> None:
     assert quality.sentences() == ("u: 1 implausible steps were found and kept.",)
 
 
+def test_two_steps_the_same_way_are_no_spike() -> None:
+    values = np.sin(0.2 * T) + np.where(T > 60, 5.0, 0.0) + np.where(T > 60.05, 5.0, 0.0)
+    quality = clean("u", T, values)[1]
+    assert (quality.spikes, quality.jumps) == (0, 2)
+
+
 def test_orders_and_resting_actuators_are_left_alone() -> None:
     pulses = 100 * np.sin(T) + np.where(np.arange(T.size) % 400 == 200, 500.0, 0.0)
     assert clean("n_thruster1", T, pulses)[1].spikes == 6
