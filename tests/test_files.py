@@ -15,9 +15,14 @@ from ferryid.files import dump_json, replacing, write_text
 def test_an_interrupt_leaves_the_old_file_and_no_rest(tmp_path: Path) -> None:
     target = tmp_path / "model.json"
     write_text(target, "old")
-    with pytest.raises(KeyboardInterrupt), replacing(target) as temporary:
-        temporary.write_text("half", encoding="utf-8")
-        raise KeyboardInterrupt
+
+    def half_way() -> None:
+        with replacing(target) as temporary:
+            temporary.write_text("half", encoding="utf-8")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        half_way()
     assert target.read_text(encoding="utf-8") == "old"
     assert [path.name for path in tmp_path.iterdir()] == ["model.json"]
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi, radians
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.simulate.noise import generator
 from ferryid.simulate.scenario import Scenario
+from ferryid.simulate.states import Control, Truth
 from ferryid.vessel.profile import Profile
-
-if TYPE_CHECKING:
-    from ferryid.simulate.trial import Control, Truth
 
 Floats = NDArray[np.float64]
 Nanoseconds = NDArray[np.int64]
