@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, Rows, gram
+from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, Rows, gram, subtract
 from ferryid.identify.qr import standard_deviations
 from ferryid.identify.recurrence import extract
 from ferryid.identify.simpls import group_outputs, simpls
@@ -109,8 +109,8 @@ class Blocks:
                 K, m = X.shape[1], Y.shape[1]
             by_term = X.strides[0] < X.strides[1]
             joined = np.empty((len(Y), K + m + 1), order="F" if by_term else "C")
-            np.subtract(X, shift[:K], out=joined[:, :K])
-            np.subtract(Y, shift[K:], out=joined[:, K:-1])
+            subtract(X, shift[:K], joined[:, :K])
+            subtract(Y, shift[K:], joined[:, K:-1])
             joined[:, -1] = 1.0
             blocks.append(gram(joined))
         if shift is None:
@@ -186,7 +186,7 @@ def bootstrap(
     table = np.concatenate([coefficients, intercepts[:, None, :]], axis=1).transpose(2, 1, 0)
     widened = count / (count - 1)
     tail = float(ndtr(np.sqrt(widened) * stdtrit(count - 1, (1.0 - level) / 2.0)))
-    low, high = np.quantile(table, [tail, 1.0 - tail], axis=2)
+    low, high = _percentiles(table, tail)
     deviation = table - table.mean(axis=2, keepdims=True)
     covariance = deviation @ deviation.transpose(0, 2, 1) / max(draws - 1, 1) * widened
     return Bootstrap(
@@ -200,6 +200,18 @@ def bootstrap(
         block_s=block_s,
         notes=notes,
     )
+
+
+def _percentiles(table: Floats, tail: float) -> tuple[Floats, Floats]:
+    """Values at probability `tail` from either end of the last axis, linear between draws (as `numpy.quantile`)."""
+    ordered = np.sort(table, axis=-1)
+    place = tail * (table.shape[-1] - 1)
+    below = int(place)
+    above = min(below + 1, table.shape[-1] - 1)
+    part = place - below
+    low = ordered[..., below] * (1.0 - part) + ordered[..., above] * part
+    high = ordered[..., -1 - below] * (1.0 - part) + ordered[..., -1 - above] * part
+    return low, high
 
 
 def bootstrap_rows(
@@ -341,6 +353,13 @@ def _moved(blocks: Blocks, shift: Floats) -> Floats:
     return np.asarray(blocks.products - cross - cross.transpose(0, 2, 1) + square)
 
 
+def _times_drawn(count: int, draws: int, seed: int) -> Floats:
+    """How often each of `count` blocks comes up in each draw of as many with replacement, shape (draws, count)."""
+    picked = np.random.default_rng(seed).integers(0, count, (draws, count))
+    flat = np.bincount((picked + count * np.arange(draws)[:, None]).ravel(), minlength=draws * count)
+    return flat.reshape(draws, count).astype(np.float64)
+
+
 def _draw(
     blocks: Blocks,
     components: int,
@@ -363,7 +382,7 @@ def _draw(
     )
     products = _moved(blocks, mean)
     count = len(blocks.n)
-    times = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=draws).astype(np.float64)
+    times = _times_drawn(count, draws, seed)
     coefficients, intercepts = np.zeros((draws, K, m)), np.empty((draws, m))
     sums = times @ products[:, -1, K:]
     intercepts[:] = mean[K:] + sums[:, :m] / sums[:, m:]

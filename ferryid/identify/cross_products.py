@@ -43,7 +43,8 @@ class CrossProducts:
     K, m
         Number of regressors (basis terms) and of outputs (axes).
     shift
-        ``[s_x, s_y]``, subtracted from every row so that large offsets cost no digits, shape (K + m,).
+        ``[s_x, s_y]``, subtracted from every row so that large offsets cost no digits, shape (K + m,). Zero where the
+        first chunk's mean is smaller than its standard deviation.
     products
         Shape (K + m + 1, K + m + 1), symmetric; the last row holds the column sums and n.
     """
@@ -297,13 +298,18 @@ class Accumulator:
             X, _ = rows.chunk(start, min(start + 2, stop))
             scratch = scratch if X.strides[0] < X.strides[1] else flat.reshape(-1, width)
         scratch[:, -1] = 1.0
+        moved = np.flatnonzero(shift[:K])
         count = 0
         for low in range(start, stop, CHUNK_ROWS):
             X, Y = rows.chunk(low, min(low + CHUNK_ROWS, stop), scratch.T[:K])
             filled = scratch[: len(Y)]
             with np.errstate(all="ignore"):
-                np.subtract(X, shift[:K], out=filled[:, :K])
-                np.subtract(Y, shift[K:], out=filled[:, K:-1])
+                if rows.fill is None:
+                    subtract(X, shift[:K], filled[:, :K])
+                else:
+                    for k in moved:
+                        filled[:, k] -= shift[k]
+                subtract(Y, shift[K:], filled[:, K:-1])
                 part = gram(filled)
             if not np.isfinite(part).all():
                 raise not_finite(X, Y, self._names, self._where)
@@ -317,7 +323,10 @@ def _first_mean(rows: Rows) -> Floats | None:
         X, Y = rows.chunk(low, low + CHUNK_ROWS)
         if len(Y):
             with np.errstate(all="ignore"):
-                return np.concatenate([X.mean(axis=0), Y.mean(axis=0)])
+                mean = np.concatenate([X.mean(axis=0), Y.mean(axis=0)])
+                # A mean below the standard deviation costs no digit: leave it.
+                spread = np.concatenate([X.std(axis=0), Y.std(axis=0)])
+                return np.where(np.abs(mean) < spread, 0.0, mean)
     return None
 
 
@@ -335,6 +344,15 @@ def not_finite(X: Floats, Y: Floats, names: Sequence[str], where: str) -> FerryI
         f"{where}: {name} must be finite for a fit, found {columns[row, column]} in {int(bad[:, column].sum())} "
         f"of {len(columns)} rows looked at. Fix: mask rows without measurements, or correct the signal's unit"
     )
+
+
+def subtract(values: Floats, shift: Floats, out: Floats) -> None:
+    """``out[:] = values - shift``, column by column where that is how `out` lies: five times as fast there."""
+    if out.strides[0] > out.strides[1]:
+        np.subtract(values, shift, out=out)
+        return
+    for k in range(len(shift)):
+        np.subtract(values[:, k], shift[k], out=out[:, k])
 
 
 def gram(rows: Floats) -> Floats:

@@ -64,11 +64,9 @@ def extract(
         alive &= length > 0.0
         norm_t = np.where(alive, length, np.inf)[:, None]
         r, p = r / norm_t, p / norm_t
-        v = p.copy()
-        for _ in range(2 if a else 0):
-            v -= _combine(V[:, :a], _times(V[:, :a], v))
+        v = p - _combine(V[:, :a], _times(V[:, :a], p)) if a else p
         length = np.sqrt(np.einsum("bk,bk->b", v, v))
-        v /= np.where(length > 0.0, length, np.inf)[:, None]
+        v = v / np.where(length > 0.0, length, np.inf)[:, None]
         S = S - v[:, :, None] * (v[:, None, :] @ S)
         R[:, a], P[:, a], V[:, a] = r, p, v
         Q[:, a] = (r[:, None, :] @ first)[:, 0]

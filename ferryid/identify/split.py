@@ -15,7 +15,10 @@ Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 
 KINDS = ("blocks", "logs", "every-kth")
-BLOCKS = 10
+BLOCK_S = 40.0
+"""Usual length of a block: a manoeuvre or two, so that training and validation rows both see every kind of them."""
+FEWEST_BLOCKS, MOST_BLOCKS = 9, 36
+"""A short log has shorter blocks, a long one longer: slow vessels make long logs, and their manoeuvres last."""
 EVERY = 4
 GUARD_S = 2.0
 """Purged on top of one window, for disturbances that outlast it; pass `correlation_time` of a residual for better."""
@@ -54,7 +57,7 @@ def split(
     *,
     window_s: float,
     guard_s: float = GUARD_S,
-    blocks: int = BLOCKS,
+    blocks: int | None = None,
     every: int = EVERY,
     validate: Sequence[str] = (),
 ) -> Split:
@@ -66,15 +69,16 @@ def split(
         Logs; only rows that are `valid` are used.
     kind
         ``"blocks"``: each log is cut into contiguous blocks of equally many valid rows, and every third of them, from
-        the second on, validates (3 of 10). ``"logs"``: whole logs validate. ``"every-kth"``: every k-th valid row
+        the second on, validates. ``"logs"``: whole logs validate. ``"every-kth"``: every k-th valid row
         validates (thesis 3.2.4); neighbours share the smoothing window, so that the score flatters.
     window_s
         Length of the smoothing window [s].
     guard_s
         Time [s] purged in addition to one window.
     blocks
-        Number of blocks a log; fewer where blocks would be shorter than four purge gaps. Among several logs, one too short
-        for three blocks is a block itself, and of such logs the second, fifth ... validate.
+        Number of blocks a log; None takes as many as are `BLOCK_S` long, 9 to 36 of them. Fewer where
+        blocks would be shorter than four purge gaps. Among several logs, one too short for three blocks is a block
+        itself, and of such logs the second, fifth ... validate.
     every
         k of ``"every-kth"``, 2 or more.
     validate
@@ -207,13 +211,14 @@ def _purged(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
     return used & ~validates & ~near, validation
 
 
-def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: int) -> Split:
+def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: int | None) -> Split:
     training, validation, notes, purges = [], [], [], []
     short = 0
     for motion in motions:
         purge_s = _purge_s(motion, window_s, guard_s)
         seconds = np.count_nonzero(motion.valid) / motion.rate_hz
-        number = min(blocks, int(seconds / (_LEAST_PURGES * purge_s)))
+        wanted = blocks or min(max(round(seconds / BLOCK_S), FEWEST_BLOCKS), MOST_BLOCKS)
+        number = min(wanted, int(seconds / (_LEAST_PURGES * purge_s)))
         if number < 3 and len(motions) == 1:
             raise _too_short(
                 motion, motion.valid, 3 * _LEAST_PURGES * purge_s, "three blocks and the gaps between them"

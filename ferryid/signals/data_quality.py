@@ -10,7 +10,7 @@ import numpy as np
 
 from ferryid.ingest.log import Loss
 from ferryid.signals.parquet import unit_of
-from ferryid.signals.quality import clean, is_angle, unwrapped
+from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.track import Motion, Track
 
@@ -51,7 +51,7 @@ def stream_quality(stream: Stream) -> dict[str, Any]:
     time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
     signals = {}
     for name, values in stream.columns.items():
-        _, found = clean(name, time_s, unwrapped(values) if is_angle(name) else values)
+        _, found = clean(name, time_s, values)
         finite = values[np.isfinite(values)]
         signals[name] = {
             "unit": unit_of(name),

@@ -174,7 +174,7 @@ def clean(name: str, time_s: Floats, values: Floats) -> tuple[Floats, ColumnQual
     finite = np.isfinite(values)
     missing = int(values.size - np.count_nonzero(finite))
     through = 0
-    if is_angle(name):
+    if is_angle(name) and not is_order(name):
         between = np.flatnonzero(finite)[_through_wrap(time_s[finite], values[finite])]
         through = int(between.size)
         finite[between] = False

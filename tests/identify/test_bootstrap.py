@@ -39,10 +39,9 @@ def test_every_draw_is_a_fit_to_the_rows_drawn(allowed) -> None:
     blocks = [CrossProducts.from_rows(X[rows], Y[rows]) for rows in cuts]
     options = {"allowed": allowed, "scale": False}
     got = bootstrap(blocks, 3, draws=40, seed=7, level=1.0 - 1e-12, **options)
-    counts = np.random.default_rng(7).multinomial(12, np.full(12, 1.0 / 12.0), size=40)
     fits = []
-    for times in counts:
-        rows = np.concatenate([cuts[i] for i in range(12) for _ in range(times[i])])
+    for picked in np.random.default_rng(7).integers(0, 12, (40, 12)):
+        rows = np.concatenate([cuts[i] for i in picked])
         fits.append(simpls(CrossProducts.from_rows(X[rows], Y[rows]), 3, **options))
     theta = np.array([fit.coefficients[-1] for fit in fits])
     intercept = np.array([fit.intercepts[-1] for fit in fits])

@@ -108,7 +108,7 @@ def test_folds_within_training_rows_leave_the_validation_rows_alone() -> None:
 
 def test_ten_blocks_of_which_three_validate() -> None:
     log = motion(np.ones(6000, dtype=bool))
-    parts = split([log], window_s=1.0, guard_s=2.0)
+    parts = split([log], window_s=1.0, guard_s=2.0, blocks=10)
     expected = np.zeros(6000, dtype=bool)
     for block in (1, 4, 7):
         expected[600 * block : 600 * block + 600] = True
@@ -119,12 +119,20 @@ def test_ten_blocks_of_which_three_validate() -> None:
     assert parts.notes == ("trial: 10 blocks of 60 s; 401 s train, 180 s validate, 19 s purged in gaps of 3.2 s.",)
 
 
+@pytest.mark.parametrize(("seconds", "length_s"), [(120, 120 / 9), (720, 40), (1440, 40), (7200, 200)])
+def test_blocks_are_a_manoeuvre_long_and_neither_too_few_nor_too_many(seconds: int, length_s: float) -> None:
+    validation = split([motion(np.ones(10 * seconds, dtype=bool))], window_s=1.0, guard_s=2.0).validation[0]
+    first = np.flatnonzero(validation)[0]
+    assert first / 10 == pytest.approx(length_s, abs=0.2)
+    assert 0.3 < validation.mean() < 0.37
+
+
 def test_short_logs_are_blocks_among_themselves() -> None:
     logs = [motion(np.ones(300, dtype=bool), log=name) for name in "abcde"]
     parts = split([*logs, motion(np.ones(6000, dtype=bool), log="long")], window_s=1.0)
     assert [mask.all() for mask in parts.validation] == [False, True, False, False, True, False]
     assert [mask.all() for mask in parts.training] == [True, False, True, True, False, False]
-    assert parts.validation[-1].sum() == 1800
+    assert parts.validation[-1].sum() == 5 * 400
     assert parts.notes[0] == "a: 1 block of 30 s; 30 s train, 0 s validate, 0 s purged in gaps of 3.2 s."
 
 
