@@ -24,6 +24,7 @@ GUARD_S = 2.0
 """Purged on top of one window, for disturbances that outlast it; pass `correlation_time` of a residual for better."""
 
 _VALIDATES_EVERY = 3
+_GOLDEN = (5.0**0.5 - 1.0) / 2.0
 _LEAST_PURGES = 4.0
 """A block is at least this many purge gaps long, so that more rows are used than purged."""
 
@@ -68,8 +69,8 @@ def split(
     motions
         Logs; only rows that are `valid` are used.
     kind
-        ``"blocks"``: each log is cut into contiguous blocks of equally many valid rows, and every third of them, from
-        the second on, validates. ``"logs"``: whole logs validate. ``"every-kth"``: every k-th valid row
+        ``"blocks"``: each log is cut into contiguous blocks of equally many valid rows, and of every three in a row
+        one validates. ``"logs"``: whole logs validate. ``"every-kth"``: every k-th valid row
         validates (thesis 3.2.4); neighbours share the smoothing window, so that the score flatters.
     window_s
         Length of the smoothing window [s].
@@ -225,11 +226,11 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
             )
         if number < 3:
             # A log too short for blocks of its own is one block among those of its kind.
-            part = np.full(motion.valid.size, short)
+            validates = np.full(motion.valid.size, short % _VALIDATES_EVERY == 1)
             number, short = 1, short + 1
         else:
-            part = _number(motion.valid, number)
-        train, check = _purged(motion.valid, part % _VALIDATES_EVERY == 1, round(purge_s * motion.rate_hz))
+            validates = _validating(number)[_number(motion.valid, number)]
+        train, check = _purged(motion.valid, validates, round(purge_s * motion.rate_hz))
         training.append(train)
         validation.append(check)
         purges.append(purge_s)
@@ -241,6 +242,19 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
             f"{lost:.0f} s purged in gaps of {purge_s:.1f} s."
         )
     return Split("blocks", tuple(training), tuple(validation), min(purges), tuple(notes))
+
+
+def _validating(number: int) -> Flags:
+    """Return which of `number` blocks validate, shape (number,): one of every three in a row.
+
+    Which of the three follows multiples of the golden ratio. Always the same one would keep step with a trial that
+    repeats itself, and validation would see manoeuvres that training never does.
+    """
+    triples = np.arange((number + 1) // _VALIDATES_EVERY)
+    chosen = np.zeros(number, dtype=bool)
+    place = ((triples * _GOLDEN + 0.5) % 1.0 * _VALIDATES_EVERY).astype(np.int64)
+    chosen[np.minimum(_VALIDATES_EVERY * triples + place, number - 1)] = True
+    return chosen
 
 
 def _logs(motions: Sequence[Motion], validate: Sequence[str]) -> Split:

@@ -110,7 +110,7 @@ def test_ten_blocks_of_which_three_validate() -> None:
     log = motion(np.ones(6000, dtype=bool))
     parts = split([log], window_s=1.0, guard_s=2.0, blocks=10)
     expected = np.zeros(6000, dtype=bool)
-    for block in (1, 4, 7):
+    for block in (1, 3, 8):
         expected[600 * block : 600 * block + 600] = True
     np.testing.assert_array_equal(parts.validation[0], expected)
     # Six borders, each with 3.2 s at 10 Hz taken from training.
@@ -122,9 +122,18 @@ def test_ten_blocks_of_which_three_validate() -> None:
 @pytest.mark.parametrize(("seconds", "length_s"), [(120, 120 / 9), (720, 40), (1440, 40), (7200, 200)])
 def test_blocks_are_a_manoeuvre_long_and_neither_too_few_nor_too_many(seconds: int, length_s: float) -> None:
     validation = split([motion(np.ones(10 * seconds, dtype=bool))], window_s=1.0, guard_s=2.0).validation[0]
-    first = np.flatnonzero(validation)[0]
+    first = np.flatnonzero(validation)[0]  # the second of the first three blocks
     assert first / 10 == pytest.approx(length_s, abs=0.2)
     assert 0.3 < validation.mean() < 0.37
+
+
+def test_blocks_do_not_keep_step_with_a_trial_that_repeats_itself() -> None:
+    parts = split([motion(np.ones(14400, dtype=bool))], window_s=1.0)
+    phase = np.arange(14400) // 400 % 3
+    for third in range(3):
+        # Whatever recurs every three blocks is seen by training and by validation.
+        assert parts.validation[0][phase == third].any()
+        assert parts.training[0][phase == third].any()
 
 
 def test_short_logs_are_blocks_among_themselves() -> None:
