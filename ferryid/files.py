@@ -6,7 +6,7 @@ import errno
 import json
 import os
 import shutil
-import tempfile
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,22 +26,39 @@ def replacing(path: Path) -> Iterator[Path]:
     FerryIdError
         When the place cannot be written or the disk is full.
     """
-    temporary: Path | None = None
+    temporary = path.parent / f".{path.name}.{uuid.uuid4().hex}.part"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-        os.close(handle)
-        os.unlink(name)
-        temporary = Path(name)
         yield temporary
         if temporary.is_dir() and path.is_dir():
-            shutil.rmtree(path)
-        os.replace(temporary, path)
+            _replace_folder(temporary, path)
+        else:
+            os.replace(temporary, path)
     except OSError as error:
         raise unwritable(path, error) from error
     finally:
-        if temporary is not None and temporary.exists():
-            shutil.rmtree(temporary) if temporary.is_dir() else temporary.unlink()
+        _remove(temporary)
+
+
+def _replace_folder(finished: Path, path: Path) -> None:
+    # A folder that holds something cannot be replaced in one step: the old one is moved aside first.
+    old = path.parent / f".{path.name}.{uuid.uuid4().hex}.part"
+    os.rename(path, old)
+    try:
+        os.rename(finished, path)
+    except OSError as error:
+        # Another process finished the same result meanwhile: one is as good as the other.
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            raise
+    finally:
+        _remove(old)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    elif path.exists():
+        path.unlink()
 
 
 def unwritable(path: Path, error: OSError) -> FerryIdError:

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import json
-import os
-import shutil
-import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
@@ -16,6 +12,7 @@ from typing import Any
 
 from ferryid import __version__
 from ferryid.errors import FerryIdError
+from ferryid.files import replacing, write_text
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
 from ferryid.signals.parquet import TIME_COLUMNS, read_table, unit_of, write_table
@@ -67,10 +64,8 @@ def by_content(
         if note["recording"]["sha256"] == sha256 and same_paths and (note["verified"] or not verify):
             kept = _loaded(folder, paths)
             # Noted anew so that the next time nothing is hashed; a folder that cannot be written is merely slower.
-            with contextlib.suppress(OSError):
-                fresh = folder / f"{_NOTE}.{uuid.uuid4().hex}"
-                fresh.write_text(json.dumps({**note, "files": now}, indent=1) + "\n", encoding="utf-8")
-                os.replace(fresh, folder / _NOTE)
+            with contextlib.suppress(FerryIdError):
+                write_text(folder / _NOTE, json.dumps({**note, "files": now}, indent=1) + "\n")
             return kept
     return None
 
@@ -111,53 +106,20 @@ def store(out: Path, recording: Recording, files: list[list[Any]], *, verify: bo
         For a folder that cannot be written or a disk that is full.
     """
     folder = folder_of(out, recording.name, recording.sha256, recording.profile_sha256)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with _temporary(folder.parent, recording.name) as draft:
-            tables = {
-                topic: f"{number:03d}{_file_part(topic)}.parquet" for number, topic in enumerate(recording.streams)
-            }
-            _write_streams(draft, recording, tables)
-            note = {
-                "schema": SCHEMA,
-                "version": __version__,
-                "verified": verify,
-                "files": files,
-                "tables": tables,
-                "recording": _plain(recording),
-            }
-            (draft / _NOTE).write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
-            _put(draft, folder)
-    except OSError as error:
-        raise FerryIdError(
-            f"{folder}: the recording cannot be written ({error.strerror or error}). "
-            "Fix: free space or choose a writable folder with --out"
-        ) from error
+    tables = {topic: f"{number:03d}{_file_part(topic)}.parquet" for number, topic in enumerate(recording.streams)}
+    with replacing(folder) as draft:
+        draft.mkdir()
+        _write_streams(draft, recording, tables)
+        note = {
+            "schema": SCHEMA,
+            "version": __version__,
+            "verified": verify,
+            "files": files,
+            "tables": tables,
+            "recording": _plain(recording),
+        }
+        (draft / _NOTE).write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
     return folder
-
-
-def _put(draft: Path, folder: Path) -> None:
-    """Rename a finished folder to its place; an older one there is removed."""
-    if folder.exists():
-        with _temporary(folder.parent, folder.name) as old:
-            os.rename(folder, old / "replaced")
-    try:
-        os.rename(draft, folder)
-    except OSError as error:
-        # Another process finished the same recording meanwhile: one is as good as the other.
-        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
-            raise
-
-
-@contextlib.contextmanager
-def _temporary(parent: Path, name: str) -> Iterator[Path]:
-    """A folder that is gone afterwards, unless it was renamed."""
-    draft = parent / f".{name}-{uuid.uuid4().hex}"
-    draft.mkdir()
-    try:
-        yield draft
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
 
 
 def _write_streams(draft: Path, recording: Recording, tables: Mapping[str, str]) -> None:
