@@ -50,6 +50,9 @@ def _add_commands() -> None:
 
 _add_commands()
 
+# Products here are small: threads cost more than they give, and on a busy machine many times more. Read when NumPy loads.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 
 def main() -> None:
     """Run the command line.

@@ -15,8 +15,8 @@ from ferryid import __version__
 from ferryid.errors import FerryIdError
 from ferryid.identify.accept import accept
 from ferryid.identify.basis import Basis, basis, relative_flow
-from ferryid.identify.bootstrap import FEWEST_BLOCKS, Blocks, block_rows, bootstrap
-from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, Rows
+from ferryid.identify.bootstrap import Blocks, block_seconds, bootstrap
+from ferryid.identify.cross_products import CrossProducts, Rows
 from ferryid.identify.estimate import Estimator
 from ferryid.identify.excitation import excitation
 from ferryid.identify.free_run import free_run
@@ -100,9 +100,17 @@ def fit(
     theta, intercept = model_fit.coefficients[chosen - 1], model_fit.intercepts[chosen - 1]
 
     progress("resampling blocks for the intervals")
-    blocks, block_s = _blocks(functions, motions, targets, parts, model_fit, chosen)
+    rows = _rows(functions, motions, targets, parts.training)
+    rates = [motion.rate_hz for motion in motions]
+    block_s, narrow = block_seconds(rows, rates, theta, intercept)
     spread = bootstrap(
-        blocks, chosen, draws=settings.draws, seed=settings.seed, allowed=functions.mask, block_s=block_s
+        Blocks.of(rows, rates, block_s),
+        chosen,
+        draws=settings.draws,
+        seed=settings.seed,
+        allowed=functions.mask,
+        block_s=block_s,
+        notes=narrow,
     )
 
     progress("judging")
@@ -220,7 +228,9 @@ def _rows(functions: Basis, motions: Sequence[Motion], outputs: Sequence[Floats]
             relative_flow(motion.nu, motion.eta[:, 2], flow) if needed and flow is not None else None
             for needed, flow in ((functions.needs_wind, motion.wind), (functions.needs_current, motion.current))
         ]
-        rows.append(Rows((motion.nu, motion.nu_dot, *flows), output, mask, functions.evaluate))
+        rows.append(
+            Rows((motion.nu, motion.nu_dot, *flows), output, mask, fill=functions.fill, terms=len(functions.terms))
+        )
     return rows
 
 
@@ -278,28 +288,6 @@ def _components(
     else:
         errors, spread = sweep_components([CrossProducts.of(*part) for part in rows], most, allowed=functions.mask)
     return one_standard_error(errors, spread)
-
-
-def _blocks(
-    functions: Basis, motions: Sequence[Motion], targets: Sequence[Floats], parts: Split, fitted: Simpls, chosen: int
-) -> tuple[Blocks, float]:
-    """Return the cross-products of training blocks, and their length [s]: long enough to know little of each other."""
-    theta, intercept = fitted.coefficients[chosen - 1], fitted.intercepts[chosen - 1]
-    memories = []
-    for rows, motion in zip(_rows(functions, motions, targets, parts.training), motions, strict=True):
-        chunks = (rows.chunk(low, low + CHUNK_ROWS) for low in range(0, len(motion.t), CHUNK_ROWS))
-        left = np.concatenate([output - values @ theta - intercept for values, output in chunks])
-        if len(left) >= FEWEST_BLOCKS:
-            memories.append(block_rows(left) / motion.rate_hz)
-    seconds = sum(float(mask.sum()) / motion.rate_hz for motion, mask in zip(motions, parts.training, strict=True))
-    length_s = min(max(memories, default=0.0), seconds / FEWEST_BLOCKS)
-    blocks = []
-    for motion, target, mask in zip(motions, targets, parts.training, strict=True):
-        used = np.flatnonzero(mask)
-        for piece in np.array_split(used, max(1, round(len(used) / max(1.0, length_s * motion.rate_hz)))):
-            if len(piece):
-                blocks.append(CrossProducts.from_rows(functions.of(motion, piece), target[piece]))
-    return Blocks.stack(blocks), length_s
 
 
 def _scores(fitted: Sequence[LogFit], parts: Split) -> dict[str, Any]:
