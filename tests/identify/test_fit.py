@@ -1,0 +1,132 @@
+"""The whole fit: what it may see, what it must recover, and when it must not believe itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.identify import fit as module
+from ferryid.identify.estimate import estimator
+from ferryid.identify.fit import fit
+from ferryid.identify.inertia import effective_mass, unbelievable, unforced, without_inertia
+from ferryid.identify.result import FitResult
+from ferryid.identify.settings import FitSettings
+from ferryid.signals.prepare import Prepared, prepare
+from ferryid.vessel import load_profile
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+PROFILE = load_profile("milliampere")
+SETTINGS = FitSettings(delta=0.4, sigma=0.4, draws=60)
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Prepared:
+    return prepare(str(FIXTURES / "short.mcap"), PROFILE, tmp_path_factory.mktemp("out"), window_s=1.0)
+
+
+def fitted(monkeypatch: pytest.MonkeyPatch, prepared: Prepared, settings: FitSettings = SETTINGS) -> FitResult:
+    monkeypatch.setattr(module, "prepare", lambda *_, **__: prepared)
+    return fit(["short.mcap"], PROFILE, settings, Path("nowhere"))
+
+
+def test_recovers_the_true_inertia_from_a_base_at_forty_percent(
+    monkeypatch: pytest.MonkeyPatch, prepared: Prepared
+) -> None:
+    result = fitted(monkeypatch, prepared)
+    assert result.verdict.accepted
+    mass = effective_mass(PROFILE, result.model.scale, result.model.terms, result.model.theta)
+    # Noise in the derivative pulls inertia down by some per cent; from 40 % it must come most of the way.
+    np.testing.assert_allclose(np.diag(mass) / np.diag(PROFILE.hull.M), 1.0, atol=0.25)
+
+
+def test_validation_rows_do_not_reach_the_coefficients(monkeypatch: pytest.MonkeyPatch, prepared: Prepared) -> None:
+    honest = fitted(monkeypatch, prepared)
+    validation = honest.logs[0].validation
+    assert not (validation & honest.logs[0].training).any()
+    motion = prepared.motion
+    poison = np.where(validation[:, None], 5.0 * motion.tau + 100.0, motion.tau)
+    poisoned = fitted(monkeypatch, replace(prepared, motion=replace(motion, tau=poison)))
+    np.testing.assert_array_equal(poisoned.model.theta, honest.model.theta)
+    np.testing.assert_array_equal(poisoned.model.low, honest.model.low)
+    assert not poisoned.verdict.accepted or poisoned.verdict.normalised_mse != honest.verdict.normalised_mse
+
+
+def test_scores_are_those_of_the_stored_model(monkeypatch: pytest.MonkeyPatch, prepared: Prepared) -> None:
+    result = fitted(monkeypatch, prepared)
+    log = result.logs[0]
+    error = (log.motion.tau - estimator(result.model).of(log.motion))[log.validation]
+    mse = result.model.scores["mse"]["model"]
+    np.testing.assert_allclose((error**2).mean(axis=0), [mse["surge"], mse["sway"], mse["yaw"]], rtol=1e-9)
+    # The curve comes from cross-products and never forms an estimate: it must agree at the chosen number.
+    base = result.model.scores["mse"]["base"]
+    curve = result.curve.validation[result.curve.chosen - 1]
+    np.testing.assert_allclose(curve, [mse[a] / base[a] for a in ("surge", "sway", "yaw")], rtol=1e-6)
+
+
+def test_an_axis_without_force_keeps_its_inertia_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, prepared: Prepared
+) -> None:
+    motion = prepared.motion
+    tau = motion.tau * np.array([1.0, 0.0, 1.0])
+    result = fitted(monkeypatch, replace(prepared, motion=replace(motion, tau=tau)))
+    mass = effective_mass(PROFILE, result.model.scale, result.model.terms, result.model.theta)
+    np.testing.assert_allclose(mass[1], 0.4 * PROFILE.hull.M[1])
+    assert any("No actuator acts in sway" in warning for warning in result.warnings)
+    degenerate = fitted(
+        monkeypatch, replace(prepared, motion=replace(motion, tau=tau)), replace(SETTINGS, inertia="fitted")
+    )
+    # Left free, the regression finds that no force needs no inertia: a perfect fit and no model.
+    lost = effective_mass(PROFILE, SETTINGS.scale, degenerate.model.terms, degenerate.model.theta)
+    assert abs(lost[1, 1]) < 0.02 * PROFILE.hull.M[1, 1]
+
+
+def test_beliefs_about_inertia() -> None:
+    rigid = np.diag([1670.0, 1670.0, PROFILE.hull.inertia_z])
+    assert not unbelievable(PROFILE, rigid).any()
+    assert unbelievable(PROFILE, rigid * np.array([0.4, 1.0, 1.0])).tolist() == [True, False, False]
+    indefinite = rigid.copy()
+    indefinite[1, 2] = indefinite[2, 1] = 1e5
+    assert unbelievable(PROFILE, indefinite).all()
+    tau = np.column_stack([np.sin(np.arange(50)), np.zeros(50), np.full(50, 3.0)])
+    assert unforced(tau, np.ones((50, 3)) * np.arange(50)[:, None]).tolist() == [False, True, True]
+
+
+def test_held_axes_lose_their_acceleration_terms_only() -> None:
+    mask = np.ones((4, 3), dtype=bool)
+    kept = without_inertia(mask, ("u_dot", "v_dot", "r_dot", "u"), np.array([False, True, False]))
+    assert kept.tolist() == [[True, False, True]] * 3 + [[True, True, True]]
+    assert mask.all()
+
+
+def test_several_logs_and_whole_logs_for_validation(tmp_path: Path) -> None:
+    logs = [str(FIXTURES / "short.mcap"), str(FIXTURES / "short.bag")]
+    result = fit(logs, PROFILE, replace(SETTINGS, split="logs"), tmp_path)
+    assert [log.training.any() for log in result.logs] == [True, False]
+    assert [log.validation.any() for log in result.logs] == [False, True]
+    assert [log.motion.log for log in result.logs] == ["short (1)", "short (2)"]
+
+
+@pytest.mark.parametrize("residual", ["commanded", "parallel"])
+@pytest.mark.parametrize("smoother", ["savgol", "kalman"])
+def test_variants_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, residual: str, smoother: str) -> None:
+    result = fit(
+        [str(FIXTURES / "short.mcap")], PROFILE, replace(SETTINGS, residual=residual, smoother=smoother), tmp_path
+    )
+    assert np.isfinite(result.verdict.normalised_mse)
+    assert result.model.settings["residual"] == residual
+
+
+def test_wind_joins_the_basis_only_when_every_log_has_it(monkeypatch: pytest.MonkeyPatch, prepared: Prepared) -> None:
+    assert "wind" in fitted(monkeypatch, prepared).model.settings["basis"]
+    calm = replace(prepared, motion=replace(prepared.motion, wind=None))
+    assert "wind" not in fitted(monkeypatch, calm).model.settings["basis"]
+
+
+def test_nothing_measured_together_is_told(monkeypatch: pytest.MonkeyPatch, prepared: Prepared) -> None:
+    nothing = replace(prepared, motion=replace(prepared.motion, tau=np.full_like(prepared.motion.tau, np.nan)))
+    with pytest.raises(FerryIdError, match=r"short: no moment .*Fix: "):
+        fitted(monkeypatch, nothing)
