@@ -1,0 +1,93 @@
+"""The report page: verdict first, everything labelled, nothing unescaped."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from ferryid.identify.fit import fit
+from ferryid.identify.result import FitResult
+from ferryid.identify.settings import FitSettings
+from ferryid.report.page import headline, render
+from ferryid.vessel import load_profile
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
+    settings = FitSettings(delta=0.4, sigma=0.4, draws=40)
+    return fit([str(FIXTURES / "short.bag")], load_profile("milliampere"), settings, tmp_path_factory.mktemp("out"))
+
+
+class Structure(HTMLParser):
+    """Collects headings, captions and unclosed tags."""
+
+    VOID = frozenset(("meta", "br", "hr", "img", "link"))
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.captions = 0
+        self.figures = 0
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        if tag not in self.VOID:
+            self.open.append(tag)
+        self.captions += tag == "figcaption"
+        self.figures += tag == "figure"
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_is_well_formed_and_every_figure_has_a_caption(result: FitResult) -> None:
+    page, drawings = render(result)
+    structure = Structure()
+    structure.feed(page)
+    assert structure.open == []
+    assert structure.figures == structure.captions == len(drawings) >= 9
+
+
+def test_verdict_comes_before_any_figure(result: FitResult) -> None:
+    page, _ = render(result)
+    assert page.index(headline(result)) < page.index("<svg")
+    rejected = replace(result, verdict=replace(result.verdict, accepted=False))
+    assert "Not accepted" in render(rejected)[0]
+
+
+def test_names_of_logs_and_warnings_are_escaped(result: FitResult) -> None:
+    log = result.logs[0]
+    evil = "<script>alert(1)</script>"
+    strange = replace(result, logs=(replace(log, motion=replace(log.motion, log=evil)),), warnings=(evil,))
+    page, _ = render(strange)
+    assert evil not in page
+    assert "&lt;script&gt;" in page
+
+
+def test_axes_carry_units(result: FitResult) -> None:
+    _, drawings = render(result)
+    forces = next(svg for name, svg in drawings.items() if name.startswith("forces"))
+    for label in ("surge X [N]", "sway Y [N]", "yaw N [N·m]", "time [s]", "measured", "base model", "new model"):
+        assert f">{label}</text>" in forces
+    for name, unit in (
+        ("free-run-errors", "position [m]"),
+        ("residual-spectrum", "frequency [Hz]"),
+        ("track", "north [m]"),
+    ):
+        assert unit in drawings[name]
+
+
+def test_the_same_result_gives_the_same_page(result: FitResult) -> None:
+    assert render(result)[0] == render(result)[0]
+
+
+def test_numbers_on_the_page_are_those_of_the_model(result: FitResult) -> None:
+    page = re.sub(r"<svg.*?</svg>", "", render(result)[0], flags=re.DOTALL)
+    for axis in ("surge", "sway", "yaw"):
+        assert f"<td>{result.model.scores['per_axis'][axis]:.3f}</td>" in page
+    assert result.model.training[0]["sha256"] in page
