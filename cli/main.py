@@ -18,6 +18,7 @@ app = typer.Typer(
     help="Turn a recorded sea trial into a better vessel model, and say honestly whether to trust it.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 

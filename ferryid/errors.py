@@ -5,6 +5,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_LIKE = 0.6
+"""Names less alike than this are different words rather than one misspelt."""
+
 
 class FerryIdError(Exception):
     """Input that cannot be used, said in one line that names file, cause and remedy.
@@ -22,6 +25,23 @@ class FerryIdError(Exception):
 
 
 def did_you_mean(name: str, options: Iterable[str]) -> str:
-    """Return ``' Did you mean "x"?'`` for the option nearest to a misspelt name, or an empty string."""
-    near = difflib.get_close_matches(name, sorted(set(options)), n=1, cutoff=0.5)
-    return f' Did you mean "{near[0]}"?' if near else ""
+    """Return ``' Did you mean "x"?'`` for the option nearest to a misspelt name, or an empty string.
+
+    Of topics (``/a/b``) the last parts must be alike as well, and one that only lacks its first parts is found too.
+    """
+    likeness, near = max(((_likeness(name, option), option) for option in set(options)), default=(0.0, ""))
+    # One letter of two or three is much of a short name.
+    enough = 0.5 if max(len(name), len(near)) <= 3 else _LIKE
+    return f' Did you mean "{near}"?' if likeness >= enough else ""
+
+
+def _likeness(name: str, option: str) -> float:
+    """Likeness of two names, 0 to 1."""
+    whole = difflib.SequenceMatcher(None, name, option).ratio()
+    if not option.startswith("/"):
+        return whole
+    short, long = sorted((f"/{name.strip('/')}", option), key=len)
+    if long.endswith(short):
+        return max(whole, _LIKE)
+    last = difflib.SequenceMatcher(None, name.rpartition("/")[2], option.rpartition("/")[2]).ratio()
+    return whole if last >= _LIKE else 0.0

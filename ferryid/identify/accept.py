@@ -71,15 +71,12 @@ def accept(base_mse: Floats, model_mse: Floats) -> Verdict:
         enough = mean <= 1.0 - IMPROVEMENT
         sentence = (
             f"On held-out data the force error (MSE relative to the base model, mean of three axes) "
-            f"{'falls' if mean < 1.0 else 'does not fall'}: {_change(mean)}; "
-            f"surge {_change(ratios[0])}, sway {_change(ratios[1])}, yaw {_change(ratios[2])}."
+            f"changes by {_change(mean)}: surge {_change(ratios[0])}, sway {_change(ratios[1])}, yaw {_change(ratios[2])}."
         )
         if not enough:
             obstacles.insert(0, f"Rejected: a fall of {100 * IMPROVEMENT:.0f} % or more is needed. {sentence}")
-        elif obstacles:
-            reasons.insert(0, sentence)
         else:
-            reasons.insert(0, f"Accepted. {sentence}")
+            reasons.insert(0, sentence)
     per_axis = {axis: float(ratio) for axis, ratio in zip(AXES, ratios, strict=True)}
     return Verdict(not obstacles, mean, per_axis, (*obstacles, *reasons))
 

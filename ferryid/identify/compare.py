@@ -21,6 +21,8 @@ from ferryid.vessel.profile import Profile
 Floats = NDArray[np.float64]
 BLOCK_S = 30.0
 DRAWS = 2000
+CONSTANT = "1"
+"""Name of the constant among the terms, as in a model file."""
 
 
 def compare(
@@ -59,7 +61,8 @@ def compare(
     entries = []
     for path in logs:
         progress(f"comparing on {Path(path).name}")
-        motion = prepare(path, profile, out, window_s=window_s).motion
+        prepared = prepare(path, profile, out, window_s=window_s)
+        motion = prepared.motion
         one, other = estimator(a), estimator(b)
         tau_a, tau_b = one.of(motion), other.of(motion)
         rows = usable(motion, tau_a, tau_b)
@@ -68,6 +71,11 @@ def compare(
             {
                 "name": motion.log,
                 "rows": int(rows.sum()),
+                "warnings": [
+                    f"{_label(model)} was trained on this log: its scores here are no evidence"
+                    for model in (a, b)
+                    if any(log["sha256"] == prepared.recording.sha256 for log in model.training)
+                ],
                 "mse": {
                     "a": by_axis(mean_square(motion.tau, tau_a, rows)),
                     "b": by_axis(mean_square(motion.tau, tau_b, rows)),
@@ -114,12 +122,19 @@ def _entry(model: Model) -> dict[str, Any]:
 def _coefficients(a: Model, b: Model) -> list[dict[str, Any]]:
     """Return the terms that either model has, with both values per axis."""
     rows = []
-    for term in dict.fromkeys((*a.terms, *b.terms)):
+    for term in dict.fromkeys((*a.terms, *b.terms, CONSTANT)):
         row: dict[str, Any] = {"term": term}
         for j, axis in enumerate(AXES):
             values = {}
             for key, model in (("a", a), ("b", b)):
-                if term in model.terms:
+                if term == CONSTANT:
+                    values[key] = {
+                        "value": float(model.intercept[j]),
+                        "low": float(model.intercept_low[j]),
+                        "high": float(model.intercept_high[j]),
+                        "unit": "N·m" if axis == "yaw" else "N",
+                    }
+                elif term in model.terms:
                     k = model.terms.index(term)
                     values[key] = {
                         "value": float(model.theta[k, j]),
@@ -180,6 +195,7 @@ def render_comparison(result: dict[str, Any]) -> str:
                 pairs = zip(run["horizons_s"], run[key], strict=True)
                 values = ", ".join(f"{h:g} s: {_number(value, factor)}" for h, value in pairs)
                 lines.append(f"  free run {label} {who.upper()}: {values}{'; ' + run['note'] if run['note'] else ''}")
+        lines.extend(f"  warning: {warning}" for warning in entry["warnings"])
         lines.append("")
     lines.append(f"  {'term':<24}" + "".join(f"{axis + ' A':>13}{axis + ' B':>13}" for axis in AXES))
     for row in result["coefficients"]:

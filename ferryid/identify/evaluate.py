@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.identify.estimate import base_estimator, estimator
-from ferryid.identify.excitation import range_columns
+from ferryid.identify.excitation import RANGE_UNITS, range_columns
 from ferryid.identify.free_run import free_run
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.scores import force_scores, free_run_plain, outside_ranges, usable
@@ -97,7 +97,8 @@ def _warnings(sha256: str, model: Model, outside: dict[str, float]) -> list[str]
         if share > OUTSIDE_WARNING:
             low, high = model.ranges[name]
             warnings.append(
-                f"{share:.0%} of the rows have {name} outside the model's range of validity, {low:.3g} to {high:.3g}"
+                f"{share:.0%} of the rows have {name} outside the model's range of validity, {low:.3g} to {high:.3g} "
+                f"{RANGE_UNITS[name]}"
             )
     return warnings
 
@@ -120,8 +121,19 @@ def render_evaluation(result: dict[str, Any]) -> str:
         lines.append(f"{'  R², model':<34}" + "".join(f"{_number(entry['r2']['model'][axis]):>11}" for axis in AXES))
         if "free_run" in entry:
             lines.extend(_free_run_lines(entry["free_run"]))
+        lines.append(f"  {_verdict(entry)}")
         lines.extend(f"  warning: {warning}" for warning in entry.get("warnings", ()))
     return "\n".join(lines)
+
+
+def _verdict(entry: dict[str, Any]) -> str:
+    mean = entry["normalised_mse"]
+    worse = [axis for axis in AXES if np.isfinite(entry["per_axis"][axis]) and entry["per_axis"][axis] > 1.05]
+    if not np.isfinite(mean):
+        return "cannot be judged: the base model makes no error here"
+    word = "better" if mean < 1.0 else "worse"
+    told = f"{abs(mean - 1.0):.0%} {word} than its base model here (mean square force error)"
+    return told + (f", but worse in {' and '.join(worse)}" if worse else "")
 
 
 def _free_run_lines(runs: dict[str, Any]) -> list[str]:

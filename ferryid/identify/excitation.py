@@ -155,6 +155,9 @@ def _tied(
     return reasons
 
 
+RANGE_UNITS = {"u": "m/s", "v": "m/s", "r": "rad/s", "u_dot": "m/s²", "v_dot": "m/s²", "r_dot": "rad/s²", "U": "m/s"}
+
+
 def ranges(nu: Floats, nu_dot: Floats) -> dict[str, tuple[float, float]]:
     """0.5 % and 99.5 % quantiles of speed, velocities and accelerations, SI; both arguments of shape (n, 3)."""
     found = {}

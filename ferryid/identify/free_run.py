@@ -20,6 +20,8 @@ ForceModel = Callable[[Floats, Floats, Floats, Floats | None, Floats | None], Fl
 HORIZONS_S = (5.0, 10.0, 20.0, 30.0, 60.0)
 MAX_STARTS = 60
 STEP_S = 0.2
+LEAP_MPS = 5.0
+"""Added to twice the greatest speed: a position that moves faster has jumped."""
 
 
 def free_run(
@@ -100,6 +102,7 @@ def _mass(force: ForceModel, motion: Motion) -> Floats | None:
 def _starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[Rows, Rows]:
     """Return start rows and the end of the unbroken stretch that each lies in."""
     good = allowed & motion.valid & np.isfinite(motion.nu).all(axis=1) & np.isfinite(motion.tau).all(axis=1)
+    good = good & ~_jumps(motion)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     spacing = max(1, round(max(shortest_s, good.sum() / motion.rate_hz / MAX_STARTS) * motion.rate_hz))
     needed = round(shortest_s * motion.rate_hz) + 1
@@ -110,6 +113,15 @@ def _starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_
             starts.append(start)
             ends.append(int(last))
     return np.array(starts, dtype=int), np.array(ends, dtype=int)
+
+
+def _jumps(motion: Motion) -> Flags:
+    """Return the rows at which the measured position leaps farther than the vessel can have gone; runs end there."""
+    step = np.hypot(*np.diff(motion.eta[:, :2], axis=0).T)
+    fastest = np.nanmax(np.hypot(motion.raw_nu[:, 0], motion.raw_nu[:, 1]), initial=0.0)
+    leaps = np.zeros(len(motion.t), dtype=bool)
+    leaps[1:] = step > (2.0 * fastest + LEAP_MPS) / motion.rate_hz
+    return leaps
 
 
 def _integrate(force: ForceModel, mass: Floats, motion: Motion, starts: Rows, horizon_s: float) -> tuple[Floats, int]:

@@ -20,8 +20,9 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 ACCELERATIONS = ("u_dot", "v_dot", "r_dot")
-LEAST_INERTIA = 0.5
-"""Fraction of the rigid body's inertia below which a fitted one is not believed; added mass can only add."""
+LEAST_INERTIA, MOST_INERTIA = 0.8, 5.0
+"""Parts of the rigid body's inertia between which a fitted one is believed. Added mass can only add, and no hull carries four
+times its own; noise in the derivative takes some per cent, which the lower limit allows for."""
 NO_FORCE = 1e-6
 """An axis is without actuators when its force varies less than this part of what the base model needs."""
 
@@ -42,9 +43,10 @@ def unforced(tau: Floats, base: Floats) -> Flags:
 
 def unbelievable(profile: Profile, mass: Floats) -> Flags:
     """Return the axes whose effective inertia cannot be right, shape (3,); all of them where the matrix as a whole is."""
-    weak = np.diag(mass) < LEAST_INERTIA * np.diag(_rigid(profile.hull))
+    share = np.diag(mass) / np.diag(_rigid(profile.hull))
+    wrong = (share < LEAST_INERTIA) | (share > MOST_INERTIA)
     positive = bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0.0))
-    return weak if weak.any() or positive else np.ones(3, dtype=bool)
+    return wrong if wrong.any() or positive else np.ones(3, dtype=bool)
 
 
 def without_inertia(mask: Flags, terms: Sequence[str], axes: Flags) -> Flags:

@@ -17,11 +17,12 @@ from ferryid.identify.model import Model, from_json, to_json
 
 @dataclass(frozen=True)
 class Stored:
-    """One stored version: its file, and whether it is the current one."""
+    """One stored version: its file, whether it is the current one, and which was before it was saved."""
 
     path: Path
     model: Model
     current: bool
+    previous: int | None = None
 
 
 def numbered(model: Model, out: Path) -> Model:
@@ -44,11 +45,12 @@ def save(model: Model, out: Path) -> Stored:
     model = numbered(model, out)
     folder = _folder(out) / model.name
     path = folder / f"{model.version}.json"
+    previous = _current(folder)
     if not path.exists():
         write_text(path, dump_json(to_json(model)))
     if model.accepted:
         write_text(folder / "current", f"{model.version}\n")
-    return Stored(path, model, _current(folder) == model.version)
+    return Stored(path, model, _current(folder) == model.version, previous)
 
 
 def load(reference: str, out: Path) -> Model:

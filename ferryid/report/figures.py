@@ -28,7 +28,7 @@ REACH = 8.0
 """Where the axis of the coefficient figure ends; a coefficient this far from zero is beyond doubt anyway."""
 SYMBOLS = ("X", "Y", "N")
 STYLE: dict[Any, Any] = {
-    "font.size": 9,
+    "font.size": 10,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -188,7 +188,9 @@ def components(curve: ComponentCurve) -> str:
         return _svg(figure)
 
 
-def coefficient_intervals(terms: Sequence[str], theta: Floats, low: Floats, high: Floats) -> str:
+def coefficient_intervals(
+    terms: Sequence[str], theta: Floats, low: Floats, high: Floats, undetermined: frozenset[str] = frozenset()
+) -> str:
     """Coefficients with 95 % intervals, each in units of its own interval's half width, so that all fit one axis."""
     with mpl.rc_context(STYLE):
         left = 0.35 + 0.07 * max(len(term) for term in terms)
@@ -201,7 +203,11 @@ def coefficient_intervals(terms: Sequence[str], theta: Floats, low: Floats, high
                 significance = np.where(half > 0, theta[:, j] / half, 0.0)
             clear = np.abs(significance) > 1
             significance = np.clip(significance, -REACH, REACH)
-            for mask, colour in ((clear, NEW), (~clear, "#aaaaaa")):
+            blind = np.array([term in undetermined for term in terms])
+            for sign, marker in ((1.0, ">"), (-1.0, "<")):
+                beyond = sign * significance >= REACH
+                ax.plot(np.full(beyond.sum(), sign * 0.97 * REACH), place[beyond], marker, color="white", markersize=4)
+            for mask, colour in ((clear & ~blind, NEW), (~clear & ~blind, "#aaaaaa"), (blind, "#f0c9a0")):
                 ax.barh(place[mask], significance[mask], color=colour, height=0.6)
             ax.axvspan(-1, 1, color=SHADE, linewidth=0, zorder=0)
             ax.set_xlim(-REACH, REACH)

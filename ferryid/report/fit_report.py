@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ferryid.files import dump_json, replacing
 from ferryid.identify.fit import fit, quiet
 from ferryid.identify.result import AXES, FitResult
@@ -126,6 +128,7 @@ def as_text(result: FitResult, stored: Stored, report: Path) -> str:
     model, scores = result.model, result.model.scores
     lines = [headline(result), *(f"  {reason}" for reason in result.verdict.reasons), ""]
     lines.append(f"{'on validation rows':<28}" + "".join(f"{axis:>12}" for axis in AXES))
+    lines.append(f"{'':<28}" + "".join(f"{unit:>12}" for unit in ("[N]", "[N]", "[N·m]")))
     for label, part in (("base", "base"), ("new", "model")):
         lines.append(
             f"{'rms force error, ' + label:<28}"
@@ -135,10 +138,12 @@ def as_text(result: FitResult, stored: Stored, report: Path) -> str:
     lines.append("")
     lines.extend(f"warning: {warning}" for warning in result.warnings)
     state = "current" if stored.current else ("stored" if model.accepted else "stored, marked as rejected")
+    if stored.current and stored.previous not in (None, model.version):
+        state += f"; before it was @{stored.previous}, compare them on a log that neither was trained on"
     lines.append(f"model   {stored.path} ({model.name}@{model.version}, {state})")
     lines.append(f"report  {report}")
     return "\n".join(lines)
 
 
 def _number(value: float) -> str:
-    return f"{value:.3f}"
+    return f"{value:.3f}" if np.isfinite(value) else "–"

@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment
 
+from ferryid.identify.excitation import RANGE_UNITS
 from ferryid.identify.inertia import effective_mass
 from ferryid.identify.result import AXES, FitResult, LogFit
 from ferryid.report import figures
-from ferryid.report.structure import worst_and_best_minute
+from ferryid.report.structure import remainder, worst_and_best_minute
 from ferryid.vessel import parse_profile
 from ferryid.vessel.parse_hull import rigid_mass
 
 MAX_LOGS = 6
 """Logs whose forces are drawn; the page stays below ten megabytes and readable."""
-
-RANGE_UNITS = {"u": "m/s", "v": "m/s", "r": "rad/s", "u_dot": "m/s²", "v_dot": "m/s²", "r_dot": "rad/s²", "U": "m/s"}
 
 
 def render(result: FitResult) -> tuple[str, dict[str, str]]:
@@ -46,13 +45,17 @@ def _drawings(part: Any) -> Iterator[tuple[str, str]]:
 def headline(result: FitResult) -> str:
     """Return the verdict in one sentence."""
     change = result.verdict.normalised_mse - 1.0
+    hull = parse_profile(result.model.profile_text, result.model.name).hull
+    base = "the base model's" if hull.has_model else "that of the base model, which is rigid-body mass alone,"
     if not np.isfinite(change):
         told = "its force error could not be compared with the base model's"
     else:
-        word = "less" if change < 0 else "more"
-        told = f"{abs(change):.0%} {word} force error than the base model on data it did not see"
+        word = "below" if change < 0 else "above"
+        told = f"mean square force error {abs(change):.1%} {word} {base} on data it did not see"
+    count = len(result.warnings)
+    trust = f" Read the {count} warnings first." if count > 1 else " Read the warning first." if count else ""
     if result.verdict.accepted:
-        return f"Accepted: {told}."
+        return f"Accepted: {told}.{trust}"
     return f"Not accepted: {told}."
 
 
@@ -71,7 +74,7 @@ def _context(result: FitResult) -> dict[str, Any]:
         "warnings": result.warnings,
         "axes": AXES,
         "score_rows": _score_rows(model.scores),
-        "split_note": " ".join(model.scores.get("split_notes", ())),
+        "split_notes": model.scores.get("split_notes", ()),
         "logs": [{"name": log.motion.log, "figures": _force_figures(log)} for log in drawn],
         "omitted": f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
         "free_run_notes": [
@@ -80,12 +83,14 @@ def _context(result: FitResult) -> dict[str, Any]:
             if run.note
         ],
         "free_run_figures": _free_run_figures(result),
+        "residual_lines": [line for log in drawn for line in remainder(log)],
         "residual_figures": [
             {
                 "file": "residual-spectrum",
                 "svg": figures.residual_spectrum(drawn),
                 "caption": "Power spectral density of measured minus estimated force. A peak at some tenths of a hertz "
-                "is mostly waves; what stays at the lowest frequencies is wind, current or a wrong model.",
+                "is mostly waves; what stays at the lowest frequencies is wind, current or a wrong model. The regular "
+                "notches are zeros of the smoothing window.",
             },
             {
                 "file": "residual-autocorrelation",
@@ -103,9 +108,16 @@ def _context(result: FitResult) -> dict[str, Any]:
             },
             {
                 "file": "coefficients",
-                "svg": figures.coefficient_intervals(model.terms, model.theta, model.low, model.high),
+                "svg": figures.coefficient_intervals(
+                    (*model.terms, "1"),
+                    np.vstack([model.theta, model.intercept]),
+                    np.vstack([model.low, model.intercept_low]),
+                    np.vstack([model.high, model.intercept_high]),
+                    frozenset(result.excitation.undetermined),
+                ),
                 "caption": "Coefficients of the correction, each over half the width of its own 95 % block-bootstrap "
-                "interval. Grey ones are not told apart from zero.",
+                "interval; an arrow goes on beyond the frame. Grey ones are not told apart from zero, pale orange ones "
+                "not from each other: the data do not determine them.",
             },
         ],
         "coefficients": _coefficients(result),
@@ -127,7 +139,7 @@ def _context(result: FitResult) -> dict[str, Any]:
             },
         ],
         "ranges": [
-            {"name": name, "low": f"{low:.4g}", "high": f"{high:.4g}", "unit": RANGE_UNITS.get(name, "")}
+            {"name": name, "low": f"{low:.4g}", "high": f"{high:.4g}", "unit": RANGE_UNITS[name]}
             for name, (low, high) in model.ranges.items()
         ],
         "quality": [_quality(log) for log in result.logs],
@@ -255,9 +267,10 @@ def _excitation_lines(result: FitResult) -> list[str]:
         )
     if np.isfinite(excitation.heading_coverage):
         lines.append(f"Headings cover {excitation.heading_coverage:.0%} of twelve 30° sectors.")
-    best = np.argsort(excitation.vip)[::-1][:5]
+    known = [k for k, term in enumerate(result.model.terms) if term not in excitation.undetermined]
+    best = sorted(known, key=lambda k: -excitation.vip[k])[:5]
     names = ", ".join(f"{result.model.terms[k]} ({excitation.vip[k]:.1f})" for k in best)
-    lines.append(f"Terms that matter most (variable importance in projection): {names}.")
+    lines.append(f"Terms that matter most, of those the data determine (variable importance in projection): {names}.")
     return lines
 
 

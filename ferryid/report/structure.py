@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.result import LogFit
+from ferryid.identify.result import AXES, LogFit
 
 Floats = NDArray[np.float64]
 POINTS = 900
@@ -70,7 +70,7 @@ def worst_and_best_minute(log: LogFit, length_s: float = 60.0) -> tuple[float, f
     """Return the start times [s] of the minutes with the largest and smallest error of the new model.
 
     The error is the squared residual over the variance of the measured force, averaged over the axes; validation rows are
-    preferred, and a minute counts when four fifths of it can be judged.
+    preferred, and a minute counts when hardly a row of it is missing.
     """
     motion = log.motion
     width = round(length_s * motion.rate_hz)
@@ -85,10 +85,36 @@ def worst_and_best_minute(log: LogFit, length_s: float = 60.0) -> tuple[float, f
     starts = np.arange(0, len(motion.t) - width, max(1, width // 6))
     rows = count[starts + width] - count[starts]
     seen = judged[starts + width] - judged[starts]
-    enough = (rows >= 0.8 * width) & ((seen >= 0.5 * width) if (seen >= 0.5 * width).any() else True)
+    enough = (rows >= 0.98 * width) & ((seen >= 0.5 * width) if (seen >= 0.5 * width).any() else True)
     if not enough.any():
         return None
     mean = (total[starts + width] - total[starts]) / np.maximum(rows, 1)
     candidates = starts[enough]
     ordered = candidates[np.argsort(mean[enough], kind="stable")]
     return float(motion.t[ordered[-1]]), float(motion.t[ordered[0]])
+
+
+SLOW_HZ = 0.05
+
+
+def remainder(log: LogFit) -> list[str]:
+    """Say of each axis how large the remaining residual is, how long it remembers, and how slow it is."""
+    told = []
+    for j, (axis, unit) in enumerate(zip(AXES, ("N", "N", "N·m"), strict=True)):
+        values = _stretch(log, "tau_model", j)
+        frequency, density = spectrum(log, "tau_model", j)
+        lag, correlation, _ = autocorrelation(log, "tau_model", j)
+        if frequency.size < 3 or lag.size == 0 or density.sum() <= 0:
+            continue
+        below = np.flatnonzero(correlation < np.exp(-1.0))
+        memory = f"{lag[below[0]]:.1f} s" if below.size else f"more than {lag[-1]:.0f} s"
+        slow = float(density[frequency < SLOW_HZ].sum() / density.sum())
+        offset = float(values.mean())
+        sentence = (
+            f"{log.motion.log}, {axis}: {float(np.sqrt(np.mean(values**2))):.3g} {unit} rms remain (mean {offset:+.3g}), "
+            f"with a memory of {memory}; {slow:.0%} of its power is slower than {1 / SLOW_HZ:.0f} s."
+        )
+        if slow > 0.5:
+            sentence += " Noise is not that slow: a steady load such as wind or current, or a missing term, is left."
+        told.append(sentence)
+    return told

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -127,7 +127,8 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
             "are not used: velocity or an actuator was not measured."
         )
     track = Track(recording.name, t[: valid.size], t0_ns, rate, columns, valid, tuple(repairs))
-    return Track(track.log, track.t, t0_ns, rate, columns, valid, (*repairs, *cross_checks(track)))
+    doubts = cross_checks(track)
+    return replace(track, repairs=(*repairs, *(doubt.says for doubt in doubts)), doubts=doubts)
 
 
 def segments(valid: Flags) -> list[slice]:

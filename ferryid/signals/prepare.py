@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.smooth import smooth
@@ -21,6 +22,7 @@ class Prepared:
     recording: Recording
     motion: Motion
     quality: Mapping[str, Any]
+    doubts: tuple[str, ...] = ()
 
 
 def prepare(
@@ -47,8 +49,20 @@ def prepare(
         See `ferryid.signals.smooth` and `ferryid.signals.align`.
     verify
         Check every checksum.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be used, also one whose signals contradict each other beyond doubt.
     """
     recording = record(path, profile, out, verify=verify)
     track = align(recording, profile, rate_hz)
+    for doubt in track.doubts:
+        if doubt.certain:
+            raise FerryIdError(
+                f"{recording.name}: signals contradict each other, so nothing can be learnt from them. {doubt.says} "
+                f"Fix: correct unit, frame or sign of the signal in the profile {profile.name}"
+            )
     motion = smooth(track, profile, window_s, smoother)
-    return Prepared(recording, motion, data_quality(recording, motion))
+    doubts = tuple(doubt.says for doubt in track.doubts)
+    return Prepared(recording, motion, data_quality(recording, motion), doubts)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.signals.track import Track
+from ferryid.signals.track import Doubt, Track
 from ferryid.vessel.frames import wrap
 
 Floats = NDArray[np.float64]
@@ -271,15 +271,16 @@ def require_excited(track: Track, nu: Floats, tau: Floats) -> None:
         )
 
 
-def cross_checks(track: Track) -> tuple[str, ...]:
-    """Return sentences on kinematic contradictions: yaw rate against heading, velocity against position.
+def cross_checks(track: Track) -> tuple[Doubt, ...]:
+    """Return kinematic contradictions: yaw rate against heading, velocity against position.
 
     Changes over two seconds are compared with the integrals of the rates, so that no noisy derivative is formed.
+    Certain are those in which both follow each other closely and yet differ in sign or by the factor of a unit.
     Nothing is corrected here.
     """
     columns = track.columns
     span = max(2, round(2.0 * track.rate_hz))
-    said: list[str] = []
+    said: list[Doubt] = []
     if "psi" in columns and "r" in columns:
         turned, integrated = _changes("psi", np.diff(columns["psi"]), columns["r"], track, span)
         said += _compare("yaw rate", "heading", turned, integrated, 0.035, _YAW_RATE_GAINS)
@@ -294,20 +295,22 @@ def cross_checks(track: Track) -> tuple[str, ...]:
     return tuple(said)
 
 
+_CERTAIN = 0.9
+"""Correlation above which a wrong sign or unit is beyond doubt."""
 _YAW_RATE_GAINS = (
-    (np.pi / 180, "it looks like degrees per second that are read as rad/s"),
-    (180 / np.pi, "it looks like rad/s that are read as degrees per second"),
+    (np.pi / 180, "degrees per second look read as rad/s, or a heading in radians as degrees"),
+    (180 / np.pi, "rad/s look read as degrees per second, or a heading in degrees as radians"),
 )
 _SPEED_GAINS = (
-    (0.514444, "it looks like knots that are read as m/s"),
-    (1 / 0.514444, "it looks like m/s that are read as knots"),
-    (1 / 3.6, "it looks like km/h that are read as m/s"),
+    (0.514444, "knots look read as m/s"),
+    (1 / 0.514444, "m/s look read as knots"),
+    (1 / 3.6, "km/h look read as m/s"),
 )
 
 
 def _compare(
     rate: str, of: str, change: Floats, integral: Floats, least: float, known: tuple[tuple[float, str], ...]
-) -> list[str]:
+) -> list[Doubt]:
     if change.size < 10 or np.sqrt(np.mean(change**2)) < least or not np.any(integral):
         return []
     both = float(change @ integral)
@@ -315,13 +318,15 @@ def _compare(
     correlation = both / float(np.sqrt((change @ change) * (integral @ integral)))
     numbers = f"gain {gain:.3g}, correlation {correlation:.2f}"
     if abs(correlation) < 0.5:
-        return [f"The {rate} does not follow the {of} ({numbers}): check topic, frame and clocks."]
-    sign = "has the wrong sign against" if gain < 0 else ""
+        return [Doubt(f"The {rate} does not follow the {of} ({numbers}): check topic, frame and clocks.", False)]
     size = next((text for value, text in known if abs(abs(gain) / value - 1.0) < 0.15), "")
-    if sign:
-        return [f"The {rate} {sign} the {of} ({numbers})" + (f", and {size}." if size else ".")]
+    certain = abs(correlation) > _CERTAIN
+    if gain < 0:
+        says = f"The {rate} has the wrong sign against the {of} ({numbers})" + (f", and {size}." if size else ".")
+        return [Doubt(says, certain)]
     if abs(gain - 1.0) > 0.1:
-        return [f"The {rate} does not match the {of} ({numbers})" + (f": {size}." if size else ".")]
+        says = f"The {rate} does not match the {of} ({numbers})" + (f": {size}." if size else ".")
+        return [Doubt(says, certain and bool(size))]
     return []
 
 

@@ -13,6 +13,14 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
+class Doubt:
+    """A kinematic contradiction between signals: a sentence, and whether it is certain that one of them is wrong."""
+
+    says: str
+    certain: bool
+
+
+@dataclass(frozen=True)
 class Track:
     """All signals of one recording on one uniform grid, in SI units, NED world frame and FRD body frame.
 
@@ -33,6 +41,8 @@ class Track:
         True where position or velocity and every actuator were measured: no gap is bridged, shape (n,).
     repairs
         Counted repairs and findings, as sentences with numbers, for `inspect` and the report.
+    doubts
+        Contradictions between signals; their sentences stand among the repairs too.
     """
 
     log: str
@@ -42,6 +52,7 @@ class Track:
     columns: Mapping[str, Floats]
     valid: Flags
     repairs: tuple[str, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -105,6 +105,9 @@ def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         return None, [_syntax_fault(text, str(error))]
+    if not data:
+        what = f'the file holds no key. Fix: begin with schema = "{SCHEMA}", or with a copy of a bundled profile'
+        return None, [Fault(1, f"{what} (ferryid vessel show milliampere --toml)")]
     faults: list[Fault] = []
     top = TableReader(data, (), key_lines(text), faults)
     schema = top.text("schema", required=True)
@@ -121,7 +124,7 @@ def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
     source = top.text("source", required=True)
     hull = parse_hull(top.table("hull", required=True, needs="without it there is no base model"))
     wind = parse_wind(top.table("wind"))
-    actuators = parse_actuators(top)
+    actuators = parse_actuators(top, hull)
     table = _parse_table(top.table("table"))
     signals = parse_signals(
         top.table("signals", required=True, needs="so nothing of a log can be used"), actuators, faults

@@ -8,16 +8,19 @@ import re
 import numpy as np
 
 from ferryid.vessel.faults import TableReader
-from ferryid.vessel.profile import Actuator, ThrustCurve
+from ferryid.vessel.profile import Actuator, Hull, ThrustCurve
 from ferryid.vessel.thrusters import thrust
 
 KINDS = ("azimuth", "propeller", "propeller_rudder", "tunnel", "force")
 
 CURVES = ("polynomial", "table", "quadratic", "open_water")
 
+_REACH = 0.6
+"""Share of length and beam within which an actuator lies when the body origin is near midship."""
 
-def parse_actuators(top: TableReader) -> tuple[Actuator, ...]:
-    """Read every ``[[actuator]]``, noting faults."""
+
+def parse_actuators(top: TableReader, hull: Hull | None) -> tuple[Actuator, ...]:
+    """Read every ``[[actuator]]``, noting faults; `hull` tells which positions are off the vessel."""
     readers = top.tables("actuator")
     if not readers:
         top.fault("the file lists no actuator, so the applied force is not known. Fix: add at least one [[actuator]]")
@@ -25,6 +28,8 @@ def parse_actuators(top: TableReader) -> tuple[Actuator, ...]:
     seen: dict[str, int] = {}
     for reader in readers:
         actuator = _actuator(reader)
+        if hull is not None:
+            _check_place(reader, actuator, hull)
         if actuator.name in seen:
             reader.fault(
                 f'the actuator name "{actuator.name}" is taken by the one on line {seen[actuator.name]}. '
@@ -66,6 +71,23 @@ def _actuator(reader: TableReader) -> Actuator:
             )
     reader.close()
     return Actuator(name, kind, (position[0], position[1]), curve, angle_rad, count, rudder, inflow)
+
+
+def _check_place(reader: TableReader, actuator: Actuator, hull: Hull) -> None:
+    """Warn of an actuator or a rudder that lies off the hull; comparisons with a size not given (NaN) are false."""
+    x, y = actuator.position_m
+    why = "Fix: check sign and unit [m], and that the body origin is near midship"
+    for place, value, size, what in ((0, x, hull.length_m, "length"), (1, y, hull.beam_m, "beam")):
+        if abs(value) > _REACH * size:
+            reader.fault(
+                f'"position_m"[{place}] = {value:g} lies off a hull of {what} {size:g} m. {why}',
+                "position_m",
+                warning=True,
+            )
+    rudder = reader.table("rudder") if actuator.rudder else None
+    x_m = actuator.rudder.get("x_m", math.nan)
+    if rudder is not None and abs(x_m) > _REACH * hull.length_m:
+        rudder.fault(f'"x_m" = {x_m:g} lies off a hull of length {hull.length_m:g} m. {why}', "x_m", warning=True)
 
 
 def _inflow(reader: TableReader, kind: str) -> dict[str, float]:

@@ -124,10 +124,15 @@ def select(profile: Profile, topics: Sequence[Topic], where: str) -> Selection:
     ]
     if lacking:
         signal = lacking[0]
-        more = f" ({len(lacking) - 1} more required signals are missing)" if len(lacking) > 1 else ""
+        others = len(lacking) - 1
+        more = f" ({others} more required signal{'s are' if others > 1 else ' is'} missing)" if others else ""
+        reason = selection.missing[signal.quantity]
+        if _topic(signal.topic, topics) is None:
+            there = _some([topic.name for topic in topics]) or "no topic"
+            reason += f"{'' if reason.endswith('?') else '.'} The log has {there}"
         raise FerryIdError(
             f"{where}: {signal.quantity} is needed by the profile {profile.name} ({profile.path}:{signal.line}), "
-            f"{selection.missing[signal.quantity]}{more}. Fix: correct the signal map, or set "
+            f"{reason.rstrip('.')}{more}. Fix: correct the signal map, or set "
             "required = false where the signal can be missed"
         )
     return selection
@@ -233,7 +238,9 @@ def _numeric(series: Series, path: str, signal: Signal) -> Floats:
             f"{series.topic}: {signal.quantity} needs numbers, found text in {path} ({sample[:40]!r}). "
             f"Fix: name a numeric field on line {signal.line} of the vessel profile"
         )
-    return np.asarray(column, dtype=np.float64)
+    # A float32 signalling NaN, as firmware writes for "no value", sets the flag that NumPy would warn of.
+    with np.errstate(invalid="ignore"):
+        return np.asarray(column, dtype=np.float64)
 
 
 def _bare(topic: str) -> str:
@@ -253,24 +260,25 @@ def _topic(name: str, topics: Sequence[Topic]) -> Topic | None:
 def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic]) -> str:
     """Say why a signal cannot be read, or return an empty string."""
     if topic is None:
-        names = [candidate.name for candidate in topics]
-        listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
-        hint = did_you_mean(signal.topic, names)
-        return f'found no topic "{signal.topic}" (there is {listed or "none"}).{hint}'
+        hint = did_you_mean(signal.topic, [candidate.name for candidate in topics])
+        return f'found no topic "{signal.topic}".{hint}'
     if topic.count == 0:
         return f"found {topic.name} without a single message"
     for path in signal.fields:
         kind = _field_type(path, topic)
         if kind is None:
-            fields = list(topic.fields)
-            listed = ", ".join(fields[:6]) + (", ..." if len(fields) > 6 else "")
             return (
-                f'found no field "{path}" in {topic.name} (it has {listed or "no readable definition"}).'
-                f"{did_you_mean(path, fields)}"
+                f'found no field "{path}" in {topic.name} (it has {_some(list(topic.fields)) or "no readable definition"}).'
+                f"{did_you_mean(path, topic.fields)}"
             )
         if kind in _TEXT_TYPES:
             return f'found text ("{kind}") in the field {path} of {topic.name}, where a number is needed'
     return ""
+
+
+def _some(names: Sequence[str]) -> str:
+    """Return the first six names."""
+    return ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
 
 
 def _field_type(path: str, topic: Topic) -> str | None:

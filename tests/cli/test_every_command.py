@@ -82,7 +82,9 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     comparison = conforms(
         ferryid("compare", "milliampere@1", "milliampere@2", "--on", other, "--out", out, "--json", "-").out
     )
-    assert len(comparison["coefficients"]) == 21 + 3  # the wind basis joins, as the log has an anemometer
+    assert (
+        len(comparison["coefficients"]) == 21 + 3 + 1
+    )  # the wind basis joins, as the log has an anemometer, and the constant
 
     models = conforms(ferryid("models", "--out", out, "--json", "-").out)["models"]
     assert [model["version"] for model in models] == [1, 2]

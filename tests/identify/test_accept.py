@@ -49,7 +49,7 @@ def test_reasons_carry_the_numbers() -> None:
     accepted, reasons = judge(0.2, 0.3, 0.4)
     assert accepted
     assert reasons == (
-        "Accepted. On held-out data the force error (MSE relative to the base model, mean of three axes) falls: -70.0 %; "
+        "On held-out data the force error (MSE relative to the base model, mean of three axes) changes by -70.0 %: "
         "surge -80.0 %, sway -70.0 %, yaw -60.0 %.",
     )
     accepted, reasons = judge(0.2, 0.3, 1.44)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -54,7 +55,7 @@ def test_is_well_formed_and_every_figure_has_a_caption(result: FitResult) -> Non
 
 
 def test_verdict_comes_before_any_figure(result: FitResult) -> None:
-    page, _ = render(result)
+    page = html.unescape(render(result)[0])
     assert page.index(headline(result)) < page.index("<svg")
     rejected = replace(result, verdict=replace(result.verdict, accepted=False))
     assert "Not accepted" in render(rejected)[0]

@@ -39,14 +39,14 @@ def test_agreeing_signals_raise_no_finding() -> None:
     ("name", "factor", "said"),
     [
         ("r", -1.0, "yaw rate has the wrong sign against the heading"),
-        ("r", 180 / np.pi, "degrees per second that are read as rad/s"),
-        ("r", np.pi / 180, "rad/s that are read as degrees per second"),
+        ("r", 180 / np.pi, "degrees per second look read as rad/s"),
+        ("r", np.pi / 180, "rad/s look read as degrees per second"),
         (
             "u",
             1 / 0.514444,
-            "surge velocity does not match the position (gain 0.514, correlation 1.00): it looks like knots",
+            "surge velocity does not match the position (gain 0.514, correlation 1.00): knots look",
         ),
-        ("u", 0.514444, "m/s that are read as knots"),
+        ("u", 0.514444, "m/s look read as knots"),
         ("v", -1.0, "sway velocity has the wrong sign against the position (gain -1"),
         ("u", 1.3, "surge velocity does not match the position (gain 0.769"),
     ],
@@ -54,12 +54,14 @@ def test_agreeing_signals_raise_no_finding() -> None:
 def test_wrong_signs_and_units_are_named(name: str, factor: float, said: str) -> None:
     track = voyage()
     (finding,) = cross_checks(voyage(**{name: factor * track.columns[name]}))
-    assert said in finding
+    assert said in finding.says
+    assert finding.certain is (factor != 1.3)
 
 
 def test_a_yaw_rate_from_elsewhere_is_named() -> None:
     (finding,) = cross_checks(voyage(r=0.1 * np.sin(2.1 * T)))
-    assert "does not follow the heading" in finding
+    assert "does not follow the heading" in finding.says
+    assert not finding.certain
 
 
 def test_only_measured_rows_enter_the_cross_checks() -> None:

@@ -123,6 +123,13 @@ CASES = {
     "name for columns": ('name = "left"', 'name = "port-aft"@', "becomes part of column names"),
     "actuator kind": ('kind = "azimuth"', 'kind = "azimut"@', 'Did you mean "azimuth"?'),
     "position": ("position_m = [-2.0, -0.5]", "position_m = [-2.0]@", "must hold 2 numbers, found 1"),
+    "position off the bow": ("position_m = [-2.0, -0.5]", "position_m = [3.1, -0.5]@", "lies off a hull of length 5 m"),
+    "position off the side": (
+        "[hull]\nlength_m = 5.0\nmass_kg = 1000.0\ninertia_z = 2000.0",
+        "[hull]\nbeam_m = 0.8\nmass_kg = 1000.0\ninertia_z = 2000.0",
+        '"position_m"[1] = 0.5 lies off a hull of beam 0.8 m',
+    ),
+    "rudder off the hull": ("x_m = -2.3", "x_m = -23.0@", "lies off a hull of length 5 m"),
     "no actuator": (
         '[[actuator]]\nname = "left"',
         '[[actuators]]@\nname = "left"',
@@ -326,8 +333,10 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         load_profile(broken)
     empty = tmp_path / "empty.toml"
     empty.write_text("")
-    with pytest.raises(FerryIdError, match=r'empty\.toml:1: the file lacks "schema"'):
+    with pytest.raises(FerryIdError, match=r"empty\.toml:1: the file holds no key\. Fix: [^(]*\([^(]*\)$"):
         load_profile(empty)
+    empty.write_text("# nothing yet\n")
+    assert len(check_profile(empty)) == 1
 
 
 def test_bundled_names_and_text_survive_embedding() -> None:

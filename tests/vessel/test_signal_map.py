@@ -112,8 +112,20 @@ def test_misspelt_topic_gets_a_suggestion() -> None:
     message = str(caught.value)
     assert message.startswith("a.bag: velocity is needed by the profile boat (boat.toml:25), found no topic")
     assert 'Did you mean "/nav2"?' in message
-    assert "(1 more required signals are missing)" in message
+    assert "The log has /nav2, /t1 (1 more required signal is missing)" in message
     assert "\n" not in message
+
+
+def test_reason_does_not_list_the_topics_for_every_signal() -> None:
+    selection = survey(profile(BODY), [topic("/gps", lat="float64"), T1])
+    assert selection.missing["velocity"] == selection.missing["yaw_rate"] == 'found no topic "/nav".'
+
+
+@pytest.mark.parametrize("bits", [0x7FA00000, 0xFFA00001])
+def test_signalling_nan_in_float32_is_a_plain_nan(bits: int) -> None:
+    speed = np.array([0x3F800000, bits], np.uint32).view(np.float32)
+    columns = convert(profile(BODY), Series("/nav", np.arange(2), None, {"r": speed}))
+    np.testing.assert_allclose(columns["r"], [-math.pi / 180, np.nan])
 
 
 def test_misspelt_field_gets_a_suggestion() -> None:
