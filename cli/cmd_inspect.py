@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ferryid.cli.options import Json, MaybeVessel, Verify
-from ferryid.cli.output import emit
+from ferryid.cli.output import emit, text_width
 
 
 def command(
@@ -21,4 +21,4 @@ def command(
     from ferryid.vessel import load_profile
 
     result = inspect(log, load_profile(vessel) if vessel else None, verify=verify)
-    emit(result, render_inspect(result), json)
+    emit(result, render_inspect(result, text_width()), json)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,6 +21,11 @@ def emit(result: Mapping[str, Any], text: str, json: str | None) -> None:
     if json is not None:
         write_text(Path(json), dump_json(dict(result)))
     typer.echo(text)
+
+
+def text_width() -> int:
+    """Columns of the terminal, at least 80; 160 when the output goes elsewhere."""
+    return max(80, shutil.get_terminal_size((160, 24)).columns)
 
 
 def progress(stage: str) -> None:

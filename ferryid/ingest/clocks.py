@@ -42,7 +42,7 @@ class ClockReport:
     Attributes
     ----------
     source
-        ``"stamp"`` or ``"receive"``: the clock that the rows are on.
+        ``"stamp"`` or ``"receive"``: the clock that the rows are on. The time column of a table counts as the latter.
     count
         Rows kept.
     rate_hz
@@ -132,7 +132,7 @@ def repair_all(series: Mapping[str, Series]) -> dict[str, tuple[Nanoseconds, Row
     Topics whose clock offsets lie within a second of one another come from one sender's clock: all are shifted by the
     smallest of their offsets, which holds the least latency. Otherwise as `repair`, per topic.
     """
-    found = {topic: _one_topic(one.receive_ns, one.stamp_ns) for topic, one in series.items()}
+    found = {topic: _one_topic(one.receive_ns, one.stamp_ns, one.time_column) for topic, one in series.items()}
     stamped = sorted(
         (report.offset_s, topic)
         for topic, (_, _, report) in found.items()
@@ -185,11 +185,14 @@ def _span_text(nanoseconds: int) -> str:
     return f"{seconds / 86_400:.6g} days"
 
 
-def _one_topic(receive_ns: Nanoseconds, stamp_ns: Nanoseconds | None) -> tuple[Nanoseconds, Rows, ClockReport]:
+def _one_topic(
+    receive_ns: Nanoseconds, stamp_ns: Nanoseconds | None, time_column: str = ""
+) -> tuple[Nanoseconds, Rows, ClockReport]:
     """Repair one topic, its stamps not yet shifted to the recorder's base."""
     receive = np.ascontiguousarray(receive_ns, dtype=np.int64)
     if stamp_ns is None:
-        return _ordered(receive, "receive", ("no header: receive times only",), drop_far_side=True)
+        note = f'times are those of its time column "{time_column}"' if time_column else "no header: receive times only"
+        return _ordered(receive, "receive", (note,), drop_far_side=True)
     stamp = np.ascontiguousarray(stamp_ns, dtype=np.int64)
     reason, notes, stamp, facts = _judge(receive, stamp)
     if reason:

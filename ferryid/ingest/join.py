@@ -75,6 +75,7 @@ def concatenate(pieces: Sequence[Series]) -> Series:
         # A stamp of only some parts would leave the others without a time, so it counts only where all have one.
         stamp_ns=np.concatenate(stamps) if len(stamps) == len(pieces) else None,
         columns={path: np.concatenate([piece.columns[path] for piece in pieces]) for path in pieces[0].columns},
+        time_column=pieces[0].time_column,
     )
 
 

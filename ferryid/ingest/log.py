@@ -85,12 +85,15 @@ class Series:
     columns
         Field path to values, shape (n,), in the file's own type (floats, integers, booleans or strings).
         A message that lacks a wanted element of a sequence has NaN there.
+    time_column
+        Column of a table that `receive_ns` was read from; an empty string for messages, which a recorder received.
     """
 
     topic: str
     receive_ns: Nanoseconds
     stamp_ns: Nanoseconds | None
     columns: Mapping[str, Column]
+    time_column: str = ""
 
 
 @dataclass(frozen=True)

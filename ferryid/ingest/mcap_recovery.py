@@ -65,10 +65,12 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
             index.statistics = summary.statistics
             index.schemas.update(summary.schemas)
             index.channels.update(summary.channels)
-        if reason is not None:
-            what = f"{reason}; the index was rebuilt by walking the whole file"
-            index.losses.insert(0, Loss(name, what, messages=0))
-    return _walked(index, file, whole_file, name)
+    index = _walked(index, file, whole_file, name)
+    if reason is not None:
+        found = sum(index.counts().values())
+        what = f"{reason}; the index was rebuilt by walking the whole file, which found {found} messages"
+        index.losses.insert(0, Loss(name, what, messages=0))
+    return index
 
 
 def _needs_walk(index: Index) -> bool:

@@ -119,7 +119,7 @@ def _series(sheet: Sheet, fields: tuple[str, ...]) -> tuple[Series, list[Loss], 
         time_ns = time_ns[good]
         stamp_ns = None if stamp_ns is None else stamp_ns[good]
         columns = {field: values[good] for field, values in columns.items()}
-    return Series(topic, time_ns, stamp_ns, columns), losses, tuple(notes)
+    return Series(topic, time_ns, stamp_ns, columns, plan.column), losses, tuple(notes)
 
 
 def to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Mask, str]:

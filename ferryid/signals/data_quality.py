@@ -115,7 +115,7 @@ def loss_sentence(loss: Loss) -> str:
     """Return a loss as one sentence: file, topic, what, how many messages and seconds."""
     name = loss.file.rpartition("/")[2]
     topic = f" {loss.topic}" if loss.topic else ""
-    amount = [f"{loss.messages} messages" if loss.messages is not None else "", ""]
+    amount = [f"{loss.messages} message{'s' * (loss.messages > 1)}" if loss.messages else "", ""]
     if loss.seconds is not None:
         amount[1] = f"{loss.seconds:.3f} s"
     size = ", ".join(part for part in amount if part)

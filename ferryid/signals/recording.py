@@ -138,7 +138,7 @@ def _log_notes(streams: Mapping[str, Stream], selection: Selection, topics: tupl
             f"{len(stamped)} topic(s) are on their senders' stamps and {len(received)} on receive times "
             f"({', '.join(received)}): the latter are later by their unknown latency"
         )
-    elif received:
+    elif received and not all(topic.encoding == "table" for topic in topics):
         notes.append("all topics are on receive times")
     return tuple(notes)
 

@@ -1,4 +1,4 @@
-"""The findings of `inspect` as text for a terminal, at most 100 columns wide."""
+"""The findings of `inspect` as text for a terminal of a given width."""
 
 from __future__ import annotations
 
@@ -9,39 +9,49 @@ from typing import Any
 from ferryid.ingest.log import Loss
 from ferryid.signals.data_quality import loss_sentence, named
 
-WIDTH = 100
 _FIELDS_SHOWN = 24
+_LEGEND = {
+    "ppm": "drift of the sender's clock against the recorder's",
+    "held": "samples that repeat the one before",
+    "spikes": "single implausible samples",
+}
 
 
-def render_inspect(result: Mapping[str, Any]) -> str:
-    """Return the output of `ferryid.signals.inspect.inspect` as text: aligned columns, at most 100 wide."""
-    blocks = [_head(result), _topics(result["topics"])]
+def render_inspect(result: Mapping[str, Any], width: int = 100) -> str:
+    """Return the output of `ferryid.signals.inspect.inspect` as text: aligned columns, at most `width` characters wide."""
+    blocks = [_head(result, width), _topics(result["topics"], width)]
     if result["vessel"] is not None:
-        blocks.append(_vessel(result["vessel"]))
+        blocks.append(_vessel(result["vessel"], width))
     else:
-        blocks.append(_fields(result["topics"]))
-        blocks.append(_matches(result["bundled"]))
+        blocks.append(_fields(result["topics"], width))
+        blocks.append(_matches(result["bundled"], width))
+    shown = {word for block in blocks for line in block.splitlines() for word in line.split()}
+    legend = "; ".join(f"{word}: {meaning}" for word, meaning in _LEGEND.items() if word in shown)
+    blocks.append(textwrap.fill(legend, width))
     losses = [Loss(**{key: value for key, value in loss.items() if key != "seconds"}) for loss in result["losses"]]
-    blocks.append(_listed("Lost", [loss_sentence(loss) for loss in losses]) if losses else "Lost: nothing")
-    blocks.append(_listed("Notes", result["notes"]))
+    lost = [loss_sentence(loss) for loss in losses]
+    blocks.append(_listed("Lost", lost, width) if losses else "Lost: nothing")
+    blocks.append(_listed("Notes", result["notes"], width))
     return "\n\n".join(block for block in blocks if block)
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
-    """Align columns; those in `left` to the left, all others to the right; the first one is cut to fit 100 columns."""
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], width: int, left: Sequence[int] = (0,)) -> str:
+    """Align columns; those in `left` to the left, and cut where the table is wider than `width`; others to the right."""
     cells = [list(header), *(list(row) for row in rows)]
     widths = [max(len(row[place]) for row in cells) for place in range(len(header))]
-    excess = sum(widths) + 2 * (len(widths) - 1) - WIDTH
-    for place in sorted(left, key=lambda one: -widths[one]):
-        if excess > 0:
-            cut = min(excess, max(0, widths[place] - 16))
+    excess = sum(widths) + 2 * (len(widths) - 1) - width
+    ends = {place: max(len(row[place].rpartition("/")[2]) for row in cells) + 2 for place in left}
+    # What stands before the last slash is spared first, and the first column, which names the row, for longest.
+    for least in ({**ends, left[0]: max(20, ends[left[0]])}, dict.fromkeys(left, 12)):
+        for place in reversed(left):
+            cut = min(max(0, excess), max(0, widths[place] - least[place]))
             widths[place] -= cut
             excess -= cut
     lines = []
     for row in cells:
         parts = [
-            _cut(cell, width).ljust(width) if place in left else cell.rjust(width)
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+            _cut(cell, size).ljust(size) if place in left else cell.rjust(size)
+            for place, (cell, size) in enumerate(zip(row, widths, strict=True))
         ]
         lines.append("  ".join(parts).rstrip())
     return "\n".join(lines)
@@ -52,11 +62,11 @@ def _cut(text: str, width: int) -> str:
     return text if len(text) <= width else "…" + text[len(text) - width + 1 :]
 
 
-def _head(result: Mapping[str, Any]) -> str:
+def _head(result: Mapping[str, Any], width: int) -> str:
     size = sum(file["bytes"] for file in result["files"])
-    start = result["start"] or "not known (times are counted from the start)"
+    start = result["start"] or "not known (times count from it)"
     lines = [
-        _cut(result["path"], WIDTH),
+        _cut(result["path"], width),
         f"  {result['format']}, {_bytes(size)}, {result['messages']} messages in {len(result['topics'])} topic(s)",
         f"  start {start}, duration {_duration(result['duration_s'])}",
         f"  {result['sha256']}",
@@ -64,7 +74,7 @@ def _head(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _topics(topics: Sequence[Mapping[str, Any]]) -> str:
+def _topics(topics: Sequence[Mapping[str, Any]], width: int) -> str:
     rows = []
     for topic in topics:
         clock = topic["clock"]
@@ -72,7 +82,7 @@ def _topics(topics: Sequence[Mapping[str, Any]]) -> str:
         if clock is not None:
             longest = max(((end - start) * 1e-9 for start, end in clock["gaps"]), default=0.0)
             values = [
-                clock["source"],
+                "column" if clock["source"] == "receive" and topic["encoding"] == "table" else clock["source"],
                 _seconds(clock["offset_s"]),
                 _drift(clock, topic["duration_s"]),
                 _seconds(clock["jitter_s"]),
@@ -83,11 +93,11 @@ def _topics(topics: Sequence[Mapping[str, Any]]) -> str:
     header = ["topic", "type", "count", "Hz", "clock", "offset", "ppm", "jitter", "gaps"]
     if all(row[1] == "table" for row in rows):
         header, rows = [header[0], *header[2:]], [[row[0], *row[2:]] for row in rows]
-        return table(header, rows)
-    return table(header, rows, left=(0, 1))
+        return table(header, rows, width)
+    return table(header, rows, width, left=(0, 1))
 
 
-def _fields(topics: Sequence[Mapping[str, Any]]) -> str:
+def _fields(topics: Sequence[Mapping[str, Any]], width: int) -> str:
     lines = ["Fields"]
     alike: dict[tuple[str, ...], list[str]] = {}
     for topic in topics:
@@ -97,11 +107,11 @@ def _fields(topics: Sequence[Mapping[str, Any]]) -> str:
         if len(names) > _FIELDS_SHOWN:
             shown += f" and {len(names) - _FIELDS_SHOWN} more (see --json)"
         text = f"{named(owners)}: {shown or 'not known'}"
-        lines += textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="      ", break_long_words=False)
+        lines += _wrapped(text, width)
     return "\n".join(lines)
 
 
-def _matches(matches: Sequence[Mapping[str, Any]]) -> str:
+def _matches(matches: Sequence[Mapping[str, Any]], width: int) -> str:
     usable = [match for match in matches if match["usable"]]
     lines = ["Bundled vessel profiles"]
     lines += [f"  {one['name']}: fits, {one['found']} of {one['signals']} signals found" for one in usable]
@@ -112,11 +122,12 @@ def _matches(matches: Sequence[Mapping[str, Any]]) -> str:
             if best and best["found"]
             else ""
         )
-        lines.append(f"  none fits{near}: describe the vessel and its signals in a profile, and pass it with --vessel")
+        what = f"none fits{near}: describe the vessel and its signals in a profile, and pass it with --vessel"
+        lines += _wrapped(what, width)
     return "\n".join(lines)
 
 
-def _vessel(vessel: Mapping[str, Any]) -> str:
+def _vessel(vessel: Mapping[str, Any], width: int) -> str:
     signals = {name: signal for stream in vessel["streams"].values() for name, signal in stream["signals"].items()}
     rows = []
     for name, source in vessel["found"].items():
@@ -141,22 +152,30 @@ def _vessel(vessel: Mapping[str, Any]) -> str:
     title = f"Vessel {vessel['name']}: " + ("fits" if vessel["usable"] else "does not fit")
     lines = [title]
     if rows:
-        lines.append(table(["signal", "unit", "min", "max", "NaN", "held", "spikes", "from"], rows, left=(0, 1, 7)))
+        header = ["signal", "unit", "min", "max", "NaN", "held", "spikes", "from"]
+        lines.append(table(header, rows, width, left=(0, 1, 7)))
     if vessel["problem"]:
-        lines += textwrap.wrap(vessel["problem"], WIDTH, initial_indent="  ", subsequent_indent="  ")
+        lines += _wrapped(vessel["problem"], width)
+    missing: dict[str, list[str]] = {}
     for quantity, reason in vessel["missing"].items():
-        lines += textwrap.wrap(f"missing {quantity}: {reason}", WIDTH, initial_indent="  ", subsequent_indent="      ")
+        missing.setdefault(reason, []).append(quantity)
+    for reason, quantities in missing.items():
+        lines += _wrapped(f"missing {', '.join(quantities)}: {reason}", width)
     for remark in vessel["remarks"]:
-        lines += textwrap.wrap(remark, WIDTH, initial_indent="  ", subsequent_indent="      ")
+        lines += _wrapped(remark, width)
     return "\n".join(lines)
 
 
-def _listed(title: str, sentences: Sequence[str]) -> str:
+def _wrapped(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width, initial_indent="  ", subsequent_indent="      ", break_on_hyphens=False)
+
+
+def _listed(title: str, sentences: Sequence[str], width: int) -> str:
     if not sentences:
         return ""
     lines = [title]
     for sentence in sentences:
-        lines += textwrap.wrap(sentence, WIDTH, initial_indent="  ", subsequent_indent="      ", break_long_words=False)
+        lines += _wrapped(sentence, width)
     return "\n".join(lines)
 
 

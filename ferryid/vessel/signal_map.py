@@ -126,13 +126,13 @@ def select(profile: Profile, topics: Sequence[Topic], where: str) -> Selection:
         signal = lacking[0]
         others = len(lacking) - 1
         more = f" ({others} more required signal{'s are' if others > 1 else ' is'} missing)" if others else ""
-        reason = selection.missing[signal.quantity]
+        reason = selection.missing[signal.quantity].removesuffix(".")
         if _topic(signal.topic, topics) is None:
             there = _some([topic.name for topic in topics]) or "no topic"
             reason += f"{'' if reason.endswith('?') else '.'} The log has {there}"
         raise FerryIdError(
             f"{where}: {signal.quantity} is needed by the profile {profile.name} ({profile.path}:{signal.line}), "
-            f"{reason.rstrip('.')}{more}. Fix: correct the signal map, or set "
+            f"{reason}{more}. Fix: correct the signal map, or set "
             "required = false where the signal can be missed"
         )
     return selection

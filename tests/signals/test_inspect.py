@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ from typing import Any
 import pytest
 
 from ferryid.errors import FerryIdError
+from ferryid.ingest.log import Loss
+from ferryid.signals.data_quality import loss_sentence
 from ferryid.signals.inspect import inspect, render_inspect
 from ferryid.signals.render import table
 from ferryid.vessel.load import load_profile
@@ -20,9 +23,9 @@ FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 def look(path: Path, profile: str | None = None) -> tuple[dict[str, Any], str]:
     result = inspect(path, load_profile(profile) if profile else None)
     json.dumps(result, allow_nan=False)
-    text = render_inspect(result)
-    assert max(map(len, text.splitlines())) <= 100
-    return result, text
+    for width in (80, 100, 240):
+        assert max(map(len, render_inspect(result, width).splitlines())) <= width
+    return result, render_inspect(result, 160)
 
 
 def test_mcap_without_a_profile() -> None:
@@ -61,6 +64,19 @@ def test_truncated_log_shows_what_is_lost() -> None:
     result, text = look(FIXTURES / "truncated.mcap")
     assert result["losses"]
     assert "Lost\n" in text
+    assert f"which found {result['messages']} messages" in text
+    assert "(0 messages)" not in text
+
+
+def test_truncated_bag_says_what_is_recovered() -> None:
+    result, text = look(FIXTURES / "truncated.bag")
+    assert f"found {result['messages']} messages without it" in text.replace("\n      ", " ")
+    assert "(0 messages)" not in text
+
+
+@pytest.mark.parametrize(("messages", "told"), [(None, "x."), (0, "x."), (1, "x (1 message)."), (7, "x (7 messages).")])
+def test_amount_of_a_loss(messages: int | None, told: str) -> None:
+    assert loss_sentence(Loss("a/b.bag", "x", None, messages)) == f"b.bag: {told}"
 
 
 def test_wrong_profile_says_what_is_missing(tmp_path: Path) -> None:
@@ -68,7 +84,8 @@ def test_wrong_profile_says_what_is_missing(tmp_path: Path) -> None:
     assert not result["vessel"]["usable"]
     assert result["vessel"]["missing"]
     assert "does not fit" in text
-    assert "missing" in text
+    assert 'missing position, heading: found no topic "/NED_pose".' in text
+    assert text.count("/thruster1/command, ") == 1
 
 
 def test_table_without_a_profile_lists_its_columns(tmp_path: Path) -> None:
@@ -77,6 +94,9 @@ def test_table_without_a_profile_lists_its_columns(tmp_path: Path) -> None:
     result, text = look(path)
     assert "speed over ground" in text
     assert "time guessed" in text
+    assert 'times are those of its time column "time [s]"' in text
+    assert "receive" not in text
+    assert result["topics"][0]["clock"]["source"] == "receive"
     assert result["start"] is None
     assert result["topics"][0]["clock"]["gaps"] == [[200_000_000, 5_000_000_000]]
 
@@ -94,9 +114,26 @@ def test_no_log_is_an_error() -> None:
 
 
 def test_long_names_keep_their_end_and_fit() -> None:
-    text = table(["topic", "type", "count"], [["/very" * 30 + "/end", "t" * 50, "1"]], left=(0, 1))
+    text = table(["topic", "type", "count"], [["/very" * 30 + "/end", "a_package/" + "t" * 40, "1"]], 100, left=(0, 1))
     assert max(map(len, text.splitlines())) <= 100
     assert "/end" in text
+    assert "/" + "t" * 40 in text
+
+
+def test_names_are_cut_only_where_the_terminal_is_narrow() -> None:
+    result = inspect(FIXTURES / "short.bag", load_profile("milliampere"))
+    assert "…" not in render_inspect(result, 180)
+    narrow = render_inspect(result, 80)
+    for end in ("pressedImage ", "enchStamped ", ".position.x\n", "thruster2/state ", "mand: azimuth\n"):
+        assert end in narrow
+
+
+def test_legend_explains_what_is_shown() -> None:
+    log = FIXTURES / "short.bag"
+    assert re.search(
+        r"^ppm: .*; held: .*; spikes: .*$", render_inspect(inspect(log, load_profile("milliampere")), 160), re.M
+    )
+    assert re.search(r"^ppm: [^;]*$", render_inspect(inspect(log), 160), re.M)
 
 
 @pytest.mark.parametrize(

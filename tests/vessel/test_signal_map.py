@@ -112,7 +112,10 @@ def test_misspelt_topic_gets_a_suggestion() -> None:
     message = str(caught.value)
     assert message.startswith("a.bag: velocity is needed by the profile boat (boat.toml:25), found no topic")
     assert 'Did you mean "/nav2"?' in message
-    assert "The log has /nav2, /t1 (1 more required signal is missing)" in message
+    assert (
+        'found no topic "/nav". Did you mean "/nav2"? The log has /nav2, /t1 (1 more required signal is missing)'
+        in message
+    )
     assert "\n" not in message
 
 

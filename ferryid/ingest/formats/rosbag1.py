@@ -131,7 +131,8 @@ class Rosbag1Reader:
         ) -> None:
             self._opening.append(Loss(str(path), what, None, messages, start_ns, end_ns))
 
-        lost(f"the index cannot be used ({error}): read by a walk over all records, no message lost by that", 0)
+        count = sum(chunk.count(number) for chunk in found.chunks for number in chunk.connections)
+        lost(f"the index cannot be used ({error}): a walk over all records found {count} messages without it", 0)
         for chunk in found.chunks:
             if chunk.end > size:
                 kept = sum(len(entries) for entries in chunk.walked.values())
