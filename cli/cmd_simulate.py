@@ -24,10 +24,11 @@ def command(
     json: Json = None,
 ) -> None:
     """Simulate a trial and write a log like a recording."""
-    from ferryid.simulate import render_simulation, run_scenario, scenario_list
+    from ferryid.simulate import render_scenarios, render_simulation, run_scenario, scenario_listing
 
     if list_:
-        typer.echo(scenario_list())
+        listing = scenario_listing()
+        emit(listing, render_scenarios(listing), json)
         return
     if not scenario or out is None:
         raise typer.BadParameter("give a scenario and --out LOG, or --list")

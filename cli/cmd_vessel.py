@@ -31,17 +31,27 @@ def check(file: File, json: Json = None) -> None:
 
 
 @app.command()
-def show(file: File) -> None:
+def show(
+    file: File,
+    toml: Annotated[
+        bool, typer.Option("--toml", help="Print the profile's own TOML, to start a new one from.")
+    ] = False,
+) -> None:
     """Show hull, actuators and signal map of a profile."""
     from ferryid.vessel import describe, load_profile
 
-    typer.echo(describe(load_profile(file)))
+    profile = load_profile(file)
+    typer.echo(profile.text if toml else describe(profile), nl=not toml)
 
 
 @app.command("list")
-def list_() -> None:
+def list_(json: Json = None) -> None:
     """List the bundled profiles."""
     from ferryid.vessel import bundled, load_profile
 
-    for name in bundled():
-        typer.echo(f"{name:<18} {load_profile(name).title}")
+    profiles = [load_profile(name) for name in bundled()]
+    result = {
+        "schema": "ferryid.vessels/1",
+        "vessels": [{"name": one.name, "title": one.title, "source": one.source} for one in profiles],
+    }
+    emit(result, "\n".join(f"{one.name:<18} {one.title}" for one in profiles), json)

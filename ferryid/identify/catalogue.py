@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,9 +41,17 @@ def render_listing(result: dict[str, Any], out: Path) -> str:
         lines.append(
             f"{mark} {model['name'] + '@' + str(model['version']):<28}"
             f"{'accepted' if model['accepted'] else 'rejected':<12}"
-            f"{'-' if score is None else format(score, '9.3f'):>9}  {model['created']:<22}{', '.join(model['logs'])}"
+            f"{'-' if score is None else format(score, '9.3f'):>9}  {model['created']:<22}{_some(model['logs'])}"
         )
-    return "\n".join([*lines, "* current"])
+    if any(model["current"] for model in result["models"]):
+        lines.append("* current")
+    return "\n".join(lines)
+
+
+def _some(names: Sequence[str]) -> str:
+    """Name the first two logs, each cut to 40 characters, and count the others."""
+    shown = [name if len(name) <= 40 else "…" + name[-39:] for name in names[:2]]
+    return ", ".join(shown) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
 
 
 def render_model(model: Model) -> str:

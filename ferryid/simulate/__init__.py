@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ferryid.simulate.commands import render_simulation, run_scenario, scenario_list
+    from ferryid.simulate.commands import render_scenarios, render_simulation, run_scenario, scenario_listing
     from ferryid.simulate.logs import write_log
     from ferryid.simulate.scenario import Scenario, list_scenarios, load_scenario, parse_scenario
     from ferryid.simulate.trial import Simulation, simulate
@@ -19,9 +19,10 @@ _HOMES = {
     "list_scenarios": "scenario",
     "load_scenario": "scenario",
     "parse_scenario": "scenario",
+    "render_scenarios": "commands",
     "render_simulation": "commands",
     "run_scenario": "commands",
-    "scenario_list": "commands",
+    "scenario_listing": "commands",
     "simulate": "trial",
     "write_log": "logs",
 }
@@ -32,9 +33,10 @@ __all__ = [
     "list_scenarios",
     "load_scenario",
     "parse_scenario",
+    "render_scenarios",
     "render_simulation",
     "run_scenario",
-    "scenario_list",
+    "scenario_listing",
     "simulate",
     "write_log",
 ]

@@ -77,8 +77,13 @@ def render_simulation(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def scenario_list() -> str:
-    """Return the bundled scenarios, one per line with its title."""
-    scenarios = list_scenarios()
-    width = max(len(name) for name in scenarios)
-    return "\n".join(f"{name:<{width}}  {title}" for name, title in scenarios.items())
+def scenario_listing() -> dict[str, Any]:
+    """Return the names and titles of the bundled scenarios (``ferryid.scenarios/1``)."""
+    scenarios = [{"name": name, "title": title} for name, title in list_scenarios().items()]
+    return {"schema": "ferryid.scenarios/1", "scenarios": scenarios}
+
+
+def render_scenarios(result: Mapping[str, Any]) -> str:
+    """Return the result of `scenario_listing`, one scenario per line with its title."""
+    width = max(len(one["name"]) for one in result["scenarios"])
+    return "\n".join(f"{one['name']:<{width}}  {one['title']}" for one in result["scenarios"])

@@ -109,11 +109,19 @@ def test_simulate_and_list(ferryid, tmp_path: Path) -> None:
     assert run.code == 0, run.err
     conforms(run.out)
     assert "twelve-corner" in ferryid("simulate", "--list").out
+    scenarios = conforms(ferryid("simulate", "--list", "--json", "-").out)["scenarios"]
+    assert "twelve-corner" in {one["name"] for one in scenarios}
 
 
 def test_vessel_check_show_and_list(ferryid, tmp_path: Path) -> None:
     assert "milliampere" in ferryid("vessel", "list").out
+    vessels = conforms(ferryid("vessel", "list", "--json", "-").out)["vessels"]
+    assert {"milliampere", "gunnerus"} <= {one["name"] for one in vessels}
     assert ferryid("vessel", "show", "milliampere").code == 0
+    copy = tmp_path / "copy.toml"
+    copy.write_text(ferryid("vessel", "show", "milliampere", "--toml").out, encoding="utf-8")
+    assert ferryid("vessel", "check", copy).out == f"{copy}: no faults\n"
+    assert copy.read_bytes() == (ROOT / "ferryid" / "vessel" / "profiles" / "milliampere.toml").read_bytes()
     assert ferryid("vessel", "check", "milliampere").code == 0
     wrong = tmp_path / "boat.toml"
     wrong.write_text('schema = "ferryid.vessel/1"\nname = "boat"\n[hull]\nmass_kg = -3\n', encoding="utf-8")

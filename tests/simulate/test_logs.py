@@ -15,7 +15,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate import load_scenario, render_simulation, run_scenario, scenario_list, simulate, write_log
+from ferryid.simulate import load_scenario, render_simulation, run_scenario, scenario_listing, simulate, write_log
 from ferryid.simulate.messages import CUSTOM
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -187,7 +187,7 @@ def test_run_scenario_says_what_it_wrote(tmp_path):
     text = render_simulation(result)
     assert "/weather/wind" in text
     assert "10 s of milliampere, seed 3" in text
-    assert "twelve-corner-wind" in scenario_list()
+    assert "twelve-corner-wind" in {one["name"] for one in scenario_listing()["scenarios"]}
 
 
 @pytest.mark.parametrize("name", ["short.mcap", "short.bag"])
