@@ -124,7 +124,7 @@ def test_names_are_cut_only_where_the_terminal_is_narrow() -> None:
     result = inspect(FIXTURES / "short.bag", load_profile("milliampere"))
     assert "…" not in render_inspect(result, 240)
     narrow = render_inspect(result, 80)
-    for end in ("pressedImage ", "enchStamped ", ".position.x\n", "thruster2/state ", "mand: azimuth\n"):
+    for end in ("ressedImage ", "enchStamped ", ".position.x\n", "thruster2/state ", "mand: azimuth\n"):
         assert end in narrow
 
 
