@@ -1,0 +1,61 @@
+"""A log compressed as a whole by zstd or lz4 (``trial.mcap.zst``, ``trial.bag.lz4``), outside a ROS2 folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
+from ferryid.ingest.unpack import MAGIC, unpack_file, working_folder
+
+_SUFFIXES = (".zstd", ".zst", ".lz4")
+
+
+class UnpackedLog:
+    """The log inside a compressed file: unpacked into a temporary folder that goes with this object."""
+
+    def __init__(self, path: Path, layout: TableLayout | None) -> None:
+        # The formats of what is inside are found by the package that found this one.
+        from ferryid.ingest import open_log
+
+        self.paths = (path,)
+        unpacked, self._lost = unpack_file(path, working_folder(self))
+        self._inner_path = unpacked
+        try:
+            self._inner: Reader = open_log(unpacked, layout)
+        except FerryIdError as error:
+            raise FerryIdError(self._told(str(error))) from error
+        self.topics: tuple[Topic, ...] = self._inner.topics
+
+    @property
+    def losses(self) -> tuple[Loss, ...]:
+        """What unpacking lost, then what the log inside lacks."""
+        inner = (replace(one, file=str(self.paths[0]), what=self._told(one.what)) for one in self._inner.losses)
+        return (*self._lost, *inner)
+
+    def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
+        """Decode the wanted fields of the log inside.
+
+        Raises
+        ------
+        FerryIdError
+            For a topic or field that the log does not have.
+        """
+        try:
+            return self._inner.read(wanted, verify=verify)
+        except FerryIdError as error:
+            raise FerryIdError(self._told(str(error))) from error
+
+    def _told(self, text: str) -> str:
+        """Name the file that the user knows instead of the temporary one."""
+        return text.replace(str(self._inner_path), str(self.paths[0]))
+
+
+def _matches(path: Path, head: bytes) -> bool:
+    return head[:4] in MAGIC and path.name.endswith(_SUFFIXES)
+
+
+# After SQLite, which unpacks its own files.
+FORMAT = Format(name="log compressed by zstd or lz4", matches=_matches, open=UnpackedLog, order=60)
