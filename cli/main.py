@@ -7,8 +7,10 @@ import os
 import pkgutil
 import sys
 import traceback
+import warnings
 
 import typer
+from typer.exceptions import TyperException
 
 import ferryid
 from ferryid.errors import FerryIdError
@@ -60,21 +62,49 @@ def main() -> None:
 
     Exit codes: 0 done, 1 a bug of ours, 2 unusable input, 3 model not accepted, 130 interrupted.
     """
+    # What NumPy cannot compute becomes NaN, and is told where it matters.
+    warnings.simplefilter("ignore", RuntimeWarning)
     try:
-        app()
+        code = app(standalone_mode=False)
+        sys.stdout.flush()
+    except TyperException as error:
+        sys.exit(_usage(error))
     except FerryIdError as error:
         sys.stderr.write(f"ferryid: {error}\n")
         sys.exit(2)
     except KeyboardInterrupt:
-        sys.stderr.write("ferryid: interrupted, nothing half-written was left\n")
-        sys.exit(130)
+        code = 130
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: nothing to say and nobody to say it to.
-        sys.stderr.close()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:
+        what = f"{error.filename}: " if error.filename else ""
+        sys.stderr.write(
+            f"ferryid: {what}{error.strerror or error}. Fix: check the path, its permissions and the disk\n"
+        )
+        sys.exit(2)
+    except MemoryError:
+        sys.stderr.write("ferryid: there is not enough memory for this log. Fix: cut it, or give a lower --rate\n")
+        sys.exit(2)
     except Exception:  # noqa: BLE001 - the last boundary: what arrives here is a bug and is shown as one
         traceback.print_exc()
         sys.stderr.write(
             f"ferryid {ferryid.__version__}: this is a bug of ferryid. Please report it with these lines\n"
         )
         sys.exit(1)
+    if code == 130:
+        sys.stderr.write("ferryid: interrupted, nothing half-written was left\n")
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _usage(error: TyperException) -> int:
+    """Show wrong use of the command line in one line; asking for nothing at all shows the help."""
+    message = error.format_message() if hasattr(error, "format_message") else str(error)
+    if "\n" in message:
+        sys.stderr.write(message + "\n")
+        return 2
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "ferryid"
+    sys.stderr.write(f"ferryid: {message.rstrip('.')}. Fix: see {command} --help\n")
+    return 2

@@ -13,13 +13,13 @@ import typer
 
 def emit(result: Mapping[str, Any], text: str, json: str | None) -> None:
     """Print `text`, or with ``--json -`` the JSON object instead; with ``--json FILE`` also write the object there."""
-    from ferryid.files import dump_json, write_text
+    from ferryid.files import dump_json, write_result
 
     if json == "-":
         typer.echo(dump_json(dict(result)), nl=False)
         return
     if json is not None:
-        write_text(Path(json), dump_json(dict(result)))
+        write_result(Path(json), dump_json(dict(result)))
     typer.echo(text)
 
 

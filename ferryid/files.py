@@ -14,6 +14,11 @@ from typing import Any
 
 from ferryid.errors import FerryIdError
 
+try:
+    import fcntl
+except ImportError:  # Windows: two fits at once into one folder may then take the same number
+    fcntl = None  # type: ignore[assignment]
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
@@ -73,6 +78,47 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file in one step: it is there whole, or not at all."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_result(path: Path, text: str) -> None:
+    """Write a JSON result where a user asked for it, but never over something that is no such result.
+
+    Raises
+    ------
+    FerryIdError
+        When the place holds anything but an earlier JSON file, or cannot be written.
+    """
+    try:
+        special = path.exists() and not path.is_file()
+        other = path.is_file() and path.suffix != ".json" and path.stat().st_size > 0
+    except OSError as error:
+        raise unwritable(path, error) from error
+    if path.is_dir() or other:
+        raise FerryIdError(
+            f"{path}: is there already and no JSON file, so it is not written over. Fix: give --json another name"
+        )
+    if not special:
+        write_text(path.resolve() if path.is_symlink() else path, text)
+        return
+    try:
+        with path.open("w", encoding="utf-8") as device:
+            device.write(text)
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Keep other processes out of a folder's numbering while the block runs, where the system has file locks."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / ".lock").open("w")
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    with lock:
+        if fcntl is not None:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def dump_json(data: Any) -> str:

@@ -14,6 +14,7 @@ from ferryid.identify.estimate import estimator
 from ferryid.identify.free_run import free_run
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.scores import by_axis, free_run_plain, mean_square, r_squared, usable
+from ferryid.identify.settings import check_window
 from ferryid.signals.prepare import prepare
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
@@ -57,6 +58,7 @@ def compare(
             f"{_label(a)} and {_label(b)}: models of different vessels ({hull_a.name}, {hull_b.name}) cannot be compared. "
             "Fix: give two models of one vessel"
         )
+    check_window(window_s)
     profile = profile or hull_b
     entries = []
     for path in logs:

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.errors import FerryIdError
 from ferryid.identify.estimate import base_estimator, estimator
 from ferryid.identify.excitation import RANGE_UNITS, range_columns
 from ferryid.identify.free_run import free_run
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.scores import force_scores, free_run_plain, outside_ranges, usable
+from ferryid.identify.settings import check_window
 from ferryid.signals.prepare import prepare
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
@@ -50,7 +52,14 @@ def evaluate(
     dict
         Schema ``ferryid.evaluate/1``.
     """
-    profile = profile or parse_profile(model.profile_text, model.name)
+    own = parse_profile(model.profile_text, model.name)
+    profile = profile or own
+    if profile.name != own.name:
+        raise FerryIdError(
+            f"{model.name}@{model.version}: a model of {own.name} says nothing about {profile.name}. "
+            "Fix: give a model and logs of one vessel"
+        )
+    check_window(window_s)
     window = float(model.settings["window_s"]) if window_s is None else window_s
     new, base = estimator(model), base_estimator(model)
     entries, parts = [], []

@@ -29,6 +29,7 @@ from ferryid.identify.scores import force_scores, usable
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.simpls import Simpls, one_standard_error, simpls, sse, sweep_components
 from ferryid.identify.split import Split, folds, split
+from ferryid.identify.store import checked_name
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.smooth import odd_rows
 from ferryid.signals.track import Motion
@@ -82,7 +83,9 @@ def fit(
     FerryIdError
         For input that cannot be used, with file, cause and remedy.
     """
+    name = checked_name(name or profile.name)
     prepared = [_prepare(path, profile, settings, out, verify, progress) for path in logs]
+    _refuse_twice(prepared)
     motions = _told_apart([one.motion for one in prepared])
     functions = _basis(settings, motions)
     progress("computing the residual")
@@ -133,7 +136,7 @@ def fit(
     free_base = free_run(base, motions, parts.validation)
     free_new = free_run(new, motions, parts.validation)
     model = Model(
-        name=name or profile.name,
+        name=name,
         version=0,
         created=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         ferryid_version=__version__,
@@ -186,6 +189,17 @@ def _prepare(
         rate_hz=settings.rate_hz,
         verify=verify,
     )
+
+
+def _refuse_twice(prepared: Sequence[Prepared]) -> None:
+    """Refuse a log that is given twice: it would train and validate on the same data."""
+    seen: dict[str, str] = {}
+    for one in prepared:
+        first = seen.setdefault(one.recording.sha256, one.recording.files[0])
+        if first is not one.recording.files[0]:
+            raise FerryIdError(
+                f"{one.recording.files[0]}: the same log as {first}, so that it would judge itself. Fix: give it once"
+            )
 
 
 def _told_apart(motions: Sequence[Motion]) -> list[Motion]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -132,7 +133,7 @@ def from_json(data: Mapping[str, Any], where: str) -> Model:
     """
     schema = str(data.get("schema", ""))
     kind, _, number = schema.partition("/")
-    if kind != "ferryid.model" or not number.isdigit():
+    if kind != "ferryid.model" or not (number.isascii() and number.isdigit()):
         raise FerryIdError(
             f'{where}: not a ferryid model, its schema is "{schema or "missing"}". '
             "Fix: give a model file written by ferryid fit"
@@ -144,6 +145,7 @@ def from_json(data: Mapping[str, Any], where: str) -> Model:
             f"Fix: pip install 'ferryid>={data.get('ferryid_version', '')}'"
         )
     try:
+        _check_parts(data)
         terms = tuple(str(term) for term in data["terms"])
         rows = [data["coefficients"][axis] for axis in AXES]
 
@@ -175,8 +177,25 @@ def from_json(data: Mapping[str, Any], where: str) -> Model:
             scores=dict(data["scores"]),
             accepted=bool(data["accepted"]),
         )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise FerryIdError(
             f"{where}: a part of the model file is missing or wrong ({type(error).__name__}: {error}). "
             "Fix: fit again, or restore the file from a backup"
         ) from error
+
+
+def _check_parts(data: Mapping[str, Any]) -> None:
+    """Raise KeyError, TypeError or ValueError where a part that others rely on is missing or of another kind."""
+    settings, scores = data["settings"], data["scores"]
+    for key in ("basis", "structure"):
+        if not isinstance(settings[key], str):
+            raise TypeError(f"settings.{key} is no text")
+    if not 0.0 <= float(settings["window_s"]) <= 60.0:
+        raise ValueError("settings.window_s is no window")
+    if not all(math.isfinite(float(value)) for value in data["base"]["scale"].values()):
+        raise ValueError("base.scale is not finite")
+    if not isinstance(scores["normalised_mse"], int | float | type(None)) or not isinstance(scores["per_axis"], dict):
+        raise TypeError("scores are not numbers")
+    for log in data["training"]:
+        if not isinstance(log["name"], str) or not isinstance(log["sha256"], str):
+            raise TypeError("training does not name its logs")

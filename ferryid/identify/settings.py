@@ -71,15 +71,16 @@ class FitSettings:
                 )
         text = str(self.components)
         if text != "auto":
-            if not text.isdigit() or int(text) < 1:
+            if not (text.isascii() and text.isdigit()) or not 1 <= int(text[:6]) <= 1000:
                 raise FerryIdError(
                     f"--components: {text!r} is not a number of components. Fix: give 1 or more, or auto"
                 )
             object.__setattr__(self, "components", int(text))
-        if not 0.0 <= self.window_s <= 60.0:
-            raise FerryIdError(f"--window: {self.window_s} s is no smoothing window. Fix: give 0 to 60 s, 1.0 is usual")
+        check_window(self.window_s)
         if self.rate_hz is not None and not 0.1 <= self.rate_hz <= 1000.0:
             raise FerryIdError(f"--rate: {self.rate_hz} Hz is no usable rate. Fix: give 0.1 to 1000 Hz, 20 is usual")
+        if not 0 <= self.seed < 2**63:
+            raise FerryIdError(f"--seed: {self.seed} is no seed. Fix: give a whole number from 0 on")
         for key in ("delta", "sigma", "zeta"):
             value = getattr(self, key)
             if not 0.0 <= value <= 100.0 or (key != "sigma" and value == 0.0):
@@ -93,3 +94,9 @@ class FitSettings:
     def plain(self) -> dict[str, Any]:
         """Return the settings as plain values for a model file."""
         return {key: value for key, value in asdict(self).items() if key not in self.scale}
+
+
+def check_window(window_s: float | None) -> None:
+    """Refuse what is no smoothing window; None stands for a default."""
+    if window_s is not None and not 0.0 <= window_s <= 60.0:
+        raise FerryIdError(f"--window: {window_s} s is no smoothing window. Fix: give 0 to 60 s, 1.0 is usual")

@@ -7,6 +7,7 @@ version in use. Versions are never overwritten.
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,6 +26,24 @@ class Stored:
     previous: int | None = None
 
 
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,79}")
+
+
+def checked_name(name: str) -> str:
+    """Return a name that a model may be stored under.
+
+    Raises
+    ------
+    FerryIdError
+        For a name that would be a path, hidden, or confused with a version.
+    """
+    if not NAME.fullmatch(name):
+        raise FerryIdError(
+            f"--name: {name[:80]!r} cannot name a model. Fix: use up to 80 letters, digits, points, dashes or underscores"
+        )
+    return name
+
+
 def numbered(model: Model, out: Path) -> Model:
     """Return a model with the version that it will be stored under: the next one of its name.
 
@@ -40,17 +59,22 @@ def numbered(model: Model, out: Path) -> Model:
     return replace(model, version=max(present, default=0) + 1)
 
 
+def planned(model: Model, out: Path) -> Stored:
+    """Return what `save` will leave for a model that has its number."""
+    folder = _folder(out) / model.name
+    previous = _current(folder)
+    return Stored(folder / f"{model.version}.json", model, model.accepted or previous == model.version, previous)
+
+
 def save(model: Model, out: Path) -> Stored:
     """Store a model under its next version; an accepted one becomes current."""
     model = numbered(model, out)
-    folder = _folder(out) / model.name
-    path = folder / f"{model.version}.json"
-    previous = _current(folder)
-    if not path.exists():
-        write_text(path, dump_json(to_json(model)))
+    stored = planned(model, out)
+    if not stored.path.exists():
+        write_text(stored.path, dump_json(to_json(model)))
     if model.accepted:
-        write_text(folder / "current", f"{model.version}\n")
-    return Stored(path, model, _current(folder) == model.version, previous)
+        write_text(stored.path.parent / "current", f"{model.version}\n")
+    return stored
 
 
 def load(reference: str, out: Path) -> Model:
@@ -75,8 +99,8 @@ def load(reference: str, out: Path) -> Model:
             f"{reference}: no model of that name under {_folder(out)}.{did_you_mean(name, names)} "
             "Fix: list what there is with ferryid models, or give the path of a model file"
         )
-    number = int(version) if version.isdigit() else (_current(folder) or max(present))
-    if number not in present or (version and not version.isdigit()):
+    number = int(version) if _is_number(version) else (_current(folder) or max(present))
+    if number not in present or (version and not _is_number(version)):
         listed = ", ".join(str(n) for n in present)
         raise FerryIdError(f"{reference}: no such version of {name}, there are {listed}. Fix: give one of these")
     return load_file(folder / f"{number}.json")
@@ -99,7 +123,7 @@ def stored_models(out: Path) -> list[Stored]:
     """Return every stored version, by name and number."""
     root = _folder(out)
     found = []
-    for folder in sorted(root.iterdir()) if root.is_dir() else []:
+    for folder in sorted(path for path in root.iterdir() if path.is_dir()) if root.is_dir() else []:
         current = _current(folder)
         for number in _versions(folder):
             path = folder / f"{number}.json"
@@ -112,13 +136,17 @@ def _folder(out: Path) -> Path:
 
 
 def _versions(folder: Path) -> list[int]:
-    return sorted(int(path.stem) for path in folder.glob("*.json") if path.stem.isdigit())
+    return sorted(int(path.stem) for path in folder.glob("*.json") if _is_number(path.stem))
 
 
 def _current(folder: Path) -> int | None:
     path = folder / "current"
-    text = path.read_text(encoding="utf-8").strip() if path.is_file() else ""
-    return int(text) if text.isdigit() else None
+    text = path.read_text(encoding="utf-8", errors="replace").strip() if path.is_file() else ""
+    return int(text) if _is_number(text) else None
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdigit() and len(text) < 10
 
 
 def _undated(model: Model) -> str:

@@ -49,6 +49,8 @@ def open_log(path: str | Path, layout: TableLayout | None = None) -> Reader:
         raise FerryIdError(f"{path}: no such file or folder, a log was to be read. Fix: check the path")
     if whole.is_dir():
         return _open_folder(whole, layout)
+    if not whole.is_file():
+        raise FerryIdError(f"{path}: neither a file nor a folder but a pipe or a device. Fix: give a recorded file")
     return _open_file(whole, layout)
 
 

@@ -27,6 +27,7 @@ _STEP_NS = _SECOND
 """Receive and stamp must advance alike within this from one message to the next, else a clock may have been set."""
 _CORRECTED_DRIFT_NS = 50_000_000
 _LARGEST_CLOCK_DRIFT_PPM = 500.0
+_LONGEST_LOG_NS = 30 * 86_400 * 1e9
 """Quartz drifts by less; beyond it the stamps run on simulated time or the log was replayed at another speed."""
 _GAP_PERIODS = 3.0
 _SHORTEST_GAP_NS = 200_000_000
@@ -267,13 +268,12 @@ def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ..
     slope = _theil_sen(places, middles)
     jitter = spread / _SECOND
     facts = _Facts(usual / _SECOND, slope * 1e6, jitter, 0, replaced)
-    drifted = slope * float(stamp.max() - stamp.min()) if np.isfinite(slope) else 0.0
+    span = float(stamp.max() - stamp.min())
+    # Over months the slope only reflects that a clock was set, by both sender and recorder alike.
+    drifted = slope * span if np.isfinite(slope) and span < _LONGEST_LOG_NS else 0.0
     if abs(drifted) > _CORRECTED_DRIFT_NS:
         if abs(slope) * 1e6 > _LARGEST_CLOCK_DRIFT_PPM:
-            notes.append(
-                f"stamps advance {1 / (1 + slope):.4g} times as fast as the recorder's clock (simulated time, or "
-                "a replay?): stamps are used as they are"
-            )
+            notes.append(f"{_pace(slope)} (simulated time, or a replay?): stamps are used as they are")
         else:
             stamp = stamp + np.rint(slope * (stamp - stamp[0])).astype(np.int64)
             notes.append(
@@ -282,6 +282,12 @@ def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ..
     if -_CONSTANT_OFFSET_NS <= usual < -1_000_000:
         notes.append(f"stamps are {-usual / _SECOND:.3f} s later than receipt: the sender's clock is ahead; kept")
     return "", tuple(notes), stamp, facts
+
+
+def _pace(slope: float) -> str:
+    if slope <= -1.0:
+        return "receive times stand still while stamps advance"
+    return f"stamps advance {1 / (1 + slope):.4g} times as fast as the recorder's clock"
 
 
 def _ordered(

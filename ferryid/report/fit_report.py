@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.files import dump_json, replacing
+from ferryid.files import alone, dump_json, replacing
 from ferryid.identify.fit import fit, quiet
 from ferryid.identify.result import AXES, FitResult
 from ferryid.identify.scores import free_run_plain
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.store import Stored, numbered, save
+from ferryid.identify.store import Stored, numbered, planned, save
 from ferryid.report.page import headline, render
 from ferryid.vessel.profile import Profile
 
@@ -70,18 +70,20 @@ def fit_and_report(
     """
     result = fit(logs, profile, settings, out, name=name, verify=verify, progress=progress)
     progress("writing the report")
-    result = replace(result, model=numbered(result.model, out))
-    folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
-    page, drawings = render(result)
-    # The model is stored last but one: whoever interrupts before finds neither a model without a report nor a rest.
-    with replacing(folder) as temporary:
-        temporary.mkdir()
-        (temporary / "report.html").write_text(page, encoding="utf-8")
-        for file, drawing in drawings.items():
-            (temporary / f"{file}.svg").write_text(drawing, encoding="utf-8")
-        stored = save(result.model, out)
+    with alone(out / "models"):
+        result = replace(result, model=numbered(result.model, out))
+        folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
+        page, drawings = render(result)
+        stored = planned(result.model, out)
         plain = as_json(result, stored, folder / "report.html")
-        (temporary / "fit.json").write_text(dump_json(plain), encoding="utf-8")
+        with replacing(folder) as temporary:
+            temporary.mkdir()
+            (temporary / "report.html").write_text(page, encoding="utf-8")
+            for file, drawing in drawings.items():
+                (temporary / f"{file}.svg").write_text(drawing, encoding="utf-8")
+            (temporary / "fit.json").write_text(dump_json(plain), encoding="utf-8")
+            # Last before the report takes its place: a full disk or an interrupt leaves neither without the other.
+            save(result.model, out)
     progress("")
     return Outcome(stored, folder / "report.html", plain, as_text(result, stored, folder / "report.html"))
 

@@ -42,6 +42,8 @@ STUCK_PERIODS = 10.0
 _AVERAGED_ABOVE = 1.9
 """Streams this many times faster than the grid are averaged over each grid interval instead of sampled."""
 _VELOCITY = ("u", "vel_N", "x", "psi")
+MOST_EMPTY_ROWS, MOST_SPARSE = 2_000_000, 50
+"""A grid beyond both limits, the second in rows per sample, comes of wrong times, not of gaps."""
 _EXACT_S = 1e-6
 
 
@@ -103,6 +105,11 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     first = int(lead.time_ns[min(int(np.searchsorted(lead.time_ns, start)), len(lead.time_ns) - 1)])
     t0_ns = max(start, first)
     count = int((end - t0_ns) * 1e-9 * rate + _EXACT_S) + 1
+    if count < 2 or count > max(MOST_EMPTY_ROWS, MOST_SPARSE * len(lead.time_ns)):
+        raise FerryIdError(
+            f"{recording.name}: its times cannot be right, {len(lead.time_ns)} samples of the velocity are spread over "
+            f"{max(0.0, (end - t0_ns) * 1e-9):.4g} s. Fix: look for wrong clocks with ferryid inspect, or cut the log"
+        )
     t = np.arange(count) / rate
     columns: dict[str, Floats] = {}
     for source in sources:

@@ -85,11 +85,12 @@ def _kept(out: Path, name: str, profile: Profile) -> Iterator[tuple[Path, dict[s
             note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue  # an incomplete folder counts as none and is replaced
-        if (
-            note.get("schema") == SCHEMA
-            and note.get("version") == __version__
-            and note["recording"]["profile_sha256"] == profile.sha256
-        ):
+        try:
+            fits = note["schema"] == SCHEMA and note["version"] == __version__
+            fits = fits and note["recording"]["profile_sha256"] == profile.sha256
+        except (KeyError, TypeError):
+            continue
+        if fits:
             yield folder, note
 
 

@@ -314,6 +314,8 @@ def _compare(
     if change.size < 10 or np.sqrt(np.mean(change**2)) < least or not np.any(integral):
         return []
     both = float(change @ integral)
+    if float(integral @ integral) < 1e-200:
+        return []
     gain = both / float(integral @ integral)
     correlation = both / float(np.sqrt((change @ change) * (integral @ integral)))
     numbers = f"gain {gain:.3g}, correlation {correlation:.2f}"

@@ -129,7 +129,8 @@ def test_an_interrupt_exits_with_130_and_leaves_nothing(
     run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out")
     assert run.code == 130
     assert not list((tmp_path / "out").rglob("*.part"))
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["logs"]
+    assert not list((tmp_path / "out").rglob("*.html"))
+    assert [path.name for path in (tmp_path / "out" / "models").rglob("*")] == [".lock"]
 
 
 def test_a_bug_of_ours_exits_with_1_and_asks_for_a_report(
@@ -144,3 +145,56 @@ def test_a_bug_of_ours_exits_with_1_and_asks_for_a_report(
     run = ferryid("inspect", fixtures / "short.mcap")
     assert run.code == 1
     assert "report it" in run.err
+
+
+@pytest.mark.parametrize("name", ["../../evil", "/tmp/evil", "a/b", ".", "x@1", "a\nb", "n" * 300])
+def test_a_model_name_that_is_a_path(ferryid, fixtures: Path, tmp_path: Path, name: str) -> None:
+    run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out", "--name", name)
+    refused(run, "--name")
+
+
+def test_json_is_never_written_over_an_input(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    log = tmp_path / "copy.mcap"
+    log.write_bytes((fixtures / "short.mcap").read_bytes())
+    refused(ferryid("inspect", log, "--json", log), "copy.mcap")
+    assert log.read_bytes() == (fixtures / "short.mcap").read_bytes()
+
+
+def test_the_same_log_twice(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    log = fixtures / "short.bag"
+    refused(ferryid("fit", log, log, "--vessel", "milliampere", "--out", tmp_path, "--split", "logs"), "the same log")
+
+
+def test_a_model_of_another_vessel(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path)
+    assert run.code == 0
+    refused(
+        ferryid("evaluate", "milliampere", fixtures / "short.csv", "--vessel", "esso-osaka", "--out", tmp_path),
+        "esso-osaka",
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('linear.y"]\nunit = "m/s"', 'linear.y"]\nunit = "kn"', "surge velocity"),
+        (
+            'field = "twist.twist.angular.z"',
+            'field = "twist.twist.angular.z"\nsign = -1',
+            "yaw rate has the wrong sign",
+        ),
+    ],
+)
+def test_signals_that_contradict_each_other(
+    ferryid, fixtures: Path, tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    profile = profile_with(tmp_path, old, new)
+    refused(ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out"), "contradict", told)
+
+
+@pytest.mark.parametrize("arguments", [(), ("fit",), ("fitt", "x"), ("fit", "--no-such")])
+def test_wrong_use_is_told_shortly(ferryid, arguments: tuple[str, ...]) -> None:
+    run = ferryid(*arguments)
+    assert run.code == 2
+    assert run.err
+    assert "Traceback" not in run.err
