@@ -41,6 +41,7 @@ Flags = NDArray[np.bool_]
 MAX_COMPONENTS = 21
 SWEEP_FOLDS = 5
 LEAST_VALIDATION_S = 60.0
+MANY_MOVED = 20
 USELESS_RAD, USELESS_S = 0.5, 10.0
 """A heading lost by this much within this time says that a model does not describe the turning at all."""
 
@@ -379,6 +380,12 @@ def _warnings(
             )
     for one in prepared:
         warnings.extend(f"{one.recording.name}: {doubt}" for doubt in one.doubts)
+        moved = max((s.clock.out_of_order + s.clock.duplicates for s in one.recording.streams.values()), default=0)
+        if moved >= MANY_MOVED:
+            warnings.append(
+                f"{one.recording.name}: up to {moved} rows of a topic were out of order or repeated a time, as when a clock is "
+                "set back during the recording: stretches may lie over one another."
+            )
         if one.recording.losses:
             more = f" (and {len(one.recording.losses) - 1} more losses)" if len(one.recording.losses) > 1 else ""
             warnings.append(f"{one.recording.name}: not all could be read: {one.recording.losses[-1].what}{more}")

@@ -117,7 +117,8 @@ def _context(result: FitResult) -> dict[str, Any]:
                 ),
                 "caption": "Coefficients of the correction, each over half the width of its own 95 % block-bootstrap "
                 "interval; an arrow goes on beyond the frame. Grey ones are not told apart from zero, pale orange ones "
-                "not from each other: the data do not determine them.",
+                "not from each other: the data do not determine them. Intervals hold the scatter at this number of "
+                "components, not the shrinkage that few components bring.",
             },
         ],
         "coefficients": _coefficients(result),

@@ -148,6 +148,10 @@ def _notes(topic: Mapping[str, Any]) -> list[str]:
         *filter(None, topic["note"].split("; ")),
         *(clock["notes"] if clock is not None else [topic["clock_unknown"]]),
     ]
+    if clock is not None and clock["out_of_order"]:
+        told.append(f"{clock['out_of_order']} rows out of order were sorted into place")
+    if clock is not None and clock["duplicates"]:
+        told.append(f"{clock['duplicates']} rows repeat the time of another and were left out")
     return list(dict.fromkeys(told))
 
 
