@@ -193,7 +193,7 @@ def coefficient_intervals(
 ) -> str:
     """Coefficients with 95 % intervals, each in units of its own interval's half width, so that all fit one axis."""
     with mpl.rc_context(STYLE):
-        left = 0.35 + 0.07 * max(len(term) for term in terms)
+        left = 0.4 + 0.085 * max(len(term) for term in terms)
         figure = _figure(1.0 + 0.2 * len(terms), top=0.3, left=left, between=(0.08, 0.1))
         columns = figure.subplots(1, 3, sharey=True)
         place = np.arange(len(terms))[::-1]
