@@ -65,7 +65,14 @@ def evaluate(
     entries, parts = [], []
     for path in logs:
         progress(f"evaluating on {Path(path).name}")
-        prepared = prepare(path, profile, out, window_s=window, rate_hz=model.settings.get("rate_hz"))
+        prepared = prepare(
+            path,
+            profile,
+            out,
+            window_s=window,
+            smoother=str(model.settings.get("smoother", "square")),
+            rate_hz=model.settings.get("rate_hz"),
+        )
         motion = prepared.motion
         tau_base, tau_model = base.of(motion), new.of(motion)
         rows = usable(motion, tau_model)
