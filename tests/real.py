@@ -103,6 +103,10 @@ Made by `make real` with the recordings at hand (they are not part of the projec
 the model in the bundled profile: where a vessel has no hull model, that is rigid-body mass alone, which is easily improved
 upon. The numbers are of validation rows, which the fit did not use. The force error says how well the motion explains the
 measured actuator force; the free run is the harder test: the model gets the measured state once, then only the forces.
+
+The validation rows trained no coefficient, but some defaults (decoupled structure, blocks of 40 s, the limits within which an
+inertia is believed) were chosen after looking at scores on these same recordings. Take the figures as somewhat flattering:
+an untouched recording is the only fair test of the defaults.
 """
 
 
