@@ -1,0 +1,48 @@
+"""The simulator's inner loops, compiled by numba and kept on disk beside their source.
+
+numba holds a compiled function to be current as long as its own file is; it does not look at the functions that it calls
+in other files. The stamp below makes every one depend on all of the simulator's source.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
+
+import numba
+from numba.core.caching import FunctionCache
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+@cache
+def source_stamp() -> str:
+    """Return a hash over the source of the whole simulator."""
+    files = sorted(Path(__file__).parent.rglob("*.py"))
+    return sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+class _StampedCache(FunctionCache):  # type: ignore[misc]
+    """numba's cache on disk, with the stamp in every key."""
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return (*super()._index_key(sig, codegen), source_stamp())
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function of numbers, arrays and named tuples at its first call.
+
+    Strict arithmetic (no reordering, no fused multiply-add) gives the same numbers on every machine and the same as plain
+    Python would. Where nothing can be written beside the source or in the user's cache, it is compiled anew each time.
+    """
+    dispatcher = numba.njit(function)
+    if not numba.config.DISABLE_JIT:
+        try:
+            dispatcher._cache = _StampedCache(dispatcher.py_func)
+        except RuntimeError:  # numba's word for "no folder to keep it in"
+            pass
+    return cast("Callable[P, R]", dispatcher)
