@@ -45,9 +45,17 @@ class Estimator:
             tau[rows] += self.basis.of(motion, rows) @ self.theta + self.intercept
         return tau
 
-    def __call__(self, nu_dot: Floats, nu: Floats, psi: Floats, wind: Floats | None, current: Floats | None) -> Floats:
+    def __call__(
+        self,
+        nu_dot: Floats,
+        nu: Floats,
+        psi: Floats,
+        wind: Floats | None,
+        current: Floats | None,
+        payload: Floats | None = None,
+    ) -> Floats:
         """Return the force for given states, all with s rows; a `free_run.ForceModel`."""
-        tau = force_of_motion(self.profile, self.scale, nu_dot, nu, psi, wind=wind, current=current)
+        tau = force_of_motion(self.profile, self.scale, nu_dot, nu, psi, wind=wind, current=current, payload=payload)
         if self.basis is None or self.theta is None or self.intercept is None:
             return tau
         wind_rel = None if wind is None else relative_flow(nu, psi, wind)

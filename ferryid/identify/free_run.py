@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,11 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.int64]
 
-ForceModel = Callable[[Floats, Floats, Floats, Floats | None, Floats | None], Floats]
-"""``force(nu_dot (s, 3), nu (s, 3), psi (s,), wind (s, 2), current (s, 2)) -> tau (s, 3)``, linear in ``nu_dot``."""
+ForceModel = Callable[..., Floats]
+"""``force(nu_dot (s, 3), nu (s, 3), psi (s,), wind (s, 2), current (s, 2)) -> tau (s, 3)``, linear in ``nu_dot``.
+
+A sixth argument, the payload (s, 2), is passed where the log has one.
+"""
 
 HORIZONS_S = (5.0, 10.0, 20.0, 30.0, 60.0)
 MAX_STARTS = 60
@@ -32,8 +36,8 @@ def free_run(
 ) -> FreeRun:
     """Predict position and velocity from many starting points and compare them with the measurement.
 
-    From each start the model takes the measured state once, and after it only the measured actuator force (and wind
-    and current where they are measured), integrated with Runge-Kutta 4. A wind or current that
+    From each start the model takes the measured state once, and after it only the measured actuator force (and wind,
+    current and payload where they are measured), integrated with Runge-Kutta 4. A wind, current or payload that
     was not measured is part of the error.
 
     Parameters
@@ -54,14 +58,13 @@ def free_run(
     errors: list[Floats] = []
     longest: tuple[int, dict[str, Floats]] = (0, {})
     diverged = 0
-    mass = _mass(force, motions[0])
-    if mass is None:
+    if not _is_positive(_masses(force, replace(motions[0], payload=None))[0]):
         return _without(horizons, "the model's effective mass matrix is not positive definite: it cannot be run free")
     for motion, allowed in zip(motions, rows, strict=True):
         starts, ends = _starting_points(motion, allowed, float(horizons[0]), float(horizons[-1]))
         if starts.size == 0:
             continue
-        path, stride = _integrate(force, mass, motion, starts, float(horizons[-1]))
+        path, stride = _integrate(force, motion, starts, float(horizons[-1]))
         error = _errors(path, stride, motion, starts, ends, horizons)
         reached = (starts + np.round(horizons[:, None] * motion.rate_hz).astype(int)) < ends
         diverged += int(np.any(reached.T & np.isnan(error[:, :, 2]), axis=1).sum())
@@ -82,21 +85,33 @@ def free_run(
     return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note)
 
 
-def _mass(force: ForceModel, motion: Motion) -> Floats | None:
-    """Return the effective mass matrix, the derivative of the force by the acceleration, if it can be inverted."""
-    at_rest = np.zeros((4, 3))
-    nu_dot = np.vstack([np.zeros(3), np.eye(3)])
-    still = np.zeros((4, 2))
+def _masses(force: ForceModel, motion: Motion) -> Floats:
+    """Return the effective mass, the derivative of the force by the acceleration, for every row: (n, 3, 3), or (1, 3, 3)."""
+    if motion.payload is None:
+        return _masses_with(force, motion, None)
+    # A payload stays the same for many rows: each of its values is asked for once.
+    values, which = np.unique(motion.payload, axis=0, return_inverse=True)
+    return _masses_with(force, motion, values)[which.reshape(-1)]
+
+
+def _masses_with(force: ForceModel, motion: Motion, payloads: Floats | None) -> Floats:
+    count = 1 if payloads is None else len(payloads)
+    at_rest = np.zeros((4 * count, 3))
+    nu_dot = np.tile(np.vstack([np.zeros(3), np.eye(3)]), (count, 1))
+    still = np.zeros((4 * count, 2))
     tau = force(
         nu_dot,
         at_rest,
-        np.zeros(4),
+        np.zeros(4 * count),
         still if motion.wind is not None else None,
         still if motion.current is not None else None,
-    )
-    mass: Floats = (tau[1:] - tau[0]).T
-    positive = bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0))
-    return mass if positive else None
+        *(() if payloads is None else (np.repeat(payloads, 4, axis=0),)),
+    ).reshape(count, 4, 3)
+    return np.asarray((tau[:, 1:] - tau[:, :1]).transpose(0, 2, 1))
+
+
+def _is_positive(mass: Floats) -> bool:
+    return bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0))
 
 
 def _starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[Rows, Rows]:
@@ -124,14 +139,15 @@ def _jumps(motion: Motion) -> Flags:
     return leaps
 
 
-def _integrate(force: ForceModel, mass: Floats, motion: Motion, starts: Rows, horizon_s: float) -> tuple[Floats, int]:
+def _integrate(force: ForceModel, motion: Motion, starts: Rows, horizon_s: float) -> tuple[Floats, int]:
     """Return states (starts, steps + 1, 6) of position, heading, velocity, and the rows per step."""
     stride = max(1, int(STEP_S * motion.rate_hz))
     substeps = max(1, int(np.ceil(1.0 / (STEP_S * motion.rate_hz))))
     dt = stride / motion.rate_hz / substeps
     steps = int(np.ceil(horizon_s * motion.rate_hz / stride))
     last = len(motion.t) - 1
-    inverse = np.linalg.inv(mass)
+    masses = _masses(force, motion)
+    inverses = np.linalg.inv(np.where(np.isfinite(masses), masses, np.eye(3)))
     limit = 10.0 * np.nanmax(np.abs(motion.nu), axis=0) + 1e-3
 
     position = np.where(np.isfinite(motion.eta[starts]), motion.eta[starts], 0.0)
@@ -144,10 +160,14 @@ def _integrate(force: ForceModel, mass: Floats, motion: Motion, starts: Rows, ho
         tau = _between(motion.tau, rows, following, part)
         wind = None if motion.wind is None else _between(motion.wind, rows, following, part)
         current = None if motion.current is None else _between(motion.current, rows, following, part)
-        rest = force(np.zeros_like(nu), nu, psi, wind, current)
+        # Held over the step, as it was measured: half a passenger never came aboard.
+        payload = () if motion.payload is None else (motion.payload[rows],)
+        rest = force(np.zeros_like(nu), nu, psi, wind, current, *payload)
+        inverse = inverses[rows] if payload else inverses[0]
+        nu_dot = np.einsum("nij,nj->ni", inverse, tau - rest) if payload else (tau - rest) @ inverse.T
         c, s = np.cos(psi), np.sin(psi)
         eta_dot = np.column_stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1], nu[:, 2]])
-        return np.hstack([eta_dot, (tau - rest) @ inverse.T])
+        return np.hstack([eta_dot, nu_dot])
 
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(steps):

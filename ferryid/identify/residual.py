@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.track import Motion
-from ferryid.vessel.hull import current_in_body, inverse_dynamics
+from ferryid.vessel.hull import current_in_body, inverse_dynamics, payload_force, payload_mass
 from ferryid.vessel.profile import Hull, Profile
 from ferryid.vessel.wind import wind_force
 
@@ -27,10 +27,17 @@ _RUNS = 4096
 def base_force(profile: Profile, motion: Motion, scale: Mapping[str, float]) -> Floats:
     """Return the applied force as the base model estimates it from the motion of a log [N, N, N·m], shape (n, 3).
 
-    See `force_of_motion`; wind and current take part where the log has them.
+    See `force_of_motion`; wind, current and payload take part where the log has them.
     """
     return force_of_motion(
-        profile, scale, motion.nu_dot, motion.nu, motion.eta[:, 2], wind=motion.wind, current=motion.current
+        profile,
+        scale,
+        motion.nu_dot,
+        motion.nu,
+        motion.eta[:, 2],
+        wind=motion.wind,
+        current=motion.current,
+        payload=motion.payload,
     )
 
 
@@ -43,6 +50,7 @@ def force_of_motion(
     *,
     wind: Floats | None = None,
     current: Floats | None = None,
+    payload: Floats | None = None,
 ) -> Floats:
     """Return ``(delta M* nu_dot + delta C*(nu) nu + sigma D*(nu) nu - tau_wind) / zeta``, (4.2)-(4.5).
 
@@ -62,6 +70,9 @@ def force_of_motion(
     wind, current
         Where air and water go to, north and east [m/s], shape (n, 2), or None. A current acts exactly, through the
         relative velocity.
+    payload
+        Mass [kg] and its place forward of the body origin [m], shape (n, 2), or None. It is known, so that delta leaves it
+        as it is.
 
     Returns
     -------
@@ -72,6 +83,8 @@ def force_of_motion(
     tau = inverse_dynamics(scaled(profile.hull, scale), nu_dot, nu, nu_c)
     if wind is not None and profile.wind is not None:
         tau = tau - wind_force(profile.wind, wind, psi, nu)
+    if payload is not None:
+        tau = tau + payload_force(payload, nu_dot, nu)
     return tau / float(scale.get("zeta", 1.0))
 
 
@@ -151,8 +164,13 @@ def _parallel(profile: Profile, motion: Motion, scale: Mapping[str, float], hori
 
 def _relief(profile: Profile, motion: Motion, scale: Mapping[str, float], first: int, count: int, steps: int) -> Floats:
     """Return the constant force that each of `count` runs must be relieved of, from row `first` on, shape (count, 3)."""
-    mass = scaled(profile.hull, scale).M / float(scale.get("zeta", 1.0))
-    inverse = np.linalg.inv(mass)
+    every = slice(first, first + count + steps)
+    mass = scaled(profile.hull, scale).M[None]
+    if motion.payload is not None:
+        mass = mass + payload_mass(motion.payload[every])
+    mass = mass / float(scale.get("zeta", 1.0))
+    # A row whose payload is unknown has no mass to invert.
+    inverse = np.linalg.inv(np.where(np.isfinite(mass), mass, np.eye(3)))
     dt = 1.0 / motion.rate_hz
     still = np.zeros((count, 3))
     relief = still
@@ -161,9 +179,11 @@ def _relief(profile: Profile, motion: Motion, scale: Mapping[str, float], first:
         rows = slice(start, start + count)
         wind = None if motion.wind is None else motion.wind[rows]
         current = None if motion.current is None else motion.current[rows]
-        needed = force_of_motion(profile, scale, still, nu, motion.eta[rows, 2], wind=wind, current=current)
-        rate: Floats = (motion.tau[rows] - relief - needed) @ inverse.T
-        return rate
+        payload = None if motion.payload is None else motion.payload[rows]
+        needed = force_of_motion(
+            profile, scale, still, nu, motion.eta[rows, 2], wind=wind, current=current, payload=payload
+        )
+        return _times(inverse, motion.tau[rows] - relief - needed, start - first)
 
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(_PASSES):
@@ -175,5 +195,12 @@ def _relief(profile: Profile, motion: Motion, scale: Mapping[str, float], first:
                 nu = nu + dt / 2 * (before + after)
             # What remains after a pass is what damping and turning took of its correction.
             parted = nu - motion.nu[first + steps : first + steps + count]
-            relief = relief + parted @ (mass / (steps * dt)).T
+            relief = relief + _times(mass, parted, steps // 2) / (steps * dt)
     return np.where(np.isfinite(relief), relief, np.nan)
+
+
+def _times(matrices: Floats, vectors: Floats, start: int) -> Floats:
+    """Return the products of vectors, shape (n, 3), with one matrix for all, or with one each from `start` on."""
+    if len(matrices) == 1:
+        return np.asarray(vectors @ matrices[0].T)
+    return np.asarray(np.einsum("nij,nj->ni", matrices[start : start + len(vectors)], vectors))

@@ -16,6 +16,7 @@ from ferryid.signals.quality import (
     clean,
     cross_checks,
     is_actuator,
+    is_load,
     is_order,
     stale,
     stuck,
@@ -65,9 +66,9 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     The grid covers the time for which there are both navigation and actuator signals, and starts on a sample of the
     velocity. Within measured data, values are interpolated linearly; headings and azimuth angles are unwrapped before
     and the wind is interpolated as a vector. Orders hold until the next order. Actuator signals that are published
-    only when they change hold too, without limit; all others are missing across a gap. Streams much faster than the
-    grid are averaged over each of its intervals, which keeps their noise from folding down. Isolated implausible
-    samples and stale repetitions are taken out before, and counted.
+    only when they change hold too, without limit, and so does a payload; all others are missing across a gap. Streams
+    much faster than the grid are averaged over each of its intervals, which keeps their noise from folding down. Isolated
+    implausible samples and stale repetitions are taken out before, and counted.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
         Where navigation or actuators are missing or empty, or never measured at the same time.
     """
     repairs: list[str] = []
-    sources = [_source(stream, repairs) for stream in recording.streams.values() if len(stream.time_ns) > 1]
+    sources = [_source(stream, repairs) for stream in recording.streams.values() if _enough(stream)]
     navigation = [s for s in sources if _has(s, NAVIGATION)]
     actuators = [s for s in sources if any(is_actuator(name) or is_order(name) for name in s.columns)]
     for group, what in ((navigation, "navigation"), (actuators, "actuator")):
@@ -142,6 +143,11 @@ def segments(valid: Flags) -> list[slice]:
     """Return the unbroken stretches of True, in order."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], valid, [False]]).astype(np.int8)))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _enough(stream: Stream) -> bool:
+    """One message is enough for what holds until the next: a payload that was weighed once."""
+    return len(stream.time_ns) > 1 or (len(stream.time_ns) == 1 and all(is_load(name) for name in stream.columns))
 
 
 def _usual_period(time_s: Floats) -> float:
@@ -202,7 +208,9 @@ def _source(stream: Stream, repairs: list[str]) -> _Source:
             )
     interval = np.diff(time_s)
     gaps = interval > bridge
-    if on_change:
+    if interval.size and all(is_load(name) for name in columns):
+        repairs.append(f"{stream.topic}: each value holds until the next, at most for {interval.max():.1f} s.")
+    elif interval.size and on_change:
         repairs.append(
             f"{stream.topic}: published when it changes; each value holds until the next, "
             f"at most for {interval.max():.1f} s."
@@ -216,7 +224,9 @@ def _source(stream: Stream, repairs: list[str]) -> _Source:
 
 
 def _on_change(time_s: Floats, columns: Mapping[str, Floats]) -> bool:
-    """True for actuator streams that are irregular and in which (nearly) every message says something new."""
+    """True for a payload, and actuator streams that are irregular and whose messages (nearly) all say something new."""
+    if all(is_load(name) for name in columns):
+        return True
     if not all(is_actuator(name) or is_order(name) for name in columns) or time_s.size < 3:
         return False
     interval = np.diff(time_s)
@@ -247,8 +257,9 @@ def _on_grid(source: _Source, t0_ns: int, t: Floats, rate: float, repairs: list[
         if times.size == 0:
             result[name] = np.full(t.size, np.nan)
             continue
-        if source.on_change or (is_order(name) and not averaged):
-            result[name] = _held(times, known, t, np.inf if source.on_change else source.bridge_s)
+        if source.on_change or is_load(name) or (is_order(name) and not averaged):
+            unlimited = source.on_change or is_load(name)
+            result[name] = _held(times, known, t, np.inf if unlimited else source.bridge_s)
             continue
         if whole:
             everywhere = _bridged(times, t, source.bridge_s) if everywhere is None else everywhere

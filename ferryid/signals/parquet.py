@@ -32,6 +32,8 @@ _UNITS = {
     **dict.fromkeys(("u", "v", "vel_N", "vel_E"), "m/s"),
     **dict.fromkeys(("wind_speed", "wind_N", "wind_E", "current_N", "current_E"), "m/s"),
     "r": "rad/s",
+    "payload_kg": "kg",
+    "payload_x": "m",
     "X_d": "N",
     "Y_d": "N",
     "N_d": "N*m",

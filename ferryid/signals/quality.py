@@ -18,6 +18,7 @@ Flags = NDArray[np.bool_]
 
 NAVIGATION = ("x", "y", "psi", "phi", "theta", "u", "v", "r", "vel_N", "vel_E")
 VELOCITY = ("u", "v", "r", "vel_N", "vel_E")
+LOAD = ("payload_kg", "payload_x")
 WEATHER = ("wind_speed", "wind_from", "wind_N", "wind_E", "current_N", "current_E")
 _ACTUATOR = ("n_", "alpha_", "delta_", "F_")
 _ORDER = tuple(f"{prefix}cmd_" for prefix in _ACTUATOR)
@@ -98,14 +99,16 @@ class ColumnQuality:
         name, of = self.name, f"of {self.count} samples"
         said = []
         if self.missing:
-            said.append(f"{name}: {self.missing} {of} are missing (NaN); short ones are interpolated.")
+            bridged = "the value before holds" if is_load(name) else "short ones are interpolated"
+            said.append(f"{name}: {self.missing} {of} are missing (NaN); {bridged}.")
         if self.through_wrap:
             said.append(
                 f"{name}: {self.through_wrap} {of} were interpolated the wrong way round between 359° and 1°; "
                 "removed and interpolated."
             )
         if self.spikes:
-            said.append(f"{name}: {self.spikes} {of} are single implausible spikes; removed and interpolated.")
+            bridged = "held over" if is_load(name) else "interpolated"
+            said.append(f"{name}: {self.spikes} {of} are single implausible spikes; removed and {bridged}.")
         if self.jumps:
             said.append(f"{name}: {self.jumps} implausible steps were found and kept.")
         if self.held:
@@ -130,6 +133,11 @@ def is_order(name: str) -> bool:
 def is_actuator(name: str) -> bool:
     """True for an actuator's measured value."""
     return name.startswith(_ACTUATOR) and not name.startswith(_ORDER)
+
+
+def is_load(name: str) -> bool:
+    """True for the payload, which stays as it is until it is measured anew, and steps when somebody boards."""
+    return name in LOAD
 
 
 def is_angle(name: str) -> bool:
@@ -398,7 +406,7 @@ def _spikes(name: str, times: Floats, known: Floats, step: Floats) -> tuple[NDAr
     single = peaks[apart[:-1] & apart[1:]]
     if single.size > _SPIKES_AT_MOST * known.size and single.size > 1:
         single = single[:0]
-    if is_actuator(name):
-        # An actuator may well step; only what comes straight back is implausible.
+    if is_actuator(name) or is_load(name):
+        # These may well step; only what comes straight back is implausible.
         return single, int(peaks.size - single.size)
     return single, int(np.count_nonzero(large) - 2 * single.size)

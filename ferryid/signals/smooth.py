@@ -22,7 +22,7 @@ Flags = NDArray[np.bool_]
 SMOOTHERS = ("square", "savgol", "kalman")
 _POLYNOMIAL = 3
 _WEATHER_SHARE = 0.8
-"""Wind or current is used where it was measured on this share of the rows; fewer, and it is left out."""
+"""Wind, current or payload is used where it was measured on this share of the rows; fewer, and it is left out."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,7 @@ class Measured:
     tau_d: Floats | None
     wind: Floats | None
     current: Floats | None
+    payload: Floats | None
     repairs: tuple[str, ...]
 
 
@@ -49,7 +50,8 @@ def smooth(track: Track, profile: Profile, window_s: float, smoother: str = "squ
     """Smooth one log and differentiate its velocities.
 
     Position, velocity, applied and commanded force, wind and current all pass through the same zero-phase filter, so
-    that force and motion stay comparable; the force is formed before, from unsmoothed actuator signals.
+    that force and motion stay comparable; the force is formed before, from unsmoothed actuator signals. A payload is not
+    smoothed: it steps when somebody boards.
 
     Parameters
     ----------
@@ -94,9 +96,10 @@ def measure(track: Track, profile: Profile) -> Measured:
     repairs = list(track.repairs)
     usable = track.valid.copy()
     wind, current = (
-        _weather(track, columns.get(f"{what}_N"), columns.get(f"{what}_E"), what, usable, repairs)
+        _known(track, columns.get(f"{what}_N"), columns.get(f"{what}_E"), what, usable, repairs)
         for what in ("wind", "current")
     )
+    payload = _payload(track, usable, repairs)
     through_water = nu if current is None else nu - current_in_body(current, eta[:, 2])
     tau, notes = applied_force(profile, columns, through_water)
     repairs.extend(notes)
@@ -110,7 +113,9 @@ def measure(track: Track, profile: Profile) -> Measured:
             "rows. Fix: check the actuator signals in the profile"
         )
     require_excited(track, nu, tau)
-    return Measured(track.log, track.t, track.rate_hz, eta, nu, tau, usable, tau_d, wind, current, tuple(repairs))
+    return Measured(
+        track.log, track.t, track.rate_hz, eta, nu, tau, usable, tau_d, wind, current, payload, tuple(repairs)
+    )
 
 
 def smooth_measured(measured: Measured, window_s: float, smoother: str = "square") -> Motion:
@@ -163,6 +168,7 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
         tau_d=done.get("tau_d"),
         wind=done.get("wind"),
         current=done.get("current"),
+        payload=measured.payload,
         repairs=(*measured.repairs, said),
     )
 
@@ -280,14 +286,29 @@ def _within(measured: Measured, half: int) -> Flags:
     return valid
 
 
-def _weather(
-    track: Track, north: Floats | None, east: Floats | None, what: str, usable: Flags, repairs: list[str]
+def _payload(track: Track, usable: Flags, repairs: list[str]) -> Floats | None:
+    """Return the payload [kg] and its place [m], shape (n, 2), and tell its range; else like `_known`."""
+    mass, place = track.columns.get("payload_kg"), track.columns.get("payload_x")
+    if mass is not None and place is not None:
+        # Nothing has no place.
+        place = np.where(mass == 0.0, np.nan_to_num(place), place)
+    payload = _known(track, mass, place, "payload", usable, repairs)
+    if payload is not None and usable.any():
+        (least, aft), (most, fore) = payload[usable].min(axis=0), payload[usable].max(axis=0)
+        weight = f"{least:.0f} to {most:.0f} kg" if most > least else f"{most:.0f} kg"
+        where = f"{aft:.2f} to {fore:.2f} m" if fore > aft else f"{fore:.2f} m"
+        repairs.append(f"Payload: {weight} at x = {where}, which the model knows as mass.")
+    return payload
+
+
+def _known(
+    track: Track, first: Floats | None, second: Floats | None, what: str, usable: Flags, repairs: list[str]
 ) -> Floats | None:
-    """Return wind or current, and take rows without it out of `usable`; None where there is (nearly) none."""
-    if north is None or east is None:
+    """Return wind, current or payload, and take rows without it out of `usable`; None where there is (nearly) none."""
+    if first is None or second is None:
         return None
-    flow = np.column_stack([north, east])
-    known: Flags = np.all(np.isfinite(flow), axis=1)
+    pair = np.column_stack([first, second])
+    known: Flags = np.all(np.isfinite(pair), axis=1)
     share = float(np.mean(known[track.valid])) if track.valid.any() else 0.0
     if share < _WEATHER_SHARE:
         repairs.append(f"The {what} was measured on {100 * share:.0f} % of the rows only and is left out.")
@@ -296,4 +317,4 @@ def _weather(
     if lost:
         repairs.append(f"{lost} rows ({lost / track.rate_hz:.1f} s) are not used: the {what} was not measured.")
     usable &= known
-    return flow
+    return pair

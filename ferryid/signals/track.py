@@ -81,6 +81,9 @@ class Motion:
         True wind [m/s] north, east, where the air goes to, shape (n, 2), or None.
     current
         Current [m/s] north, east, where the water goes to, shape (n, 2), or None.
+    payload
+        Measured payload [kg] and its place forward of the body origin [m], held from one measurement to the next and not
+        smoothed, shape (n, 2), or None.
     valid
         True for rows whose whole smoothing window lies inside measured data.
     raw_nu
@@ -101,4 +104,5 @@ class Motion:
     tau_d: Floats | None = None
     wind: Floats | None = None
     current: Floats | None = None
+    payload: Floats | None = None
     repairs: tuple[str, ...] = field(default=())

@@ -110,7 +110,9 @@ def _how(signal: Signal) -> str:
         parts.append(f"offset {signal.offset:+g}")
     if signal.full_rpm:
         parts.append(f"of {signal.full_rpm:g} rpm")
-    if signal.mount_m != (0.0, 0.0):
+    if signal.quantity == "payload" and len(signal.fields) == 1:
+        parts.append(f"standing at x = {signal.mount_m[0]:g} m")
+    elif signal.mount_m != (0.0, 0.0):
         parts.append(f"measured at ({signal.mount_m[0]:g}, {signal.mount_m[1]:g}) m")
     if not signal.required:
         parts.append("may be missing")

@@ -98,6 +98,45 @@ def inverse_dynamics(hull: Hull, nu_dot: Floats, nu: Floats, nu_c: Floats | None
     )
 
 
+def payload_mass(payload: Floats) -> Floats:
+    """Return what a payload adds to the mass matrix, ``[[m, 0, 0], [0, m, m x], [0, m x, m x²]]``, shape (..., 3, 3).
+
+    Rigid-body mass on the centre line, (2.5) with its own moment of inertia left out.
+
+    Parameters
+    ----------
+    payload
+        Mass [kg], and how far forward of the body origin it stands [m], shape (..., 2).
+    """
+    payload = np.asarray(payload, dtype=np.float64)
+    m, x = payload[..., 0], payload[..., 1]
+    matrix = np.zeros((*m.shape, 3, 3))
+    matrix[..., 0, 0] = matrix[..., 1, 1] = m
+    matrix[..., 1, 2] = matrix[..., 2, 1] = m * x
+    matrix[..., 2, 2] = m * x**2
+    return matrix
+
+
+def payload_force(payload: Floats, nu_dot: Floats, nu: Floats) -> Floats:
+    """Return the force that it takes to move a payload along, ``dM nu_dot + dC(nu) nu``, shape (n, 3) [N, N, N·m].
+
+    As a rigid body it acts on the velocity over ground, whatever the current. Its mass times the acceleration of the point
+    where it stands, ``a = [u_dot - v r - x r², v_dot + x r_dot + u r]``.
+
+    Parameters
+    ----------
+    payload
+        See `payload_mass`, shape (n, 2).
+    nu_dot, nu
+        Acceleration and velocity over ground, shape (n, 3).
+    """
+    m, x = payload[..., 0], payload[..., 1]
+    u, v, r = nu[..., 0], nu[..., 1], nu[..., 2]
+    surge = m * (nu_dot[..., 0] - v * r - x * r**2)
+    sway = m * (nu_dot[..., 1] + x * nu_dot[..., 2] + u * r)
+    return np.stack([surge, sway, x * sway], axis=-1)
+
+
 def forward(hull: Hull, nu: Floats, tau: Floats, nu_c: Floats | None = None) -> Floats:
     """Return the acceleration `nu_dot` under a force, shape (n, 3): the inverse of `inverse_dynamics`.
 

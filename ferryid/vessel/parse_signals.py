@@ -12,10 +12,10 @@ BODY_FRAMES = ("FRD", "FLU")
 WORLD_FRAMES = ("NED", "ENU")
 VESSEL_QUANTITIES = (
     *("position", "heading", "velocity", "yaw_rate", "roll", "pitch"),
-    *("wind", "current", "tau_d"),
+    *("wind", "current", "payload", "tau_d"),
 )
 ROLE_KINDS = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force": "force", "thrust": "force"}
-_OPTIONAL = ("wind", "current", "tau_d", "roll", "pitch")
+_OPTIONAL = ("wind", "current", "payload", "tau_d", "roll", "pitch")
 
 
 def parse_signals(
@@ -51,6 +51,11 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
     if quantity == "wind" and not table.has("fields"):
         fields, unit = _wind_fields(table, options)
         sign, offset = _sign(table), table.number("offset", 0.0)
+    elif quantity == "payload":
+        fields, unit = _payload_fields(table, options)
+        sign, offset = _sign(table), table.number("offset", 0.0)
+        if len(fields) == 1:
+            mount_m = (table.number("x_m", 0.0), 0.0)
     elif quantity == "heading" and table.has("quaternion"):
         fields, unit = table.texts("quaternion", 4), "quaternion"
         frame = _frame(table, WORLD_FRAMES, "heading")
@@ -103,6 +108,16 @@ def _wind_fields(table: TableReader, options: dict[str, str]) -> tuple[tuple[str
     options["reference"] = table.text("reference", required=True, options=("bow", "north"))
     options["air"] = table.text("air", required=True, options=("apparent", "true"))
     return fields, unit
+
+
+def _payload_fields(table: TableReader, options: dict[str, str]) -> tuple[tuple[str, ...], str]:
+    """Take the field of the mass and, where it is measured, that of the payload's place along the vessel."""
+    mass = table.text("mass", required=True)
+    unit = _unit(table, "mass")
+    if not table.has("x"):
+        return (mass,), unit
+    options["x_unit"] = _unit(table, "length", "x_unit", default="m")
+    return (mass, table.text("x")), unit
 
 
 def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Actuator]) -> Signal | None:

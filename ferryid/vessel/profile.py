@@ -102,10 +102,11 @@ class WindAreas:
 class Signal:
     """One entry of the signal map: the fields of one topic that give one canonical quantity.
 
-    `quantity` is the key in the file (``position``, ``heading``, ``velocity``, ``yaw_rate``, ``wind`` or
+    `quantity` is the key in the file (``position``, ``heading``, ``velocity``, ``yaw_rate``, ``wind``, ``payload`` or
     ``<actuator>.<speed|angle|rudder|force|thrust>`` with ``.command`` appended for orders); `line` is its line there.
     A scalar is ``sign * value + offset`` in `unit`, and a propeller speed in ``%`` or ``fraction`` is of `full_rpm`.
-    `mount_m` is where an antenna or a log sits (x forward, y starboard of the body origin) [m].
+    `mount_m` is where an antenna or a log sits, or a payload whose place is not measured (x forward, y starboard of the
+    body origin) [m].
     """
 
     quantity: str

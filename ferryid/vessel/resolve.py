@@ -12,7 +12,7 @@ from ferryid.vessel.profile import Floats, Profile, Signal
 
 
 def resolve(profile: Profile, columns: Mapping[str, Floats], rate_hz: float | None = None) -> dict[str, Floats]:
-    """Complete aligned columns: `u, v, r` and true wind, at the body origin.
+    """Complete aligned columns: `u, v, r` and true wind, at the body origin, and the payload's place.
 
     Where the log has no yaw rate it is the slope of the heading, and where it has no velocity that of the position;
     `resolve_notes` says so. Differences never reach across missing samples.
@@ -49,6 +49,7 @@ def resolve(profile: Profile, columns: Mapping[str, Floats], rate_hz: float | No
     _move_position(out, signals.get("position"))
     _body_velocity(profile, out, signals, rate_hz)
     _true_wind(out, signals.get("wind"))
+    _payload_place(out, signals.get("payload"))
     return out
 
 
@@ -61,6 +62,9 @@ def resolve_notes(profile: Profile, columns: Collection[str]) -> tuple[str, ...]
         notes.append("Surge and sway are the slope of the position turned by the heading: the log has no velocity.")
     elif "u" not in columns and "vel_N" in columns:
         notes.append("Surge and sway are the velocity over ground turned by the heading.")
+    payload = next((signal for signal in profile.signals if signal.quantity == "payload"), None)
+    if payload is not None and "payload_kg" in columns and "payload_x" not in columns:
+        notes.append(f"The payload's place is not measured: the profile puts it at x = {payload.mount_m[0]:g} m.")
     wind = next((signal for signal in profile.signals if signal.quantity == "wind"), None)
     if wind is not None and "wind_speed" in columns:
         if "psi" not in columns:
@@ -124,3 +128,8 @@ def _true_wind(out: dict[str, Floats], signal: Signal | None) -> None:
         over_north, over_east = to_world(out["u"], out["v"], out["psi"])
         north, east = north + over_north, east + over_east
     out["wind_N"], out["wind_E"] = north, east
+
+
+def _payload_place(out: dict[str, Floats], signal: Signal | None) -> None:
+    if signal is not None and "payload_kg" in out and "payload_x" not in out:
+        out["payload_x"] = np.where(np.isfinite(out["payload_kg"]), signal.mount_m[0], np.nan)

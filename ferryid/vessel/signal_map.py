@@ -2,7 +2,8 @@
 
 Canonical columns: ``x, y`` [m, NED]; ``psi`` [rad]; ``phi, theta`` [rad]; ``u, v`` [m/s, FRD, over ground];
 ``r`` [rad/s]; ``vel_N, vel_E`` [m/s]; ``wind_speed`` [m/s], ``wind_from`` [rad, clockwise]; ``wind_N, wind_E`` [m/s,
-where the air goes to]; ``current_N, current_E`` [m/s, where the water goes to]; for an actuator NAME ``n_NAME`` [rpm],
+where the air goes to]; ``current_N, current_E`` [m/s, where the water goes to]; ``payload_kg`` [kg] and ``payload_x`` [m,
+forward of the body origin]; for an actuator NAME ``n_NAME`` [rpm],
 ``alpha_NAME`` [rad], ``delta_NAME`` [rad], ``F_NAME`` [N]; orders with ``_cmd`` after the prefix (``n_cmd_NAME``);
 ``X_d, Y_d`` [N], ``N_d`` [N·m].
 """
@@ -63,6 +64,8 @@ def canonical_columns(signal: Signal) -> tuple[str, ...]:
         return ("u", "v") if signal.frame in ("FRD", "FLU") else ("vel_N", "vel_E")
     if signal.quantity == "wind":
         return ("wind_N", "wind_E") if signal.frame else ("wind_speed", "wind_from")
+    if signal.quantity == "payload":
+        return ("payload_kg", "payload_x")[: len(signal.fields)]
     if signal.quantity in _SIMPLE:
         return _SIMPLE[signal.quantity]
     name, _, rest = signal.quantity.partition(".")
@@ -178,6 +181,9 @@ def _convert(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
     if quantity == "wind":
         direction = _scalar(signal, values[1], factor(signal.options["direction_unit"], "angle"))
         return [values[0] * factor(signal.unit, "speed"), direction]
+    if quantity == "payload":
+        mass = _scalar(signal, values[0], factor(signal.unit, "mass"))
+        return [mass, *(place * factor(signal.options["x_unit"], "length") for place in values[1:])]
     if quantity == "tau_d":
         force = factor(signal.unit, "force")
         moment = factor(signal.options["moment_unit"], "moment")

@@ -24,11 +24,12 @@ KINDS: Final = MappingProxyType(
         "rotation": {"rpm": 1.0, "rps": 60.0, "rad/s": 60.0 / _TURN, "deg/s": 1.0 / 6.0},
         "force": {"N": 1.0, "kN": 1000.0, "kgf": 9.80665, "lbf": 4.4482216152605},
         "moment": {"N*m": 1.0, "kN*m": 1000.0, "kgf*m": 9.80665, "lbf*ft": 1.3558179483314004},
+        "mass": {"kg": 1.0, "t": 1000.0, "lb": 0.45359237},
         "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
         "fraction": {"1": 1.0, "%": 0.01, "fraction": 1.0},
     }
 )
-"""Kind of quantity to unit name to factor. Canonical: m, rad, m/s, rad/s, rpm (rotation), N, N*m, s, 1."""
+"""Kind of quantity to unit name to factor. Canonical: m, rad, m/s, rad/s, rpm (rotation), N, N*m, kg, s, 1."""
 
 CANONICAL: Final = MappingProxyType(
     {
@@ -39,6 +40,7 @@ CANONICAL: Final = MappingProxyType(
         "rotation": "rpm",
         "force": "N",
         "moment": "N*m",
+        "mass": "kg",
         "time": "s",
         "fraction": "1",
     }
@@ -72,6 +74,10 @@ _SPELLINGS: Final = MappingProxyType(
         "N·m": "N*m",
         "kNm": "kN*m",
         "kN·m": "kN*m",
+        "kilogram": "kg",
+        "kilograms": "kg",
+        "tonne": "t",
+        "tonnes": "t",
     }
 )
 

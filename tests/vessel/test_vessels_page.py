@@ -53,6 +53,6 @@ def test_every_name_is_documented() -> None:
     ]
     assert [name for name in names if f'"{name}"' not in PAGE and f"`{name}`" not in PAGE] == []
     documented = next(line for line in PAGE.splitlines() if line.startswith("- `unit`:"))
-    kinds = ("length", "angle", "speed", "rate", "force", "moment")
+    kinds = ("length", "angle", "speed", "rate", "force", "moment", "mass")
     units = {unit for kind in kinds for unit in UNIT_KINDS[kind]}
     assert units - set(re.split(r"[ :.]+", documented)) == set()
