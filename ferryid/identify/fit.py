@@ -85,26 +85,26 @@ def fit(
     prepared = [_prepare(path, profile, settings, out, verify, progress) for path in logs]
     _refuse_twice(prepared)
     motions = _told_apart([one.motion for one in prepared])
-    functions = _basis(settings, motions)
+    functions = basis_of(settings, motions)
     progress("computing the residual")
     targets = [residual(profile, motion, settings.scale, settings.residual) for motion in motions]
     measured = [residual(profile, motion, settings.scale) for motion in motions]
     motions = [
-        replace(motion, valid=_usable(motion, functions, target, error))
+        replace(motion, valid=known_rows(motion, functions, target, error))
         for motion, target, error in zip(motions, targets, measured, strict=True)
     ]
     parts = split(motions, settings.split, window_s=settings.window_s)
 
     progress("fitting")
     training = factorise(
-        *_rows(functions, motions, targets, parts.training), names=functions.terms, where=motions[0].log
+        *rows_of(functions, motions, targets, parts.training), names=functions.terms, where=motions[0].log
     )
-    validation = type(training).of(*_rows(functions, motions, measured, parts.validation))
-    functions, model_fit, chosen, held = _regress(profile, settings, functions, motions, targets, parts, training)
+    validation = type(training).of(*rows_of(functions, motions, measured, parts.validation))
+    functions, model_fit, chosen, held = regress(profile, settings, functions, motions, targets, parts, training)
     theta, intercept = model_fit.coefficients[chosen - 1], model_fit.intercepts[chosen - 1]
 
     progress("resampling blocks for the intervals")
-    rows = _rows(functions, motions, targets, parts.training)
+    rows = rows_of(functions, motions, targets, parts.training)
     rates = [motion.rate_hz for motion in motions]
     block_s, narrow = block_seconds(rows, rates, theta, intercept)
     spread = bootstrap(
@@ -140,7 +140,7 @@ def fit(
         ferryid_version=__version__,
         profile_text=profile.text,
         scale=settings.scale,
-        settings={**settings.plain(), "basis": functions.name, "components": chosen, **_grids(motions, settings)},
+        settings={**settings.plain(), "basis": functions.name, "components": chosen, **grids(motions, settings)},
         terms=functions.terms,
         units=functions.units,
         theta=theta,
@@ -211,7 +211,7 @@ def _told_apart(motions: Sequence[Motion]) -> list[Motion]:
     ]
 
 
-def _basis(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
+def basis_of(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
     """Return the basis of the settings; wind and current join it when every log has them, unless the name says how."""
     if "+" in settings.basis:
         return basis(settings.basis, structure=settings.structure)
@@ -220,7 +220,7 @@ def _basis(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
     return basis(settings.basis, wind=wind, current=current, structure=settings.structure)
 
 
-def _usable(motion: Motion, functions: Basis, target: Floats, error: Floats) -> Flags:
+def known_rows(motion: Motion, functions: Basis, target: Floats, error: Floats) -> Flags:
     """Return the rows on which force, residual and every measurement that the basis needs are known."""
     rows = usable(motion, target, error, motion.nu, motion.nu_dot)
     if functions.needs_wind and motion.wind is not None:
@@ -235,7 +235,9 @@ def _usable(motion: Motion, functions: Basis, target: Floats, error: Floats) -> 
     return rows
 
 
-def _rows(functions: Basis, motions: Sequence[Motion], outputs: Sequence[Floats], masks: Sequence[Flags]) -> list[Rows]:
+def rows_of(
+    functions: Basis, motions: Sequence[Motion], outputs: Sequence[Floats], masks: Sequence[Flags]
+) -> list[Rows]:
     """Return basis and outputs of the marked rows of every log; the basis is evaluated in chunks and forgotten."""
     rows = []
     for motion, output, mask in zip(motions, outputs, masks, strict=True):
@@ -249,7 +251,7 @@ def _rows(functions: Basis, motions: Sequence[Motion], outputs: Sequence[Floats]
     return rows
 
 
-def _regress(
+def regress(
     profile: Profile,
     settings: FitSettings,
     functions: Basis,
@@ -257,8 +259,14 @@ def _regress(
     targets: Sequence[Floats],
     parts: Split,
     training: CrossProducts | QrFactor,
+    *,
+    before: Floats | None = None,
 ) -> tuple[Basis, Simpls, int, tuple[str, ...]]:
-    """Return basis, SIMPLS fit and number of components, and on which axes the inertia had to be held and why."""
+    """Return basis, SIMPLS fit and number of components, and on which axes the inertia had to be held and why.
+
+    `before` (K, 3) are coefficients that the ones fitted here come on top of; they count in the effective inertia.
+    """
+    already = 0.0 if before is None else before
     most = min(MAX_COMPONENTS, len(functions.terms))
     tau = np.concatenate([motion.tau[mask] for motion, mask in zip(motions, parts.training, strict=True)])
     base = tau - np.concatenate([target[mask] for target, mask in zip(targets, parts.training, strict=True)])
@@ -268,7 +276,7 @@ def _regress(
         functions = replace(functions, mask=without_inertia(functions.mask, functions.terms, axes))
         model_fit = simpls(training, most, allowed=functions.mask)
         chosen = _components(settings, functions, motions, targets, parts, most, type(training))
-        mass = effective_mass(profile, settings.scale, functions.terms, model_fit.coefficients[chosen - 1])
+        mass = effective_mass(profile, settings.scale, functions.terms, model_fit.coefficients[chosen - 1] + already)
         more = unbelievable(profile, mass) & ~axes
         if settings.inertia == "fitted" or not more.any():
             return functions, model_fit, chosen, tuple(told.values())
@@ -297,7 +305,7 @@ def _components(
         ]
         for cut in cuts
     ]
-    rows = [_rows(functions, motions, targets, masks) for masks in apart]
+    rows = [rows_of(functions, motions, targets, masks) for masks in apart]
     if kind is QrFactor:
         errors, spread = sweep_components([QrFactor.of(*part) for part in rows], most, allowed=functions.mask)
     else:
@@ -341,7 +349,7 @@ def _curve(
     )
 
 
-def _grids(motions: Sequence[Motion], settings: FitSettings) -> dict[str, Any]:
+def grids(motions: Sequence[Motion], settings: FitSettings) -> dict[str, Any]:
     """Return the grid rates [Hz] and window lengths [s] that came of the settings."""
     rates = sorted({motion.rate_hz for motion in motions})
     rows = [odd_rows(settings.window_s, rate) for rate in rates]
