@@ -1,13 +1,16 @@
-"""Paths as set points for the reference filter: which pose is asked for from which time on."""
+"""Paths: poses asked for one after the other, or the way through their positions for a guidance law."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import pi, radians
+from itertools import pairwise
+from math import atan2, degrees, pi, radians
 
 Pose = tuple[float, float, float]
 """North, east [m] and heading; in degrees in the tables of this module, in radians in `SetPoints`."""
+Waypoint = tuple[float, float]
+"""North, east [m]."""
 
 TWELVE_CORNER: tuple[Pose, ...] = (
     *((0.0, -15.0, -90.0), (15.0, -15.0, 0.0), (15.0, 0.0, 0.0), (30.0, 0.0, 0.0)),
@@ -25,6 +28,12 @@ FOUR_CORNER: tuple[Pose, ...] = (
 )
 """Surge, sway, yaw, surge with sway, and all three at once, in the manner of Skjetne et al. (2017)."""
 
+OPERATION: tuple[Waypoint, ...] = (
+    *((0.0, 0.0), (50.0, -12.0), (95.0, 14.0), (140.0, 10.0), (144.0, 23.0), (134.0, 34.0)),
+    *((92.0, 46.0), (50.0, 34.0), (8.0, 52.0), (-18.0, 24.0), (0.0, 0.0)),
+)
+"""A round of some 12 minutes in the manner of Aurlien (2021), Figure 5.16: two quick changes at the north end, then back."""
+
 
 @dataclass(frozen=True)
 class SetPoints:
@@ -35,8 +44,17 @@ class SetPoints:
 
     @property
     def duration_s(self) -> float:
-        """Time that the whole path takes [s]."""
+        """Time that the whole path takes [s] when each pose is held for its time."""
         return self.dwell_s * len(self.poses)
+
+    @property
+    def waypoints(self) -> tuple[Waypoint, ...]:
+        """Positions [m] one after the other, for a guidance law; where only the heading changes there is but one."""
+        found: list[Waypoint] = []
+        for x, y, _ in self.poses:
+            if not found or found[-1] != (x, y):
+                found.append((x, y))
+        return tuple(found)
 
     def at(self, t: float) -> Pose:
         """Return the pose asked for at time `t` [s]; the last one holds."""
@@ -90,9 +108,24 @@ def _crossing() -> tuple[Pose, ...]:
     )
 
 
+def _operational() -> tuple[Pose, ...]:
+    """Follow `OPERATION` with the bow ahead: each pose looks the way that its leg comes."""
+    # Whole degrees: the last bit of atan2 differs between machines, and a log must not.
+    ways = [float(round(degrees(atan2(to[1] - by[1], to[0] - by[0])))) for by, to in pairwise(OPERATION)]
+    return tuple((x, y, way) for (x, y), way in zip(OPERATION, (ways[0], *ways), strict=True))
+
+
+def _on_the_spot() -> tuple[Pose, ...]:
+    """Turn once round in quarters to starboard, then back, without leaving the place."""
+    quarters = (90.0, 180.0, -90.0, 0.0, -90.0, 180.0, 90.0, 0.0)
+    return tuple((0.0, 0.0, heading) for heading in quarters)
+
+
 PATHS: Mapping[str, Callable[[], tuple[Pose, ...]]] = {
     "twelve-corner": lambda: TWELVE_CORNER,
     "four-corner": lambda: FOUR_CORNER,
     "zigzag": _zigzag,
     "crossing": _crossing,
+    "operational": _operational,
+    "on-the-spot": _on_the_spot,
 }

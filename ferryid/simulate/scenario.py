@@ -11,92 +11,86 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.simulate.control import Gains, ReferenceTuning
+from ferryid.simulate.check_scenario import check_against, disagreements, raise_first
 from ferryid.simulate.paths import PATHS, Pose, SetPoints, set_points
-from ferryid.simulate.plant import DAMPING
+from ferryid.simulate.read_section import read_section, section
+from ferryid.simulate.sections import (
+    Control,
+    Current,
+    Fouling,
+    Guidance,
+    Manoeuvre,
+    Mooring,
+    Payload,
+    Sensors,
+    Shallow,
+    Thrusters,
+    Wake,
+    Waves,
+    Wind,
+)
+from ferryid.simulate.series import read_series
 from ferryid.vessel.faults import Fault, TableReader
-from ferryid.vessel.toml_lines import key_lines
+from ferryid.vessel.parse_hull import DAMPING_TERMS
+from ferryid.vessel.toml_lines import key_lines, line_of
+
+__all__ = [
+    "Environment",
+    "Scenario",
+    "check_against",
+    "list_scenarios",
+    "load_scenario",
+    "parse_scenario",
+    "read_series",
+]
 
 SCHEMA = "ferryid.scenario/1"
 MASS = ("m11", "m22", "m23", "m32", "m33")
 LONGEST_S = 14_400.0
 """Longest trial [s]; longer ones would not fit into the memory of a small machine."""
 MOST_ROUNDS = 1000
-LARGEST = {
-    **dict.fromkeys(("north_mps", "east_mps", "gust_std_mps"), 60.0),
-    **dict.fromkeys(("navigation_rate_hz", "thruster_rate_hz", "wind_rate_hz"), 200.0),
-    **dict.fromkeys(("imu_rate_hz", "camera_rate_hz"), 1000.0),
-    "omega_radps": 20.0,
-}
-"""Largest value of a key; 1e6 for those not listed. Beyond these no vessel is simulated, only overflow."""
+MOST_POSES = 20_000
+LARGEST_SEED = 2**63 - 1
+NOWHERE = SetPoints(((0.0, 0.0, 0.0),), 1.0)
+"""The path of a trial without one."""
 
 
 @dataclass(frozen=True)
-class Wind:
-    """Wind over ground [m/s], where the air goes to, with Ornstein-Uhlenbeck gusts on both components."""
+class Environment:
+    """``[environment]``: everything that comes from outside the vessel."""
 
-    north_mps: float = 0.0
-    east_mps: float = 0.0
-    gust_std_mps: float = 0.0
-    gust_time_s: float = 8.0
-
-
-@dataclass(frozen=True)
-class Current:
-    """Steady current over ground [m/s], where the water goes to."""
-
-    north_mps: float = 0.0
-    east_mps: float = 0.0
-
-
-@dataclass(frozen=True)
-class Thrusters:
-    """Dynamics of every azimuth thruster: first-order lags and rate limits."""
-
-    speed_lag_s: float = 0.4
-    speed_rate_rpmps: float = 600.0
-    azimuth_lag_s: float = 0.2
-    azimuth_rate_degps: float = 60.0
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviations of the measurements: Aurlien (2021), Table 5.2, then the other sensors.
-
-    `white_share` is the part of the navigation's standard deviations that is white; the rest is coloured.
-    """
-
-    position_m: float = 0.02
-    heading_deg: float = 0.2
-    velocity_mps: float = 0.05
-    yaw_rate_degps: float = 0.2
-    acceleration_mps2: float = 0.01
-    yaw_acceleration_degps2: float = 0.1
-    white_share: float = 0.1
-    speed_rpm: float = 1.0
-    azimuth_deg: float = 0.05
-    wind_speed_mps: float = 0.15
-    wind_direction_deg: float = 1.5
-
-
-@dataclass(frozen=True)
-class Sensors:
-    """Rates, and which unmapped topics fill the log as a real one does. Rate 0 leaves a topic out."""
-
-    navigation_rate_hz: float = 20.0
-    thruster_rate_hz: float = 20.0
-    wind_rate_hz: float = 0.0
-    imu_rate_hz: float = 100.0
-    camera_rate_hz: float = 1.0
-    clock_offset_ms: float = 0.0
+    wind: Wind = field(default_factory=Wind)
+    current: Current = field(default_factory=Current)
+    waves: Waves = field(default_factory=Waves)
+    wakes: tuple[Wake, ...] = ()
+    shallow: Shallow = field(default_factory=Shallow)
+    mooring: Mooring = field(default_factory=Mooring)
 
 
 @dataclass(frozen=True)
 class Scenario:
     """Everything that one simulated trial depends on, apart from the vessel profile it names.
 
-    `true_hull` holds factors on the true vessel's coefficients (``{"X_u": 1.2}``), which the profile does not know.
-    `delta` and `sigma` scale the controller's model, (4.2)-(4.4). `start_ns` is the first sample's time since 1970.
+    Attributes
+    ----------
+    name, title, vessel, seed
+        As in the file; `name` is the file's.
+    start_ns
+        First sample's time since 1970 [ns].
+    duration_s
+        Length of the trial [s].
+    path
+        Where the vessel goes; a single pose where a manoeuvre takes the path's place.
+    manoeuvre
+        Orders straight to the actuators; its `kind` is empty where there is a path.
+    guidance, controller, wind, current, waves, wakes, shallow, mooring, payload, fouling, thrusters, sensors
+        The sections of the file, see `ferryid.simulate.sections`.
+    true_hull
+        Factors on the true vessel's coefficients (``{"X_u": 1.2}``), which the profile does not know.
+    text
+        The TOML source.
+    folder
+        Where the files lie that the scenario names; None for the working directory.
     """
 
     name: str
@@ -106,17 +100,31 @@ class Scenario:
     duration_s: float
     start_ns: int
     seed: int
-    delta: float = 1.0
-    sigma: float = 1.0
-    gains: Gains = field(default_factory=Gains)
-    reference: ReferenceTuning = field(default_factory=ReferenceTuning)
+    manoeuvre: Manoeuvre = field(default_factory=Manoeuvre)
+    guidance: Guidance = field(default_factory=Guidance)
+    controller: Control = field(default_factory=Control)
     wind: Wind = field(default_factory=Wind)
     current: Current = field(default_factory=Current)
+    waves: Waves = field(default_factory=Waves)
+    wakes: tuple[Wake, ...] = ()
+    shallow: Shallow = field(default_factory=Shallow)
+    mooring: Mooring = field(default_factory=Mooring)
+    payload: tuple[Payload, ...] = ()
+    fouling: Fouling = field(default_factory=Fouling)
     thrusters: Thrusters = field(default_factory=Thrusters)
     sensors: Sensors = field(default_factory=Sensors)
-    noise: Noise = field(default_factory=Noise)
     true_hull: Mapping[str, float] = field(default_factory=dict)
     text: str = ""
+    folder: Path | None = None
+
+    @property
+    def where(self) -> str:
+        """The file as messages name it."""
+        return f"{self.name}.toml" if self.folder is None else str(self.folder / f"{self.name}.toml")
+
+    def file(self, name: str) -> Path:
+        """Return the path of a file that the scenario names, relative to its own folder."""
+        return (self.folder or Path()) / name
 
 
 def list_scenarios() -> dict[str, str]:
@@ -150,11 +158,20 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         raise FerryIdError(f"{name}: the scenario cannot be read, {error.strerror}. Fix: check the path") from error
     except UnicodeDecodeError as error:
         raise FerryIdError(f"{name}: the scenario is not UTF-8 text, {error.reason}. Fix: save it as UTF-8") from error
-    return parse_scenario(text, name)
+    return parse_scenario(text, name, path.parent)
 
 
-def parse_scenario(text: str, where: str) -> Scenario:
-    """Read a scenario from its TOML text; `where` names it in messages.
+def parse_scenario(text: str, where: str, folder: Path | None = None) -> Scenario:
+    """Read a scenario from its TOML text.
+
+    Parameters
+    ----------
+    text
+        The TOML source.
+    where
+        Name of the file, for messages.
+    folder
+        Where the files lie that the scenario names; the working directory where it is left out.
 
     Raises
     ------
@@ -163,107 +180,76 @@ def parse_scenario(text: str, where: str) -> Scenario:
     """
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    # A number of thousands of digits, or thousands of brackets, ends in errors of Python rather than of TOML.
+    except (ValueError, RecursionError) as error:
         raise FerryIdError(f"{where}: not valid TOML, {error}. Fix: correct the line") from error
     faults: list[Fault] = []
-    scenario = _read(TableReader(data, (), key_lines(text), faults), Path(where).stem, text)
-    if faults:
-        first = min(faults, key=lambda fault: fault.line)
-        more = f" ({len(faults) - 1} more)" if len(faults) > 1 else ""
-        raise FerryIdError(f"{where}:{first.line}: {first.message}{more}")
+    lines = key_lines(text)
+    scenario = _read(TableReader(data, (), lines, faults), Path(where).stem, text, folder)
+    faults += [Fault(line_of(lines, place), message) for place, message in disagreements(scenario, data)]
+    raise_first(where, faults)
     return scenario
 
 
-def _read(top: TableReader, name: str, text: str) -> Scenario:
+def _read(top: TableReader, name: str, text: str, folder: Path | None) -> Scenario:
     top.text("schema", required=True, options=(SCHEMA,))
     title = top.text("title", name)
     vessel = top.text("vessel", required=True)
     seed = top.whole("seed", 0)
+    if seed > LARGEST_SEED:
+        top.fault(f'"seed" must be at most {LARGEST_SEED}, found {seed}', "seed")
     start_ns = _start(top)
-    path = _path(top)
-    duration_s = top.number("duration_s", path.duration_s, above=0.0, at_most=LONGEST_S)
-    if duration_s > LONGEST_S:
-        top.fault(
-            f"the path takes {duration_s:g} s, at most {LONGEST_S:g} s are simulated. Fix: set duration_s", "path"
-        )
-    controller = _section(top, "controller")
-    delta = controller.number("delta", 1.0, at_least=0.0, at_most=10.0)
-    sigma = controller.number("sigma", 1.0, at_least=0.0, at_most=10.0)
-    gains = Gains(**_triples(controller, Gains()))
-    reference = _section(controller, "reference")
-    tuning = ReferenceTuning(**_triples(reference, ReferenceTuning()))
-    environment = _section(top, "environment")
-    wind = _section(environment, "wind")
-    current = _section(environment, "current")
-    sensors = _section(top, "sensors")
-    noise = _section(sensors, "noise")
-    thrusters = _section(top, "thrusters")
+    manoeuvre = read_section(section(top, "manoeuvre"), Manoeuvre)
+    path = _path(top, moved=top.has("manoeuvre"))
+    guidance = read_section(section(top, "guidance"), Guidance)
+    environment = read_section(section(top, "environment"), Environment)
+    rest = read_section(top, _Rest, close=False)
     scenario = Scenario(
         name=name,
         title=title,
         vessel=vessel,
         path=path,
-        duration_s=duration_s,
+        duration_s=_duration(top, path, manoeuvre, guidance),
         start_ns=start_ns,
         seed=seed,
-        delta=delta,
-        sigma=sigma,
-        gains=gains,
-        reference=tuning,
-        wind=Wind(**_numbers(wind, Wind(), positive=("gust_time_s",), any_sign=("north_mps", "east_mps"))),
-        current=Current(**_numbers(current, Current(), any_sign=("north_mps", "east_mps"))),
-        thrusters=Thrusters(**_numbers(thrusters, Thrusters(), positive=("speed_rate_rpmps", "azimuth_rate_degps"))),
-        sensors=Sensors(
-            **_numbers(
-                sensors,
-                Sensors(),
-                positive=("navigation_rate_hz", "thruster_rate_hz"),
-                any_sign=("clock_offset_ms",),
-            )
-        ),
-        noise=Noise(**_numbers(noise, Noise())),
+        manoeuvre=manoeuvre,
+        guidance=guidance,
         true_hull=_true_hull(top),
         text=text,
+        folder=folder,
+        **vars(environment),
+        **vars(rest),
     )
-    if scenario.noise.white_share > 1.0:
-        noise.fault('"white_share" must be at most 1', "white_share")
-    for table in (wind, current, environment, reference, controller, noise, sensors, thrusters, top):
-        table.close()
+    top.close()
     return scenario
 
 
-def _section(parent: TableReader, key: str) -> TableReader:
-    """Return a table that may be left out, as an empty one then."""
-    table = parent.table(key)
-    return TableReader({}, (*parent.path, key), {}, []) if table is None else table
+@dataclass(frozen=True)
+class _Rest:
+    """The sections that stand at the top of the file and need nothing but being read."""
+
+    controller: Control = field(default_factory=Control)
+    payload: tuple[Payload, ...] = ()
+    fouling: Fouling = field(default_factory=Fouling)
+    thrusters: Thrusters = field(default_factory=Thrusters)
+    sensors: Sensors = field(default_factory=Sensors)
 
 
-def _numbers(
-    table: TableReader, defaults: Any, positive: tuple[str, ...] = (), any_sign: tuple[str, ...] = ()
-) -> dict[str, float]:
-    """Read one number per field of a dataclass: above zero, of any sign, or else at least zero."""
-    values = {}
-    for key, default in vars(defaults).items():
-        largest = LARGEST.get(key, 1e6)
-        if key in any_sign:
-            values[key] = table.number(key, default, at_least=-largest, at_most=largest)
-        elif key in positive:
-            values[key] = table.number(key, default, above=0.0, at_most=largest)
-        else:
-            values[key] = table.number(key, default, at_least=0.0, at_most=largest)
-    return values
-
-
-def _triples(table: TableReader, defaults: Any) -> dict[str, Any]:
-    """Read three non-negative numbers per field of a dataclass: north, east and heading."""
-    values = {}
-    for key, default in vars(defaults).items():
-        given = table.numbers(key, 3)
-        largest = LARGEST.get(key, 1e6)
-        if given and not all(0.0 <= value <= largest for value in given):
-            table.fault(f'"{key}" must hold numbers of at least 0 and at most {largest:g}', key)
-        values[key] = given or default
-    return values
+def _duration(top: TableReader, path: SetPoints, manoeuvre: Manoeuvre, guidance: Guidance) -> float:
+    """Return how long the trial takes: what the file says, or else what its path or manoeuvre takes."""
+    given = top.has("duration_s")
+    usual = manoeuvre.duration_s if manoeuvre.kind else path.duration_s
+    duration_s = top.number("duration_s", usual, above=0.0, at_most=LONGEST_S)
+    if duration_s > LONGEST_S:
+        what, key = ("manoeuvre", "manoeuvre") if manoeuvre.kind else ("path", "path")
+        top.fault(f"the {what} takes {duration_s:g} s, at most {LONGEST_S:g} s are simulated. Fix: set duration_s", key)
+    if guidance.law != "set-points" and not given and top.has("path"):
+        top.fault(
+            f'the file lacks "duration_s", which says how long the law "{guidance.law}" follows the path. '
+            "Fix: add duration_s = 720 at the top",
+            "guidance",
+        )
+    return duration_s
 
 
 def _start(top: TableReader) -> int:
@@ -281,11 +267,15 @@ def _start(top: TableReader) -> int:
     return int(moment.timestamp()) * 10**9 + moment.microsecond * 1000
 
 
-def _path(top: TableReader) -> SetPoints:
-    """Return the set points of a named path, or of the user's own ``points``."""
-    table = top.table("path", required=True, needs="which says where the vessel goes")
+def _path(top: TableReader, *, moved: bool) -> SetPoints:
+    """Return the set points of a named path, or of the user's own ``points``; none where a manoeuvre moves the vessel."""
+    if moved:
+        if top.has("path"):
+            top.fault("a trial follows either a path or a manoeuvre, found both. Fix: remove one of them", "manoeuvre")
+        return NOWHERE
+    table = top.table("path", required=True, needs="which says where the vessel goes (or [manoeuvre], what it does)")
     if table is None:
-        return SetPoints(((0.0, 0.0, 0.0),), 1.0)
+        return NOWHERE
     kind = table.text("kind", required=True, options=(*PATHS, "points"))
     dwell_s = table.number("dwell_s", 60.0, above=0.0, at_most=LONGEST_S)
     size = table.number("size", 1.0, above=0.0, at_most=1e3)
@@ -293,11 +283,16 @@ def _path(top: TableReader) -> SetPoints:
     if rounds > MOST_ROUNDS:
         table.fault(f'"rounds" must be at most {MOST_ROUNDS}, found {rounds}', "rounds")
         rounds = 1
-    poses: tuple[Pose, ...] = ((0.0, 0.0, 0.0),)
+    poses = NOWHERE.poses
     if kind == "points":
         poses = _points(table) or poses
     elif kind:
         poses = PATHS[kind]()
+        if table.has("points"):
+            table.fault(f'"points" belongs to kind = "points", found kind = "{kind}". Fix: remove one', "points")
+    if len(poses) * rounds > MOST_POSES:
+        table.fault(f"a path has at most {MOST_POSES} points, found {len(poses) * rounds}. Fix: fewer rounds")
+        rounds = 1
     table.close()
     return set_points(poses, dwell_s, size, rounds)
 
@@ -317,12 +312,11 @@ def _points(table: TableReader) -> tuple[Pose, ...]:
 
 def _true_hull(top: TableReader) -> dict[str, float]:
     """Return factors on the true hull's coefficients by SNAME name."""
-    table = _section(top, "true_hull")
-    factors = {}
-    for name in (*MASS, *DAMPING):
+    table = section(top, "true_hull")
+    factors: dict[str, Any] = {}
+    for name in (*MASS, *DAMPING_TERMS):
         if table.has(name):
-            factors[name] = table.number(
-                name, 1.0, at_least=0.1 if name in ("m11", "m22", "m33") else 0.0, at_most=10.0
-            )
+            least = 0.1 if name in ("m11", "m22", "m33") else 0.0
+            factors[name] = table.number(name, 1.0, at_least=least, at_most=10.0)
     table.close()
     return factors

@@ -44,7 +44,7 @@ def test_bundled_scenarios():
         assert scenario.name == name
         assert scenario.title == title
     thesis = load_scenario("twelve-corner")
-    assert (thesis.delta, thesis.sigma, thesis.duration_s) == (0.4, 0.4, 1440.0)
+    assert (thesis.controller.delta, thesis.controller.sigma, thesis.duration_s) == (0.4, 0.4, 1440.0)
 
 
 def test_every_key_arrives():
@@ -52,11 +52,12 @@ def test_every_key_arrives():
     assert scenario.name == "mine"
     assert scenario.duration_s == 40.0
     assert scenario.start_ns == 1654072200250000000
-    assert scenario.gains.Kp == (100.0, 100.0, 400.0)
-    assert scenario.gains.Kd == type(scenario.gains)().Kd
+    gains = scenario.controller.gains
+    assert gains.Kp == (100.0, 100.0, 400.0)
+    assert gains.Kd == type(gains)().Kd
     assert scenario.wind.north_mps == -3.0
     assert scenario.sensors.wind_rate_hz == 10.0
-    assert scenario.noise.velocity_mps == 0.02
+    assert scenario.sensors.noise.velocity_mps == 0.02
     assert scenario.true_hull == {"X_u": 1.2}
     assert scenario.path.at(25.0)[:2] == (10.0, 5.0)
 
