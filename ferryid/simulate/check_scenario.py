@@ -108,6 +108,7 @@ def _manoeuvre(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Doubt]:
 
 def _sea(scenario: Scenario) -> Iterator[Doubt]:
     """Yield waves and wakes that would break: they are steeper than any sea is."""
+    seas: list[tuple[KeyPath, float, float]]
     seas = [(("environment", "waves"), scenario.waves.significant_height_m, scenario.waves.peak_period_s)]
     seas += [(("environment", "wakes", i), wake.height_m, wake.period_s) for i, wake in enumerate(scenario.wakes)]
     for place, height_m, period_s in seas:

@@ -49,10 +49,10 @@ class SetPoints:
 
     @property
     def waypoints(self) -> tuple[Waypoint, ...]:
-        """Positions [m] one after the other, for a guidance law; where only the heading changes there is but one."""
-        found: list[Waypoint] = []
+        """Positions [m] from the start at 0, 0 on, for a guidance law; where only the heading changes there is but one."""
+        found: list[Waypoint] = [(0.0, 0.0)]
         for x, y, _ in self.poses:
-            if not found or found[-1] != (x, y):
+            if found[-1] != (x, y):
                 found.append((x, y))
         return tuple(found)
 

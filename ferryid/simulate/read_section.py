@@ -52,12 +52,11 @@ def _value(table: TableReader, entry: Field[Any], hint: Any) -> Any:
     low, high = entry.metadata.get("low", -1e6), entry.metadata.get("high", 1e6)
     above = entry.metadata.get("above", -inf)
     parts = get_args(hint)
-    if is_dataclass(hint):
-        assert isinstance(hint, type)
+    if isinstance(hint, type) and is_dataclass(hint):
         if hint in FLATTENED:
             return read_section(table, hint, close=False)
         return read_section(section(table, key), hint)
-    if get_origin(hint) is tuple and is_dataclass(parts[0]):
+    if get_origin(hint) is tuple and isinstance(parts[0], type) and is_dataclass(parts[0]):
         return _entries(table, key, parts[0])
     assert default is not MISSING, f"{entry.name} has no default"
     if get_origin(hint) is tuple:
