@@ -1,22 +1,95 @@
-"""Coloured noise as a navigation filter leaves it, and gusts; every channel with a random stream of its own."""
+"""Random numbers that are the same everywhere, and noise made of them: coloured, gusts, dropouts.
+
+NumPy promises the integers of a seeded PCG64 for good, but not what its distributions make of them, and their
+logarithms differ in the last bit between processors. Only the integers are taken from it.
+"""
 
 from __future__ import annotations
 
 import zlib
-from math import exp, sqrt
+from math import pi, radians, sqrt
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.simulate.compiled import compiled
+from ferryid.simulate.elementary import cos, exp, log, sin
+
+if TYPE_CHECKING:
+    from ferryid.simulate.scenario import Scenario
+    from ferryid.simulate.sections import Noise
+
 Floats = NDArray[np.float64]
+Integers = NDArray[np.uint64]
+Flags = NDArray[np.bool_]
+State = tuple[float, float, float, float, float, float]
+Vector = tuple[float, float, float]
+
+PHASES_S = {"wind": 0.037, "current": 0.029, "payload": 0.043}
+"""When, after the start, the sensors of the surroundings take their first sample [s]."""
 
 
-def generator(seed: int, channel: str) -> np.random.Generator:
+class Random:
+    """One stream of random numbers; the methods draw from it one after the other.
+
+    Parameters
+    ----------
+    seed
+        Of the whole trial.
+    channel
+        What the stream is for; streams of two channels have nothing in common, and none can shift another.
+    """
+
+    def __init__(self, seed: int, channel: str) -> None:
+        self._source = np.random.PCG64([seed, zlib.crc32(channel.encode())])
+
+    def integers(self, n: int) -> Integers:
+        """Return n integers of 64 random bits."""
+        return np.asarray(self._source.random_raw(n), dtype=np.uint64)
+
+    def random(self, n: int) -> Floats:
+        """Return n numbers that are uniform between 0 and 1, and never either."""
+        return np.asarray(((self.integers(n) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52)
+
+    def standard_normal(self, n: int) -> Floats:
+        """Return n numbers of the standard normal distribution, by the method of Box and Muller."""
+        values = self.random(n + n % 2)
+        _box_muller(values)
+        return values[:n]
+
+    def standard_exponential(self, n: int) -> Floats:
+        """Return n numbers of the exponential distribution of mean 1."""
+        values = self.random(n)
+        _exponential(values)
+        return values
+
+    def bytes(self, n: int) -> bytes:
+        """Return n random bytes."""
+        return self.integers(-(-n // 8)).astype("<u8").tobytes()[:n]
+
+
+def generator(seed: int, channel: str) -> Random:
     """Return the random stream of one channel, which no other channel can shift."""
-    return np.random.default_rng([seed, zlib.crc32(channel.encode())])
+    return Random(seed, channel)
 
 
-def smooth_noise(random: np.random.Generator, n: int, step_s: float, std: float, rate_std: float) -> Floats:
+@compiled
+def _box_muller(values: Floats) -> None:
+    """Turn uniform numbers into normal ones, in place and in pairs."""
+    for i in range(0, len(values), 2):
+        radius = sqrt(-2.0 * log(values[i]))
+        angle = 2.0 * pi * values[i + 1]
+        values[i], values[i + 1] = radius * cos(angle), radius * sin(angle)
+
+
+@compiled
+def _exponential(values: Floats) -> None:
+    for i in range(len(values)):
+        values[i] = -log(values[i])
+
+
+def smooth_noise(random: Random, n: int, step_s: float, std: float, rate_std: float) -> Floats:
     """Return stationary noise whose own standard deviation and that of its time derivative are both given, shape (n,).
 
     A critically damped second-order Gauss-Markov process, sampled exactly. Table 5.2 of Aurlien (2021) states the
@@ -26,41 +99,251 @@ def smooth_noise(random: np.random.Generator, n: int, step_s: float, std: float,
         return np.zeros(n)
     w = rate_std / std
     e = exp(-w * step_s)
-    A = np.array([[1.0 + w * step_s, step_s], [-w * w * step_s, 1.0 - w * step_s]]) * e
-    P = np.diag([std * std, rate_std * rate_std])
-    Q = P - A @ P @ A.T
-    # Cholesky factor by hand: rounding may leave nothing of Q[0, 0] where the process hardly moves within a step.
-    first = sqrt(max(float(Q[0, 0]), 0.0))
-    cross = float(Q[1, 0]) / first if first > 0.0 else 0.0
-    second = sqrt(max(float(Q[1, 1]) - cross * cross, 0.0))
-    white = random.standard_normal((n, 2))
-    kicks = np.column_stack((first * white[:, 0], cross * white[:, 0] + second * white[:, 1])).tolist()
-    x, x_dot = std * white[0, 0], rate_std * white[0, 1]
-    a, b, c, d = A.ravel().tolist()
-    values = [x]
-    for kick, kick_dot in kicks[1:]:
-        x, x_dot = a * x + b * x_dot + kick, c * x + d * x_dot + kick_dot
-        values.append(x)
-    return np.asarray(values)
+    # Transition of (x, x_dot), and the covariance Q = P - A P A' that one step adds, P the stationary one.
+    a, b, c, d = (1.0 + w * step_s) * e, step_s * e, -w * w * step_s * e, (1.0 - w * step_s) * e
+    p, q = std * std, rate_std * rate_std
+    # Cholesky factor of Q; rounding may leave nothing of its first element where the process hardly moves within a step.
+    first = sqrt(max(p - (a * a * p + b * b * q), 0.0))
+    cross = -(a * c * p + b * d * q) / first if first > 0.0 else 0.0
+    second = sqrt(max(q - (c * c * p + d * d * q) - cross * cross, 0.0))
+    values = np.empty(n)
+    _second_order(random.standard_normal(2 * n), (a, b, c, d), (first, cross, second), (std, rate_std), values)
+    return values
 
 
-def measurement_noise(
-    random: np.random.Generator, n: int, step_s: float, std: float, rate_std: float, white_share: float
-) -> Floats:
+@compiled
+def _second_order(
+    white: Floats,
+    transition: tuple[float, float, float, float],
+    kick: tuple[float, float, float],
+    start: tuple[float, float],
+    values: Floats,
+) -> None:
+    a, b, c, d = transition
+    first, cross, second = kick
+    x, x_dot = start[0] * white[0], start[1] * white[1]
+    for i in range(len(values)):
+        if i > 0:
+            one, other = white[2 * i], white[2 * i + 1]
+            x, x_dot = a * x + b * x_dot + first * one, c * x + d * x_dot + (cross * one + second * other)
+        values[i] = x
+
+
+def measurement_noise(random: Random, n: int, step_s: float, std: float, rate_std: float, white_share: float) -> Floats:
     """Return noise of standard deviation `std`, of which the share `white_share` (of `std`) is white, shape (n,)."""
     white = white_share * std * random.standard_normal(n)
     return white + smooth_noise(random, n, step_s, std * sqrt(1.0 - white_share**2), rate_std)
 
 
-def gusts(random: np.random.Generator, n: int, step_s: float, std: float, time_constant_s: float) -> Floats:
+def gusts(random: Random, n: int, step_s: float, std: float, time_constant_s: float) -> Floats:
     """Return an Ornstein-Uhlenbeck process, stationary from its first sample on, shape (n,)."""
     if std == 0.0:
         return np.zeros(n)
     keep = exp(-step_s / time_constant_s)
-    kicks = (std * sqrt(1.0 - keep * keep) * random.standard_normal(n)).tolist()
-    value = std * float(random.standard_normal())
-    values = []
-    for kick in kicks:
-        values.append(value)
-        value = keep * value + kick
-    return np.asarray(values)
+    values = random.standard_normal(n)
+    _first_order(values, keep, std, std * sqrt(1.0 - keep * keep))
+    return values
+
+
+@compiled
+def _first_order(values: Floats, keep: float, start: float, kick: float) -> None:
+    """Turn white noise into a first-order process, in place."""
+    value = start * values[0]
+    values[0] = value
+    for i in range(1, len(values)):
+        value = keep * value + kick * values[i]
+        values[i] = value
+
+
+def gaps(random: Random, t: Floats, per_min: float, length_s: float) -> Flags:
+    """Return where a sensor is silent, shape (n,), the first sample never being lost.
+
+    Silences come at random, `per_min` to a minute of the time between them, and last `length_s`.
+
+    Parameters
+    ----------
+    t
+        Sample times [s], ascending, shape (n,).
+    """
+    lost = np.zeros(len(t), dtype=bool)
+    if per_min == 0.0 or length_s == 0.0 or not len(t):
+        return lost
+    start = float(t[0])
+    while start <= t[-1]:
+        start += 60.0 / per_min * float(random.standard_exponential(1)[0])
+        lost |= (t > start) & (t <= start + length_s)
+        start += length_s
+    lost[0] = False
+    return lost
+
+
+def interpolated(t: Floats, grid: Floats, values: Floats) -> Floats:
+    """Return the columns of `values`, given at ascending `grid`, at ascending times `t`; linear, held beyond the ends.
+
+    Parameters
+    ----------
+    t, grid
+        Times [s], shape (n,) and (m,).
+    values
+        Shape (m, k).
+
+    Returns
+    -------
+    Floats
+        Shape (n, k).
+    """
+    out = np.empty((len(t), values.shape[1]))
+    _interpolate(t, grid, values, out)
+    return out
+
+
+@compiled
+def _interpolate(t: Floats, grid: Floats, values: Floats, out: Floats) -> None:
+    low, last = 0, len(grid) - 1
+    for i in range(len(t)):
+        while low < last and grid[low + 1] <= t[i]:
+            low += 1
+        share = 0.0
+        if low < last and t[i] > grid[low]:
+            share = (t[i] - grid[low]) / (grid[low + 1] - grid[low])
+        for j in range(values.shape[1]):
+            out[i, j] = values[low, j]
+            if share > 0.0:
+                out[i, j] += share * (values[low + 1, j] - values[low, j])
+
+
+def navigation_noise(noise: Noise, seed: int, n: int, step_s: float) -> Floats:
+    """Return the errors of pose and velocities as a navigation filter leaves them, shape (n, 6) [m, rad, m/s, rad/s].
+
+    The time derivative of a position's error is as large as the velocity's own error, and that of a velocity's error
+    as large as Table 5.2 states for the acceleration.
+    """
+    turn, yaw = radians(noise.yaw_rate_degps), radians(noise.yaw_acceleration_degps2)
+    channels = {
+        "x": (noise.position_m, noise.velocity_mps),
+        "y": (noise.position_m, noise.velocity_mps),
+        "psi": (radians(noise.heading_deg), turn),
+        "u": (noise.velocity_mps, noise.acceleration_mps2),
+        "v": (noise.velocity_mps, noise.acceleration_mps2),
+        "r": (turn, yaw),
+    }
+    return np.column_stack(
+        [
+            measurement_noise(generator(seed, name), n, step_s, std, rate_std, noise.white_share)
+            for name, (std, rate_std) in channels.items()
+        ]
+    )
+
+
+class NavErrors(NamedTuple):
+    """Systematic errors of the navigation: `ferryid.simulate.sections.Navigation` in SI units."""
+
+    antenna_x_m: float
+    antenna_y_m: float
+    heading_bias_rad: float
+    yaw_rate_factor: float
+    delay_s: float
+
+
+def navigation_errors(scenario: Scenario) -> NavErrors:
+    """Return the systematic errors of a scenario's navigation."""
+    navigation = scenario.sensors.navigation
+    ahead, across = navigation.antenna_m
+    return NavErrors(
+        ahead,
+        across,
+        radians(navigation.heading_bias_deg),
+        navigation.yaw_rate_factor,
+        navigation.delay_s,
+    )
+
+
+@compiled
+def measure(errors: NavErrors, k: int, noise: Floats, state: State) -> tuple[Vector, Vector]:
+    """Return pose and velocities as the navigation gives them.
+
+    The antenna's velocity over ground is resolved with the heading as measured, so that a biased heading turns the
+    velocity as well, the way a satellite compass does that is mounted askew.
+
+    Parameters
+    ----------
+    errors
+        Systematic errors.
+    k
+        Number of the control cycle.
+    noise
+        Its row of `navigation_noise`, shape (6,).
+    state
+        Pose and velocities of the body origin at the time measured, `delay_s` ago.
+
+    Returns
+    -------
+    eta, nu
+        Pose [m, m, rad] and velocities [m/s, m/s, rad/s].
+    """
+    x, y, psi, u, v, r = state
+    ahead, across = errors.antenna_x_m, errors.antenna_y_m
+    c, s = cos(psi), sin(psi)
+    x, y = x + (c * ahead - s * across), y + (s * ahead + c * across)
+    u, v = u - r * across, v + r * ahead
+    if errors.heading_bias_rad != 0.0:
+        c, s = cos(errors.heading_bias_rad), sin(errors.heading_bias_rad)
+        u, v = c * u + s * v, c * v - s * u
+    psi, r = psi + errors.heading_bias_rad, r * errors.yaw_rate_factor
+    return (x + noise[0], y + noise[1], psi + noise[2]), (u + noise[3], v + noise[4], r + noise[5])
+
+
+def navigation_sent(scenario: Scenario, seed: int, n: int, step_s: float) -> Flags:
+    """Return in which control cycles the navigation sends anything, shape (n,)."""
+    navigation = scenario.sensors.navigation
+    t = np.arange(n, dtype=np.float64) * step_s
+    return ~gaps(generator(seed, "navigation gaps"), t, navigation.dropouts_per_min, navigation.dropout_s)
+
+
+def controller_weather(
+    scenario: Scenario, seed: int, wind: Floats, current: Floats, payload: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return wind, current and payload as the feedforward gets them, one row a control cycle.
+
+    Each is sampled at its topic's rate and phase, noisy, and held; zero before the first sample, and where the topic is left
+    out. The anemometer's errors act on both components alike.
+
+    Parameters
+    ----------
+    scenario, seed
+        Of the trial.
+    wind, current
+        Truth over ground, north and east, one row a control cycle [m/s], shape (m, 2).
+    payload
+        Truth, mass aboard [kg] and its place [m], shape (m, 2).
+    """
+    sensors, noise = scenario.sensors, scenario.sensors.noise
+    t = np.arange(len(wind)) / sensors.navigation_rate_hz
+    asked = (
+        ("wind", wind, sensors.wind_rate_hz, (noise.wind_speed_mps, noise.wind_speed_mps)),
+        ("current", current, sensors.current_rate_hz, (noise.current_mps, noise.current_mps)),
+        ("payload", payload, sensors.payload_rate_hz, (noise.payload_kg, 0.0)),
+    )
+    made = []
+    for name, truth, rate_hz, std in asked:
+        seen = np.zeros((len(t), 2))
+        if rate_hz > 0.0:
+            taken = np.arange(PHASES_S[name], t[-1], 1.0 / rate_hz)
+            random = generator(seed, f"controller {name}")
+            values = interpolated(taken, t, truth)
+            for axis in range(2):
+                values[:, axis] += std[axis] * random.standard_normal(len(taken))
+            row = np.searchsorted(taken, t, side="right") - 1
+            seen[row >= 0] = values[row[row >= 0]]
+        made.append(seen)
+    return made[0], made[1], made[2]
+
+
+def wind_series(scenario: Scenario, seed: int, n: int, step_s: float) -> tuple[Floats, Floats]:
+    """Return the wind's north and east components [m/s] every `step_s` seconds: steady part, gusts, recorded series."""
+    wind = scenario.wind
+    north, east = (
+        steady + gusts(generator(seed, f"gust {axis}"), n, step_s, wind.gust_std_mps, wind.gust_time_s)
+        for axis, steady in (("north", wind.north_mps), ("east", wind.east_mps))
+    )
+    return north, east
