@@ -45,6 +45,12 @@ def cautions(
     seconds = sum(float(mask.sum()) / motion.rate_hz for motion, mask in zip(motions, parts.validation, strict=True))
     if seconds < LEAST_VALIDATION_S:
         warnings.append(f"Only {seconds:.0f} s validate: the verdict rests on little data.")
+    weighed = [motion.payload is not None for motion in motions]
+    if any(weighed) and not all(weighed):
+        warnings.append(
+            f"{len(weighed) - sum(weighed)} of {len(weighed)} logs have no payload measured and are taken as empty: a load "
+            "aboard there ends up in the coefficients."
+        )
     if settings.residual == "commanded":
         warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
     for axis in AXES:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ferryid.errors import FerryIdError
 from ferryid.identify.estimate import base_estimator, estimator
-from ferryid.identify.excitation import RANGE_UNITS, range_columns
+from ferryid.identify.excitation import RANGE_UNITS, payload_kg, range_columns
 from ferryid.identify.free_run import free_run
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.scores import force_scores, free_run_plain, outside_ranges, usable
@@ -77,7 +77,8 @@ def evaluate(
         tau_base, tau_model = base.of(motion), new.of(motion)
         rows = usable(motion, tau_model)
         parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))
-        outside = outside_ranges(range_columns(motion.nu[rows], motion.nu_dot[rows]), model.ranges)
+        columns = range_columns(motion.nu[rows], motion.nu_dot[rows], payload_kg(motion, rows))
+        outside = outside_ranges(columns, model.ranges)
         entries.append(
             {
                 "name": motion.log,
@@ -90,7 +91,7 @@ def evaluate(
                     "model": free_run_plain(free_run(new, [motion], [rows])),
                 },
                 "outside": outside,
-                "warnings": _warnings(prepared.recording.sha256, model, outside),
+                "warnings": _warnings(prepared.recording.sha256, model, outside, motion.payload is not None),
                 "data_quality": prepared.quality,
             }
         )
@@ -105,8 +106,10 @@ def evaluate(
     }
 
 
-def _warnings(sha256: str, model: Model, outside: dict[str, float]) -> list[str]:
+def _warnings(sha256: str, model: Model, outside: dict[str, float], weighed: bool) -> list[str]:
     warnings = []
+    if not weighed and "payload_kg" in model.ranges:
+        warnings.append("the model was trained with the payload known, and this log has none: it is taken as empty")
     if any(log["sha256"] == sha256 for log in model.training):
         warnings.append("the model was trained on this log: its scores here are no evidence")
     for name, share in outside.items():

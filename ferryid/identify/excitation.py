@@ -55,9 +55,12 @@ def excitation(
     nu = np.concatenate([motion.nu[mask] for motion, mask in zip(motions, masks, strict=True)])
     nu_dot = np.concatenate([motion.nu_dot[mask] for motion, mask in zip(motions, masks, strict=True)])
     psi = np.concatenate([motion.eta[mask, 2] for motion, mask in zip(motions, masks, strict=True)])
+    payload = None
+    if any(motion.payload is not None for motion in motions):
+        payload = np.concatenate([payload_kg(motion, mask) for motion, mask in zip(motions, masks, strict=True)])
     return Excitation(
         singular_values=singular_values(source),
-        ranges=ranges(nu, nu_dot),
+        ranges=ranges(nu, nu_dot, payload),
         heading_coverage=heading_coverage(psi),
         undetermined=undetermined(source, terms, allowed),
         vip=vip,
@@ -155,25 +158,41 @@ def _tied(
     return reasons
 
 
-RANGE_UNITS = {"u": "m/s", "v": "m/s", "r": "rad/s", "u_dot": "m/s²", "v_dot": "m/s²", "r_dot": "rad/s²", "U": "m/s"}
+RANGE_UNITS = {
+    **dict.fromkeys(("u", "v", "U"), "m/s"),
+    "r": "rad/s",
+    **dict.fromkeys(("u_dot", "v_dot"), "m/s²"),
+    "r_dot": "rad/s²",
+    "payload_kg": "kg",
+}
 
 
-def ranges(nu: Floats, nu_dot: Floats) -> dict[str, tuple[float, float]]:
-    """0.5 % and 99.5 % quantiles of speed, velocities and accelerations, SI; both arguments of shape (n, 3)."""
+def ranges(nu: Floats, nu_dot: Floats, payload: Floats | None = None) -> dict[str, tuple[float, float]]:
+    """0.5 % and 99.5 % quantiles of what `range_columns` gives."""
     found = {}
-    for name, values in range_columns(nu, nu_dot).items():
+    for name, values in range_columns(nu, nu_dot, payload).items():
         low, high = np.quantile(values, _QUANTILES) if len(values) else (np.nan, np.nan)
         found[name] = (float(low), float(high))
     return found
 
 
-def range_columns(nu: Floats, nu_dot: Floats) -> dict[str, Floats]:
-    """Return the columns that ranges of validity are given for: u, v, r, u_dot, v_dot, r_dot and the speed U, SI."""
+def range_columns(nu: Floats, nu_dot: Floats, payload: Floats | None = None) -> dict[str, Floats]:
+    """Return the columns that ranges of validity are given for: u, v, r, u_dot, v_dot, r_dot and the speed U, SI.
+
+    The velocities and accelerations have the shape (n, 3). A payload [kg], shape (n,), has a range where it is known: its
+    mass is, but not what the deeper draught does to damping and added mass.
+    """
     return {
+        **({} if payload is None else {"payload_kg": payload}),
         **{name: nu[:, i] for i, name in enumerate("uvr")},
         **{f"{name}_dot": nu_dot[:, i] for i, name in enumerate("uvr")},
         "U": np.hypot(nu[:, 0], nu[:, 1]),
     }
+
+
+def payload_kg(motion: Motion, rows: Flags) -> Floats:
+    """Return the payload on the marked rows [kg], none where the log does not measure it, shape (rows,)."""
+    return np.zeros(int(rows.sum())) if motion.payload is None else motion.payload[rows, 0]
 
 
 def heading_coverage(psi: Floats) -> float:

@@ -306,6 +306,13 @@ def _provenance(result: FitResult) -> list[dict[str, str]]:
         ("settings", ", ".join(f"{key} = {value}" for key, value in model.settings.items())),
         ("base model scaled by", ", ".join(f"{key} = {value:g}" for key, value in model.scale.items())),
     ]
+    known = [
+        name
+        for name in ("wind", "current", "payload")
+        if any(getattr(log.motion, name) is not None for log in result.logs)
+    ]
+    if known:
+        rows.append(("measured, and known to the model", ", ".join(known)))
     for log in model.training:
         rows.append(
             (

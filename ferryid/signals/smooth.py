@@ -23,6 +23,8 @@ SMOOTHERS = ("square", "savgol", "kalman")
 _POLYNOMIAL = 3
 _WEATHER_SHARE = 0.8
 """Wind, current or payload is used where it was measured on this share of the rows; fewer, and it is left out."""
+LEAST_PAYLOAD, MOST_PAYLOAD = -0.5, 10.0
+"""Parts of the hull's own mass between which a payload is believed. A scale errs below zero, and a pontoon carries much."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ def measure(track: Track, profile: Profile) -> Measured:
         _known(track, columns.get(f"{what}_N"), columns.get(f"{what}_E"), what, usable, repairs)
         for what in ("wind", "current")
     )
-    payload = _payload(track, usable, repairs)
+    payload = _payload(track, profile, usable, repairs)
     through_water = nu if current is None else nu - current_in_body(current, eta[:, 2])
     tau, notes = applied_force(profile, columns, through_water)
     repairs.extend(notes)
@@ -286,8 +288,14 @@ def _within(measured: Measured, half: int) -> Flags:
     return valid
 
 
-def _payload(track: Track, usable: Flags, repairs: list[str]) -> Floats | None:
-    """Return the payload [kg] and its place [m], shape (n, 2), and tell its range; else like `_known`."""
+def _payload(track: Track, profile: Profile, usable: Flags, repairs: list[str]) -> Floats | None:
+    """Return the payload [kg] and its place [m], shape (n, 2), and tell its range; else like `_known`.
+
+    Raises
+    ------
+    FerryIdError
+        For a payload that the vessel cannot carry: a wrong unit, or the whole displacement.
+    """
     mass, place = track.columns.get("payload_kg"), track.columns.get("payload_x")
     if mass is not None and place is not None:
         # Nothing has no place.
@@ -295,6 +303,12 @@ def _payload(track: Track, usable: Flags, repairs: list[str]) -> Floats | None:
     payload = _known(track, mass, place, "payload", usable, repairs)
     if payload is not None and usable.any():
         (least, aft), (most, fore) = payload[usable].min(axis=0), payload[usable].max(axis=0)
+        hull_kg = profile.hull.mass_kg
+        if least < LEAST_PAYLOAD * hull_kg or most > MOST_PAYLOAD * hull_kg:
+            raise FerryIdError(
+                f"{track.log}: the payload cannot be right, found {least:.5g} to {most:.5g} kg on a vessel of "
+                f"{hull_kg:.5g} kg. Fix: correct unit, sign or offset of signals.payload in the profile"
+            )
         weight = f"{least:.0f} to {most:.0f} kg" if most > least else f"{most:.0f} kg"
         where = f"{aft:.2f} to {fore:.2f} m" if fore > aft else f"{fore:.2f} m"
         repairs.append(f"Payload: {weight} at x = {where}, which the model knows as mass.")
