@@ -1,0 +1,31 @@
+"""Current over ground, steady or slowly turning."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.simulate.compiled import compiled
+from ferryid.simulate.elementary import cos, sin
+from ferryid.simulate.sections import Current
+
+Floats = NDArray[np.float64]
+
+
+def turn_rate(current: Current) -> float:
+    """Return how fast the current turns [rad/s], clockwise from above."""
+    return current.turn_degpmin * pi / 180.0 / 60.0
+
+
+@compiled
+def current_series(north: float, east: float, turn_radps: float, n: int, step_s: float) -> Floats:
+    """Return the velocity of the water over ground every `step_s` seconds, shape (n, 2) [m/s, north and east]."""
+    series = np.empty((n, 2))
+    for i in range(n):
+        angle = turn_radps * (i * step_s)
+        c, s = cos(angle), sin(angle)
+        series[i, 0] = c * north - s * east
+        series[i, 1] = s * north + c * east
+    return series

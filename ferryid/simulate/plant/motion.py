@@ -1,0 +1,248 @@
+"""The vessel in motion: all loads together, and one Runge-Kutta step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError
+from ferryid.simulate.compiled import compiled
+from ferryid.simulate.elementary import cos, sin
+from ferryid.simulate.noise import wind_series
+from ferryid.simulate.plant import rolling
+from ferryid.simulate.plant.current import current_series, turn_rate
+from ferryid.simulate.plant.hull import (
+    Force,
+    Hydrodynamics,
+    State,
+    coriolis_load,
+    damping_load,
+    fouled,
+    hydrodynamics,
+    perturbed,
+)
+from ferryid.simulate.plant.mooring import Spring, mooring_load
+from ferryid.simulate.plant.payload import Masses
+from ferryid.simulate.plant.phases import Phases, phases_of
+from ferryid.simulate.plant.shallow import Patch, damping_factor, patch_of
+from ferryid.simulate.plant.thrusters import Gear, gear_of, move, stand, thrust_load
+from ferryid.simulate.plant.waves import Sea, sea_of, wave_load
+from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
+from ferryid.vessel.profile import Profile
+
+if TYPE_CHECKING:
+    from ferryid.simulate.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+
+class Plant(NamedTuple):
+    """All that the vessel's motion depends on. One run at a time: `gear.acting` and `sea.terms` are written to.
+
+    `added` is the added mass in the order of `hull.MASS`. `wind` and `current` (2 steps + 1, 2) are velocities over ground,
+    north and east [m/s], every half step.
+    """
+
+    p: Hydrodynamics
+    added: Masses
+    areas: Areas
+    wind: Floats
+    current: Floats
+    turn_radps: float
+    phases: Phases
+    gear: Gear
+    sea: Sea
+    spring: Spring
+    shallow: Patch
+
+
+def build(scenario: Scenario, profile: Profile, seed: int, h: float, steps: int) -> Plant:
+    """Return the plant of a scenario, for `steps` steps of `h` seconds.
+
+    Raises
+    ------
+    FerryIdError
+        When the profile lacks what the scenario needs, or a fault names a thruster that the vessel has not.
+    """
+    if not profile.hull.has_model:
+        raise FerryIdError(
+            f"{profile.name}: the simulator needs the hull's damping, found no [hull.D] in the profile. "
+            "Fix: simulate a vessel with a hull model, such as milliampere"
+        )
+    hull = fouled(perturbed(profile.hull, scenario.true_hull), scenario.fouling)
+    p = hydrodynamics(hull)
+    m, x_g, I_z = float(hull.mass_kg), float(hull.x_g_m), float(hull.inertia_z)
+    n = 2 * steps + 1
+    current, mooring = scenario.current, scenario.mooring
+    turn_radps = turn_rate(current)
+    return Plant(
+        p=p,
+        added=(p[0] - m, p[1] - m, p[2] - m * x_g, p[3] - m * x_g, p[4] - I_z),
+        areas=areas_of(profile.wind),
+        wind=np.column_stack(wind_series(scenario, seed, n, 0.5 * h)),
+        current=current_series(float(current.north_mps), float(current.east_mps), turn_radps, n, 0.5 * h),
+        turn_radps=turn_radps,
+        phases=phases_of(p, profile, scenario.payload, mooring, scenario.thrusters.faults, h, steps),
+        gear=gear_of(profile, scenario.thrusters, h),
+        sea=sea_of(profile, scenario.waves, scenario.wakes, seed),
+        spring=Spring(
+            float(mooring.north_m),
+            float(mooring.east_m),
+            float(mooring.stiffness_north_Npm),
+            float(mooring.stiffness_east_Npm),
+        ),
+        shallow=patch_of(scenario.shallow),
+    )
+
+
+def resting(plant: Plant) -> Floats:
+    """Return the actuators at rest, shape (k, 3): speed [rpm or N], angle or rudder [rad], lagged force [N]."""
+    gear = plant.gear
+    thrusters = np.zeros((len(gear.x), 3))
+    fixed = gear.steers == 0
+    thrusters[fixed, 1] = gear.angle[fixed]
+    return thrusters
+
+
+def payload_aboard(plant: Plant, steps: int) -> Floats:
+    """Return the payload's mass [kg] and place [m] in each of the first `steps` steps, shape (steps, 2)."""
+    return np.asarray(plant.phases.payload[plant.phases.of_step[:steps]])
+
+
+def roll_pitch(plant: Plant, t: Floats, eta: Floats) -> Floats:
+    """Return roll and pitch [rad] along a track, shape (n, 2); see `ferryid.simulate.plant.rolling.roll_pitch`."""
+    return rolling.roll_pitch(plant.sea, t, eta)
+
+
+@compiled
+def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: State) -> tuple[State, Force, Force]:
+    """Return the state's time derivative, the force of the actuators and that of the waves [N, N, N·m].
+
+    Rigid-body terms act on nu and added-mass terms on ``nu_r = nu - nu_c``. For an irrotational current the two add up to the
+    whole M and C acting on nu_r, with ``[r v_c, -r u_c, 0]`` added at the end; what is left is the force of a current
+    that changes over ground, on added mass alone.
+
+    Parameters
+    ----------
+    plant, phase
+        Plant, and the phase of the step.
+    node
+        0, 1 or 2: start, middle or end of the step.
+    i
+        Index of the time on the half-step grid.
+    t
+        The time itself [s].
+    state
+        See `State`.
+    """
+    x, y, psi, u, v, r = state
+    c, s = cos(psi), sin(psi)
+    north, east = plant.current[i, 0], plant.current[i, 1]
+    u_c, v_c = c * north + s * east, c * east - s * north
+    u_r, v_r = u - u_c, v - v_c
+    tau = thrust_load(plant.gear, node, u_r, v_r, r)
+    wave = wave_load(plant.sea, t, x, y, psi, c, s)
+    north, east = plant.wind[i, 0], plant.wind[i, 1]
+    blown = wind_load(plant.areas, u - c * north - s * east, v - c * east + s * north)
+    mass = plant.phases.mass[phase]
+    C = coriolis_load(mass[0], mass[1], mass[2], u_r, v_r, r)
+    D = damping_load(plant.p, u_r, v_r, r)
+    factor = damping_factor(plant.shallow, x, y)
+    X = tau[0] + wave[0] + blown[0] - C[0] - factor * D[0]
+    Y = tau[1] + wave[1] + blown[1] - C[1] - factor * D[1]
+    N = tau[2] + wave[2] + blown[2] - C[2] - factor * D[2]
+    if plant.phases.moored[phase] > 0.0:
+        held = mooring_load(plant.spring, x, y, c, s)
+        X, Y = X + held[0], Y + held[1]
+    if plant.turn_radps != 0.0:
+        # R^T dV/dt of a current that turns clockwise: the current itself, a quarter turn on.
+        u_t, v_t = -plant.turn_radps * v_c, plant.turn_radps * u_c
+        X += plant.added[0] * u_t
+        Y += plant.added[1] * v_t
+        N += plant.added[3] * v_t
+    inv = plant.phases.inverse[phase]
+    rates = (
+        c * u - s * v,
+        s * u + c * v,
+        r,
+        inv[0] * X + r * v_c,
+        inv[1] * Y + inv[2] * N - r * u_c,
+        inv[3] * Y + inv[4] * N,
+    )
+    return rates, tau, wave
+
+
+@compiled
+def _ahead(state: State, rates: State, d: float) -> State:
+    return (
+        state[0] + d * rates[0],
+        state[1] + d * rates[1],
+        state[2] + d * rates[2],
+        state[3] + d * rates[3],
+        state[4] + d * rates[4],
+        state[5] + d * rates[5],
+    )
+
+
+@compiled
+def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, orders: Floats) -> State:
+    """Take one classical Runge-Kutta step.
+
+    Parameters
+    ----------
+    plant
+        From `build`, with the same `h`.
+    i
+        Index of the step's start on the half-step grid; even.
+    h
+        Step [s].
+    state
+        At the start.
+    thrusters
+        Speed [rpm or N], angle [rad] and lagged force [N] of each, shape (k, 3); moved in place to the end of the step.
+    orders
+        Speed [rpm or N] and angle or rudder [rad] of each, shape (k, 2).
+
+    Returns
+    -------
+    State
+        At the end; with payload that boards there already aboard.
+    """
+    phases = plant.phases
+    step = i // 2
+    phase = phases.of_step[step]
+    t, d = step * h, 0.5 * h
+    move(plant.gear, thrusters, orders, phases.factor[phase], phases.offset[phase], h)
+    k1, _, _ = derivative(plant, phase, 0, i, t, state)
+    k2, _, _ = derivative(plant, phase, 1, i + 1, t + d, _ahead(state, k1, d))
+    k3, _, _ = derivative(plant, phase, 1, i + 1, t + d, _ahead(state, k2, d))
+    k4, _, _ = derivative(plant, phase, 2, i + 2, t + h, _ahead(state, k3, h))
+    d = h / 6.0
+    x, y, psi, u, v, r = state
+    x += d * (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0])
+    y += d * (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1])
+    psi += d * (k1[2] + 2.0 * (k2[2] + k3[2]) + k4[2])
+    u += d * (k1[3] + 2.0 * (k2[3] + k3[3]) + k4[3])
+    v += d * (k1[4] + 2.0 * (k2[4] + k3[4]) + k4[4])
+    r += d * (k1[5] + 2.0 * (k2[5] + k3[5]) + k4[5])
+    later = phases.of_step[min(step + 1, len(phases.of_step) - 1)]
+    if later != phase:
+        b = phases.boarding[later]
+        u, v, r = b[0] * u, b[1] * v + b[2] * r, b[3] * v + b[4] * r
+    return x, y, psi, u, v, r
+
+
+@compiled
+def observe(plant: Plant, i: int, h: float, state: State, thrusters: Floats, row: Floats) -> None:
+    """Write the acceleration, the force of the actuators that really acts and that of the waves into ``row[0:9]``.
+
+    Parameters as of `advance`, which it leaves as it is.
+    """
+    phases = plant.phases
+    phase = phases.of_step[i // 2]
+    stand(plant.gear, thrusters, phases.factor[phase], phases.offset[phase])
+    rates, tau, wave = derivative(plant, phase, 0, i, (i // 2) * h, state)
+    for j in range(3):
+        row[j], row[3 + j], row[6 + j] = rates[3 + j], tau[j], wave[j]
