@@ -346,6 +346,7 @@ def test_bundled_names_and_text_survive_embedding() -> None:
         "kvlcc2-model",
         "milliampere",
         "milliampere-2025",
+        "revolt",
         "vtec-usv",
     )
     for name in bundled():
