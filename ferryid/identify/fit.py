@@ -270,14 +270,15 @@ def regress(
     most = min(MAX_COMPONENTS, len(functions.terms))
     tau = np.concatenate([motion.tau[mask] for motion, mask in zip(motions, parts.training, strict=True)])
     base = tau - np.concatenate([target[mask] for target, mask in zip(targets, parts.training, strict=True)])
-    axes = unforced(tau, base) if settings.inertia == "auto" else np.zeros(3, dtype=bool)
+    fitted = functions.mask.any(axis=0)
+    axes = unforced(tau, base) & fitted if settings.inertia == "auto" else np.zeros(3, dtype=bool)
     told = {axis: reason(axis, np.zeros((3, 3)), profile, True) for axis in np.flatnonzero(axes).tolist()}
     while True:
         functions = replace(functions, mask=without_inertia(functions.mask, functions.terms, axes))
         model_fit = simpls(training, most, allowed=functions.mask)
         chosen = _components(settings, functions, motions, targets, parts, most, type(training))
         mass = effective_mass(profile, settings.scale, functions.terms, model_fit.coefficients[chosen - 1] + already)
-        more = unbelievable(profile, mass) & ~axes
+        more = unbelievable(profile, mass) & fitted & ~axes
         if settings.inertia == "fitted" or not more.any():
             return functions, model_fit, chosen, tuple(told.values())
         told |= {axis: reason(axis, mass, profile, False) for axis in np.flatnonzero(more).tolist()}
