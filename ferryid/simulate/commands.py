@@ -10,7 +10,7 @@ import numpy as np
 
 from ferryid.simulate.logs import check_output, write_log
 from ferryid.simulate.scenario import list_scenarios, load_scenario
-from ferryid.simulate.trial import simulate
+from ferryid.simulate.trial import Simulation, simulate
 
 SCHEMA = "ferryid.simulate/1"
 
@@ -40,7 +40,7 @@ def run_scenario(
     simulation = simulate(asked, seed)
     write_log(simulation, out, truth, storage=storage, overwrite=overwrite)
     control = simulation.control
-    error = simulation.truth.eta[:: len(simulation.truth.t) // len(control.t)] - control.eta_d
+    position_m, heading_deg = _tracking(simulation)
     return {
         "schema": SCHEMA,
         "scenario": asked.name,
@@ -52,11 +52,23 @@ def run_scenario(
         "truth": None if truth is None else str(truth),
         "topics": {stream.topic: len(stream.stamp_ns) for stream in simulation.streams},
         "tracking_rms": {
-            "position_m": float(np.sqrt(np.mean(np.sum(error[:, :2] ** 2, axis=1)))),
-            "heading_deg": float(np.degrees(np.sqrt(np.mean(error[:, 2] ** 2)))),
+            "position_m": position_m,
+            "heading_deg": heading_deg,
         },
         "saturated_share": float(np.mean(control.saturated)),
     }
+
+
+def _tracking(simulation: Simulation) -> tuple[float | None, float | None]:
+    """Return the rms distance [m] and angle [deg] from the reference; None where a manoeuvre has none."""
+    if simulation.scenario.manoeuvre.kind:
+        return None, None
+    truth, control = simulation.truth, simulation.control
+    error = truth.eta[:: len(truth.t) // len(control.t)] - control.eta_d
+    return (
+        float(np.sqrt(np.mean(np.sum(error[:, :2] ** 2, axis=1)))),
+        float(np.degrees(np.sqrt(np.mean(error[:, 2] ** 2)))),
+    )
 
 
 def render_simulation(result: Mapping[str, Any]) -> str:
@@ -70,10 +82,11 @@ def render_simulation(result: Mapping[str, Any]) -> str:
     width = max(len(topic) for topic in result["topics"])
     lines += [f"  {topic:<{width}}  {count:>7} messages" for topic, count in result["topics"].items()]
     rms = result["tracking_rms"]
-    lines.append(
-        f"kept to its reference within {rms['position_m']:.2f} m and {rms['heading_deg']:.1f} deg (rms), "
-        f"thrust saturated {100.0 * result['saturated_share']:.1f} % of the time"
-    )
+    if rms["position_m"] is not None:
+        lines.append(
+            f"kept to its reference within {rms['position_m']:.2f} m and {rms['heading_deg']:.1f} deg (rms), "
+            f"thrust saturated {100.0 * result['saturated_share']:.1f} % of the time"
+        )
     return "\n".join(lines)
 
 
