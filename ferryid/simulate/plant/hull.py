@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeAlias
 
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.sections import Fouling
 from ferryid.vessel.profile import Hull
 
@@ -53,7 +53,7 @@ def fouled(hull: Hull, fouling: Fouling) -> Hull:
     return replace(hull, D={name: value * (factors[name[0]] if "|" in name else 1.0) for name, value in hull.D.items()})
 
 
-@compiled
+@borrowing
 def coriolis_load(m11: float, m22: float, m23: float, u: float, v: float, r: float) -> Force:
     """Return C(nu) nu [N, N, N·m]; `m23` is the mean of m23 and m32.
 
@@ -66,7 +66,7 @@ def coriolis_load(m11: float, m22: float, m23: float, u: float, v: float, r: flo
     return c13 * r, c23 * r, -c13 * u - c23 * v
 
 
-@compiled
+@borrowing
 def damping_load(p: Hydrodynamics, u: float, v: float, r: float) -> Force:
     """Return D(nu) nu [N, N, N·m] for velocities through the water [m/s, m/s, rad/s]; (2.12)-(2.14)."""
     au, av, ar = abs(u), abs(v), abs(r)
@@ -76,7 +76,7 @@ def damping_load(p: Hydrodynamics, u: float, v: float, r: float) -> Force:
     return X, Y, N
 
 
-@compiled
+@borrowing
 def hull_load(p: Hydrodynamics, u: float, v: float, r: float) -> Force:
     """Return C(nu) nu + D(nu) nu [N, N, N·m] for velocities through the water [m/s, m/s, rad/s]."""
     C = coriolis_load(p[0], p[1], 0.5 * (p[2] + p[3]), u, v, r)
@@ -84,7 +84,7 @@ def hull_load(p: Hydrodynamics, u: float, v: float, r: float) -> Force:
     return C[0] + D[0], C[1] + D[1], C[2] + D[2]
 
 
-@compiled
+@borrowing
 def required_force(p: Hydrodynamics, u_dot: float, v_dot: float, r_dot: float, u: float, v: float, r: float) -> Force:
     """Return M nu_dot + C nu + D nu [N, N, N·m]: what a motion through still water takes, (2.3)."""
     X, Y, N = hull_load(p, u, v, r)

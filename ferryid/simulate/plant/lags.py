@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import exp
+from ferryid.simulate.plant.borrowing import borrowing
 
 Weights = tuple[float, float, float, float]
 """What is kept of the old value, then the weights of the input at start, middle and end of a step."""
 
 
-@compiled
+@borrowing
 def follow(value: float, order: float, lag_s: float, rate_limit: float, h: float, decay: float) -> float:
     """Return where a first-order lag with a rate limit stands after `h` seconds of a constant order; exact.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.hull import Force
 
 
@@ -17,7 +17,7 @@ class Spring(NamedTuple):
     stiffness_east_Npm: float
 
 
-@compiled
+@borrowing
 def mooring_load(spring: Spring, x: float, y: float, cos_psi: float, sin_psi: float) -> Force:
     """Return the spring's force on the body origin in the body frame [N, N, N·m]; no moment."""
     north = -spring.stiffness_north_Npm * (x - spring.north_m)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import cos, sin
 from ferryid.simulate.noise import wind_series
 from ferryid.simulate.plant import rolling
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.current import current_series, turn_rate
 from ferryid.simulate.plant.hull import (
     Force,
@@ -116,7 +116,7 @@ def roll_pitch(plant: Plant, t: Floats, eta: Floats) -> Floats:
     return rolling.roll_pitch(plant.sea, t, eta)
 
 
-@compiled
+@borrowing
 def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: State) -> tuple[State, Force, Force]:
     """Return the state's time derivative, the force of the actuators and that of the waves [N, N, N·m].
 
@@ -174,7 +174,7 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     return rates, tau, wave
 
 
-@compiled
+@borrowing
 def _ahead(state: State, rates: State, d: float) -> State:
     return (
         state[0] + d * rates[0],
@@ -186,7 +186,7 @@ def _ahead(state: State, rates: State, d: float) -> State:
     )
 
 
-@compiled
+@borrowing
 def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, orders: Floats) -> State:
     """Take one classical Runge-Kutta step.
 
@@ -234,7 +234,7 @@ def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, ord
     return x, y, psi, u, v, r
 
 
-@compiled
+@borrowing
 def observe(plant: Plant, i: int, h: float, state: State, thrusters: Floats, row: Floats) -> None:
     """Write the acceleration, the force of the actuators that really acts and that of the waves into ``row[0:9]``.
 

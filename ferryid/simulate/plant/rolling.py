@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import cos, exp, sin
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.waves import GRAVITY, Sea, slopes
 
 Floats = NDArray[np.float64]
@@ -60,7 +60,7 @@ def roll_pitch(sea: Sea, t: Floats, eta: Floats) -> Floats:
     return attitude
 
 
-@compiled
+@borrowing
 def _slopes_along(sea: Sea, t: Floats, eta: Floats, out: Floats) -> None:
     """Write the roll and the pitch of a hull that lies flat on the water, everywhere along the track."""
     for i in range(len(t)):
@@ -68,7 +68,7 @@ def _slopes_along(sea: Sea, t: Floats, eta: Floats, out: Floats) -> None:
         out[i, 0], out[i, 1] = -starboard, forward
 
 
-@compiled
+@borrowing
 def swing(values: Floats, omega: float, damping: float, h: float) -> None:
     """Turn what drives an oscillator into its answer, in place; it starts at rest in equilibrium.
 

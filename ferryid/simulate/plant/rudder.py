@@ -7,8 +7,8 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import atan2, cos, sin
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.hull import Force
 from ferryid.vessel.profile import Actuator
 from ferryid.vessel.thrusters import FRESH_WATER
@@ -39,7 +39,7 @@ def rudder_row(actuator: Actuator) -> tuple[float, ...]:
     return (*numbers, float(inflow["diameter_m"]), float(inflow.get("water_density", FRESH_WATER)))
 
 
-@compiled
+@borrowing
 def rudder_load(row: Floats, delta: float, thrust: float, u_p: float, v: float, r: float) -> Force:
     """Return the force of a rudder on the hull [N, N, N·m].
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.sections import Shallow
 
 
@@ -25,14 +25,14 @@ def patch_of(shallow: Shallow) -> Patch:
     return Patch(south, north, west, east, shallow.damping_factor, shallow.edge_m)
 
 
-@compiled
+@borrowing
 def _share(outside: float, edge_m: float) -> float:
     """Return 1 at the rectangle and 0 from `edge_m` on, with no kink in between."""
     s = 1.0 - min(max(outside / edge_m, 0.0), 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
-@compiled
+@borrowing
 def damping_factor(patch: Patch, x: float, y: float) -> float:
     """Return the factor on the damping at a place [m]."""
     if patch.factor == 1.0:

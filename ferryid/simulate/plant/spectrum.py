@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import exp, log
+from ferryid.simulate.plant.borrowing import borrowing
 
 Floats = NDArray[np.float64]
 
@@ -17,7 +18,7 @@ LOWEST, HIGHEST = 0.4, 5.0
 INTERVALS = 4600
 
 
-@compiled
+@borrowing
 def jonswap(share: float, gamma: float) -> float:
     """Return the spectral density, but for a constant factor, at a share of the peak frequency.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.vessel.profile import Actuator, Profile, ThrustCurve
 from ferryid.vessel.thrusters import FRESH_WATER
 
@@ -117,7 +117,7 @@ def _curve(profile: Profile, actuator: Actuator) -> ThrustCurve:
     return curve
 
 
-@compiled
+@borrowing
 def force_at(curves: Curves, k: int, speed: float) -> float:
     """Return the bollard force [N] of actuator k at a speed [rpm]; beyond the range that of its end."""
     if curves.direct[k]:
@@ -134,7 +134,7 @@ def force_at(curves: Curves, k: int, speed: float) -> float:
     return float(curves.forces[k, side, node] * (1.0 - share) + curves.forces[k, side, node + 1] * share)
 
 
-@compiled
+@borrowing
 def speed_for(curves: Curves, k: int, force: float) -> float:
     """Return the speed [rpm] of actuator k, of the force's sign, that gives a force [N]; out of reach, that of the largest."""
     if curves.direct[k]:
@@ -159,7 +159,7 @@ def speed_for(curves: Curves, k: int, force: float) -> float:
     return float(end * ((low + share) / (NODES - 1)))
 
 
-@compiled
+@borrowing
 def largest_force(curves: Curves, k: int, ahead: bool) -> float:
     """Return the largest force [N] of actuator k ahead or astern, without its sign; infinite for a direct force."""
     if curves.direct[k]:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import cos, sin
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.lags import Weights, decay_of, follow, lag_weights
 from ferryid.simulate.plant.rudder import COLUMNS, rudder_load, rudder_row
@@ -134,7 +134,7 @@ def gear_of(profile: Profile, dynamics: Thrusters, h: float) -> Gear:
     return gear
 
 
-@compiled
+@borrowing
 def move(gear: Gear, thrusters: Floats, orders: Floats, factor: Floats, offset: Floats, h: float) -> None:
     """Move all actuators towards their orders for one step, and note how they act at its start, middle and end.
 
@@ -180,7 +180,7 @@ def move(gear: Gear, thrusters: Floats, orders: Floats, factor: Floats, offset: 
             _interact(gear, node)
 
 
-@compiled
+@borrowing
 def stand(gear: Gear, thrusters: Floats, factor: Floats, offset: Floats) -> None:
     """Note how the actuators act at the start of a step, without moving them; parameters as of `move`."""
     for k in range(len(gear.x)):
@@ -194,7 +194,7 @@ def stand(gear: Gear, thrusters: Floats, factor: Floats, offset: Floats) -> None
         _interact(gear, 0)
 
 
-@compiled
+@borrowing
 def _note(
     gear: Gear, node: int, k: int, n: float, a: float, f: float, deficit: float, factor: float, offset: float
 ) -> None:
@@ -209,7 +209,7 @@ def _note(
     acting[DEFICIT] = deficit
 
 
-@compiled
+@borrowing
 def _interact(gear: Gear, node: int) -> None:
     """Take off what each thruster loses in the wakes of the others.
 
@@ -245,7 +245,7 @@ def _interact(gear: Gear, node: int) -> None:
         acting[i, FACTOR] *= acting[i, KEEP]
 
 
-@compiled
+@borrowing
 def thrust_load(gear: Gear, node: int, u: float, v: float, r: float) -> Force:
     """Return the force of all actuators on the hull [N, N, N·m].
 
@@ -280,7 +280,7 @@ def thrust_load(gear: Gear, node: int, u: float, v: float, r: float) -> Force:
     return X, Y, N
 
 
-@compiled
+@borrowing
 def _open_water(gear: Gear, k: int, n: float, u_p: float) -> float:
     """Return ``rho n² D⁴ K_T(J)`` of all units, deduction taken off [N]; K_T is linear between its points."""
     if n == 0.0:

@@ -19,6 +19,7 @@ from ferryid.errors import FerryIdError
 from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import cos, exp, sin
 from ferryid.simulate.noise import generator
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.spectrum import components, deep_water
 from ferryid.simulate.sections import Wake, Waves
@@ -115,7 +116,7 @@ def _box(profile: Profile) -> tuple[float, float, float]:
     return float(hull.length_m), float(hull.beam_m), float(draught_m)
 
 
-@compiled
+@borrowing
 def sinc(p: float) -> float:
     """Return ``sin p / p``."""
     if abs(p) < 0.1:
@@ -124,7 +125,7 @@ def sinc(p: float) -> float:
     return sin(p) / p
 
 
-@compiled
+@borrowing
 def lever(p: float) -> float:
     """Return ``(sin p - p cos p) / p²``, the spherical Bessel function of first order."""
     if abs(p) < 0.3:
@@ -162,7 +163,7 @@ def amplitudes(number: Floats, amplitude: Floats, direction: Floats, box: tuple[
     return table
 
 
-@compiled
+@borrowing
 def first_order(sea: Sea, t: float, x: float, y: float, psi: float) -> Force:
     """Return the Froude-Krylov force [N, N, N·m] at a time [s] on a vessel at a place [m] and heading [rad]."""
     count = len(sea.frequency)
@@ -210,7 +211,7 @@ def first_order(sea: Sea, t: float, x: float, y: float, psi: float) -> Force:
     return X, Y, N
 
 
-@compiled
+@borrowing
 def wave_load(sea: Sea, t: float, x: float, y: float, psi: float, cos_psi: float, sin_psi: float) -> Force:
     """Return the force of waves and wakes with the sea's mean drift [N, N, N·m]; parameters as of `first_order`."""
     X, Y, N = first_order(sea, t, x, y, psi)
@@ -223,7 +224,7 @@ def wave_load(sea: Sea, t: float, x: float, y: float, psi: float, cos_psi: float
     return X, Y, N
 
 
-@compiled
+@borrowing
 def slopes(sea: Sea, t: float, x: float, y: float, psi: float) -> tuple[float, float]:
     """Return the slope of the water under the hull, forward and to starboard [rad], as the box feels it.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import pi, sqrt
 from typing import NamedTuple
 
-from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import atan2
+from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.hull import Force
 from ferryid.vessel.profile import WindAreas
 
@@ -33,7 +33,7 @@ def areas_of(areas: WindAreas | None) -> Areas:
     return Areas(*(float(getattr(areas, name)) for name in Areas._fields))
 
 
-@compiled
+@borrowing
 def wind_load(w: Areas, u_rw: float, v_rw: float) -> Force:
     """Return the wind load [N, N, N·m] for the hull's velocity relative to the air [m/s].
 
