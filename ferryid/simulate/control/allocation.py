@@ -75,18 +75,18 @@ def build_allocation(scenario: Scenario, profile: Profile, curves: Curves) -> Al
     fits = k == 2 and bool(turns.all()) and x[0] != x[1] and all(a.position_m[1] == 0.0 for a in actuators)
     if wanted == "nsca" and not fits:
         raise FerryIdError(
-            f"{scenario.name}: NSCA allocation needs two azimuth thrusters on the centre line, found "
+            f"{scenario.where}: NSCA allocation needs two azimuth thrusters on the centre line, found "
             f'{_listed(actuators)} on {profile.name}. Fix: use allocation = "pseudo-inverse"'
         )
     if any(actuator.kind == "propeller_rudder" for actuator in actuators):
         raise FerryIdError(
-            f"{scenario.name}: a path needs force in every direction, and no force is allocated to a rudder, found "
+            f"{scenario.where}: a path needs force in every direction, and no force is allocated to a rudder, found "
             f"{_listed(actuators)} on {profile.name}. Fix: give [manoeuvre] in place of [path], or choose another vessel"
         )
     shares = _pseudo_inverse(actuators)
     if shares is None:
         raise FerryIdError(
-            f"{scenario.name}: a path needs actuators that push ahead, across and round independently, found "
+            f"{scenario.where}: a path needs actuators that push ahead, across and round independently, found "
             f"{_listed(actuators)} on {profile.name}. Fix: give [manoeuvre] in place of [path], or choose another vessel"
         )
     return Allocation(NSCA if fits and wanted != "pseudo-inverse" else PSEUDO_INVERSE, curves, x, turns, shares)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import sqrt
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from ferryid.identify.store import load_file
 from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.hull import Hydrodynamics, hydrodynamics, required_force
+from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
 from ferryid.vessel.parse_hull import rigid_mass
 from ferryid.vessel.profile import Profile
 
@@ -43,6 +43,8 @@ class Feedforward(NamedTuple):
     rigid, water
         Share of the hull that moves over ground, and the one that moves through the water: its damping, and the added mass;
         without measured current all of its mass, and `rigid` is zero.
+    areas
+        Wind areas of the model's vessel; all zero where it leaves the wind to theta.
     weather, flow, load
         Whether measured wind, current and payload are used.
     zeta
@@ -57,6 +59,7 @@ class Feedforward(NamedTuple):
 
     rigid: Hydrodynamics
     water: Hydrodynamics
+    areas: Areas
     weather: bool
     flow: bool
     load: bool
@@ -85,7 +88,7 @@ def build_feedforward(scenario: Scenario, profile: Profile, model: Model | None)
     """
     control, sensors = scenario.controller, scenario.sensors
     if model is None and control.model:
-        model = load_file((scenario.folder or Path()) / control.model)
+        model = load_file(scenario.file(control.model))
     if model is None:
         return feedforward_of(Estimator(profile, {"delta": control.delta, "sigma": control.sigma}))
     estimated = estimator(model)
@@ -95,7 +98,7 @@ def build_feedforward(scenario: Scenario, profile: Profile, model: Model | None)
     ):
         if needed and rate_hz == 0.0:
             raise FerryIdError(
-                f"{scenario.name}: the controller's model {model.name}@{model.version} needs measured {what}, found "
+                f"{scenario.where}: the controller's model {model.name}@{model.version} needs measured {what}, found "
                 f"{what}_rate_hz = 0. Fix: set {what}_rate_hz in [sensors], or use a model of a basis without {what}"
             )
     return feedforward_of(
@@ -119,6 +122,7 @@ def feedforward_of(
     return Feedforward(
         rigid=hydrodynamics(rigid),
         water=hydrodynamics(replace(hull, M=hull.M - rigid.M)),
+        areas=areas_of(estimated.profile.wind),
         weather=weather,
         flow=flow,
         load=load,
@@ -162,6 +166,9 @@ def ahead_of(
     # An irrotational current turns with the body: nu_c_dot = [r v_c, -r u_c, 0].
     W = required_force(model.water, nu_dot[0] - r * v_c, nu_dot[1] + r * u_c, nu_dot[2], u - u_c, v - v_c, r)
     X, Y, N = X + W[0], Y + W[1], N + W[2]
+    if model.weather:
+        A = wind_load(model.areas, u - u_w, v - v_w)
+        X, Y, N = X - A[0], Y - A[1], N - A[2]
     if model.load:
         m, x = payload
         sway = m * (nu_dot[1] + x * nu_dot[2] + u * r)

@@ -64,14 +64,11 @@ def build_guidance(scenario: Scenario) -> tuple[Guidance, Floats]:
     """
     path, chosen = scenario.path, scenario.guidance
     poses = np.array(path.poses, dtype=np.float64).reshape(-1, 3)
-    points = [(0.0, 0.0)]
-    for x, y, _ in path.poses:
-        if (x, y) != points[-1]:
-            points.append((x, y))
+    points = path.waypoints
     law = LAWS.index(chosen.law)
     if law != SET_POINTS and len(points) < 2 and not scenario.manoeuvre.kind:
         raise FerryIdError(
-            f'{scenario.name}: the guidance "{chosen.law}" follows a path, found no point away from the start. '
+            f'{scenario.where}: the guidance "{chosen.law}" follows a path, found no point away from the start. '
             'Fix: give [path] at least one point elsewhere, or use law = "set-points"'
         )
     guidance = Guidance(law, poses, path.dwell_s, np.array(points), chosen.radius_m, chosen.look_ahead_m)

@@ -102,7 +102,7 @@ def build_helm(scenario: Scenario, profile: Profile) -> tuple[Helm, Floats]:
         if not able.any():
             kinds = ", ".join(f"{actuator.kind} at {actuator.position_m}" for actuator in profile.actuators)
             raise FerryIdError(
-                f'{scenario.name}: the manoeuvre "{manoeuvre.kind}" needs {what}, found {kinds or "none"} on '
+                f'{scenario.where}: the manoeuvre "{manoeuvre.kind}" needs {what}, found {kinds or "none"} on '
                 f"{profile.name}. Fix: choose another manoeuvre or vessel"
             )
     return helm, np.zeros(2)
