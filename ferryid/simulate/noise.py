@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import zlib
 from math import pi, radians, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import cos, exp, log, sin
-
-if TYPE_CHECKING:
-    from ferryid.simulate.scenario import Scenario
-    from ferryid.simulate.sections import Noise
+from ferryid.simulate.scenario import Scenario, read_series
+from ferryid.simulate.sections import Noise
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.uint64]
@@ -340,10 +338,20 @@ def controller_weather(
 
 
 def wind_series(scenario: Scenario, seed: int, n: int, step_s: float) -> tuple[Floats, Floats]:
-    """Return the wind's north and east components [m/s] every `step_s` seconds: steady part, gusts, recorded series."""
+    """Return the wind's north and east components [m/s] every `step_s` seconds: steady part, gusts, recorded series.
+
+    Raises
+    ------
+    FerryIdError
+        When the recorded series cannot be read.
+    """
     wind = scenario.wind
     north, east = (
         steady + gusts(generator(seed, f"gust {axis}"), n, step_s, wind.gust_std_mps, wind.gust_time_s)
         for axis, steady in (("north", wind.north_mps), ("east", wind.east_mps))
     )
+    if wind.series:
+        grid, *recorded = read_series(scenario.file(wind.series))
+        series = interpolated(np.arange(n, dtype=np.float64) * step_s, grid, np.column_stack(recorded))
+        north, east = north + series[:, 0], east + series[:, 1]
     return north, east
