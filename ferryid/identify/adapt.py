@@ -175,7 +175,7 @@ def update_axes(
             "base_model": reference(model),
             "updated": [*(AXES[axis] for axis in numbers), *changed],
         },
-        theta=np.where(mask, model.theta + found.theta, model.theta),
+        theta=model.theta + found.theta,
         intercept=np.where(constant, model.intercept + found.intercept, model.intercept),
         low=np.where(mask, model.theta + found.low, model.low),
         high=np.where(mask, model.theta + found.high, model.high),

@@ -181,6 +181,10 @@ def test_surge_update_does_not_mind_that_nothing_acts_on_locked_axes() -> None:
     row = after.terms.index("u_dot")
     assert still.theta[row, 0] == before.theta[row, 0]
     assert after.theta[row, 0] == pytest.approx(before.theta[row, 0] + 500.0, rel=1e-3)
+    # Nor that the earlier model's inertia there cannot be.
+    light = before.theta.copy()
+    light[before.terms.index("v_dot"), 1] -= 5000.0
+    assert update_axes(replace(before, theta=light), [log]).settings["notes"] == []
 
 
 def test_surge_update_beats_a_whole_fit_of_a_crossing_elsewhere() -> None:
@@ -207,6 +211,7 @@ def test_update_of_given_terms_and_axes() -> None:
     kept = sorted(set(range(len(after.terms))) - set(rows))
     np.testing.assert_array_equal(after.covariance[1][np.ix_(kept, again)], 0.0)
     np.testing.assert_array_equal(after.covariance[1][np.ix_(kept, kept)], before.covariance[1][np.ix_(kept, kept)])
+    np.testing.assert_array_equal(after.covariance[1][np.ix_(again, kept)], 0.0)
     half = (after.high - after.low)[rows[0], 1] / 2.0
     assert half == pytest.approx(1.96 * after.covariance[1, rows[0], rows[0]] ** 0.5, rel=0.5)
     assert after.low[rows[0], 1] < after.theta[rows[0], 1] < after.high[rows[0], 1]
@@ -253,7 +258,7 @@ def refusals() -> list[tuple[str, object]]:
     log = motion(1)
     model = fit_motions(PROFILE, [log], WEAK)
     other = replace(model, profile_text=PROFILE.text.replace('"milliampere"', '"ferry"', 1))
-    spoilt = replace(model, terms=(*model.terms[:-1], "w"))
+    spoilt = replace(model, terms=model.terms[:-1], theta=model.theta[:-1])
     return [
         ("no motions", lambda: fit_motions(PROFILE, [], WEAK)),
         ("one mask", lambda: fit_motions(PROFILE, [log], WEAK, rows=[log.valid[:-1]])),

@@ -113,6 +113,11 @@ def test_logs_shared_over_a_third_model_tie_all_three() -> None:
     bridge = replace(c, training=(*a.training, *b.training), covariance=a.covariance)
     got = weighted([a, b, bridge], [0.25, 0.25, 0.5]).covariance
     np.testing.assert_allclose(got, 0.75 * a.covariance + 0.25 * b.covariance, rtol=1e-12)
+    # Also where the third is tied to the first by a log that the second does not have.
+    more = replace(a, training=(*a.training, *c.training))
+    chain = replace(a, training=(*a.training, *b.training))
+    got = weighted([more, chain, replace(c, covariance=b.covariance)], [0.25, 0.25, 0.5]).covariance
+    np.testing.assert_allclose(got, 0.5 * a.covariance + 0.5 * b.covariance, rtol=1e-12)
 
 
 def test_intervals_are_normal_ones() -> None:
@@ -140,7 +145,8 @@ def test_reference_tells_models_apart_but_not_dates() -> None:
 
 
 def test_ranges_span_and_logs_are_counted_once() -> None:
-    assert spanned([{"u": (0.0, 1.0)}, {"u": (-1.0, 0.5), "v": (2.0, 3.0)}]) == {"u": (-1.0, 1.0), "v": (2.0, 3.0)}
+    parts = [{"u": (0.0, 1.0)}, {"u": (-1.0, 0.5), "v": (2.0, 3.0)}]
+    assert spanned(parts) == spanned(parts[::-1]) == {"u": (-1.0, 1.0), "v": (2.0, 3.0)}
     small, large = {"sha256": "a", "rows": 3}, {"sha256": "a", "rows": 5}
     assert gathered([[small], [large, {"sha256": "b", "rows": 1}], [small]]) == (large, {"sha256": "b", "rows": 1})
 
