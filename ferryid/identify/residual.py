@@ -175,23 +175,23 @@ def _relief(profile: Profile, motion: Motion, scale: Mapping[str, float], first:
     still = np.zeros((count, 3))
     relief = still
 
-    def nu_dot(nu: Floats, start: int) -> Floats:
+    def nu_dot(nu: Floats, start: int, aboard: int) -> Floats:
         rows = slice(start, start + count)
         wind = None if motion.wind is None else motion.wind[rows]
         current = None if motion.current is None else motion.current[rows]
-        payload = None if motion.payload is None else motion.payload[rows]
+        payload = None if motion.payload is None else motion.payload[aboard : aboard + count]
         needed = force_of_motion(
             profile, scale, still, nu, motion.eta[rows, 2], wind=wind, current=current, payload=payload
         )
-        return _times(inverse, motion.tau[rows] - relief - needed, start - first)
+        return _times(inverse, motion.tau[rows] - relief - needed, aboard - first)
 
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(_PASSES):
             nu = motion.nu[first : first + count]
             for step in range(first, first + steps):
-                # Heun's rule uses the measured forces at both ends and invents none in between.
-                before = nu_dot(nu, step)
-                after = nu_dot(nu + dt * before, step + 1)
+                # Heun's rule uses the measured forces at both ends and invents none in between; a payload holds.
+                before = nu_dot(nu, step, step)
+                after = nu_dot(nu + dt * before, step + 1, step)
                 nu = nu + dt / 2 * (before + after)
             # What remains after a pass is what damping and turning took of its correction.
             parted = nu - motion.nu[first + steps : first + steps + count]

@@ -100,6 +100,20 @@ def test_a_fast_scale_is_not_averaged_over_a_step() -> None:
     fast = np.arange(0.0, 60.0, 0.01)
     track = aligned(fast, np.where(fast < 30.0, 0.0, 400.0))
     assert set(track.columns["payload_kg"].tolist()) == {0.0, 400.0}
+    assert not any("averaged" in said for said in track.repairs)
+
+
+def test_holds_in_a_table_with_everything_else_too() -> None:
+    fast = np.arange(0.0, 60.0, 0.01)
+    weighed = np.where(fast < 30.0, 0.0, 400.0)
+    weighed[np.arange(len(fast)) % 300 != 0] = np.nan
+    motion = {"psi": 0.01 * fast, "u": 0.1 * fast, "v": -0.02 * fast, "r": 0.01 + 1e-4 * fast}
+    table = stream("/navigation", fast, **motion, payload_kg=weighed, payload_x=np.full(len(fast), 0.2))
+    track = align(recording(table), PROFILE, 10.0)
+    assert set(track.columns["payload_kg"].tolist()) == {0.0, 400.0}
+    assert any(
+        s == "payload_kg: 5980 of 6000 samples are missing (NaN); the value before holds." for s in track.repairs
+    )
 
 
 def test_boarding_is_no_implausible_step_but_a_wild_sample_is() -> None:
