@@ -29,8 +29,8 @@ FOUR_CORNER: tuple[Pose, ...] = (
 """Surge, sway, yaw, surge with sway, and all three at once, in the manner of Skjetne et al. (2017)."""
 
 OPERATION: tuple[Waypoint, ...] = (
-    *((0.0, 0.0), (50.0, -12.0), (95.0, 14.0), (140.0, 10.0), (144.0, 23.0), (134.0, 34.0)),
-    *((92.0, 46.0), (50.0, 34.0), (8.0, 52.0), (-18.0, 24.0), (0.0, 0.0)),
+    *((0.0, 0.0), (35.0, -10.0), (70.0, 10.0), (105.0, 6.0), (109.0, 19.0), (98.0, 29.0), (62.0, 22.0)),
+    *((38.0, 52.0), (58.0, 76.0), (20.0, 112.0), (-26.0, 96.0), (-46.0, 52.0), (-12.0, 20.0), (0.0, 0.0)),
 )
 """A round of some 12 minutes in the manner of Aurlien (2021), Figure 5.16: two quick changes at the north end, then back."""
 
