@@ -41,8 +41,7 @@ class Feedforward(NamedTuple):
     Attributes
     ----------
     rigid, water
-        Share of the hull that moves over ground, and the one that moves through the water: its damping, and the added mass;
-        without measured current all of its mass, and `rigid` is zero.
+        Rigid body of the hull, which moves over ground, and its added mass and damping, which move through the water.
     areas
         Wind areas of the model's vessel; all zero where it leaves the wind to theta.
     weather, flow, load
@@ -114,7 +113,7 @@ def feedforward_of(
 ) -> Feedforward:
     """Return a model as numbers; `weather`, `flow` and `load` say whether wind, current and payload are measured."""
     hull = scaled(estimated.profile.hull, estimated.scale)
-    rigid = replace(hull, M=(1.0 if flow else 0.0) * rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z), D={})
+    rigid = replace(hull, M=rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z), D={})
     functions = () if estimated.basis is None else estimated.basis.functions
     factors = [[FACTORS.index(name) for name in (*term.factors, "1", "1")[:MOST]] for term in functions]
     theta = np.zeros((0, 3)) if estimated.theta is None else estimated.theta
@@ -157,7 +156,7 @@ def ahead_of(
     """
     u, v, r = nu
     c, s = cos(psi), sin(psi)
-    u_c = v_c = u_w = v_w = 0.0
+    u_c, v_c, u_w, v_w = 0.0, 0.0, 0.0, 0.0
     if model.flow:
         u_c, v_c = c * current[0] + s * current[1], c * current[1] - s * current[0]
     if model.weather:

@@ -11,10 +11,10 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.basis import BASES, CURRENT, DIMENSIONS, STRUCTURES, WIND, basis
+from ferryid.identify.basis import BASES, CURRENT, DIMENSIONS, STRUCTURES, WIND, Basis, Term, basis
 from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.model import to_json
-from ferryid.simulate.control.feedforward import FACTORS, ahead_of, build_feedforward, feedforward_of
+from ferryid.simulate.control.feedforward import ahead_of, build_feedforward, feedforward_of
 from ferryid.simulate.sections import Control, Sensors
 from ferryid.vessel import load_profile
 
@@ -72,7 +72,12 @@ def test_vessels_without_wind_areas_leave_the_wind_to_the_terms():
 
 
 def test_every_factor_has_its_place():
-    assert FACTORS[:-1] == tuple(DIMENSIONS)
+    """Also those that no basis has used so far, and products of three of them."""
+    names = list(DIMENSIONS)
+    terms = [Term(" ".join(part), part, (0,)) for part in [(a,) for a in names] + [*zip(names, names[5:], names[9:])]]  # noqa: B905
+    functions = Basis("all", "coupled", tuple(terms), np.ones((len(terms), 3), dtype=bool))
+    theta = np.random.default_rng(7).normal(size=(len(terms), 3))
+    assert_equal(Estimator(PROFILE, SCALE, functions, theta, np.zeros(3)), (True, True, False), 4)
 
 
 def test_steady_run_against_a_current():

@@ -61,6 +61,16 @@ def test_the_carrot_stops_at_the_last_point():
     assert goal(CARROT, 29.0, 19.0, leg=1)[0] == pytest.approx((30.0, 20.0, pi / 2))
 
 
+@pytest.mark.parametrize("law", [LOOK_AHEAD, ENCLOSURE])
+def test_at_the_last_point_the_heading_stays(law):
+    guidance, state = along(CORNER, law)
+    state[LEG] = 1
+    _, _, psi = guide(guidance, state, 0.0, (30.0, 14.0, 0.0))
+    assert psi == pytest.approx(pi / 2)
+    for x, y in ((31.0, 18.0), (29.0, 20.5), (28.0, 22.0)):
+        assert guide(guidance, state, 0.0, (x, y, 0.0)) == pytest.approx((30.0, 20.0, pi / 2))
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.floats(0.5, 20), st.floats(-12, 12), st.floats(1, 12))
 def test_look_ahead_heads_as_the_law_says(x, y, look_ahead):

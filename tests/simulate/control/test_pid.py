@@ -56,6 +56,9 @@ def test_feedback_pushes_back_in_the_body_frame(controller):
     # 1 m north of the goal, bow to the east: north is to port, so the push is to starboard.
     tau, _ = force((1.0, 0.0, pi / 2))
     assert tau == pytest.approx((0.0, gains.Kp[0], -gains.Kp[2] * pi / 2), abs=1e-9)
+    # 1 m east of it, that is ahead: the push is back.
+    tau, _ = force((0.0, 1.0, pi / 2))
+    assert tau == pytest.approx((-gains.Kp[1], 0.0, -gains.Kp[2] * pi / 2), abs=1e-9)
     # A heading error beyond half a turn goes the shorter way.
     tau, _ = force((0.0, 0.0, 1.5 * pi))
     assert tau[2] == pytest.approx(gains.Kp[2] * pi / 2)
