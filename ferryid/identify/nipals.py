@@ -23,6 +23,9 @@ TOLERANCE = 1e-6
 MOST_ITERATIONS = 500
 _EXHAUSTED = 1e-15
 """Stop when X'Y has fallen to this part of its first norm: what is left is rounding noise, as in SIMPLS."""
+_BLAS_ENTRIES = 9000
+"""Entries in one BLAS call, few enough that it starts no threads: these slow such products down many times over when
+other programs are busy, and a comparison in time would be one of schedulers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,17 +121,17 @@ def nipals(
     squares_x, squares_y = float(np.sum(E**2)), np.sum(F**2, axis=0)
     in_x, in_y = np.zeros(components), np.zeros((components, m))
     rounds = np.zeros(components, dtype=np.int64)
-    limit = _EXHAUSTED * float(np.linalg.norm(E.T @ F))
+    limit = _EXHAUSTED * float(np.linalg.norm(_transposed(E, F)))
     converged, found = True, 0
     for a in range(min(components, K)):
-        if not float(np.linalg.norm(E.T @ F)) > limit:
+        if not float(np.linalg.norm(_transposed(E, F))) > limit:
             break
         w, rounds[a], settled = _weight(E, F, tolerance, most_iterations)
         converged &= settled
         w *= np.sign(w[np.argmax(np.abs(w))])
-        t = E @ w
-        length = float(t @ t)
-        p, c = E.T @ t / length, F.T @ t / length
+        t = _times(E, w)
+        length = float(np.sum(t**2))
+        p, c = _transposed(E, t) / length, _transposed(F, t) / length
         E -= np.outer(t, p)
         F -= np.outer(t, c)
         W[:, a], P[:, a], C[:, a] = w, p, c
@@ -181,19 +184,40 @@ def covariances(weights: Floats, X: Floats, Y: Floats, *, scale: bool = True) ->
 
 def _weight(E: Floats, F: Floats, tolerance: float, most: int) -> tuple[Floats, int, bool]:
     """Return the weight vector of the next component, the rounds it took, and whether it settled."""
-    u = F[:, np.argmax(np.sum(F**2, axis=0))]
+    u = F[:, np.argmax(np.sum(F**2, axis=0))].copy()
     before = np.zeros(E.shape[1])
     for count in range(1, most + 1):
-        w = E.T @ u
+        w = _transposed(E, u)
         w /= np.linalg.norm(w)
-        t = E @ w
-        c = F.T @ t / (t @ t)
+        t = _times(E, w)
+        c = _transposed(F, t) / np.sum(t**2)
         step = w - before
         if float(step @ step) < tolerance or F.shape[1] == 1:
             return w, count, True
         before = w
-        u = F @ c / (c @ c)
+        u = _times(F, c) / (c @ c)
     return before, most, False
+
+
+def _times(A: Floats, x: Floats) -> Floats:
+    """Return ``A x``, shape (n,), in blocks of `_BLAS_ENTRIES`."""
+    block = max(1, _BLAS_ENTRIES // A.shape[1])
+    whole = len(A) // block * block
+    product = np.empty(len(A))
+    np.matmul(A[:whole].reshape(-1, block, A.shape[1]), x, out=product[:whole].reshape(-1, block))
+    product[whole:] = A[whole:] @ x
+    return product
+
+
+def _transposed(A: Floats, B: Floats) -> Floats:
+    """Return ``A'B`` for B of shape (n,) or (n, m), in blocks of `_BLAS_ENTRIES`."""
+    columns = B.reshape(len(B), -1)
+    block = max(1, _BLAS_ENTRIES // A.shape[1])
+    whole = len(A) // block * block
+    left = A[:whole].reshape(-1, block, A.shape[1]).transpose(0, 2, 1)
+    product = np.matmul(left, columns[:whole].reshape(-1, block, columns.shape[1])).sum(axis=0)
+    product += A[whole:].T @ columns[whole:]
+    return np.asarray(product.reshape(A.shape[1], *B.shape[1:]))
 
 
 def _standardised(values: Floats, scale: bool) -> tuple[Floats, Floats, Floats]:

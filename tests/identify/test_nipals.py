@@ -49,6 +49,15 @@ def test_usual_tolerance_stops_where_scikit_learn_stops() -> None:
     np.testing.assert_allclose(fit.scores(X) @ fit.loadings.T, other.x_scores_ @ other.x_loadings_.T, atol=0.02)
 
 
+def test_long_data_agree_with_scikit_learn() -> None:
+    # Several blocks of rows and a rest.
+    X, Y = data()
+    X, Y = np.tile(X, (12, 1))[:4567], np.tile(Y, (12, 1))[:4567]
+    fit = nipals(X, Y, 3, tolerance=1e-26, most_iterations=20000)
+    other = PLSRegression(3, tol=1e-26, max_iter=20000).fit(X, Y)
+    np.testing.assert_allclose(X @ fit.coefficients[-1] + fit.intercepts[-1], other.predict(X), rtol=1e-9, atol=1e-8)
+
+
 def test_one_output_is_simpls() -> None:
     X, Y = data(1)
     np.testing.assert_allclose(
