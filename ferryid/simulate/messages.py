@@ -19,6 +19,14 @@ CUSTOM = {
         "float32 speed      # m/s, apparent\n"
         "float32 direction  # rad, where the wind comes from, relative to the bow, positive to starboard\n"
     ),
+    "ferry_msgs/msg/Current": (
+        "std_msgs/Header header\nfloat64 north    # m/s, where the water goes to, over ground\nfloat64 east     # m/s\n"
+    ),
+    "ferry_msgs/msg/Payload": (
+        "std_msgs/Header header\n"
+        "float64 mass     # kg, aboard besides the vessel itself\n"
+        "float64 x        # m, its centre forward of the body origin\n"
+    ),
 }
 """Message types of the ferry's own package, whose definitions travel in the log."""
 

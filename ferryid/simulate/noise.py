@@ -7,7 +7,7 @@ logarithms differ in the last bit between processors. Only the integers are take
 from __future__ import annotations
 
 import zlib
-from math import pi, radians, sqrt
+from math import ceil, pi, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -130,7 +130,7 @@ def _second_order(
 def measurement_noise(random: Random, n: int, step_s: float, std: float, rate_std: float, white_share: float) -> Floats:
     """Return noise of standard deviation `std`, of which the share `white_share` (of `std`) is white, shape (n,)."""
     white = white_share * std * random.standard_normal(n)
-    return white + smooth_noise(random, n, step_s, std * sqrt(1.0 - white_share**2), rate_std)
+    return white + smooth_noise(random, n, step_s, std * sqrt(1.0 - white_share * white_share), rate_std)
 
 
 def gusts(random: Random, n: int, step_s: float, std: float, time_constant_s: float) -> Floats:
@@ -173,6 +173,12 @@ def gaps(random: Random, t: Floats, per_min: float, length_s: float) -> Flags:
         start += length_s
     lost[0] = False
     return lost
+
+
+def sample_times(end_s: float, rate_hz: float, phase_s: float) -> Floats:
+    """Return when a sensor takes its samples, from `phase_s` up to `end_s` [s]; not `numpy.arange`, which may fuse + and *."""
+    n = max(ceil((end_s - phase_s) * rate_hz - 1e-9), 0)
+    return np.asarray(np.arange(n, dtype=np.float64) / rate_hz + phase_s)
 
 
 def interpolated(t: Floats, grid: Floats, values: Floats) -> Floats:
@@ -316,7 +322,7 @@ def controller_weather(
         Truth, mass aboard [kg] and its place [m], shape (m, 2).
     """
     sensors, noise = scenario.sensors, scenario.sensors.noise
-    t = np.arange(len(wind)) / sensors.navigation_rate_hz
+    t = np.arange(len(wind), dtype=np.float64) / sensors.navigation_rate_hz
     asked = (
         ("wind", wind, sensors.wind_rate_hz, (noise.wind_speed_mps, noise.wind_speed_mps)),
         ("current", current, sensors.current_rate_hz, (noise.current_mps, noise.current_mps)),
@@ -326,7 +332,7 @@ def controller_weather(
     for name, truth, rate_hz, std in asked:
         seen = np.zeros((len(t), 2))
         if rate_hz > 0.0:
-            taken = np.arange(PHASES_S[name], t[-1], 1.0 / rate_hz)
+            taken = sample_times(float(t[-1]), rate_hz, PHASES_S[name])
             random = generator(seed, f"controller {name}")
             values = interpolated(taken, t, truth)
             for axis in range(2):

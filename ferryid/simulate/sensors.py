@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.noise import generator
+from ferryid.simulate.elementary import directions, sines_cosines
+from ferryid.simulate.noise import PHASES_S, gaps, generator, interpolated, sample_times
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.states import Control, Truth
 from ferryid.vessel.profile import Profile
@@ -67,27 +68,36 @@ LINKS = {
     "/control/tau_d": Link(0.0, 0.001, 0.0004),
     "command": Link(0.0, 0.0015, 0.0004),
     "state": Link(0.011, 0.006, 0.0012),
-    "/weather/wind": Link(0.037, 0.045, 0.006),
+    "/weather/wind": Link(PHASES_S["wind"], 0.045, 0.006),
+    "/weather/current": Link(PHASES_S["current"], 0.08, 0.01),
+    "/payload/waterline": Link(PHASES_S["payload"], 0.12, 0.02),
     "/imu/data": Link(0.004, 0.0025, 0.0005),
     "/camera/image/compressed": Link(0.31, 0.085, 0.012),
 }
 """Typical figures of a small vessel's network; the jitter is the mean of a gamma distribution of shape 2."""
 
+TURNING = ("azimuth", "propeller_rudder")
+"""Kinds of actuators whose angle is measured; that of the others is how they are built in."""
+
 
 def sense(scenario: Scenario, profile: Profile, seed: int, truth: Truth, control: Control) -> tuple[Stream, ...]:
     """Return the streams of every topic of a trial, as `ferryid.simulate.trial.simulate` puts them into a log."""
-    names = [actuator.name for actuator in profile.actuators]
-    makers = [_odometry(scenario, seed, control), _tau_d(scenario, seed, control)]
-    for index, name in enumerate(names):
-        makers.append(_thruster_state(scenario, seed, truth, index, name))
-        makers.append(_thruster_command(scenario, seed, control, index, name))
-    if scenario.sensors.wind_rate_hz > 0.0:
-        makers.append(_wind(scenario, seed, truth))
-    if scenario.sensors.imu_rate_hz > 0.0:
-        makers.append(_imu(scenario, seed, truth))
-    if scenario.sensors.camera_rate_hz > 0.0:
-        makers.append(_camera(scenario, seed, truth))
-    return tuple(makers)
+    sensors = scenario.sensors
+    made = [_odometry(scenario, seed, truth, control), _tau_d(scenario, seed, control)]
+    for index, actuator in enumerate(profile.actuators):
+        turning = actuator.kind in TURNING
+        made.append(_thruster_state(scenario, seed, truth, index, actuator.name, turning=turning))
+        made.append(_thruster_command(scenario, seed, control, index, actuator.name))
+    for rate_hz, make in (
+        (sensors.wind_rate_hz, _wind),
+        (sensors.current_rate_hz, _current),
+        (sensors.payload_rate_hz, _payload),
+        (sensors.imu_rate_hz, _imu),
+        (sensors.camera_rate_hz, _camera),
+    ):
+        if rate_hz > 0.0:
+            made.append(make(scenario, seed, truth, rate_hz))
+    return tuple(made)
 
 
 def apparent_wind(wind: Floats, psi: Floats, nu: Floats) -> tuple[Floats, Floats]:
@@ -105,31 +115,45 @@ def apparent_wind(wind: Floats, psi: Floats, nu: Floats) -> tuple[Floats, Floats
     speed, direction
         Shape (n,); the direction is positive to starboard and lies in (-pi, pi].
     """
-    c, s = np.cos(psi), np.sin(psi)
+    s, c = sines_cosines(psi)
     u_rw = nu[:, 0] - (c * wind[:, 0] + s * wind[:, 1])
     v_rw = nu[:, 1] - (c * wind[:, 1] - s * wind[:, 0])
-    return np.hypot(u_rw, v_rw), np.arctan2(v_rw, u_rw)
+    return np.sqrt(u_rw * u_rw + v_rw * v_rw), directions(v_rw, u_rw)
 
 
-def _times(scenario: Scenario, seed: int, topic: str, link: Link, t: Floats) -> tuple[Nanoseconds, Nanoseconds]:
+def quaternion(roll: Floats, pitch: Floats, yaw: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return x, y, z and w of the turn from NED to body by yaw, pitch and roll [rad], in this order, shape (n,) each."""
+    (s1, c1), (s2, c2), (s3, c3) = (sines_cosines(0.5 * angle) for angle in (roll, pitch, yaw))
+    return (
+        s1 * c2 * c3 - c1 * s2 * s3,
+        c1 * s2 * c3 + s1 * c2 * s3,
+        c1 * c2 * s3 - s1 * s2 * c3,
+        c1 * c2 * c3 + s1 * s2 * s3,
+    )
+
+
+def _times(
+    scenario: Scenario, seed: int, topic: str, link: Link, t: Floats, ahead_ms: float = 0.0
+) -> tuple[Nanoseconds, Nanoseconds]:
     """Stamp samples taken at `t` [s] and let them travel to the recorder, which is never out of order per topic.
 
-    The recorder's clock is ahead of the senders' by the scenario's offset.
+    The recorder's clock is ahead of the senders' by the scenario's offset, the sender's own by `ahead_ms`.
     """
-    stamp = scenario.start_ns + np.rint(t * 1e9).astype(np.int64)
-    jitter = generator(seed, f"jitter {topic}").gamma(2.0, 0.5 * link.jitter_s, len(t))
+    taken = scenario.start_ns + np.rint(t * 1e9).astype(np.int64)
+    random = generator(seed, f"jitter {topic}")
+    jitter = 0.5 * link.jitter_s * (random.standard_exponential(len(t)) + random.standard_exponential(len(t)))
     late = link.latency_s + jitter + scenario.sensors.clock_offset_ms * 1e-3
-    return stamp, np.maximum.accumulate(stamp + np.rint(late * 1e9).astype(np.int64))
+    return taken + round(ahead_ms * 1e6), np.maximum.accumulate(taken + np.rint(late * 1e9).astype(np.int64))
 
 
-def _sample_times(truth: Truth, rate_hz: float, phase_s: float) -> Floats:
+def _sample_times(truth: Truth, rate_hz: float, link: Link) -> Floats:
     """Return the sample times of a sensor within the truth's time range [s]."""
-    return np.arange(phase_s, truth.t[-1], 1.0 / rate_hz)
+    return sample_times(float(truth.t[-1]), rate_hz, link.phase_s)
 
 
-def _at(truth: Truth, values: Floats, t: Floats) -> Floats:
-    """Interpolate true columns, shape (n, k), to sample times; linear, the grid being far finer than the motion."""
-    return np.column_stack([np.interp(t, truth.t, column) for column in values.T])
+def _at(truth: Truth, t: Floats, *columns: Floats) -> list[Floats]:
+    """Interpolate true columns to sample times; linear, the grid being far finer than the motion."""
+    return list(interpolated(t, truth.t, np.column_stack(columns)).T.copy())
 
 
 def _wrapped(angle: Floats) -> Floats:
@@ -137,23 +161,31 @@ def _wrapped(angle: Floats) -> Floats:
     return np.asarray(pi - np.mod(pi - angle, 2.0 * pi))
 
 
-def _odometry(scenario: Scenario, seed: int, control: Control) -> Stream:
+def _odometry(scenario: Scenario, seed: int, truth: Truth, control: Control) -> Stream:
     topic = "/navigation/odometry"
-    x, y, psi, u, v, r = control.measured.T
-    noise = scenario.noise
+    sent = control.sent
+    t = control.t[sent]
+    x, y, psi, u, v, r = control.measured[sent].T
+    noise = scenario.sensors.noise
+    random = generator(seed, topic)
+    roll, pitch = (
+        angle + radians(noise.attitude_deg) * random.standard_normal(len(control.t))[sent]
+        for angle in _at(truth, t - scenario.sensors.navigation.delay_s, truth.attitude)
+    )
+    q = quaternion(roll, pitch, _wrapped(psi))
     pose, twist = np.zeros(36), np.zeros(36)
-    pose[[0, 7]], pose[35] = noise.position_m**2, radians(noise.heading_deg) ** 2
-    twist[[0, 7]], twist[35] = noise.velocity_mps**2, radians(noise.yaw_rate_degps) ** 2
+    turn, attitude, yaw = (radians(std) for std in (noise.yaw_rate_degps, noise.attitude_deg, noise.heading_deg))
+    pose[[0, 7]], pose[[21, 28]], pose[35] = noise.position_m * noise.position_m, attitude * attitude, yaw * yaw
+    twist[[0, 7]], twist[35] = noise.velocity_mps * noise.velocity_mps, turn * turn
     return Stream(
         topic,
         "nav_msgs/msg/Odometry",
         "ned",
-        *_times(scenario, seed, topic, LINKS[topic], control.t),
+        *_times(scenario, seed, topic, LINKS[topic], t),
         columns={
             "pose.pose.position.x": x,
             "pose.pose.position.y": y,
-            "pose.pose.orientation.z": np.sin(0.5 * _wrapped(psi)),
-            "pose.pose.orientation.w": np.cos(0.5 * _wrapped(psi)),
+            **{f"pose.pose.orientation.{axis}": values for axis, values in zip("xyzw", q, strict=True)},
             "twist.twist.linear.x": u,
             "twist.twist.linear.y": v,
             "twist.twist.angular.z": r,
@@ -185,33 +217,39 @@ def _thruster_command(scenario: Scenario, seed: int, control: Control, index: in
     )
 
 
-def _thruster_state(scenario: Scenario, seed: int, truth: Truth, index: int, name: str) -> Stream:
+def _thruster_state(scenario: Scenario, seed: int, truth: Truth, index: int, name: str, *, turning: bool) -> Stream:
     topic = f"/{name}/state"
-    link = LINKS["state"]
-    t = _sample_times(truth, scenario.sensors.thruster_rate_hz, link.phase_s)
+    link, sensors = LINKS["state"], scenario.sensors
+    t = _sample_times(truth, sensors.thruster_rate_hz, link)
     random = generator(seed, topic)
-    both = _at(truth, np.column_stack((truth.speeds[:, index], truth.angles[:, index])), t)
-    speed = both[:, 0] + scenario.noise.speed_rpm * random.standard_normal(len(t))
-    angle = both[:, 1] + radians(scenario.noise.azimuth_deg) * random.standard_normal(len(t))
+    speed, angle = _at(truth, t, truth.speeds[:, index], truth.angles[:, index])
+    speed += sensors.noise.speed_rpm * random.standard_normal(len(t))
+    if turning:
+        angle += radians(sensors.noise.azimuth_deg) * random.standard_normal(len(t))
+        if sensors.azimuth_step_deg > 0.0:
+            step = radians(sensors.azimuth_step_deg)
+            angle = np.rint(angle / step) * step
+    sent = ~gaps(generator(seed, f"gaps {topic}"), t, sensors.dropouts_per_min, sensors.dropout_s)
+    stamp, receive = _times(scenario, seed, topic, link, t, sensors.thruster_clock_offset_ms)
     return Stream(
         topic,
         "ferry_msgs/msg/ThrusterState",
         name,
-        *_times(scenario, seed, topic, link, t),
-        columns={"speed": speed, "azimuth": _wrapped(angle)},
+        stamp[sent],
+        receive[sent],
+        columns={"speed": speed[sent], "azimuth": _wrapped(angle)[sent]},
     )
 
 
-def _wind(scenario: Scenario, seed: int, truth: Truth) -> Stream:
+def _wind(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
     topic = "/weather/wind"
-    link = LINKS[topic]
-    t = _sample_times(truth, scenario.sensors.wind_rate_hz, link.phase_s)
+    link, noise = LINKS[topic], scenario.sensors.noise
+    t = _sample_times(truth, rate_hz, link)
     random = generator(seed, topic)
-    true_speed, true_direction = apparent_wind(
-        _at(truth, truth.wind, t), np.interp(t, truth.t, truth.eta[:, 2]), _at(truth, truth.nu, t)
-    )
-    speed = np.abs(true_speed + scenario.noise.wind_speed_mps * random.standard_normal(len(t)))
-    direction = true_direction + radians(scenario.noise.wind_direction_deg) * random.standard_normal(len(t))
+    values = interpolated(t, truth.t, np.column_stack((truth.wind, truth.eta[:, 2], truth.nu)))
+    true_speed, true_direction = apparent_wind(values[:, :2], values[:, 2].copy(), values[:, 3:])
+    speed = np.abs(true_speed + noise.wind_speed_mps * random.standard_normal(len(t)))
+    direction = true_direction + radians(noise.wind_direction_deg) * random.standard_normal(len(t))
     return Stream(
         topic,
         "ferry_msgs/msg/Wind",
@@ -224,41 +262,67 @@ def _wind(scenario: Scenario, seed: int, truth: Truth) -> Stream:
     )
 
 
-def _imu(scenario: Scenario, seed: int, truth: Truth) -> Stream:
-    topic = "/imu/data"
-    link = LINKS[topic]
-    t = _sample_times(truth, scenario.sensors.imu_rate_hz, link.phase_s)
+def _current(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
+    topic = "/weather/current"
+    link, std = LINKS[topic], scenario.sensors.noise.current_mps
+    t = _sample_times(truth, rate_hz, link)
     random = generator(seed, topic)
-    u, v, r = _at(truth, truth.nu, t).T
-    u_dot, v_dot, _ = _at(truth, truth.nu_dot, t).T
-    psi = _wrapped(np.interp(t, truth.t, truth.eta[:, 2]))
-    shake = IMU_ACCELERATION_STD * random.standard_normal((3, len(t)))
-    turn = IMU_TURN_STD * random.standard_normal((3, len(t)))
+    north, east = (values + std * random.standard_normal(len(t)) for values in _at(truth, t, truth.current))
     return Stream(
         topic,
-        "sensor_msgs/msg/Imu",
-        "imu",
+        "ferry_msgs/msg/Current",
+        "ned",
         *_times(scenario, seed, topic, link, t),
-        columns={
-            "orientation.z": np.sin(0.5 * psi),
-            "orientation.w": np.cos(0.5 * psi),
-            "angular_velocity.x": turn[0],
-            "angular_velocity.y": turn[1],
-            "angular_velocity.z": r + turn[2],
-            "linear_acceleration.x": u_dot - r * v + shake[0],
-            "linear_acceleration.y": v_dot + r * u + shake[1],
-            "linear_acceleration.z": shake[2] - GRAVITY,
-        },
+        columns={"north": north, "east": east},
     )
 
 
-def _camera(scenario: Scenario, seed: int, truth: Truth) -> Stream:
+def _payload(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
+    """Return what a camera that reads the waterline makes of the mass aboard; a little noise may weigh less than nothing."""
+    topic = "/payload/waterline"
+    link, std = LINKS[topic], scenario.sensors.noise.payload_kg
+    t = _sample_times(truth, rate_hz, link)
+    mass, x = _at(truth, t, truth.payload)
+    return Stream(
+        topic,
+        "ferry_msgs/msg/Payload",
+        "body",
+        *_times(scenario, seed, topic, link, t),
+        columns={"mass": mass + std * generator(seed, topic).standard_normal(len(t)), "x": x},
+    )
+
+
+def _imu(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
+    """Return attitude, turn rates and specific force at the body origin; heave is left out."""
+    topic = "/imu/data"
+    link = LINKS[topic]
+    t = _sample_times(truth, rate_hz, link)
+    random = generator(seed, topic)
+    rolling = np.gradient(truth.attitude, float(truth.t[1] - truth.t[0]), axis=0)
+    psi, u, v, r, u_dot, v_dot, roll, pitch, roll_dot, pitch_dot = _at(
+        truth, t, truth.eta[:, 2], truth.nu, truth.nu_dot[:, :2], truth.attitude, rolling
+    )
+    (s1, c1), (s2, c2) = sines_cosines(roll), sines_cosines(pitch)
+    q = quaternion(roll, pitch, _wrapped(psi))
+    rates = (roll_dot - r * s2, pitch_dot * c1 + r * c2 * s1, r * c2 * c1 - pitch_dot * s1)
+    force = (u_dot - r * v + GRAVITY * s2, v_dot + r * u - GRAVITY * c2 * s1, -GRAVITY * c2 * c1)
+    columns = {f"orientation.{axis}": values for axis, values in zip("xyzw", q, strict=True)}
+    for field_name, std, values in (
+        ("angular_velocity", IMU_TURN_STD, rates),
+        ("linear_acceleration", IMU_ACCELERATION_STD, force),
+    ):
+        for axis, one in zip("xyz", values, strict=True):
+            columns[f"{field_name}.{axis}"] = one + std * random.standard_normal(len(t))
+    return Stream(topic, "sensor_msgs/msg/Imu", "imu", *_times(scenario, seed, topic, link, t), columns=columns)
+
+
+def _camera(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
     """Return frames of random bytes between the markers of a JPEG: bulk of no content that a reader must skip."""
     topic = "/camera/image/compressed"
     link = LINKS[topic]
-    t = _sample_times(truth, scenario.sensors.camera_rate_hz, link.phase_s)
+    t = _sample_times(truth, rate_hz, link)
     random = generator(seed, topic)
-    sizes = random.integers(900, 1500, len(t)).tolist()
+    sizes = (900.0 + np.floor(600.0 * random.random(len(t)))).astype(np.int64).tolist()
     return Stream(
         topic,
         "sensor_msgs/msg/CompressedImage",
