@@ -298,7 +298,8 @@ class Manoeuvre:
     `heading_deg` to that side. ``turning-circle``: the same lead, then the helm stays at `helm_deg`. ``on-the-spot-turn``: every
     azimuth thruster pushes across, so that their moments add up, at `speed_rpm`, after the lead the other way round, changing
     every `hold_s`. ``rpm-steps``: straight ahead through `levels` (shares of `speed_rpm`), `hold_s` each, over and over. The
-    helm is the angle of the azimuth thrusters or rudders aft of the body origin, positive turning to starboard.
+    helm is the angle of the azimuth thrusters or rudders aft of the body origin, positive turning to starboard. An actuator
+    whose force is ordered directly takes `speed_rpm` for N.
     """
 
     kind: str = chosen("", "zigzag", "turning-circle", "on-the-spot-turn", "rpm-steps")
