@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import shutil
 import sqlite3
 from collections.abc import Iterator
@@ -125,13 +124,13 @@ def _inside(temporary: Path, name: str) -> Iterator[Path]:
 
 def _in_order(streams: list[Stream], ros_version: int) -> Iterator[tuple[int, int, int, bytes]]:
     """Yield (receive time, stream index, stamp, bytes) of all messages as a recorder gets them."""
-
-    def rows(index: int, stream: Stream) -> Iterator[tuple[int, int, int, bytes]]:
-        receive, stamps = stream.receive_ns.tolist(), stream.stamp_ns.tolist()
-        for when, stamp, data in zip(receive, stamps, serialised(stream, ros_version), strict=True):
-            yield when, index, stamp, data
-
-    return heapq.merge(*(rows(index, stream) for index, stream in enumerate(streams)), key=lambda row: row[:2])
+    receive = np.concatenate([stream.receive_ns for stream in streams])
+    stamps = np.concatenate([stream.stamp_ns for stream in streams])
+    index = np.repeat(np.arange(len(streams)), [len(stream.stamp_ns) for stream in streams])
+    order = np.lexsort((index, receive))
+    messages = [serialised(stream, ros_version) for stream in streams]
+    for when, which, stamp in zip(receive[order].tolist(), index[order].tolist(), stamps[order].tolist(), strict=True):
+        yield when, which, stamp, next(messages[which])
 
 
 def _write_mcap(streams: list[Stream], path: Path, chunk_bytes: int) -> None:

@@ -1,4 +1,4 @@
-"""Messages of a simulated log, serialised by the ordinary ROS1 and ROS2 serialisers."""
+"""Messages of a simulated log, as the ordinary ROS1 and ROS2 serialisers write them."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ CUSTOM = {
     ),
 }
 """Message types of the ferry's own package, whose definitions travel in the log."""
+BLOCK = 4096
+"""Messages that are made at once."""
 
 
 @cache
@@ -41,25 +43,85 @@ def typestore(ros_version: int) -> Typestore:
 
 
 def serialised(stream: Stream, ros_version: int) -> Iterator[bytes]:
-    """Yield the messages of a stream as bytes, in its order."""
+    """Yield the messages of a stream as bytes, in its order.
+
+    The serialiser writes one message of each stream. All others have the same layout, and differ from it in the places of
+    those fields that change, where whole columns are put at once; only frames of a camera are written one by one.
+    """
     store = typestore(ros_version)
     message = _blank(store, stream.type)
     _put(message, "header.frame_id", stream.frame_id)
     for path, value in stream.constants.items():
         _put(message, path, value)
-    setters = [_setter(message, path) for path in stream.columns]
-    values = [column.tolist() for column in stream.columns.values()]
-    write: Callable[..., Any] = store.serialize_ros1 if ros_version == 1 else store.serialize_cdr
+    if stream.blobs:
+        yield from _one_by_one(stream, message, ros_version)
+        return
+    template = _bytes(store, message, stream.type, ros_version)
+    places = _places(store, stream.type, message, ros_version)
+    seconds, nanoseconds = np.divmod(stream.stamp_ns, 10**9)
+    columns = {"header.stamp.sec": seconds, "header.stamp.nanosec": nanoseconds, **stream.columns}
+    if ros_version == 1:
+        columns["header.seq"] = np.arange(len(stream.stamp_ns))
+    offsets, formats = zip(*(places[path] for path in columns), strict=True)
+    layout = np.dtype(
+        {"names": list(columns), "formats": list(formats), "offsets": list(offsets), "itemsize": len(template)}
+    )
+    for start in range(0, len(stream.stamp_ns), BLOCK):
+        rows = range(len(stream.stamp_ns))[start : start + BLOCK]
+        block = np.frombuffer(bytearray(template * len(rows)), dtype=layout)
+        for path, values in columns.items():
+            block[path] = values[start : start + BLOCK]
+        data = block.tobytes()
+        for place in range(0, len(data), len(template)):
+            yield data[place : place + len(template)]
+
+
+def _one_by_one(stream: Stream, message: Any, ros_version: int) -> Iterator[bytes]:
+    """Yield messages that hold blobs, whose lengths differ, through the serialiser."""
     stamp = message.header.stamp
-    for row, when in enumerate(stream.stamp_ns.tolist()):
+    for row, (when, blob) in enumerate(zip(stream.stamp_ns.tolist(), stream.blobs, strict=True)):
         stamp.sec, stamp.nanosec = divmod(when, 10**9)
         if ros_version == 1:
             message.header.seq = row
-        for (holder, name), column in zip(setters, values, strict=True):
-            setattr(holder, name, column[row])
-        if stream.blobs:
-            message.data = np.frombuffer(stream.blobs[row], dtype=np.uint8)
-        yield bytes(write(message, stream.type))
+        message.data = np.frombuffer(blob, dtype=np.uint8)
+        yield _bytes(typestore(ros_version), message, stream.type, ros_version)
+
+
+def _bytes(store: Typestore, message: Any, name: str, ros_version: int) -> bytes:
+    write: Callable[..., Any] = store.serialize_ros1 if ros_version == 1 else store.serialize_cdr
+    return bytes(write(message, name))
+
+
+def _places(store: Typestore, name: str, message: Any, ros_version: int) -> dict[str, tuple[int, str]]:
+    """Return where the numbers of a message without sequences lie: field path to offset [bytes] and type.
+
+    ROS1 packs its fields; CDR aligns each to its own size, counted from the end of its header of 4 bytes.
+    """
+    aligned = ros_version == 2
+    header = 4 if aligned else 0
+    places: dict[str, tuple[int, str]] = {}
+    end = header
+
+    def walk(name: str, message: Any, prefix: str) -> None:
+        nonlocal end
+        node: Any
+        for field, (node, description) in store.get_msgdef(name).fields:
+            value = getattr(message, field)
+            if node.name == "NAME":
+                walk(str(description), value, f"{prefix}{field}.")
+                continue
+            form: Any = description
+            base, count = (form[0], 1) if node.name == "BASE" else (form[0][1][0], form[1])
+            text = base == "string"
+            number = np.dtype("uint32" if text else base).newbyteorder("<")
+            if aligned:
+                end += (header - end) % number.itemsize
+            places[prefix + field] = (end, number.str if node.name == "BASE" else f"({count},){number.str}")
+            # A string is its length, its bytes and, in CDR, a zero.
+            end += number.itemsize * count + (len(value.encode()) + (1 if aligned else 0) if text else 0)
+
+    walk(name, message, "")
+    return places
 
 
 def _blank(store: Typestore, name: str) -> Any:
