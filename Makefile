@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test demo picture bench real fixtures wheel-check lint clean
+.PHONY: test demo picture bench real thesis fixtures wheel-check lint clean
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .
@@ -27,6 +27,10 @@ bench: $(VENV)/installed $(VENV)/bench-installed
 # Fits on the real recordings, where they lie in ../shared/data; writes reports/real.
 real: $(VENV)/installed
 	$(BIN)/python -m tests.real
+
+# The thesis's trials, flown again: writes reports/thesis.md and its figures.
+thesis: $(VENV)/installed
+	$(BIN)/ferryid reproduce thesis --out reports --json reports/thesis.json
 
 fixtures: $(VENV)/installed
 	$(BIN)/python -m fixtures

@@ -1,0 +1,26 @@
+"""ferryid reproduce."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ferryid.cli.options import OUT, Json
+from ferryid.cli.output import emit, progress
+
+
+def command(
+    what: Annotated[str, typer.Argument(help="What to reproduce: thesis.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the page and its figures.")] = OUT,
+    only: Annotated[list[str] | None, typer.Option("--only", help="A study by name; may be given again.")] = None,
+    seeds: Annotated[int, typer.Option(help="Repetitions of every study, each with other weather and noise.")] = 5,
+    processes: Annotated[int, typer.Option(help="Processes to share the work among.")] = 2,
+    json: Json = None,
+) -> None:
+    """Fly published trials again in the simulator and set the results side by side."""
+    from ferryid.reproduce.run import render_reproduction, reproduce
+
+    result = reproduce(what, out, only=only or (), repetitions=seeds, processes=processes, progress=progress)
+    emit(result, render_reproduction(result), json)

@@ -1,0 +1,1 @@
+"""Published results flown again in the simulator: theirs beside ours, and why they differ."""
