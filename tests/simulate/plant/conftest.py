@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ferryid.simulate.plant.hull import Force, State
-from ferryid.simulate.plant.motion import Plant, advance, build, observe, resting
+from ferryid.simulate.plant.motion import Plant, advance, build, resting
 from ferryid.simulate.scenario import NOWHERE, Scenario
 from ferryid.vessel.load import load_profile
 from ferryid.vessel.profile import Actuator, Profile
@@ -27,8 +27,7 @@ def _steps(plant, h, first, count, state, thrusters, orders):  # type: ignore[no
     for k in range(count):
         for j in range(6):
             rows[k, j] = state[j]
-        observe(plant, 2 * (first + k), h, state, thrusters, rows[k, 6:])
-        state = advance(plant, 2 * (first + k), h, state, thrusters, orders)
+        state = advance(plant, 2 * (first + k), h, state, thrusters, orders, rows[k, 6:])
     return state, rows
 
 
