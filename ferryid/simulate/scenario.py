@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib import resources
@@ -32,7 +32,7 @@ from ferryid.simulate.sections import (
 from ferryid.simulate.series import read_series
 from ferryid.vessel.faults import Fault, TableReader
 from ferryid.vessel.parse_hull import DAMPING_TERMS
-from ferryid.vessel.toml_lines import key_lines, line_of
+from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of
 
 __all__ = [
     "Environment",
@@ -50,7 +50,6 @@ LONGEST_S = 14_400.0
 """Longest trial [s]; longer ones would not fit into the memory of a small machine."""
 MOST_ROUNDS = 1000
 MOST_POSES = 20_000
-LARGEST_SEED = 2**63 - 1
 NOWHERE = SetPoints(((0.0, 0.0, 0.0),), 1.0)
 """The path of a trial without one."""
 
@@ -183,12 +182,27 @@ def parse_scenario(text: str, where: str, folder: Path | None = None) -> Scenari
     # A number of thousands of digits, or thousands of brackets, ends in errors of Python rather than of TOML.
     except (ValueError, RecursionError) as error:
         raise FerryIdError(f"{where}: not valid TOML, {error}. Fix: correct the line") from error
-    faults: list[Fault] = []
     lines = key_lines(text)
+    faults = [
+        Fault(line_of(lines, place), "the number is too long. Fix: write fewer digits") for place in _long(data, ())
+    ]
+    raise_first(where, faults)
     scenario = _read(TableReader(data, (), lines, faults), Path(where).stem, text, folder)
     faults += [Fault(line_of(lines, place), message) for place, message in disagreements(scenario, data)]
     raise_first(where, faults)
     return scenario
+
+
+def _long(data: Any, place: KeyPath) -> Iterator[KeyPath]:
+    """Yield the places of whole numbers beyond TOML's 64 bits, which Python reads but cannot turn into its floats."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from _long(value, (*place, key))
+    elif isinstance(data, list):
+        for index, value in enumerate(data):
+            yield from _long(value, (*place, index))
+    elif isinstance(data, int) and not -(2**63) <= data < 2**63:
+        yield place
 
 
 def _read(top: TableReader, name: str, text: str, folder: Path | None) -> Scenario:
@@ -196,8 +210,6 @@ def _read(top: TableReader, name: str, text: str, folder: Path | None) -> Scenar
     title = top.text("title", name)
     vessel = top.text("vessel", required=True)
     seed = top.whole("seed", 0)
-    if seed > LARGEST_SEED:
-        top.fault(f'"seed" must be at most {LARGEST_SEED}, found {seed}', "seed")
     start_ns = _start(top)
     manoeuvre = read_section(section(top, "manoeuvre"), Manoeuvre)
     path = _path(top, moved=top.has("manoeuvre"))
