@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from math import exp
+import zlib
+from math import exp, sqrt
 
+import mpmath
 import numpy as np
 import pytest
+from scipy import stats
 
-from ferryid.simulate.noise import generator, gusts, measurement_noise, smooth_noise
+from ferryid.simulate.noise import generator, gusts, interpolated, measurement_noise, sample_times, smooth_noise
 
 N = 200_000
 
@@ -60,3 +63,44 @@ def test_channels_do_not_share_a_random_stream():
     assert abs(np.corrcoef(a, b)[0, 1]) < 0.2
     assert (a == again).all()
     assert (generator(8, "u").standard_normal(500) != a).all()
+
+
+def test_random_numbers_are_those_of_their_distributions():
+    random = generator(11, "any")
+    uniform, normal, waits = random.random(N), random.standard_normal(N + 1), random.standard_exponential(N)
+    assert len(normal) == N + 1
+    # Kolmogorov-Smirnov: 1.95 / sqrt(n) is passed by chance once in a thousand times.
+    for values, distribution in ((uniform, "uniform"), (normal, "norm"), (waits, "expon")):
+        assert stats.kstest(values, distribution).statistic < 1.95 / sqrt(N)
+    # Box and Muller's pairs have nothing to do with each other, nor have their squares.
+    one, other = normal[:N:2], normal[1:N:2]
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.015
+    assert abs(np.corrcoef(one**2, other**2)[0, 1]) < 0.015
+    assert len(random.bytes(13)) == 13
+
+
+def test_random_numbers_are_these_for_good():
+    """Bits of PCG64 as NumPy promises them, and numbers made of them with mpmath."""
+    raw = np.random.PCG64([5, zlib.crc32(b"any")]).random_raw(2).tolist()
+    one, other = (mpmath.mpf(2 * (bits >> 12) + 1) / 2**53 for bits in raw)
+    radius, angle = mpmath.sqrt(-2 * mpmath.log(one)), 2 * mpmath.pi * other
+    found = generator(5, "any").standard_normal(2)
+    np.testing.assert_allclose(
+        found, [float(radius * mpmath.cos(angle)), float(radius * mpmath.sin(angle))], rtol=1e-14
+    )
+    assert generator(5, "any").random(1)[0] == float(one)
+
+
+def test_interpolation_is_that_of_numpy():
+    random = np.random.default_rng(1)
+    grid, values = np.sort(random.uniform(0.0, 10.0, 50)), random.normal(size=(50, 3))
+    t = np.sort(np.concatenate((random.uniform(-2.0, 12.0, 400), grid)))
+    expected = np.column_stack([np.interp(t, grid, column) for column in values.T])
+    np.testing.assert_allclose(interpolated(t, grid, values), expected, atol=1e-12)
+    np.testing.assert_array_equal(interpolated(t, grid[:1], values[:1]), np.repeat(values[:1], len(t), axis=0))
+
+
+def test_sample_times_end_before_the_end():
+    np.testing.assert_allclose(sample_times(1.0, 4.0, 0.1), [0.1, 0.35, 0.6, 0.85])
+    np.testing.assert_allclose(sample_times(1.0, 4.0, 0.0), [0.0, 0.25, 0.5, 0.75])
+    assert len(sample_times(1.0, 4.0, 2.0)) == 0

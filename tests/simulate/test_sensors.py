@@ -1,0 +1,289 @@
+"""What sensors and navigation report of a motion that is known in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, pi, radians, sin
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from ferryid.simulate import load_scenario
+from ferryid.simulate.noise import (
+    controller_weather,
+    measure,
+    navigation_errors,
+    navigation_sent,
+    wind_series,
+)
+from ferryid.simulate.sections import Navigation, Noise, Wind
+from ferryid.simulate.sensors import quaternion, sense
+from ferryid.simulate.states import Control, Truth
+from ferryid.vessel.load import load_profile
+
+RADIUS_M, RATE_RADPS, SPEED_MPS = 20.0, 0.08, 1.6
+QUIET = Noise(**{name: 0.0 for name in vars(Noise()) if name != "white_share"})
+STEP_S = 0.02
+END_S = 80.0
+
+
+def scenario(**sensors):
+    made = load_scenario("twelve-corner")
+    return replace(made, sensors=replace(made.sensors, noise=QUIET, **sensors))
+
+
+def turning(t):
+    """A steady turn to starboard: the centre RADIUS_M to the east of the start, drift angle 0."""
+    psi = RATE_RADPS * t
+    zero = np.zeros_like(t)
+    return (
+        np.column_stack((RADIUS_M * np.sin(psi), RADIUS_M * (1.0 - np.cos(psi)), psi)),
+        np.column_stack((zero + SPEED_MPS, zero, zero + RATE_RADPS)),
+    )
+
+
+def trial(**changes):
+    """Truth and control of the steady turn, rolling and pitching."""
+    t = np.arange(round(END_S / STEP_S)) * STEP_S
+    eta, nu = turning(t)
+    n = len(t)
+    truth = Truth(
+        t=t,
+        eta=eta,
+        nu=nu,
+        nu_dot=np.zeros((n, 3)),
+        tau=np.zeros((n, 3)),
+        wave=np.zeros((n, 3)),
+        attitude=np.column_stack((0.1 * np.sin(2.0 * t), 0.05 * np.cos(3.0 * t))),
+        wind=np.zeros((n, 2)),
+        current=np.column_stack((0.1 + 0.001 * t, -0.2 * np.ones(n))),
+        payload=np.column_stack((np.where(t < 40.0, 0.0, 300.0), np.full(n, -0.5))),
+        speeds=np.column_stack((t * 3.0, -t)),
+        angles=np.column_stack((0.2 * t, -0.3 * t)),
+    )
+    m = round(END_S / 0.05)
+    cycles = np.arange(m) * 0.05
+    eta, nu = turning(cycles)
+    nothing = np.zeros((m, 3))
+    control = Control(
+        t=cycles,
+        t_order=cycles + STEP_S,
+        measured=np.column_stack((eta, nu)),
+        sent=np.ones(m, dtype=bool),
+        goal=nothing,
+        eta_d=nothing,
+        nu_d=nothing,
+        tau_d=nothing,
+        feedforward=nothing,
+        speeds=np.zeros((m, 2)),
+        angles=np.zeros((m, 2)),
+        saturated=np.zeros(m, dtype=bool),
+    )
+    return replace(truth, **{k: v for k, v in changes.items() if k in vars(truth)}), replace(
+        control, **{k: v for k, v in changes.items() if k in vars(control)}
+    )
+
+
+def streams(asked, **changes):
+    made = sense(asked, load_profile("milliampere"), 1, *trial(**changes))
+    return {stream.topic: stream for stream in made}
+
+
+def taken(stream, asked):
+    return (stream.stamp_ns - asked.start_ns) * 1e-9
+
+
+def attitude(stream, path):
+    q = np.column_stack([stream.columns[f"{path}.{axis}"] for axis in "xyzw"])
+    np.testing.assert_allclose(np.sum(q * q, axis=1), 1.0, atol=1e-14)
+    return Rotation.from_quat(q).as_euler("ZYX")
+
+
+def test_quaternion_is_the_one_of_scipy():
+    roll, pitch, yaw = np.random.default_rng(1).uniform(-1.5, 1.5, (3, 50))
+    expected = Rotation.from_euler("ZYX", np.column_stack((yaw, pitch, roll))).as_quat()
+    found = np.column_stack(quaternion(roll, pitch, yaw))
+    np.testing.assert_allclose(found * np.sign(found[:, 3:]), expected * np.sign(expected[:, 3:]), atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("topic", "path"), [("/navigation/odometry", "pose.pose.orientation"), ("/imu/data", "orientation")]
+)
+def test_quaternions_hold_roll_pitch_and_heading(topic, path):
+    asked = scenario()
+    stream = streams(asked)[topic]
+    t = taken(stream, asked)
+    yaw, pitch, roll = attitude(stream, path).T
+    np.testing.assert_allclose(roll, 0.1 * np.sin(2.0 * t), atol=1e-4)
+    np.testing.assert_allclose(pitch, 0.05 * np.cos(3.0 * t), atol=1e-4)
+    assert np.abs(np.sin(0.5 * (yaw - RATE_RADPS * t))).max() < 1e-4
+
+
+def test_attitude_of_the_odometry_is_as_old_as_the_rest():
+    asked = scenario(navigation=Navigation(delay_s=0.2))
+    stream = streams(asked)["/navigation/odometry"]
+    t = np.maximum(taken(stream, asked) - 0.2, 0.0)
+    np.testing.assert_allclose(attitude(stream, "pose.pose.orientation")[:, 2], 0.1 * np.sin(2.0 * t), atol=1e-4)
+
+
+def test_imu_feels_rates_and_gravity_of_roll_and_pitch():
+    """Body rates and specific force against the rotation matrix, differentiated."""
+    asked = scenario()
+    stream = streams(asked)["/imu/data"]
+    t = taken(stream, asked)
+    inside = (t > 1.0) & (t < END_S - 1.0)
+
+    def rotation(at):
+        return Rotation.from_euler(
+            "ZYX", np.column_stack((RATE_RADPS * at, 0.05 * np.cos(3.0 * at), 0.1 * np.sin(2.0 * at)))
+        )
+
+    h = 1e-4
+    rates = (rotation(t - h).inv() * rotation(t + h)).as_rotvec() / (2.0 * h)
+    down = rotation(t).inv().apply(np.array([0.0, 0.0, 9.81]))
+    for i, axis in enumerate("xyz"):
+        rate = stream.columns[f"angular_velocity.{axis}"] - rates[:, i]
+        assert abs(rate[inside].mean()) < 1e-4
+        assert rate[inside].std() == pytest.approx(0.002, rel=0.05)
+        centripetal = SPEED_MPS * RATE_RADPS if axis == "y" else 0.0
+        force = stream.columns[f"linear_acceleration.{axis}"] + down[:, i] - centripetal
+        assert abs(force[inside].mean()) < 2e-3
+        assert force[inside].std() == pytest.approx(0.03, rel=0.05)
+
+
+def test_current_and_payload_are_measured_where_asked():
+    assert not {"/weather/current", "/payload/waterline"} & set(streams(scenario()))
+    asked = scenario(current_rate_hz=2.0, payload_rate_hz=4.0)
+    found = streams(asked)
+    current, payload = found["/weather/current"], found["/payload/waterline"]
+    np.testing.assert_allclose(current.columns["north"], 0.1 + 0.001 * taken(current, asked), atol=1e-9)
+    np.testing.assert_allclose(current.columns["east"], -0.2)
+    late = taken(payload, asked) > 40.1
+    assert (payload.columns["mass"][late] == 300.0).all()
+    assert (payload.columns["mass"][taken(payload, asked) < 39.9] == 0.0).all()
+    assert (payload.columns["x"] == -0.5).all()
+    noisy = replace(asked, sensors=replace(asked.sensors, noise=replace(QUIET, current_mps=0.02, payload_kg=10.0)))
+    found = streams(noisy)
+    assert (found["/weather/current"].columns["east"] + 0.2).std() == pytest.approx(0.02, rel=0.2)
+    assert found["/payload/waterline"].columns["mass"][late].std() == pytest.approx(10.0, rel=0.2)
+
+
+def test_the_thrusters_clock_moves_their_stamps_alone():
+    one, two = streams(scenario()), streams(scenario(thruster_clock_offset_ms=120.0))
+    for topic, stream in one.items():
+        other = two[topic]
+        np.testing.assert_array_equal(other.receive_ns, stream.receive_ns)
+        ahead = 120_000_000 if topic in ("/thruster1/state", "/thruster2/state") else 0
+        np.testing.assert_array_equal(other.stamp_ns - stream.stamp_ns, ahead)
+
+
+def test_encoders_round_to_their_step():
+    asked = scenario(azimuth_step_deg=1.0)
+    stream = streams(asked)["/thruster1/state"]
+    degrees = np.degrees(stream.columns["azimuth"])
+    np.testing.assert_allclose(degrees, np.rint(degrees), atol=1e-9)
+    error = stream.columns["azimuth"] - 0.2 * taken(stream, asked)
+    error = np.abs(np.angle(np.exp(1j * error)))
+    assert error.max() <= radians(0.5) + 1e-9
+    assert error.max() > radians(0.49)
+
+
+def test_silences_are_as_frequent_and_as_long_as_asked():
+    asked = scenario(dropouts_per_min=6.0, dropout_s=1.0)
+    silent, full = streams(asked), streams(scenario())
+    assert len(silent["/imu/data"].stamp_ns) == len(full["/imu/data"].stamp_ns)
+    for topic in ("/thruster1/state", "/thruster2/state"):
+        steps = np.diff(silent[topic].stamp_ns) * 1e-9
+        long = steps[steps > 0.06]
+        assert ((long > 0.999) & (long < 1.101)).all() or (long > 1.9).any()
+        assert set(silent[topic].stamp_ns) < set(full[topic].stamp_ns)
+    assert not np.array_equal(silent["/thruster1/state"].stamp_ns, silent["/thruster2/state"].stamp_ns)
+    lost = ~navigation_sent(scenario(navigation=Navigation(dropouts_per_min=6.0, dropout_s=2.0)), 3, 400_000, 0.05)
+    # On average 10 s between silences of 2 s: a sixth of the time.
+    assert lost.mean() == pytest.approx(2.0 / 12.0, rel=0.1)
+    assert not lost[0]
+    assert navigation_sent(scenario(), 3, 100, 0.05).all()
+
+
+def test_what_the_navigation_did_not_send_is_not_in_the_log():
+    sent = np.ones(round(END_S / 0.05), dtype=bool)
+    sent[300:340] = False
+    found, full = streams(scenario(), sent=sent), streams(scenario())
+    np.testing.assert_array_equal(found["/navigation/odometry"].stamp_ns, full["/navigation/odometry"].stamp_ns[sent])
+    np.testing.assert_array_equal(
+        found["/navigation/odometry"].columns["pose.pose.position.x"],
+        full["/navigation/odometry"].columns["pose.pose.position.x"][sent],
+    )
+    assert len(found["/control/tau_d"].stamp_ns) == len(sent)
+
+
+def test_navigation_without_errors_is_the_truth_plus_noise():
+    state = (1.0, 2.0, 0.3, 0.4, 0.5, 0.06)
+    noise = np.arange(6) * 0.001
+    eta, nu = measure(navigation_errors(scenario()), 0, noise, state)
+    np.testing.assert_allclose((*eta, *nu), state + noise, rtol=1e-15)
+
+
+def test_an_antenna_off_the_origin_moves_as_its_point_of_the_hull_does():
+    """Its velocity, turned to NED, is the slope of its position."""
+    errors = navigation_errors(scenario(navigation=Navigation(antenna_m=(2.0, -1.0))))
+    t = np.array([9.999, 10.0, 10.001])
+    pose, velocity = turning(t)
+    seen = [measure(errors, 0, np.zeros(6), (*e, *n)) for e, n in zip(pose.tolist(), velocity.tolist(), strict=True)]
+    slope = (np.array(seen[2][0]) - np.array(seen[0][0])) / 0.002
+    (_, _, psi), (u, v, r) = seen[1]
+    np.testing.assert_allclose(slope, (cos(psi) * u - sin(psi) * v, sin(psi) * u + cos(psi) * v, r), atol=1e-6)
+    # At heading 0 the antenna lies 2 m north and 1 m west of the origin.
+    eta, nu = measure(errors, 0, np.zeros(6), (0.0, 0.0, 0.0, 1.0, 0.0, 0.1))
+    np.testing.assert_allclose((*eta, *nu), (2.0, -1.0, 0.0, 1.1, 0.2, 0.1))
+
+
+def test_a_biased_heading_turns_the_velocity_and_keeps_the_course():
+    errors = navigation_errors(scenario(navigation=Navigation(heading_bias_deg=10.0, yaw_rate_factor=1.1)))
+    eta, nu = measure(errors, 0, np.zeros(6), (0.0, 0.0, 0.5, 2.0, 0.0, 0.1))
+    assert eta[2] == pytest.approx(0.5 + radians(10.0))
+    assert nu == pytest.approx((2.0 * cos(radians(10.0)), -2.0 * sin(radians(10.0)), 0.11))
+    course = eta[2] + np.arctan2(nu[1], nu[0])
+    assert course == pytest.approx(0.5)
+
+
+def test_the_feedforward_gets_only_what_is_measured():
+    m = 400
+    wind = np.column_stack((np.arange(m) * 0.05, np.full(m, 3.0)))
+    current, payload = np.full((m, 2), 0.3), np.column_stack((np.full(m, 200.0), np.ones(m)))
+    for values in controller_weather(scenario(), 1, wind, current, payload):
+        assert not values.any()
+    asked = scenario(wind_rate_hz=10.0, current_rate_hz=2.0, payload_rate_hz=1.0)
+    seen_wind, seen_current, seen_payload = controller_weather(asked, 1, wind, current, payload)
+    old = wind[:, 0] - seen_wind[:, 0]
+    # Held between samples of 10 Hz, zero before the first.
+    assert (seen_wind[0] == 0.0).all()
+    assert old[1:].min() >= -1e-12
+    assert old[1:].max() < 0.1
+    assert (seen_wind[1:, 1] == 3.0).all()
+    assert (seen_current[1:] == 0.3).all()
+    assert (seen_payload[1:] == (200.0, 1.0)).all()
+
+
+def test_a_recorded_wind_is_added_and_held(tmp_path):
+    (tmp_path / "w.csv").write_text("time,north,east\n1,0,5\n3,2,-5\n")
+    asked = scenario()
+    asked = replace(asked, folder=tmp_path, wind=Wind(north_mps=10.0, series="w.csv"))
+    north, east = wind_series(asked, 1, 9, 0.5)
+    np.testing.assert_allclose(north, [10, 10, 10, 10.5, 11, 11.5, 12, 12, 12])
+    np.testing.assert_allclose(east, [5, 5, 5, 2.5, 0, -2.5, -5, -5, -5], atol=1e-12)
+
+
+def test_headings_are_wrapped_before_they_are_halved():
+    """A quaternion of two turns more is the same attitude."""
+    asked = scenario()
+    eta = trial()[0].eta
+    measured = trial()[1].measured.copy()
+    measured[:, 2] += 4.0 * pi
+    once, twice = (
+        streams(asked, **changes)["/navigation/odometry"] for changes in ({}, {"measured": measured, "eta": eta})
+    )
+    np.testing.assert_allclose(
+        twice.columns["pose.pose.orientation.w"], once.columns["pose.pose.orientation.w"], atol=1e-12
+    )
