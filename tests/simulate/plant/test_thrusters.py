@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ferryid.simulate.plant.lags import decay_of, follow, lag_weights
-from ferryid.simulate.plant.thrusters import gear_of, move, stand, thrust_load
+from ferryid.simulate.plant.thrusters import gear_of, move, thrust_load
 from ferryid.simulate.sections import Fault, Thrusters
 from ferryid.vessel.load import load_profile
 from ferryid.vessel.profile import Actuator
@@ -28,11 +28,12 @@ def bollard(n):
 
 
 def load(profile, dynamics, thrusters, nu=(0.0, 0.0, 0.0), factor=None, offset=None):
-    """Return the force of the actuators as they stand, and how each acts."""
+    """Return the force of the actuators as they stand, ordered to stay there."""
     k = len(profile.actuators)
     gear = gear_of(profile, dynamics, 0.02)
     states = np.array([[*row, 0.0] for row in thrusters])
-    stand(gear, states, np.ones(k) if factor is None else factor, np.zeros(k) if offset is None else offset)
+    factor, offset = np.ones(k) if factor is None else factor, np.zeros(k) if offset is None else offset
+    move(gear, states, states[:, :2].copy(), factor, offset, 0.02)
     return thrust_load(gear, 0, *nu)
 
 
