@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing
 
 Floats = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def _arctangents() -> Floats:
 ARCTANGENTS = _arctangents()
 
 
-@compiled
+@borrowing
 def sin_cos(x: float) -> tuple[float, float]:
     """Return sine and cosine of an angle [rad] of at most 1e6, at little more than the price of one."""
     n = (x * TWO_OVER_PI + ROUNDING) - ROUNDING
@@ -119,19 +119,19 @@ def sin_cos(x: float) -> tuple[float, float]:
     return s, c
 
 
-@compiled
+@borrowing
 def sin(x: float) -> float:
     """Return the sine of an angle [rad] of at most 1e6."""
     return sin_cos(x)[0]
 
 
-@compiled
+@borrowing
 def cos(x: float) -> float:
     """Return the cosine of an angle [rad] of at most 1e6."""
     return sin_cos(x)[1]
 
 
-@compiled
+@borrowing
 def exp(x: float) -> float:
     """Return e to the power x; 0 below -708 and infinity above 709.7, near the ends of what numbers can be."""
     if not SMALLEST_EXP <= x <= LARGEST_EXP:
@@ -154,7 +154,7 @@ def exp(x: float) -> float:
     )
 
 
-@compiled
+@borrowing
 def log(x: float) -> float:
     """Return the natural logarithm of x > 0."""
     if not 0.0 < x < INFINITY:
@@ -177,7 +177,7 @@ def log(x: float) -> float:
     return float(scale * LN_2_1 - ((half - (s * (half + p) + scale * LN_2_2)) - f))
 
 
-@compiled
+@borrowing
 def atan2(y: float, x: float) -> float:
     """Return the angle of the point (x, y) [rad], in [-pi, pi]; 0 for the origin. Zeros have no sign."""
     across, along = abs(y), abs(x)
@@ -228,7 +228,7 @@ def sines_cosines(angles: Floats) -> tuple[Floats, Floats]:
     return sines, cosines
 
 
-@compiled
+@borrowing
 def _sines_cosines(angles: Floats, sines: Floats, cosines: Floats) -> None:
     for i in range(len(angles)):
         sines[i], cosines[i] = sin_cos(angles[i])
@@ -241,7 +241,7 @@ def directions(y: Floats, x: Floats) -> Floats:
     return out
 
 
-@compiled
+@borrowing
 def _directions(y: Floats, x: Floats, out: Floats) -> None:
     for i in range(len(out)):
         out[i] = atan2(y[i], x[i])

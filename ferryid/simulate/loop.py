@@ -16,14 +16,14 @@ from ferryid.simulate.control.pid import Pid, desired_force
 from ferryid.simulate.control.reference import Tuning, advance_reference, body_reference
 from ferryid.simulate.noise import NavErrors, measure
 from ferryid.simulate.plant.hull import State
-from ferryid.simulate.plant.motion import Plant, advance, observe
+from ferryid.simulate.plant.motion import Plant, advance
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 OBSERVED = 9
 ROW = 7 + OBSERVED
-"""Columns of the truth before those of the thrusters: time, state, and what `observe` writes."""
+"""Columns of the truth before those of the thrusters: time, state, and what `advance` writes."""
 RECORD = 25
 """Columns of the control's record before those of the thrusters."""
 
@@ -137,10 +137,9 @@ def run(loop: Loop, memory: Memory, measured: Measured, h: float, steps: int, ro
             row = rows[first + j]
             _write_state(row, t + j * h, state)
             index = 2 * (first + j)
-            observe(plant, index, h, state, memory.thrusters, row[7:ROW])
             for i in range(k):
                 row[ROW + i], row[ROW + k + i] = memory.thrusters[i, 0], memory.thrusters[i, 1]
-            state = advance(plant, index, h, state, memory.thrusters, acting)
+            state = advance(plant, index, h, state, memory.thrusters, acting, row[7:ROW])
             acting[:] = orders
 
 

@@ -295,11 +295,11 @@ class Manoeuvre:
     """``[manoeuvre]``, in place of ``[path]``: orders straight to the actuators, with no feedback but what the test defines.
 
     ``zigzag``: ahead at `speed_rpm` for `lead_s`, then the helm swings to ±`helm_deg` whenever the heading has changed by
-    `heading_deg` to that side. ``turning-circle``: the same lead, then the helm stays at `helm_deg`. ``on-the-spot-turn``: every
-    azimuth thruster pushes across, so that their moments add up, at `speed_rpm`, after the lead the other way round, changing
-    every `hold_s`. ``rpm-steps``: straight ahead through `levels` (shares of `speed_rpm`), `hold_s` each, over and over. The
-    helm is the angle of the azimuth thrusters or rudders aft of the body origin, positive turning to starboard. An actuator
-    whose force is ordered directly takes `speed_rpm` for N.
+    `heading_deg` to that side. ``turning-circle``: the same lead, then the helm stays at `helm_deg`. ``on-the-spot-turn``:
+    every azimuth thruster pushes across, so that their moments add up, at `speed_rpm`, after the lead the other way round,
+    changing every `hold_s`. ``rpm-steps``: straight ahead through `levels` (shares of `speed_rpm`), `hold_s` each, over
+    and over. The helm is the angle of the azimuth thrusters or rudders aft of the body origin, positive turning to
+    starboard. An actuator whose force is ordered directly takes `speed_rpm` for N.
     """
 
     kind: str = chosen("", "zigzag", "turning-circle", "on-the-spot-turn", "rpm-steps")

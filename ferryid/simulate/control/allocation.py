@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.control.angle import shorter_way
 from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.thrust import Curves, largest_force, speed_for
@@ -145,7 +145,7 @@ def _inverse(G: list[list[float]]) -> list[list[float]] | None:
     return [[cofactor(j, i) / det for j in range(3)] for i in range(3)]
 
 
-@compiled
+@borrowing
 def allocate(allocation: Allocation, tau_d: Triple, before: Floats, after: Floats) -> bool:
     """Write the orders that give a desired force, and return whether it had to be shortened.
 
@@ -193,7 +193,7 @@ def allocate(allocation: Allocation, tau_d: Triple, before: Floats, after: Float
     return saturated
 
 
-@compiled
+@borrowing
 def _nsca(allocation: Allocation, tau_d: Triple, before: Floats, after: Floats) -> bool:
     """Share between two azimuth thrusters on the centre line, at unequal distances as well.
 
@@ -210,7 +210,7 @@ def _nsca(allocation: Allocation, tau_d: Triple, before: Floats, after: Floats) 
     return saturated
 
 
-@compiled
+@borrowing
 def _order_azimuth(curves: Curves, i: int, along: float, across: float, before: Floats, after: Floats) -> float:
     """Order a surge and sway force of azimuth thruster i and return its size [N]."""
     size = sqrt(along * along + across * across)
@@ -221,7 +221,7 @@ def _order_azimuth(curves: Curves, i: int, along: float, across: float, before: 
     return float(size)
 
 
-@compiled
+@borrowing
 def _part(allocation: Allocation, i: int, tau: Triple) -> Pair:
     """Return surge and sway force of azimuth thruster i, or the force of a fixed actuator and 0 [N]."""
     P = allocation.shares[i]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import pi
 
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing
 
 
-@compiled
+@borrowing
 def shorter_way(angle: float) -> float:
     """Wrap an angle [rad] to (-pi, pi]."""
     return pi - (pi - angle) % (2.0 * pi)

@@ -14,7 +14,7 @@ from ferryid.identify.basis import DIMENSIONS
 from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.residual import scaled
 from ferryid.identify.store import load_file
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.hull import Hydrodynamics, hydrodynamics, required_force
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
@@ -132,7 +132,7 @@ def feedforward_of(
     )
 
 
-@compiled
+@borrowing
 def ahead_of(
     model: Feedforward, nu_dot: Triple, nu: Triple, psi: float, wind: Pair, current: Pair, payload: Pair
 ) -> Triple:
@@ -185,7 +185,7 @@ def ahead_of(
     return X, Y, N
 
 
-@compiled
+@borrowing
 def _factors(nu_dot: Triple, nu: Triple, air: Pair, water: Pair) -> tuple[float, ...]:
     """Return the values of `FACTORS`; `air` and `water` are the hull's velocity relative to them, along x and y [m/s]."""
     u, v, r = nu

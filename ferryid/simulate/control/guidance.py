@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.control.angle import shorter_way
 from ferryid.simulate.elementary import atan2
 
@@ -75,7 +75,7 @@ def build_guidance(scenario: Scenario) -> tuple[Guidance, Floats]:
     return guidance, np.zeros(3)
 
 
-@compiled
+@borrowing
 def guide(guidance: Guidance, gstate: Floats, t: float, eta: Triple) -> Triple:
     """Return the goal of the reference filter: north, east [m] and heading [rad, not wrapped].
 
@@ -135,12 +135,12 @@ def guide(guidance: Guidance, gstate: Floats, t: float, eta: Triple) -> Triple:
     return x, y, gstate[HEADING]
 
 
-@compiled
+@borrowing
 def _carrot(along: float, radius: float) -> float:
     """Return how far along the leg the carrot is: twice the radius ahead, and waiting at the radius before the leg starts."""
     return along + 2.0 * radius if along > 0.0 else radius
 
 
-@compiled
+@borrowing
 def _distance(x: float, y: float) -> float:
     return sqrt(x * x + y * y)

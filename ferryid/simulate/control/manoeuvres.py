@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing
 from ferryid.vessel.profile import Actuator, Profile
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def _spin(actuator: Actuator) -> tuple[float, float]:
     return (side, 0.0) if actuator.kind == "tunnel" else (0.0, 0.0)
 
 
-@compiled
+@borrowing
 def helm(manoeuvre: Helm, mstate: Floats, t: float, eta: Triple, nu: Triple, orders: Floats) -> None:
     """Write the orders of one cycle.
 

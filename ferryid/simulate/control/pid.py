@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.control.angle import shorter_way
 from ferryid.simulate.control.feedforward import Feedforward, ahead_of
 from ferryid.simulate.control.reference import body_reference
@@ -38,7 +38,7 @@ def build_pid(scenario: Scenario, profile: Profile) -> tuple[Pid, Floats]:
     return Pid(gains.Kp, gains.Kd, gains.Ki, (reach[0], reach[1], reach[2])), np.zeros(3)
 
 
-@compiled
+@borrowing
 def desired_force(
     pid: Pid,
     feedforward: Feedforward,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import cos, sin
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def build_reference(scenario: Scenario) -> tuple[Tuning, Floats]:
     )
 
 
-@compiled
+@borrowing
 def advance_reference(tuning: Tuning, ref: Floats, goal: Triple, h: float) -> None:
     """Move the filter towards `goal` for `h` seconds.
 
@@ -75,7 +75,7 @@ def advance_reference(tuning: Tuning, ref: Floats, goal: Triple, h: float) -> No
         ref[0, i], ref[1, i], ref[2, i] = x, v, a
 
 
-@compiled
+@borrowing
 def body_reference(ref: Floats) -> tuple[Triple, Triple]:
     """Return desired nu [m/s, m/s, rad/s] and nu_dot in the body frame of the desired heading."""
     c, s = cos(ref[0, 2]), sin(ref[0, 2])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import exp
-from ferryid.simulate.plant.borrowing import borrowing
 
 Weights = tuple[float, float, float, float]
 """What is kept of the old value, then the weights of the input at start, middle and end of a step."""

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import cos, sin
 from ferryid.simulate.noise import wind_series
 from ferryid.simulate.plant import rolling
-from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.current import current_series, turn_rate
 from ferryid.simulate.plant.hull import (
     Force,
@@ -27,7 +27,7 @@ from ferryid.simulate.plant.mooring import Spring, mooring_load
 from ferryid.simulate.plant.payload import Masses
 from ferryid.simulate.plant.phases import Phases, phases_of
 from ferryid.simulate.plant.shallow import Patch, damping_factor, patch_of
-from ferryid.simulate.plant.thrusters import Gear, gear_of, move, stand, thrust_load
+from ferryid.simulate.plant.thrusters import Gear, gear_of, move, thrust_load
 from ferryid.simulate.plant.waves import Sea, sea_of, wave_load
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
 from ferryid.vessel.profile import Profile
@@ -187,7 +187,7 @@ def _ahead(state: State, rates: State, d: float) -> State:
 
 
 @borrowing
-def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, orders: Floats) -> State:
+def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, orders: Floats, row: Floats) -> State:
     """Take one classical Runge-Kutta step.
 
     Parameters
@@ -204,6 +204,9 @@ def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, ord
         Speed [rpm or N], angle [rad] and lagged force [N] of each, shape (k, 3); moved in place to the end of the step.
     orders
         Speed [rpm or N] and angle or rudder [rad] of each, shape (k, 2).
+    row
+        Shape (9,), overwritten with the acceleration, the force of the actuators that really acts and that of the waves at
+        the start of the step.
 
     Returns
     -------
@@ -215,10 +218,22 @@ def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, ord
     phase = phases.of_step[step]
     t, d = step * h, 0.5 * h
     move(plant.gear, thrusters, orders, phases.factor[phase], phases.offset[phase], h)
-    k1, _, _ = derivative(plant, phase, 0, i, t, state)
-    k2, _, _ = derivative(plant, phase, 1, i + 1, t + d, _ahead(state, k1, d))
-    k3, _, _ = derivative(plant, phase, 1, i + 1, t + d, _ahead(state, k2, d))
-    k4, _, _ = derivative(plant, phase, 2, i + 2, t + h, _ahead(state, k3, h))
+    at = state
+    k1 = k2 = k3 = k4 = state
+    # A loop, so that the loads are compiled into the step once and not four times over.
+    for stage in range(4):
+        node = (stage + 1) // 2
+        rates, tau, wave = derivative(plant, phase, node, i + node, t + node * d, at)
+        if stage == 0:
+            for j in range(3):
+                row[j], row[3 + j], row[6 + j] = rates[3 + j], tau[j], wave[j]
+            k1, at = rates, _ahead(state, rates, d)
+        elif stage == 1:
+            k2, at = rates, _ahead(state, rates, d)
+        elif stage == 2:
+            k3, at = rates, _ahead(state, rates, h)
+        else:
+            k4 = rates
     d = h / 6.0
     x, y, psi, u, v, r = state
     x += d * (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0])
@@ -232,17 +247,3 @@ def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, ord
         b = phases.boarding[later]
         u, v, r = b[0] * u, b[1] * v + b[2] * r, b[3] * v + b[4] * r
     return x, y, psi, u, v, r
-
-
-@borrowing
-def observe(plant: Plant, i: int, h: float, state: State, thrusters: Floats, row: Floats) -> None:
-    """Write the acceleration, the force of the actuators that really acts and that of the waves into ``row[0:9]``.
-
-    Parameters as of `advance`, which it leaves as it is.
-    """
-    phases = plant.phases
-    phase = phases.of_step[i // 2]
-    stand(plant.gear, thrusters, phases.factor[phase], phases.offset[phase])
-    rates, tau, wave = derivative(plant, phase, 0, i, (i // 2) * h, state)
-    for j in range(3):
-        row[j], row[3 + j], row[6 + j] = rates[3 + j], tau[j], wave[j]

@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import cos, exp, sin
-from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.waves import GRAVITY, Sea, slopes
 
 Floats = NDArray[np.float64]

@@ -7,9 +7,8 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing, compiled
 from ferryid.simulate.elementary import exp, log
-from ferryid.simulate.plant.borrowing import borrowing
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate.plant.borrowing import borrowing
+from ferryid.simulate.compiled import borrowing
 from ferryid.vessel.profile import Actuator, Profile, ThrustCurve
 from ferryid.vessel.thrusters import FRESH_WATER
 

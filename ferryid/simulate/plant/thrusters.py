@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import cos, sin
-from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.lags import Weights, decay_of, follow, lag_weights
 from ferryid.simulate.plant.rudder import COLUMNS, rudder_load, rudder_row
@@ -181,20 +181,6 @@ def move(gear: Gear, thrusters: Floats, orders: Floats, factor: Floats, offset: 
 
 
 @borrowing
-def stand(gear: Gear, thrusters: Floats, factor: Floats, offset: Floats) -> None:
-    """Note how the actuators act at the start of a step, without moving them; parameters as of `move`."""
-    for k in range(len(gear.x)):
-        n, a = thrusters[k, 0], thrusters[k, 1]
-        F = force_at(gear.curves, k, n)
-        f = F
-        if gear.force_lag[k] > 0.0:
-            f = thrusters[k, 2]
-        _note(gear, 0, k, n, a, f, f - F, factor[k], offset[k])
-    if gear.interaction > 0.0:
-        _interact(gear, 0)
-
-
-@borrowing
 def _note(
     gear: Gear, node: int, k: int, n: float, a: float, f: float, deficit: float, factor: float, offset: float
 ) -> None:
@@ -252,7 +238,7 @@ def thrust_load(gear: Gear, node: int, u: float, v: float, r: float) -> Force:
     Parameters
     ----------
     gear
-        Actuators, after `move` or `stand`.
+        Actuators, after `move`.
     node
         0, 1 or 2: start, middle or end of the step.
     u, v, r

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import compiled
+from ferryid.simulate.compiled import borrowing, compiled
 from ferryid.simulate.elementary import cos, exp, sin
 from ferryid.simulate.noise import generator
-from ferryid.simulate.plant.borrowing import borrowing
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.spectrum import components, deep_water
 from ferryid.simulate.sections import Wake, Waves
