@@ -113,6 +113,22 @@ def test_simulate_and_list(ferryid, tmp_path: Path) -> None:
     assert "twelve-corner" in {one["name"] for one in scenarios}
 
 
+def test_reproduce_one_study(ferryid, tmp_path: Path) -> None:
+    run = ferryid(
+        "reproduce", "thesis", "--only", "calm", "--seeds", "1", "--processes", "1", "--out", tmp_path, "--json", "-"
+    )
+    assert run.code == 0, run.err
+    result = conforms(run.out)
+    page = (tmp_path / "thesis.md").read_text(encoding="utf-8")
+    assert [study["name"] for study in result["studies"]] == ["calm"]
+    shown = re.findall(r"\(thesis/([^)]+[.]svg)\)", page)
+    assert shown == [figure["file"] for figure in result["studies"][0]["figures"]]
+    assert sorted(shown) == sorted(path.name for path in (tmp_path / "thesis").iterdir())
+    refused = ferryid("reproduce", "thesis", "--only", "clam", "--out", tmp_path)
+    assert refused.code == 2
+    assert 'Did you mean "calm"' in refused.err
+
+
 def test_vessel_check_show_and_list(ferryid, tmp_path: Path) -> None:
     assert "milliampere" in ferryid("vessel", "list").out
     vessels = conforms(ferryid("vessel", "list", "--json", "-").out)["vessels"]
