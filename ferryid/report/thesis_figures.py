@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ferryid.report.drawing import Drawing, Floats, Panel
 from ferryid.report.figures import STYLE, WIDTH
@@ -27,7 +27,8 @@ def draw(drawing: Drawing) -> str:
     colours = {label: COLOURS[i % len(COLOURS)] for i, label in enumerate(labels)}
     with mpl.rc_context(STYLE):
         rows = ceil(len(drawing.panels) / drawing.columns)
-        legend_rows = ceil(len(labels) / 3)
+        beside = _columns(labels)
+        legend_rows = ceil(len(labels) / beside)
         top = 0.15 + 0.22 * legend_rows + (0.2 if any(panel.title for panel in drawing.panels) else 0.0)
         height = (4.2 if drawing.equal else (1.55 if rows > 1 else 2.6) * rows) + top + 0.5
         figure = Figure(figsize=(WIDTH, height))
@@ -50,7 +51,7 @@ def draw(drawing: Drawing) -> str:
             ax.set_xlabel(drawing.x_label)
         if len(labels) > 1:
             handles = [Line2D([], [], color=colours[label], label=label) for label in labels]
-            figure.legend(handles=handles, loc="upper center", ncols=min(3, len(labels)), borderaxespad=0.1)
+            figure.legend(handles=handles, loc="upper center", ncols=beside, borderaxespad=0.1)
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
         return text.getvalue()
@@ -68,8 +69,15 @@ def _panel(ax: Axes, panel: Panel, colours: dict[str, str]) -> None:
         ax.set_title(panel.title, fontsize=10)
     if panel.logarithmic:
         ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         ax.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _columns(labels: list[str]) -> int:
+    """Return how many labels of a legend fit beside one another."""
+    longest = max(len(label) for label in labels)
+    return min(len(labels), 3 if longest <= 20 else 2 if longest <= 36 else 1)
 
 
 def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
