@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ferryid.cli.options import Json
-from ferryid.cli.output import emit
+from ferryid.cli.output import emit, progress
 
 
 def command(
@@ -32,5 +32,7 @@ def command(
         return
     if not scenario or out is None:
         raise typer.BadParameter("give a scenario and --out LOG, or --list")
-    result = run_scenario(scenario, out, storage=storage, truth=truth, seed=seed, overwrite=overwrite)
+    result = run_scenario(
+        scenario, out, storage=storage, truth=truth, seed=seed, overwrite=overwrite, progress=progress
+    )
     emit(result, render_simulation(result), json)

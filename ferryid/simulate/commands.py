@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ def run_scenario(
     truth: Path | None = None,
     seed: int | None = None,
     overwrite: bool = False,
+    progress: Callable[[str], None],
 ) -> dict[str, Any]:
     """Simulate a scenario, write its log and return what was written (``ferryid.simulate/1``).
 
@@ -34,11 +35,16 @@ def run_scenario(
         As for `ferryid.simulate.write_log`.
     seed
         Takes the place of the scenario's own.
+    progress
+        Called with the name of each stage.
     """
     asked = load_scenario(scenario)
     check_output(out, truth, storage=storage, overwrite=overwrite)
+    progress("simulating (the first run after an installation compiles the simulator, some 20 s)")
     simulation = simulate(asked, seed)
+    progress("writing the log")
     write_log(simulation, out, truth, storage=storage, overwrite=overwrite)
+    progress("")
     control = simulation.control
     position_m, heading_deg = _tracking(simulation)
     return {
@@ -56,6 +62,7 @@ def run_scenario(
             "heading_deg": heading_deg,
         },
         "saturated_share": float(np.mean(control.saturated)),
+        "undefined_aims": control.undefined_aims,
     }
 
 
@@ -86,6 +93,11 @@ def render_simulation(result: Mapping[str, Any]) -> str:
         lines.append(
             f"kept to its reference within {rms['position_m']:.2f} m and {rms['heading_deg']:.1f} deg (rms), "
             f"thrust saturated {100.0 * result['saturated_share']:.1f} % of the time"
+        )
+    if result["undefined_aims"]:
+        lines.append(
+            f"too far from the path for the enclosure law in {result['undefined_aims']} control cycles: it aimed at the "
+            "nearest point instead"
         )
     return "\n".join(lines)
 

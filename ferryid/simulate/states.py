@@ -74,6 +74,8 @@ class Control:
         Orders to every thruster, shape (m, k).
     saturated
         True where the desired force was out of reach, shape (m,).
+    undefined_aims
+        How many cycles the enclosure law found no point of the path on its circle and aimed at the nearest.
     """
 
     t: Floats
@@ -88,3 +90,4 @@ class Control:
     speeds: Floats
     angles: Floats
     saturated: NDArray[np.bool_]
+    undefined_aims: int

@@ -122,7 +122,7 @@ def sail(scenario: Scenario, profile: Profile, seed: int, model: Model | None = 
             "Fix: smaller gains or forces; a hull whose damping drives instead of damping does this too"
         )
     attitude = roll_pitch(plant, rows[:, 0], rows[:, 1:4])
-    return _truth(rows, k, wind, current, payload, attitude), _control(records, k)
+    return _truth(rows, k, wind, current, payload, attitude), _control(records, k, int(way[2]))
 
 
 def _truth(rows: Floats, k: int, wind: Floats, current: Floats, payload: Floats, attitude: Floats) -> Truth:
@@ -142,7 +142,7 @@ def _truth(rows: Floats, k: int, wind: Floats, current: Floats, payload: Floats,
     )
 
 
-def _control(records: Floats, k: int) -> Control:
+def _control(records: Floats, k: int, undefined_aims: int) -> Control:
     return Control(
         t=records[:, 0],
         t_order=records[:, 1],
@@ -156,4 +156,5 @@ def _control(records: Floats, k: int) -> Control:
         speeds=records[:, RECORD : RECORD + k],
         angles=records[:, RECORD + k :],
         saturated=records[:, 23] > 0.0,
+        undefined_aims=undefined_aims,
     )

@@ -196,11 +196,14 @@ class TableReader:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Tell whether a value is a number that a float can hold; TOML's whole numbers have no end."""
+    return isinstance(value, float) or (type(value) is int and abs(value) < 2**63)
 
 
 def _kind(value: object) -> str:
     names = {bool: "true/false", str: "a string", int: "a number", float: "a number", dict: "a table"}
+    if type(value) is int and not _is_number(value):
+        return "one of more than 63 bits"
     if isinstance(value, list):
         return "an array of " + (", ".join(sorted({_kind(entry) for entry in value})) or "nothing")
     return names.get(type(value), f"a {type(value).__name__}")
