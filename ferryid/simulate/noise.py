@@ -208,7 +208,7 @@ def _interpolate(t: Floats, grid: Floats, values: Floats, out: Floats) -> None:
         while low < last and grid[low + 1] <= t[i]:
             low += 1
         share = 0.0
-        if low < last and t[i] > grid[low]:
+        if low < last:
             share = (t[i] - grid[low]) / (grid[low + 1] - grid[low])
         for j in range(values.shape[1]):
             out[i, j] = values[low, j]
