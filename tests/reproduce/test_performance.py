@@ -23,7 +23,7 @@ def _control(t: np.ndarray, eta_d: np.ndarray, tau_d: np.ndarray, feedforward: n
     return Control(
         t=t, t_order=t, measured=np.zeros((m, 6)), sent=np.ones(m, dtype=bool), goal=eta_d, eta_d=eta_d,
         nu_d=np.zeros((m, 3)), tau_d=tau_d, feedforward=feedforward, speeds=np.zeros((m, 2)), angles=np.zeros((m, 2)),
-        saturated=np.zeros(m, dtype=bool),
+        saturated=np.zeros(m, dtype=bool), undefined_aims=0,
     )  # fmt: skip
 
 

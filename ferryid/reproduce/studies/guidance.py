@@ -46,6 +46,8 @@ class Ride:
         Way made good [m].
     energy_J
         Mechanical work.
+    aimless
+        Cycles in which the law had no point to aim at: the path was further away than the enclosure's radius.
     """
 
     off_m: float
@@ -57,6 +59,7 @@ class Ride:
     feedforward: Floats
     distance_m: float
     energy_J: float
+    aimless: int
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,7 @@ def study(lab: Lab) -> Study:
                 ("jerk of the reference, rms [m/s³]", "jerk", 1.0),
                 ("way travelled [m]", "distance_m", 1.0),
                 ("energy [kJ]", "energy_J", 1e-3),
+                ("cycles without a point to aim at", "aimless", 1.0),
             )
         )
         + tuple(
@@ -180,6 +184,7 @@ def _ride(flight: Flight) -> Ride:
         signal_power(flight.performance.feedforward),
         float(np.sum(np.hypot(*np.diff(truth.eta[:, :2], axis=0).T))),
         flight.performance.EC,
+        control.undefined_aims,
     )
 
 
