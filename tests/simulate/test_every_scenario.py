@@ -1,0 +1,32 @@
+"""Every bundled scenario runs, and its log goes through a fit like a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.identify.fit import fit
+from ferryid.identify.settings import FitSettings
+from ferryid.simulate import list_scenarios, load_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+
+NAMES = tuple(list_scenarios())
+SUFFIXES = (".mcap", ".bag", "")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenario_runs_and_is_fitted(name: str, tmp_path: Path) -> None:
+    scenario = load_scenario(name)
+    simulation = simulate(scenario)
+    truth, control = simulation.truth, simulation.control
+    assert control.t[-1] + 1.0 / scenario.sensors.navigation_rate_hz == pytest.approx(scenario.duration_s)
+    assert np.isfinite(truth.nu).all()
+    log = tmp_path / f"{name}{SUFFIXES[NAMES.index(name) % len(SUFFIXES)]}"
+    write_log(simulation, log)
+    result = fit([str(log)], load_profile(scenario.vessel), FitSettings(delta=0.4, sigma=0.4, draws=20), tmp_path / "out")
+    scores = result.model.scores
+    assert scores["rows"] > 0.1 * scenario.duration_s * scenario.sensors.navigation_rate_hz
+    assert np.isfinite(result.model.theta).all()
+    assert np.isfinite([scores["mse"][part][axis] for part in ("base", "model") for axis in scores["mse"]["base"]]).all()
