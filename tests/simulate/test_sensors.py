@@ -79,6 +79,7 @@ def trial(**changes):
         speeds=np.zeros((m, 2)),
         angles=np.zeros((m, 2)),
         saturated=np.zeros(m, dtype=bool),
+        undefined_aims=0,
     )
     return replace(truth, **{k: v for k, v in changes.items() if k in vars(truth)}), replace(
         control, **{k: v for k, v in changes.items() if k in vars(control)}
