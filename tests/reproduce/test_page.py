@@ -23,6 +23,7 @@ STUDY = Study(
         Row("error", "%", -75.0, (-10.0, -30.0, -20.0)),
         Row("window", "s", "short", (1.0,)),
         Row("new", "", None, (2.5,)),
+        Row("up", "%", 5.0, (4.0,)),
     ),
     (Table("A table.", ("a", "b"), (("1", "2"),)),),
     ("It follows.",),
