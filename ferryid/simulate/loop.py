@@ -98,7 +98,7 @@ def run(loop: Loop, memory: Memory, measured: Measured, h: float, steps: int, ro
         first = m * steps
         _write_state(rows[first], t, state)
         if measured.sent[m] or m == 0:
-            eta, nu = measure(loop.errors, m, measured.noise[m], _past(rows, first, loop.errors.delay_s / h))
+            eta, nu = measure(loop.errors, measured.noise[m], _past(rows, first, loop.errors.delay_s / h))
         before[:] = orders
         tau_d, ahead, goal = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (eta[0], eta[1], eta[2])
         if loop.open_loop:

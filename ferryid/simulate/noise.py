@@ -263,7 +263,7 @@ def navigation_errors(scenario: Scenario) -> NavErrors:
 
 
 @compiled
-def measure(errors: NavErrors, k: int, noise: Floats, state: State) -> tuple[Vector, Vector]:
+def measure(errors: NavErrors, noise: Floats, state: State) -> tuple[Vector, Vector]:
     """Return pose and velocities as the navigation gives them.
 
     The antenna's velocity over ground is resolved with the heading as measured, so that a biased heading turns the
@@ -273,10 +273,8 @@ def measure(errors: NavErrors, k: int, noise: Floats, state: State) -> tuple[Vec
     ----------
     errors
         Systematic errors.
-    k
-        Number of the control cycle.
     noise
-        Its row of `navigation_noise`, shape (6,).
+        The control cycle's row of `navigation_noise`, shape (6,).
     state
         Pose and velocities of the body origin at the time measured, `delay_s` ago.
 

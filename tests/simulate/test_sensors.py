@@ -222,7 +222,7 @@ def test_what_the_navigation_did_not_send_is_not_in_the_log():
 def test_navigation_without_errors_is_the_truth_plus_noise():
     state = (1.0, 2.0, 0.3, 0.4, 0.5, 0.06)
     noise = np.arange(6) * 0.001
-    eta, nu = measure(navigation_errors(scenario()), 0, noise, state)
+    eta, nu = measure(navigation_errors(scenario()), noise, state)
     np.testing.assert_allclose((*eta, *nu), state + noise, rtol=1e-15)
 
 
@@ -231,21 +231,21 @@ def test_an_antenna_off_the_origin_moves_as_its_point_of_the_hull_does():
     errors = navigation_errors(scenario(navigation=Navigation(antenna_m=(2.0, -1.0))))
     t = np.array([9.999, 10.0, 10.001])
     pose, velocity = turning(t)
-    seen = [measure(errors, 0, np.zeros(6), (*e, *n)) for e, n in zip(pose.tolist(), velocity.tolist(), strict=True)]
+    seen = [measure(errors, np.zeros(6), (*e, *n)) for e, n in zip(pose.tolist(), velocity.tolist(), strict=True)]
     slope = (np.array(seen[2][0]) - np.array(seen[0][0])) / 0.002
     (_, _, psi), (u, v, r) = seen[1]
     np.testing.assert_allclose(slope, (cos(psi) * u - sin(psi) * v, sin(psi) * u + cos(psi) * v, r), atol=1e-6)
     # At heading 0 the antenna lies 2 m north and 1 m west of the origin.
-    eta, nu = measure(errors, 0, np.zeros(6), (0.0, 0.0, 0.0, 1.0, 0.0, 0.1))
+    eta, nu = measure(errors, np.zeros(6), (0.0, 0.0, 0.0, 1.0, 0.0, 0.1))
     np.testing.assert_allclose((*eta, *nu), (2.0, -1.0, 0.0, 1.1, 0.2, 0.1))
 
 
 def test_a_biased_heading_turns_the_velocity_and_keeps_the_course():
     errors = navigation_errors(scenario(navigation=Navigation(heading_bias_deg=10.0, yaw_rate_factor=1.1)))
-    eta, nu = measure(errors, 0, np.zeros(6), (0.0, 0.0, 0.5, 2.0, 0.0, 0.1))
+    eta, nu = measure(errors, np.zeros(6), (0.0, 0.0, 0.5, 2.0, 0.0, 0.1))
     assert eta[2] == pytest.approx(0.5 + radians(10.0))
     assert nu == pytest.approx((2.0 * cos(radians(10.0)), -2.0 * sin(radians(10.0)), 0.11))
-    eta, nu = measure(errors, 0, np.zeros(6), (0.0, 0.0, 0.5, 1.0, 1.0, 0.0))
+    eta, nu = measure(errors, np.zeros(6), (0.0, 0.0, 0.5, 1.0, 1.0, 0.0))
     assert eta[2] + np.arctan2(nu[1], nu[0]) == pytest.approx(0.5 + pi / 4)
     assert np.hypot(*nu[:2]) == pytest.approx(2.0**0.5)
 
