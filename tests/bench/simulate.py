@@ -46,7 +46,9 @@ def run(quick: bool) -> Section:
     sail(plain, profile, 0)
     first_s = time.perf_counter() - start
     rows = [
-        real_time("full plant: wind, gusts, current, 40 waves, wakes, payload and all losses", sailing(full), repeats, 2000),
+        real_time(
+            "full plant: wind, gusts, current, 40 waves, wakes, payload and all losses", sailing(full), repeats, 2000
+        ),
         real_time("the same without waves", sailing(replace(full, waves=Waves(), wakes=())), repeats, None),
         real_time("hull, wind and gusts", sailing(plain), repeats, None),
         real_time("hull, wind and gusts, with every sensor's messages", lambda: simulate(plain, 1), repeats, None),
@@ -86,7 +88,13 @@ def process(plain: Scenario) -> Callable[[], object]:
     """Return a run of the command, from a file to a file."""
     folder = Path(tempfile.mkdtemp())
     (folder / "bench.toml").write_text(plain.text, encoding="utf-8")
-    command = [sys.executable, "-c", "from ferryid.cli.main import main; main()", "simulate", str(folder / "bench.toml")]
+    command = [
+        sys.executable,
+        "-c",
+        "from ferryid.cli.main import main; main()",
+        "simulate",
+        str(folder / "bench.toml"),
+    ]
     return lambda: subprocess.run(
         [*command, "--out", str(folder / "t.mcap"), "--overwrite"], check=True, capture_output=True
     )
