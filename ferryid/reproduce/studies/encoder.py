@@ -134,9 +134,8 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         "Whole degrees make the model's MSE "
         + ", ".join(f"{100 * (ratio - 1):+.1f} % in {axis}" for ratio, axis in zip(worse, AXES, strict=True))
         + (
-            ": too little to make or break the method. This agrees with the thesis's first pilot test, which "
-            "brought no improvement "
-            "although the update was in place."
+            ": in these runs too little to make or break the method. Whole degrees are our guess at what the thesis's "
+            "integers were, and its encoders may have had other faults that the update mended."
             if max(worse) < 1.05
             else ": the update is worth having."
         )

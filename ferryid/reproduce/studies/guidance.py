@@ -253,6 +253,8 @@ def _pictures(flights: list[Flight], eleventh: Flight) -> tuple[Drawing, ...]:
             "time [s]",
             (Panel("desired speed [m/s]", tuple(speeds)),),
         ),
+        _response(flights[0], body=True),
+        _response(flights[0], body=False),
         control_shares(
             "5-19-shares-round-10", "Feedforward and feedback in round 10, as in figure 5.19.", flights[0].performance
         ),
@@ -260,6 +262,28 @@ def _pictures(flights: list[Flight], eleventh: Flight) -> tuple[Drawing, ...]:
             "5-20-shares-round-11", "Feedforward and feedback in round 11, as in figure 5.20.", eleventh.performance
         ),
     )
+
+
+def _response(flight: Flight, *, body: bool) -> Drawing:
+    """Return figure 5.17, velocities, or 5.18, position and heading, of round 10: true and desired."""
+    truth, control = flight.simulation.truth, flight.simulation.control
+    wanted, real = (control.nu_d, truth.nu) if body else (control.eta_d, truth.eta)
+    degrees = np.array([1.0, 1.0, 180.0 / np.pi])
+    labels = ("u [m/s]", "v [m/s]", "r [deg/s]") if body else ("north [m]", "east [m]", "heading [deg]")
+    every, seldom = 25, 10  # half a second each
+    panels = tuple(
+        Panel(
+            label,
+            (
+                Line("true", truth.t[::every], degrees[j] * real[::every, j]),
+                Line("desired", control.t[::seldom], degrees[j] * wanted[::seldom, j]),
+            ),
+        )
+        for j, label in enumerate(labels)
+    )
+    name, what = ("5-17-body", "Velocities") if body else ("5-18-ned", "Position and heading")
+    figure = name[:4].replace("-", ".")
+    return Drawing(name, f"{what} in round 10, carrot and Master Model, as in figure {figure}.", "time [s]", panels)
 
 
 def _findings(outcomes: list[Outcome]) -> list[str]:
