@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from ferryid.identify.model import Model
 from ferryid.identify.qr import QrFactor, factorise
 from ferryid.identify.settings import FitSettings
 from ferryid.signals.track import Motion
+from ferryid.vessel.load import parse_profile
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
@@ -48,3 +50,9 @@ def hull_alone(profile: Profile, scale: dict[str, float]) -> Estimator:
 def without_anemometer(motion: Motion) -> Motion:
     """Return a log as it would be had nobody measured wind and current."""
     return replace(motion, wind=None, current=None)
+
+
+def without_wind_areas(profile: Profile) -> Profile:
+    """Return a profile that knows nothing of the wind on its vessel; models learnt with it store it so."""
+    text = re.sub(r"^\[wind\].*?(?=^\[|\Z)", "", profile.text, flags=re.MULTILINE | re.DOTALL)
+    return parse_profile(text, profile.name)
