@@ -59,6 +59,6 @@ def seeds(count: int) -> tuple[int, ...]:
     """
     if not FEWEST_SEEDS <= count <= MOST_SEEDS:
         raise FerryIdError(
-            f"--seeds: {count} is no number of repetitions. Fix: give {FEWEST_SEEDS} to {MOST_SEEDS}, 5 is usual"
+            f"--seeds: {count} is no number of repetitions. Fix: give {FEWEST_SEEDS} to {MOST_SEEDS}, 7 is usual"
         )
     return tuple(range(1, count + 1))

@@ -41,7 +41,7 @@ def reproduce(
     out: Path,
     *,
     only: Sequence[str] = (),
-    repetitions: int = 5,
+    repetitions: int = 7,
     processes: int = 2,
     progress: Callable[[str], None],
 ) -> dict[str, Any]:

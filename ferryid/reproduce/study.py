@@ -136,7 +136,10 @@ def changes(new: Sequence[float], old: Sequence[float]) -> tuple[float, ...]:
 def spread(values: Sequence[float], unit: str = "", *, signed: bool = False) -> str:
     """Return ``median (least to greatest)`` of several runs as text."""
     form = "+" if signed else ""
-    middle, least, most = (number(value, form) for value in (median(values), low(values), high(values)))
+    middle, least, most = (
+        percent(value, form) if unit == "%" else number(value, form)
+        for value in (median(values), low(values), high(values))
+    )
     unit = f" {unit}" if unit else ""
     return f"{middle}{unit} ({least} to {most})" if len(values) > 1 else f"{middle}{unit}"
 
@@ -145,6 +148,16 @@ def number(value: float, form: str = "") -> str:
     """Return a number with three digits that count, whole from 100 on."""
     if not np.isfinite(value):
         return "–"
-    digits = 0 if abs(value) >= 100 or value == int(value) else 1 if abs(value) >= 10 else 2 if abs(value) >= 1 else 3
+    size = abs(value)
+    digits = 0 if size >= 99.95 or value == int(value) else 1 if size >= 9.995 else 2 if size >= 0.9995 else 3
     text = f"{value:{form}.{digits}f}"
     return text.replace("-", "−")
+
+
+def percent(value: float, form: str = "+") -> str:
+    """Return a percentage with one decimal, whole from 100 on; its sign always, unless `form` is empty."""
+    if not np.isfinite(value):
+        return "–"
+    rounded = round(value, 1) + 0.0  # no minus before a zero
+    digits = 0 if abs(rounded) >= 100.0 or rounded == int(rounded) != 0 else 1
+    return f"{rounded:{form if rounded else ''}.{digits}f}".replace("-", "−")

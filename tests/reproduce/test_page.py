@@ -40,6 +40,8 @@ def test_theirs_stands_beside_the_median_and_range_of_ours() -> None:
     assert "- It follows." in text
     assert "![A caption.](thesis/one.svg)" in text
     assert "median of 3 runs" in text
+    assert "[at the end](#chosen)" in text
+    assert '<a id="chosen"></a>' in text
     assert "| a | b |\n|---|---|\n| 1 | 2 |" in text
 
 

@@ -17,7 +17,7 @@ from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, hull_alone, learn
 from ferryid.reproduce.performance import MEASURES
 from ferryid.reproduce.pictures import integrals
-from ferryid.reproduce.study import Row, Study, Table, change, changes, number, spread
+from ferryid.reproduce.study import Row, Study, Table, change, changes, number, percent, spread
 from ferryid.reproduce.variants import noiseless, prompt
 from ferryid.signals.smooth import moving_mean, odd_rows
 from ferryid.signals.track import Motion
@@ -246,8 +246,8 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         )
     lot = np.std(ise[:, 2], axis=1, ddof=1) / np.mean(ise[:, 2], axis=1)
     told.append(
-        f"Most of that scatter is the noise of each round: the Master Model's ISE, which learns nothing, differs by "
-        f"{number(100 * float(np.median(lot)))} % (standard deviation, median of the runs) between the same four rounds."
+        f"So much comes of each round's noise: the Master Model's ISE, which learns nothing, differs by "
+        f"{percent(100 * float(np.median(lot)), '')} % (standard deviation, median of the runs) between the same four rounds."
     )
     ratio = np.median(ise[:, :2] / ise[:, 2:], axis=0)
     told.append(

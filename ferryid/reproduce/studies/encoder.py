@@ -14,7 +14,7 @@ from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
 from ferryid.reproduce.pictures import against
-from ferryid.reproduce.study import Row, Study, Table, changes, median, number, spread
+from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 from ferryid.simulate.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -132,7 +132,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
     worse = [median([one.error[1, j] / one.error[0, j] for one in outcomes]) for j in range(3)]
     told.append(
         "Whole degrees make the model's MSE "
-        + ", ".join(f"{100 * (ratio - 1):+.1f} % in {axis}" for ratio, axis in zip(worse, AXES, strict=True))
+        + ", ".join(f"{percent(100 * (ratio - 1))} % in {axis}" for ratio, axis in zip(worse, AXES, strict=True))
         + (
             ": in these runs too little to make or break the method. Whole degrees are our guess at what the thesis's "
             "integers were, and its encoders may have had other faults that the update mended."

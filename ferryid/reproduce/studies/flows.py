@@ -19,7 +19,7 @@ from ferryid.identify.simpls import simpls
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn, without_anemometer, without_wind_areas
-from ferryid.reproduce.study import Row, Study, Table, changes, median, number, spread
+from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 from ferryid.signals.track import Motion
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Current
@@ -269,7 +269,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         told.append(
             f"Measuring the {what} changes the force MSE by "
             + "; ".join(
-                f"{', '.join(f'{value:+.0f} %' for value in values)} with the basis of the {whose}"
+                f"{', '.join(f'{percent(value)} %' for value in values)} with the basis of the {whose}"
                 for whose, values in zip(("thesis", "paper"), gain, strict=True)
             )
             + " (surge, sway, yaw)."
@@ -302,7 +302,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         ]
         told.append(
             f"In the loop, wind {CONTROLLERS[k]}: ISE {spread(ise, '%', signed=True)} against unmeasured, feedback power "
-            + ", ".join(f"{number(value, '+')} % in {axis}" for value, axis in zip(power, AXES, strict=True))
+            + ", ".join(f"{percent(value)} % in {axis}" for value, axis in zip(power, AXES, strict=True))
             + "."
         )
     return told

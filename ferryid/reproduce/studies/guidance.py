@@ -15,7 +15,7 @@ from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, learn
 from ferryid.reproduce.performance import signal_power
 from ferryid.reproduce.pictures import control_shares
-from ferryid.reproduce.study import Row, Study, Table, changes, median, number, spread
+from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 
 Floats = NDArray[np.float64]
 
@@ -323,7 +323,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
     ]
     told.append(
         "From round 10 to round 11 feedback power changes by "
-        + ", ".join(f"{value:+.0f} % in {axis}" for value, axis in zip(shift, AXES, strict=True))
+        + ", ".join(f"{percent(value)} % in {axis}" for value, axis in zip(shift, AXES, strict=True))
         + (
             ": little, as in the thesis."
             if max(abs(value) for value in shift) < 15.0

@@ -15,7 +15,7 @@ from ferryid.reproduce.flight import campaign, trial
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, hull_alone
 from ferryid.reproduce.pictures import against
-from ferryid.reproduce.study import Row, Study, Table, change, median, number, spread
+from ferryid.reproduce.study import Row, Study, Table, change, median, percent, spread
 from ferryid.reproduce.variants import windier
 from ferryid.simulate.scenario import Scenario
 from ferryid.vessel.load import load_profile
@@ -125,14 +125,14 @@ def _findings(gains: Floats, calm: Floats) -> list[str]:
     for j, axis in enumerate(AXES):
         reached = [SPREADS[k] for k in range(len(SPREADS)) if median(gains[:, k, j].tolist()) <= THEIRS[j]]
         told.append(
-            f"{axis}: the thesis's {THEIRS[j]:.0f} % is reached with coefficients off by {_off(reached[0])}."
+            f"{axis}: the thesis's {percent(THEIRS[j])} % is reached with coefficients off by {_off(reached[0])}."
             if reached
-            else f"{axis}: the thesis's {THEIRS[j]:.0f} % is reached with none of these; the most is "
-            f"{min(median(gains[:, k, j].tolist()) for k in range(len(SPREADS))):.0f} %."
+            else f"{axis}: the thesis's {percent(THEIRS[j])} % is reached with none of these; the most is "
+            f"{percent(min(median(gains[:, k, j].tolist()) for k in range(len(SPREADS))))} %."
         )
     told.append(
         "Without wind the same wrong hulls give "
-        + ", ".join(f"{number(median(calm[:, j].tolist()), '+')} %" for j in range(3))
+        + ", ".join(f"{percent(median(calm[:, j].tolist()))} %" for j in range(3))
         + f" (surge, sway, yaw; off by {_off(SPREADS[-1])}). The gain over the Master Model thus depends on how wrong that "
         "is and on what else is in the force, here the wind that nobody measures; the method is the same throughout."
     )

@@ -17,7 +17,7 @@ from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, hull_alone
 from ferryid.reproduce.performance import MEASURES
 from ferryid.reproduce.pictures import control_shares, integrals, model_fit
-from ferryid.reproduce.study import Row, Study, Table, change, changes, median, number, spread
+from ferryid.reproduce.study import Row, Study, Table, change, changes, median, percent, spread
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
@@ -211,4 +211,4 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
 
 
 def _three(values: list[float]) -> str:
-    return ", ".join(f"{number(value, '+')} %" for value in values)
+    return ", ".join(f"{percent(value)} %" for value in values)

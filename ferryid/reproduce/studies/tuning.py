@@ -139,7 +139,9 @@ def study(lab: Lab) -> Study:
             "trained on one calm round and tested on another.",
             "Table 5.2 lists noise on the acceleration beside noise on the velocity. Both at once can be read as "
             "coloured noise of "
-            "the velocity, as here, or as white noise on two separate measurements; the last row does the latter.",
+            "the velocity, as here, or as white noise on two separate measurements; the last row does the latter."
+            " With white noise our control loop does not work (see section 5.4), so that those logs are of a vessel that "
+            "wanders.",
         ),
         tuple(rows),
         (table, by_waves),

@@ -15,7 +15,7 @@ from ferryid.identify.model import AXES, Model
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
-from ferryid.reproduce.study import Study, Table, changes, median, number, spread
+from ferryid.reproduce.study import Study, Table, changes, median, number, percent, spread
 from ferryid.signals.track import Motion
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Payload
@@ -176,9 +176,9 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         ]
         told.append(
             f"{WAYS[k][0].upper()}{WAYS[k][1:]} is better than the old model on both in the median, by "
-            f"{number(100 * (1 - half[k]))} % and {number(100 * (1 - twelve[k]))} %, and in {both} of {len(outcomes)} runs "
-            f"each on its own. Flown, it changes ISE by {number(flown[0], '+')} % (crossing) and {number(flown[1], '+')} % "
-            "(12-corner): it does no harm; how much it helps these runs leave open."
+            f"{percent(100 * (1 - half[k]), '')} % and {percent(100 * (1 - twelve[k]), '')} %, and in {both} of "
+            f"{len(outcomes)} runs on its own. Flown, it changes ISE by {percent(flown[0])} % (crossing) and "
+            f"{percent(flown[1])} % (12-corner). How much it helps, these runs leave open."
         )
     if not safe:
         told.append("No way of updating is better than the old model on both.")

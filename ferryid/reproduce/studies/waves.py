@@ -20,7 +20,7 @@ from ferryid.reproduce.flight import Flight, campaign, controlled, fly, master_r
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, hull_alone, learn
 from ferryid.reproduce.pictures import FORCES, against, control_shares, integrals, model_fit
-from ferryid.reproduce.study import Row, Study, Table, changes, median, number, spread
+from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 from ferryid.reproduce.variants import rougher, windier
 from ferryid.simulate.scenario import Scenario
 from ferryid.vessel.profile import Profile
@@ -369,7 +369,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
     ]
     told.append(
         "Flown in the same waves, Model 6 takes "
-        + ", ".join(f"{number(value, '+')} % in {axis}" for value, axis in zip(power, AXES, strict=True))
+        + ", ".join(f"{percent(value)} % in {axis}" for value, axis in zip(power, AXES, strict=True))
         + " of feedback power against Model 2; the thesis, which compares rounds of different days, found more with Model 6."
     )
     accepted = [sum(one.told[k].accepted for one in outcomes) for k in range(len(BREEZY))]
