@@ -63,7 +63,16 @@ class Finding:
     says
         One sentence in plain words.
     evidence
-        Columns for the figure that shows it: name to values.
+        Columns for the figure that shows it, one row a window, shape (m,) each, on the one axis that shows it best:
+
+        - ``t``: middle of the window [s], ascending;
+        - ``before``, ``after``: what is left over without and with the finding, in one unit;
+        - ``explained``: what the finding adds, in the same unit; where it holds, `before` follows it and `after` does not;
+        - ``regressor``, optional: the quantity that gives it away (heading for a wind, squared speed for fouling);
+          `explained` takes its place where there is none.
+    labels
+        Names of the columns of `evidence` for people, with unit: ``residual`` (of `before`, `after` and `explained`) and
+        ``regressor``. Such as ``{"residual": "sway force left over [N]", "regressor": "heading [deg]"}``.
     """
 
     effect: str
@@ -81,14 +90,55 @@ class Finding:
     separating_manoeuvre: str | None
     says: str
     evidence: Mapping[str, Floats] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Withheld:
+    """What the diagnosis found of a signal that it was not shown, beside what the sensor had measured.
+
+    `found` and `measured` are by the names of the effect's parameters; `measured` is the mean over the log, in the unit of `found`.
+    """
+
+    signal: str
+    found: Mapping[str, Estimate]
+    measured: Mapping[str, float]
+    says: str
 
 
 @dataclass(frozen=True)
 class Diagnosis:
     """A verdict on one log.
 
-    `before` and `after` hold ``{"mse": {axis: N² or N²m²}, "free_run": {...}}`` on held-out rows; `notes` are sentences for the
-    reader: what was not tested and why, what is left in the residual.
+    Attributes
+    ----------
+    log, vessel
+        Names.
+    verdict
+        One of `VERDICTS`.
+    findings
+        In the order in which they matter.
+    before, after
+        On held-out rows, without and with the findings:
+
+        - ``mse``: force error by axis [N² or N²m²];
+        - ``free_run``: as `ferryid.identify.scores.free_run_plain` gives it, or empty;
+        - ``rows`` (in `before`, optional): how many rows these are, so that several logs can be pooled;
+        - ``ratio`` (in `after`, optional): `after` over `before` of the force error by axis, each ``{"value", "low", "high"}`` with
+          a 95 % interval from a block bootstrap;
+        - ``free_run_ratio`` (in `after`, optional): the same for the free run, by ``"position_m"``, ``"heading_rad"``, ``"speed_mps"``
+          and ``"yaw_rate_radps"``, at the horizon ``"horizon_s"``;
+        - ``placebos`` (in `after`, optional): force error by axis of the same findings fitted to what cannot hold them, by name
+          ("time shifted", "heading reversed").
+    notes
+        Sentences for the reader: what was not tested and why, what is left in the residual.
+    model
+        Path of the model with the findings in it.
+    evidence
+        What was left over in the whole log, one row a window: ``t`` [s], shape (m,); ``before``, ``after`` [N, N, N·m], shape (m, 3);
+        optionally ``heading`` [deg], ``speed`` [m/s], ``north`` and ``east`` [m], shape (m,).
+    withheld
+        Signals that were hidden from the diagnosis.
     """
 
     log: str
@@ -99,6 +149,8 @@ class Diagnosis:
     after: Mapping[str, Any]
     notes: tuple[str, ...] = ()
     model: str | None = None
+    evidence: Mapping[str, Floats] = field(default_factory=dict)
+    withheld: tuple[Withheld, ...] = ()
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -112,6 +164,15 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "before": dict(diagnosis.before),
         "after": dict(diagnosis.after),
         "notes": list(diagnosis.notes),
+        "withheld": [
+            {
+                "signal": one.signal,
+                "found": {name: vars(estimate) for name, estimate in one.found.items()},
+                "measured": dict(one.measured),
+                "says": one.says,
+            }
+            for one in diagnosis.withheld
+        ],
         "model": diagnosis.model,
     }
 
