@@ -97,7 +97,8 @@ class Finding:
 class Withheld:
     """What the diagnosis found of a signal that it was not shown, beside what the sensor had measured.
 
-    `found` and `measured` are by the names of the effect's parameters; `measured` is the mean over the log, in the unit of `found`.
+    `found` and `measured` are by the names of the effect's parameters; `measured` is the mean over the log, in the unit
+    of `found`.
     """
 
     signal: str
@@ -124,19 +125,19 @@ class Diagnosis:
         - ``mse``: force error by axis [N² or N²m²];
         - ``free_run``: as `ferryid.identify.scores.free_run_plain` gives it, or empty;
         - ``rows`` (in `before`, optional): how many rows these are, so that several logs can be pooled;
-        - ``ratio`` (in `after`, optional): `after` over `before` of the force error by axis, each ``{"value", "low", "high"}`` with
-          a 95 % interval from a block bootstrap;
-        - ``free_run_ratio`` (in `after`, optional): the same for the free run, by ``"position_m"``, ``"heading_rad"``, ``"speed_mps"``
-          and ``"yaw_rate_radps"``, at the horizon ``"horizon_s"``;
-        - ``placebos`` (in `after`, optional): force error by axis of the same findings fitted to what cannot hold them, by name
-          ("time shifted", "heading reversed").
+        - ``ratio`` (in `after`, optional): `after` over `before` of the force error by axis, each
+          ``{"value", "low", "high"}`` with a 95 % interval from a block bootstrap;
+        - ``free_run_ratio`` (in `after`, optional): the same for the root-mean-square errors of the free run, by
+          ``position_m``, ``heading_rad``, ``speed_mps`` and ``yaw_rate_radps``, at the horizon ``horizon_s`` [s];
+        - ``placebos`` (in `after`, optional): force error by axis with findings that cannot be true in the place of
+          these, by name ("time shifted", "heading reversed").
     notes
         Sentences for the reader: what was not tested and why, what is left in the residual.
     model
         Path of the model with the findings in it.
     evidence
-        What was left over in the whole log, one row a window: ``t`` [s], shape (m,); ``before``, ``after`` [N, N, N·m], shape (m, 3);
-        optionally ``heading`` [deg], ``speed`` [m/s], ``north`` and ``east`` [m], shape (m,).
+        What was left over in the whole log, one row a window: ``t`` [s], shape (m,); ``before``, ``after`` [N, N, N·m],
+        shape (m, 3); optionally ``heading`` [deg] and ``speed`` [m/s], shape (m,).
     withheld
         Signals that were hidden from the diagnosis.
     """
