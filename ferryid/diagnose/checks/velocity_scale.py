@@ -1,0 +1,44 @@
+"""Velocity scale: velocities measured in another unit, or by an instrument that reads too much or too little."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.kinematics import SCALE, kinematics
+from ferryid.effects.picture import Scene
+
+LEAST = 0.03
+UNITS = {
+    1.0 / 0.514444: "m/s read as knots",
+    0.514444: "knots read as m/s",
+    3.6: "km/h read as m/s",
+    1 / 3.6: "m/s read as km/h",
+}
+"""Factors of mistaken units, measured over true."""
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return the factor, measured over true, where speed over ground is not what positions give."""
+    found = kinematics(scene)
+    if found is None or not found.found(SCALE, LEAST):
+        return None
+    factor = found.solution.estimate(SCALE, "-")
+    unit = [text for value, text in UNITS.items() if abs(factor.value / value - 1.0) < LEAST]
+    scale = np.array([factor.value, factor.value, 1.0])
+
+    def correct(seen: Scene) -> Scene:
+        return replace(seen, nu_raw=seen.nu_raw / scale, nu=seen.nu / scale)
+
+    return SensorFinding(
+        "velocity_scale",
+        {"factor": factor},
+        f"The speed measured is {factor.value:.3f} times that of the positions{', ' + unit[0] if unit else ''}.",
+        correct,
+        found.evidence(SCALE),
+    )
+
+
+CHECK = Check("velocity_scale", "Position against integrated velocity", find, place=40)
