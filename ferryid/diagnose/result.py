@@ -162,8 +162,8 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "vessel": diagnosis.vessel,
         "verdict": diagnosis.verdict,
         "findings": [_finding(one) for one in diagnosis.findings],
-        "before": dict(diagnosis.before),
-        "after": dict(diagnosis.after),
+        "before": {"mse": {}, "free_run": {}, **diagnosis.before},
+        "after": {"mse": {}, "free_run": {}, **diagnosis.after},
         "notes": list(diagnosis.notes),
         "withheld": [
             {
