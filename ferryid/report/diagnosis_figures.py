@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from scipy.special import stdtrit
 
 from ferryid.diagnose.result import AXES, Diagnosis, Finding
 from ferryid.report.figures import (
@@ -26,7 +27,7 @@ from ferryid.report.structure import envelope
 
 BINS = 10
 """Bins of a profile; each holds about the same number of windows."""
-WITHOUT, WITH, FOUND = "left over without the finding", "left over with it", "what it adds"
+WITHOUT, WITH, FOUND = "without the finding", "with it", "what it adds"
 
 
 def drawable(finding: Finding) -> bool:
@@ -68,7 +69,8 @@ def on_regressor(finding: Finding) -> str:
         if "explained" in evidence:
             places, means, _ = binned(x, evidence["explained"])
             ax.plot(places, means, color=MEASURED, linewidth=1.5, label=FOUND)
-        ax.set_xlabel(f"what the finding adds: {residual}" if own else finding.labels.get("regressor", "regressor"))
+        unit = "".join(residual.partition("[")[1:])
+        ax.set_xlabel(f"{FOUND} {unit}" if own else finding.labels.get("regressor", "regressor"))
         ax.set_ylabel(residual)
         legend_above(figure, ax, 3)
         return svg_text(figure)
@@ -134,7 +136,7 @@ def binned(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         half = float("nan")
         if n > 1:
             weight = counts / counts.sum()
-            half = 1.96 * float(np.sqrt(np.sum(weight**2 * (means - mean) ** 2) * n / (n - 1)))
+            half = float(stdtrit(n - 1, 0.975) * np.sqrt(np.sum(weight**2 * (means - mean) ** 2) * n / (n - 1)))
         rows.append((float(np.median(x[inside])), mean, half))
     places, means, halves = np.array(rows).T
     return places, means, halves

@@ -71,8 +71,7 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
         hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
         remarks = [*hidden, *(f"note: {note}" for note in one.notes)]
         lines += ["", *remarks] if remarks else []
-        if one.model:
-            lines += ["", f"model   {one.model}"]
+        lines += ["", f"model   {one.model}"] if one.model else [""]
         blocks.append("\n".join(_folded(line) for line in lines))
     return "\n\n".join(blocks)
 
@@ -93,10 +92,18 @@ def _folded(line: str) -> str:
         return line
     indent = " " * (len(line) - len(line.lstrip()))
     hanging = indent + ("   " if re.match(r"\d+\. ", line) else "")
-    return fill(line.strip(), TEXT_COLUMNS, initial_indent=indent, subsequent_indent=hanging)
+    return fill(
+        line.strip(),
+        TEXT_COLUMNS,
+        initial_indent=indent,
+        subsequent_indent=hanging,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
 
 
 def _log(diagnosis: Diagnosis, prefix: str, drawn: bool) -> dict[str, Any]:
+    force_rows, free_run_rows = diagnosis_words.force_rows(diagnosis), diagnosis_words.free_run_rows(diagnosis)
     return {
         "name": diagnosis.log,
         "vessel": diagnosis.vessel,
@@ -104,9 +111,10 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool) -> dict[str, Any]:
         "headline": diagnosis_words.headline(diagnosis),
         "findings": [_finding(one, f"{prefix}finding-{k}", drawn) for k, one in enumerate(diagnosis.findings, 1)],
         "names": [diagnosis_words.title(one.effect, one.instance) for one in diagnosis.findings],
-        "force_rows": diagnosis_words.force_rows(diagnosis),
-        "free_run_rows": diagnosis_words.free_run_rows(diagnosis),
+        "force_rows": force_rows,
+        "free_run_rows": free_run_rows,
         "free_run_figures": _free_run_figures(diagnosis, prefix) if drawn else [],
+        "intervals": any(" to " in cell for row in (*force_rows, *free_run_rows) for cell in row["cells"]),
         "free_run_note": diagnosis.before.get("free_run", {}).get("note", ""),
         "figures": [
             {"file": f"{prefix}{name}", "svg": svg, "caption": caption}
@@ -135,13 +143,13 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool) -> dict[str, Any]:
 def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
     shown = []
     if drawn and diagnosis_figures.drawable(finding):
-        what = finding.labels.get("regressor", "what the finding adds") if "regressor" in finding.evidence else ""
+        what = finding.labels.get("regressor", "") if "regressor" in finding.evidence else ""
         against = what.partition(" [")[0] or "what the finding adds"
         shown = [
             {
                 "file": f"{file}-evidence",
                 "svg": diagnosis_figures.on_regressor(finding),
-                "caption": f"Against {against}. Points: windows of the recording; marks: their means with 95 % intervals. "
+                "caption": f"What is left over, against {against}. Points: windows of the recording; marks: their means with 95 % intervals. "
                 "Where the finding holds, orange follows the black line, and blue is flat.",
             },
             {
