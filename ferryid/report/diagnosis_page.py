@@ -149,7 +149,8 @@ def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
             {
                 "file": f"{file}-evidence",
                 "svg": diagnosis_figures.on_regressor(finding),
-                "caption": f"What is left over, against {against}. Points: windows of the recording; marks: their means with 95 % intervals. "
+                "caption": f"What is left over, against {against}. Points: windows of the recording; marks: their means with "
+                "95 % intervals. "
                 "Where the finding holds, orange follows the black line, and blue is flat.",
             },
             {

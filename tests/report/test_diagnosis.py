@@ -20,7 +20,7 @@ from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.report.diagnosis_figures import binned
 from ferryid.report.diagnosis_page import as_text, render
-from ferryid.report.diagnosis_report import as_json, patient, report
+from ferryid.report.diagnosis_report import patient, report
 from ferryid.report.diagnosis_words import changed, estimate, headline, numbers, overall, ratio_of, rivals, trust, where
 
 T = np.arange(0.0, 720.0, 2.0)
@@ -337,7 +337,7 @@ def test_one_verdict_on_several_logs(verdicts: tuple[str, ...], one: str) -> Non
 
 
 def test_bins_hold_the_mean_and_an_interval_that_knows_what_is_independent() -> None:
-    """A slope comes back; the interval of separate visits is wider than that of single values where a visit shares its error."""
+    """A slope comes back; the interval is as wide as separate visits scatter, not as narrow as single values would have it."""
     rng = np.random.default_rng(0)
     x = np.tile(np.linspace(0.0, 1.0, 200), 30)
     offset = np.repeat(rng.standard_normal(30), 200)
