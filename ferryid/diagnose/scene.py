@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.hypothesis import HULL_SPREAD
+from ferryid.diagnose.velocity import steadied
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, acceleration, hull_of
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.estimate import Estimator, estimator
@@ -377,7 +378,7 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         t=measured.t,
         eta=eta,
         nu_raw=nu_raw,
-        nu=_mean(nu_raw, rows),
+        nu=steadied(_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
         parts=np.stack(parts, axis=1),
         angles=np.column_stack(angles),
         usable=usable,
