@@ -303,11 +303,14 @@ def _profiles(windows_: Windows, kept: Ints, white: Floats, errors: Floats) -> t
     scene = windows_.scene
     rows = windows_.starts[kept] + len(windows_.weight) // 2
     chosen = errors[kept]
-    turn = np.arange(SECTORS + 1) * (360.0 / SECTORS)
+    turn: Floats = np.linspace(0.0, 360.0, SECTORS + 1)
     heading = np.asarray(np.degrees(scene.psi[rows]) % 360.0, dtype=np.float64)
     made = [profile_of("heading", "deg", heading, turn, white, chosen)]
     speed = np.hypot(scene.nu[rows, 0], scene.nu[rows, 1])
-    sorted_by = [("speed", "m/s", speed, SPEEDS), ("yaw rate", "deg/s", np.degrees(scene.nu[rows, 2]), SPEEDS)]
+    sorted_by: list[tuple[str, str, Floats, int]] = [
+        ("speed", "m/s", speed, SPEEDS),
+        ("yaw rate", "deg/s", np.degrees(scene.nu[rows, 2]), SPEEDS),
+    ]
     if np.isfinite(scene.eta[rows, :2]).all():
         sorted_by += [("north", "m", scene.eta[rows, 0], PLACES), ("east", "m", scene.eta[rows, 1], PLACES)]
     for k, name in enumerate(scene.names):
@@ -318,7 +321,7 @@ def _profiles(windows_: Windows, kept: Ints, white: Floats, errors: Floats) -> t
             sector = np.asarray(np.degrees(angle) % 360.0, dtype=np.float64)
             made.append(profile_of(f"{name} angle", "deg", sector, turn, white, chosen))
     for name, unit, value, bins in sorted_by:
-        edges = np.unique(np.quantile(value, np.linspace(0.0, 1.0, bins + 1)))
+        edges: Floats = np.unique(np.quantile(value, np.linspace(0.0, 1.0, bins + 1)))
         if len(edges) > 2:
             made.append(profile_of(name, unit, value, edges, white, chosen))
     return tuple(sorted(made, key=lambda one: -one.statistic))
