@@ -102,7 +102,9 @@ class Trial:
         return Trial(self.windows, self.plain, noise_of(gaps, self.windows.runs), self.hull_spread)
 
 
-def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | None = None) -> Fit:
+def fit(
+    trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | None = None, *, steps: int = STEPS
+) -> Fit:
     """Fit a hypothesis by Gauss-Newton steps on the posterior.
 
     Every parameter is believed to be about its neutral value, give or take its size, and the hull's coefficients to be
@@ -116,6 +118,8 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
         Effects, in the order in which they act.
     start
         Parameters to begin with; the neutral ones where None.
+    steps
+        Most Gauss-Newton steps; with 0 the spread is that at the start.
     """
     every = [parameter for suspect in suspects for parameter in suspect.parameters]
     size = np.array([parameter.size for parameter in every])
@@ -140,7 +144,7 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
     w = white(z)
     cost = float(w @ w + z @ z)
     A = np.eye(h + q)
-    for _ in range(STEPS):
+    for count in range(max(steps, 1)):
         J = np.empty((len(w), h + q))
         J[:, :h] = trial.by_hull
         for k in range(q):
@@ -149,6 +153,8 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
             moved[h + k] += d
             J[:, h + k] = (white(moved) - w) / d
         A = J.T @ J + np.eye(h + q)
+        if count == steps:
+            break
         step = -np.linalg.solve(A, J.T @ w + z)
         step *= min(1.0, TRUST / max(float(np.abs(step).max()), 1e-12))
         better = False

@@ -26,11 +26,11 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 SECTORS = 12
-SPEEDS, PLACES = 5, 3
+SPEEDS, PLACES, TIMES = 5, 3, 6
 FEWEST = 4
 """Windows in a bin that are needed to judge it."""
-BREAK = 1.95
-"""Kolmogorov's statistic of a change of mean, as of which it is believed: one in a thousand without any."""
+BREAK = 2.3
+"""Kuiper's statistic of changes of the mean, as of which they are believed: one in a thousand without any."""
 MOST_BREAKS = 6
 ACTS = 0.15
 """An interval acts whose mean excess is more than this part of the strongest one's."""
@@ -148,9 +148,9 @@ def locate(trial: Trial, before: Fit, after: Fit, scene: Scene | None = None) ->
     shares = _shared(np.maximum(uneven, 0.0) if unexplained else excess)
     axes = shares if shares.any() else np.full(3, 1.0 / 3.0)
     strength = (white**2 if unexplained else white**2 - calm**2) @ axes
-    middle = trial.windows.middle_s
+    middle, seconds = trial.windows.middle_s, trial.windows.scene.t
     reach = 0.5 * len(trial.windows.weight) * trial.windows.scene.step_s
-    intervals = acting(middle[kept], strength, reach, (float(middle[0] - reach), float(middle[-1] + reach)))
+    intervals = acting(middle[kept], strength, reach, (float(seconds[0]), float(seconds[-1])))
     onset = None if not intervals or intervals[0][0] <= middle[0] else intervals[0][0]
     offset = None if not intervals or intervals[-1][1] >= middle[-1] else intervals[-1][1]
     return Location(
@@ -213,7 +213,7 @@ def acting(
 
     References
     ----------
-    Vostrikova (1981) for the segmentation; the standard deviation of the mean is that of blocks, since strength is correlated.
+    Kuiper (1960) for the statistic, Vostrikova (1981) for the segmentation; the standard deviation of the mean is that of blocks, since strength is correlated.
     """
     edges = [0, *sorted(_breaks(strength, 0, len(strength), MOST_BREAKS)), len(strength)]
     means = [float(strength[a:b].mean()) for a, b in pairwise(edges)]
@@ -275,18 +275,17 @@ def _breaks(strength: Floats, first: int, end: int, most: int) -> list[int]:
     part = strength[first:end]
     # Large squares are rare and heavy: ranks would lose the size, a root keeps both.
     part = np.sign(part) * np.sqrt(np.abs(part))
-    away = np.cumsum(part - part.mean())[:-1]
-    allowed = np.abs(away[FEWEST - 1 : n - FEWEST])
-    k = int(np.argmax(allowed)) + FEWEST
-    left, right = part[:k] - part[:k].mean(), part[k:] - part[k:].mean()
-    deviation = _long_deviation(np.concatenate([left, right]))
-    if allowed.max() <= BREAK * deviation * sqrt(n):
+    away = np.concatenate([[0.0], np.cumsum(part - part.mean())])
+    # From its lowest to its highest point the sum gains most: one of the two ends of what differs, or both.
+    cuts = sorted({int(np.argmin(away)), int(np.argmax(away))})
+    cuts = [k for k in cuts if FEWEST <= k <= n - FEWEST]
+    pieces = np.split(part, cuts)
+    deviation = _long_deviation(np.concatenate([piece - piece.mean() for piece in pieces]))
+    if not cuts or away.max() - away.min() <= BREAK * deviation * sqrt(n):
         return []
-    return [
-        first + k,
-        *_breaks(strength, first, first + k, most // 2),
-        *_breaks(strength, first + k, end, most // 2),
-    ]
+    ends = [first, *(first + k for k in cuts), end]
+    further = [k for a, b in pairwise(ends) for k in _breaks(strength, a, b, most // 2)]
+    return [*ends[1:-1], *further]
 
 
 def _long_deviation(values: Floats) -> float:
@@ -311,6 +310,7 @@ def _profiles(windows_: Windows, kept: Ints, white: Floats, errors: Floats) -> t
         ("speed", "m/s", speed, SPEEDS),
         ("yaw rate", "deg/s", np.degrees(scene.nu[rows, 2]), SPEEDS),
     ]
+    sorted_by.append(("time", "s", windows_.middle_s[kept], TIMES))
     if np.isfinite(scene.eta[rows, :2]).all():
         sorted_by += [("north", "m", scene.eta[rows, 0], PLACES), ("east", "m", scene.eta[rows, 1], PLACES)]
     for k, name in enumerate(scene.names):
@@ -329,9 +329,11 @@ def _profiles(windows_: Windows, kept: Ints, white: Floats, errors: Floats) -> t
 
 def _in_words(profiles: Sequence[Profiled], shares: Floats) -> str:
     """Return the bins of the most telling profile that hold at least half of its greatest excess."""
-    if not profiles or profiles[0].statistic < TELLS:
+    telling = [one for one in profiles if one.statistic >= TELLS]
+    if not telling:
         return "all along"
-    one = profiles[0]
+    # When is said with the intervals: here time only stands for what nothing else tells.
+    one = next((one for one in telling if one.name != "time"), telling[0])
     level = np.where(np.isfinite(one.excess).all(axis=1), np.nan_to_num(one.excess) @ shares, -np.inf)
     strong = level >= HALF * level.max()
     pieces = [

@@ -13,7 +13,7 @@ from ferryid.effects import effects
 from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
 
-ODDS = 10.0
+ODDS = 8.0
 """Logarithm of the evidence that an effect must show over none before it is as likely as none."""
 NEAR = 3.0
 """Rivals whose evidence is less than this behind are not told apart."""

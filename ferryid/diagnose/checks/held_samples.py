@@ -19,7 +19,8 @@ SHORTEST_ROWS, SHORTEST_S = 5, 0.4
 COARSE = 0.5
 """A sensor that has fewer values than this share of its changes repeats by its resolution; a hold then has to end in a jump."""
 JUMP = 4.0
-LEAST_SHARE, LEAST_RUNS = 0.01, 2
+LEAST_SHARE, LEAST_S = 0.005, 2.0
+"""Holds that are neither this share of the log nor one as long as this do no harm."""
 
 
 def find(scene: Scene) -> SensorFinding | None:
@@ -29,9 +30,9 @@ def find(scene: Scene) -> SensorFinding | None:
     rows = held.any(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8))).reshape(-1, 2)
     share = float(rows.sum()) / max(int(scene.usable.sum()), 1)
-    if share < LEAST_SHARE and len(edges) < LEAST_RUNS:
+    longest = float((edges[:, 1] - edges[:, 0]).max(initial=0)) * scene.step_s
+    if share < LEAST_SHARE and longest < LEAST_S:
         return None
-    longest = float((edges[:, 1] - edges[:, 0]).max()) * scene.step_s
     names = [name for name, column in zip(NAMES, held.T, strict=True) if column.any()]
     percent = 100.0 * share
 
