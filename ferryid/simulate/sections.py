@@ -178,7 +178,9 @@ class Thrusters:
 class Noise:
     """``[sensors.noise]``: standard deviations, Aurlien (2021), Table 5.2, then the other sensors.
 
-    `white_share` is the part of the navigation's standard deviations that is white; the rest is coloured.
+    `white_share` is the part of the navigation's standard deviations that is white; the rest is coloured. `acceleration_mps2`
+    and `yaw_acceleration_degps2` are those of the time derivative of the velocities' coloured noise; the IMU's own noise is
+    `imu_acceleration_mps2` and `imu_turn_degps`, white, on each axis.
     """
 
     position_m: float = limited(0.02)
@@ -189,6 +191,8 @@ class Noise:
     yaw_acceleration_degps2: float = limited(0.1)
     white_share: float = limited(0.1, 0.0, 1.0)
     attitude_deg: float = limited(0.05)
+    imu_acceleration_mps2: float = limited(0.03)
+    imu_turn_degps: float = limited(0.115)
     speed_rpm: float = limited(1.0)
     azimuth_deg: float = limited(0.05)
     wind_speed_mps: float = limited(0.15)

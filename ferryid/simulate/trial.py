@@ -17,11 +17,12 @@ from ferryid.simulate.control.manoeuvres import build_helm
 from ferryid.simulate.control.pid import build_pid
 from ferryid.simulate.control.reference import build_reference
 from ferryid.simulate.loop import RECORD, ROW, Loop, Measured, Memory, run
-from ferryid.simulate.noise import controller_weather, navigation_errors, navigation_noise, navigation_sent
+from ferryid.simulate.noise import navigation_errors, navigation_noise, navigation_sent
 from ferryid.simulate.plant.motion import build, payload_aboard, resting, roll_pitch
 from ferryid.simulate.scenario import Scenario, check_against
 from ferryid.simulate.sensors import Stream, sense
 from ferryid.simulate.states import Control, Truth
+from ferryid.simulate.surroundings import controller_weather
 from ferryid.vessel.load import load_profile
 from ferryid.vessel.profile import Profile
 
@@ -108,10 +109,19 @@ def sail(scenario: Scenario, profile: Profile, seed: int, model: Model | None = 
     n = steps * cycles
     wind, current = plant.wind[: 2 * n : 2], plant.current[: 2 * n : 2]
     payload = payload_aboard(plant, n)
+    at = np.arange(cycles, dtype=np.float64) * cycle
     measured = Measured(
         navigation_noise(scenario.sensors.noise, seed, cycles, cycle),
         navigation_sent(scenario, seed, cycles, cycle),
-        *controller_weather(scenario, seed, wind[::steps], current[::steps], payload[::steps]),
+        *controller_weather(
+            scenario,
+            seed,
+            at,
+            np.add.outer(at, np.arange(steps, dtype=np.float64) * h).ravel(),
+            wind,
+            current,
+            payload,
+        ),
     )
     rows, records = np.empty((n, ROW + 2 * k)), np.empty((cycles, RECORD + 2 * k))
     run(loop, memory, measured, h, steps, rows, records)

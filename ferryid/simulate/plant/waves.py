@@ -5,11 +5,11 @@ draught around the body origin. By Gauss's theorem it is the integral of the pre
 has a closed form. Phases are taken where the vessel is, so the encounter frequency follows. Deep water; the current does
 not change the waves.
 
-The diffraction force comes on top of it in the approximation for long waves, the added mass times the acceleration of the
-water (relative acceleration; Newman 1977, Marine Hydrodynamics, section 6.18): each amplitude of the Froude-Krylov force, which is
-that acceleration times the displaced mass, is multiplied by ``1 + A / (rho V)``, so that in long waves the hull moves
-as the water does. This neglects what waves shorter than some three hull lengths do, where the diffraction force falls off and
-changes its phase, and the orbital velocity in the damping, which acts on the hull's velocity against the current alone.
+The diffraction force comes on top of it in the approximation for long waves (Faltinsen 1990, Sea Loads, ch. 3): the added mass
+times the acceleration of the water. Each amplitude of the Froude-Krylov force, which is that acceleration times the
+displaced mass, is multiplied by ``1 + A / (rho V)``, so that in long waves the hull moves as the water does. This
+neglects the diffraction of waves as short as the hull, which is weaker and out of phase; the coupling of sway and yaw by added
+mass; and the orbital velocity in the damping, which acts on the velocity against the current alone.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ def lever(p: float) -> float:
 
 @compiled
 def amplitudes(number: Floats, amplitude: Floats, direction: Floats, box: tuple[float, float, float]) -> Floats:
-    """Return the amplitudes of the Froude-Krylov force of every component at every heading, shape (HEADINGS + 1, 3, K) [N, N, N·m].
+    """Return the amplitudes of each component's Froude-Krylov force, shape (HEADINGS + 1, 3, K) [N, N, N·m].
 
     Parameters
     ----------
