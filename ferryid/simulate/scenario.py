@@ -138,6 +138,20 @@ class Scenario:
         return (self.folder or Path()) / name
 
 
+def check_seed(seed: int) -> None:
+    """Refuse a seed that no scenario could have.
+
+    Raises
+    ------
+    FerryIdError
+        When it is negative or longer than TOML's numbers.
+    """
+    if not 0 <= seed < 2**63:
+        raise FerryIdError(
+            f"--seed: must be a whole number of at least 0 and less than 2^63, found {seed!r:.40}. Fix: give such a number"
+        )
+
+
 def list_scenarios() -> dict[str, str]:
     """Return the bundled scenarios: name to title, in alphabetical order."""
     folder = resources.files("ferryid.simulate.scenarios")

@@ -206,9 +206,9 @@ def test_the_trial_tells_the_hull_from_the_scaled_base_model():
 
 def test_vessels_that_cannot_be_simulated_are_refused():
     scenario = load_scenario("twelve-corner")
-    with pytest.raises(FerryIdError, match=r"needs the hull's damping"):
+    with pytest.raises(FerryIdError, match=r"^twelve-corner\.toml:\d+: the simulator needs the hull's damping"):
         simulate(replace(scenario, vessel="vtec-usv"))
-    with pytest.raises(FerryIdError, match="at least two control cycles"):
+    with pytest.raises(FerryIdError, match=r"^twelve-corner\.toml:\d+: a trial needs at least two control cycles"):
         simulate(replace(scenario, duration_s=0.01))
 
 
