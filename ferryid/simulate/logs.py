@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ferryid import __version__
-from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.files import replacing
+from ferryid.simulate.places import check_output
 from ferryid.simulate.recorders import write_mcap, write_ros1, write_ros2
 from ferryid.simulate.trial import Simulation
 
-STORAGES = ("sqlite3", "mcap")
 CHUNK_BYTES = 768 * 1024
 
 
@@ -55,51 +54,18 @@ def write_log(
     check_output(out, truth, storage=storage, overwrite=overwrite)
     suffix = out.suffix.lower()
     streams = [stream for stream in simulation.streams if len(stream.stamp_ns)]
-    if suffix == ".mcap":
-        with replacing(out) as temporary:
+    # Both are whole before either gets its name.
+    with ExitStack() as both:
+        temporary = both.enter_context(replacing(out, new=not overwrite))
+        if suffix == ".mcap":
             write_mcap(streams, temporary, chunk_bytes)
-    elif suffix == ".bag":
-        with replacing(out) as temporary:
+        elif suffix == ".bag":
             write_ros1(streams, temporary, chunk_bytes)
-    else:
-        with replacing(out) as temporary, _inside(temporary, out.name) as folder:
-            write_ros2(streams, folder, storage)
-    if truth is not None:
-        with replacing(truth) as temporary:
-            _write_truth(simulation, temporary)
-
-
-def check_output(out: Path, truth: Path | None = None, *, storage: str = "sqlite3", overwrite: bool = False) -> None:
-    """Refuse names and places that `write_log` cannot or must not write to; the parameters are the same."""
-    if storage not in STORAGES:
-        raise FerryIdError(
-            f'{out}: storage of a ROS2 folder cannot be "{storage}".{did_you_mean(storage, STORAGES)} '
-            f"Fix: use one of {', '.join(STORAGES)}"
-        )
-    suffix = out.suffix.lower()
-    if suffix not in ("", ".mcap", ".bag"):
-        raise FerryIdError(
-            f'{out}: the suffix says which format to write, found "{suffix}". '
-            "Fix: end the name in .mcap, .bag (ROS1), or nothing for a ROS2 folder"
-        )
-    _check_free(out, folder=suffix == "", overwrite=overwrite)
-    if truth is not None:
-        if truth.resolve() == out.resolve():
-            raise FerryIdError(f"{truth}: log and truth cannot be the same file. Fix: give --truth another name")
-        _check_free(truth, folder=False, overwrite=overwrite)
-
-
-def _check_free(path: Path, *, folder: bool, overwrite: bool) -> None:
-    """Refuse to replace anything unasked, and never a folder by a file or a folder that is not a recording."""
-    if not path.exists():
-        return
-    if not overwrite:
-        raise FerryIdError(f"{path}: exists already. Fix: choose another name, or replace it with --overwrite")
-    if path.is_dir() != folder or (folder and not (path / "metadata.yaml").exists()):
-        raise FerryIdError(
-            f"{path}: cannot be replaced, found {'a folder that is no ROS2 recording' if path.is_dir() else 'a file'}. "
-            "Fix: choose another name"
-        )
+        else:
+            with _inside(temporary, out.name) as folder:
+                write_ros2(streams, folder, storage)
+        if truth is not None:
+            _write_truth(simulation, both.enter_context(replacing(truth, new=not overwrite)))
 
 
 @contextmanager
