@@ -177,7 +177,8 @@ def gaps(random: Random, t: Floats, per_min: float, length_s: float) -> Flags:
     start = float(t[0])
     while start <= t[-1]:
         start += 60.0 / per_min * float(random.standard_exponential(1)[0])
-        lost |= (t > start) & (t <= start + length_s)
+        first, end = np.searchsorted(t, (start, start + length_s), side="right")
+        lost[first:end] = True
         start += length_s
     lost[0] = False
     return lost

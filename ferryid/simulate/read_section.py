@@ -27,8 +27,8 @@ def read_section(table: TableReader, kind: type[Section], *, close: bool = True)
     """Read one table into its dataclass; a fault is noted for whatever does not fit, and the default taken.
 
     Fields are numbers, whole numbers, words, numbers of a fixed or any count, another section (a table inside this one)
-    or a tuple of sections (an array of tables). Metadata hold the limits (``low``, ``high``, and ``least`` above ``low`` itself) and a word's
-    ``options``.
+    or a tuple of sections (an array of tables). Metadata hold the limits (``low``,
+    ``high``, and ``least`` above ``low`` itself) and a word's ``options``.
 
     Parameters
     ----------
