@@ -144,7 +144,7 @@ def test_a_model_that_needs_what_is_not_measured_is_refused(scenario, model, nam
 
 def test_a_model_of_another_vessel_is_refused(scenario, model):
     made = model("modulus")
-    with pytest.raises(FerryIdError, match=r"boat@3 is one of milliampere, found the vessel other\. Fix: "):
+    with pytest.raises(FerryIdError, match=r"boat@3 belongs to milliampere, found the vessel other\. Fix: "):
         build_feedforward(scenario(), replace(PROFILE, name="other"), made)
 
 
