@@ -83,7 +83,8 @@ def build_feedforward(scenario: Scenario, profile: Profile, model: Model | None)
     Raises
     ------
     FerryIdError
-        When the model cannot be read, is of another vessel, or needs wind or current that the scenario's sensors do not measure.
+        When the model cannot be read, is of another vessel, or needs wind or current that the scenario does
+        not measure.
     """
     control, sensors = scenario.controller, scenario.sensors
     if model is None and control.model:
@@ -93,7 +94,7 @@ def build_feedforward(scenario: Scenario, profile: Profile, model: Model | None)
     estimated = estimator(model)
     if estimated.profile.name != profile.name:
         raise FerryIdError(
-            f"{scenario.where}: the controller's model {model.name}@{model.version} is one of {estimated.profile.name}, found "
+            f"{scenario.where}: the controller's model {model.name}@{model.version} belongs to {estimated.profile.name}, found "
             f"the vessel {profile.name}. Fix: fit a model of this vessel, or simulate the other"
         )
     for needed, rate_hz, what in (
