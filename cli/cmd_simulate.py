@@ -33,6 +33,13 @@ def command(
     if not scenario or out is None:
         raise typer.BadParameter("give a scenario and --out LOG, or --list")
     result = run_scenario(
-        scenario, out, storage=storage, truth=truth, seed=seed, overwrite=overwrite, progress=progress
+        scenario,
+        out,
+        storage=storage,
+        truth=truth,
+        seed=seed,
+        overwrite=overwrite,
+        json=None if json in (None, "-") else Path(json),
+        progress=progress,
     )
     emit(result, render_simulation(result), json)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import importlib
 import os
 import pkgutil
+import signal
 import sys
 import traceback
 import warnings
+from types import FrameType
 
 import typer
 from typer.exceptions import TyperException
@@ -57,11 +59,21 @@ _add_commands()
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
+class _Terminated(BaseException):
+    """The process is asked to end; what is half done is cleaned up on the way out, as after an interrupt."""
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise _Terminated
+
+
 def main() -> None:
     """Run the command line.
 
-    Exit codes: 0 done, 1 a bug of ours, 2 unusable input, 3 model not accepted, 130 interrupted.
+    Exit codes: 0 done, 1 a bug of ours, 2 unusable input, 3 model not accepted, 130 interrupted, 143 terminated.
     """
+    _open_streams()
+    signal.signal(signal.SIGTERM, _terminate)
     # What NumPy cannot compute becomes NaN, and is told where it matters.
     warnings.simplefilter("ignore", RuntimeWarning)
     try:
@@ -72,6 +84,8 @@ def main() -> None:
     except FerryIdError as error:
         sys.stderr.write(f"ferryid: {error}\n")
         sys.exit(2)
+    except _Terminated:
+        code = 143
     except KeyboardInterrupt:
         code = 130
     except BrokenPipeError:
@@ -93,9 +107,20 @@ def main() -> None:
             f"ferryid {ferryid.__version__}: this is a bug of ferryid. Please report it with these lines\n"
         )
         sys.exit(1)
-    if code == 130:
+    if code in (130, 143):
         sys.stderr.write("ferryid: interrupted, nothing half-written was left\n")
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _open_streams() -> None:
+    """Give output that was closed before we started (``>&-``) a place to go; a log must not take its number either."""
+    for name, number in (("stdin", 0), ("stdout", 1), ("stderr", 2)):
+        if getattr(sys, name) is None:
+            null = os.open(os.devnull, os.O_RDWR)
+            if null != number:
+                os.dup2(null, number)
+                os.close(null)
+            setattr(sys, name, os.fdopen(number, "r" if number == 0 else "w", encoding="utf-8"))
 
 
 def _usage(error: TyperException) -> int:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_LONGEST = 2000
+"""Most characters of a message; what is longer loses its middle, where a value stands that no one would read."""
 _LIKE = 0.6
 """Names less alike than this are different words rather than one misspelt."""
 
@@ -17,11 +19,19 @@ class FerryIdError(Exception):
     Parameters
     ----------
     message
-        ``"<file>: <what is wrong and who needs it>, <what was found instead>. Fix: <remedy>"``.
+        ``"<file>: <what is wrong and who needs it>, <what was found instead>. Fix: <remedy>"``. It may quote any input:
+        see `one_line`.
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(message)
+        super().__init__(one_line(message))
+
+
+def one_line(message: str) -> str:
+    """Return a message fit for a terminal and a single line: control characters written out, an endless one shortened."""
+    if len(message) > _LONGEST:
+        message = f"{message[: _LONGEST // 2]} ... {message[-_LONGEST // 2 :]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in message)
 
 
 def did_you_mean(name: str, options: Iterable[str]) -> str:

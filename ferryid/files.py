@@ -21,21 +21,30 @@ except ImportError:  # Windows: two fits at once into one folder may then take t
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
     """Give a temporary name beside `path` and rename it over `path` when the block ends without an error.
 
     The block may create a file or a folder under the temporary name. An interrupt or an error removes it.
 
+    Parameters
+    ----------
+    path
+        Where the result goes.
+    new
+        True replaces nothing, not even what another process has put there meanwhile.
+
     Raises
     ------
     FerryIdError
-        When the place cannot be written or the disk is full.
+        When the place cannot be written or is taken, or the disk is full.
     """
     temporary = path.parent / f".{path.name}.{uuid.uuid4().hex}.part"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
-        if temporary.is_dir() and path.is_dir():
+        if new:
+            _put(temporary, path)
+        elif temporary.is_dir() and path.is_dir():
             _replace_folder(temporary, path)
         else:
             os.replace(temporary, path)
@@ -43,6 +52,21 @@ def replacing(path: Path) -> Iterator[Path]:
         raise unwritable(path, error) from error
     finally:
         _remove(temporary)
+
+
+def _put(finished: Path, path: Path) -> None:
+    """Rename to a place where nothing is; only one of several processes can."""
+    try:
+        if finished.is_dir():
+            # A folder takes the place of an empty one alone.
+            os.rename(finished, path)
+        else:
+            os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+            os.replace(finished, path)
+    except OSError as error:
+        if error.errno in (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR):
+            raise taken(path) from error
+        raise
 
 
 def _replace_folder(finished: Path, path: Path) -> None:
@@ -60,9 +84,9 @@ def _replace_folder(finished: Path, path: Path) -> None:
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir():
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
-    elif path.exists():
+    elif os.path.lexists(path):
         path.unlink()
 
 
@@ -74,19 +98,24 @@ def unwritable(path: Path, error: OSError) -> FerryIdError:
     return FerryIdError(f"{path}: cannot be written, {reason}. Fix: choose a folder you may write to with --out")
 
 
+def taken(path: Path) -> FerryIdError:
+    """Return the error for a place where something is that must stay."""
+    return FerryIdError(f"{path}: exists already. Fix: choose another name, or replace it with --overwrite")
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one step: it is there whole, or not at all."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def write_result(path: Path, text: str) -> None:
-    """Write a JSON result where a user asked for it, but never over something that is no such result.
+def check_result(path: Path) -> bool:
+    """Refuse a place for a JSON result that holds anything but an earlier one; tell whether it is a device.
 
     Raises
     ------
     FerryIdError
-        When the place holds anything but an earlier JSON file, or cannot be written.
+        When something else is there, or it cannot be seen.
     """
     try:
         special = path.exists() and not path.is_file()
@@ -97,7 +126,18 @@ def write_result(path: Path, text: str) -> None:
         raise FerryIdError(
             f"{path}: is there already and no JSON file, so it is not written over. Fix: give --json another name"
         )
-    if not special:
+    return special
+
+
+def write_result(path: Path, text: str) -> None:
+    """Write a JSON result where a user asked for it, but never over something that is no such result.
+
+    Raises
+    ------
+    FerryIdError
+        When the place holds anything but an earlier JSON file, or cannot be written.
+    """
+    if not check_result(path):
         write_text(path.resolve() if path.is_symlink() else path, text)
         return
     try:

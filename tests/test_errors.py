@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ferryid.errors import did_you_mean
+from ferryid.errors import FerryIdError, did_you_mean
 
 TOPICS = (
     "/navigation/odometry",
@@ -46,3 +46,18 @@ def test_another_topic_is_not_offered(name: str) -> None:
 def test_no_option_and_no_likeness() -> None:
     assert did_you_mean("speed", ()) == ""
     assert did_you_mean("speed", ("azimuth", "header.frame_id")) == ""
+
+
+@pytest.mark.parametrize("sign", ["\n", "\r", "\x1b", "\0", "\x85", "\u2028", "\udcff"])
+def test_a_message_stays_one_line_whatever_it_quotes(sign: str) -> None:
+    message = str(FerryIdError(f"log: found a{sign}b. Fix: write °"))
+    assert message.isprintable()
+    assert message.startswith("log: found a\\")
+    assert message.endswith("b. Fix: write °")
+
+
+def test_a_message_keeps_its_ends_when_it_quotes_too_much() -> None:
+    message = str(FerryIdError(f"log: found {'x' * 10**6}. Fix: less"))
+    assert len(message) < 2100
+    assert message.startswith("log: found x")
+    assert message.endswith("x. Fix: less")

@@ -133,7 +133,7 @@ def from_json(data: Mapping[str, Any], where: str) -> Model:
     """
     schema = str(data.get("schema", ""))
     kind, _, number = schema.partition("/")
-    if kind != "ferryid.model" or not (number.isascii() and number.isdigit()):
+    if kind != "ferryid.model" or not (number.isascii() and number.isdigit()) or not 0 < len(number.lstrip("0")) < 10:
         raise FerryIdError(
             f'{where}: not a ferryid model, its schema is "{schema or "missing"}". '
             "Fix: give a model file written by ferryid fit"
@@ -177,7 +177,7 @@ def from_json(data: Mapping[str, Any], where: str) -> Model:
             scores=dict(data["scores"]),
             accepted=bool(data["accepted"]),
         )
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise FerryIdError(
             f"{where}: a part of the model file is missing or wrong ({type(error).__name__}: {error}). "
             "Fix: fit again, or restore the file from a backup"
@@ -194,6 +194,8 @@ def _check_parts(data: Mapping[str, Any]) -> None:
         raise ValueError("settings.window_s is no window")
     if not all(math.isfinite(float(value)) for value in data["base"]["scale"].values()):
         raise ValueError("base.scale is not finite")
+    if not all(math.isfinite(row["value"]) for axis in AXES for row in data["coefficients"][axis].values()):
+        raise ValueError("a coefficient is not finite")
     if not isinstance(scores["normalised_mse"], int | float | type(None)) or not isinstance(scores["per_axis"], dict):
         raise TypeError("scores are not numbers")
     for log in data["training"]:

@@ -110,7 +110,8 @@ def load_file(path: Path) -> Model:
     """Load one model file."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    # Thousands of brackets, or of digits, end in errors of Python rather than of JSON.
+    except (OSError, ValueError, RecursionError) as error:
         raise FerryIdError(
             f"{path}: not readable as a model file ({error}). Fix: give a JSON file written by ferryid fit"
         ) from error

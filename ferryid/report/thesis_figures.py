@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from ferryid.report.drawing import Drawing, Floats, Panel
 from ferryid.report.figures import STYLE, WIDTH
@@ -19,6 +19,9 @@ from ferryid.report.structure import envelope
 COLOURS = ("#222222", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7f7f7f")
 LONGEST = 1500
 """A line of more points is drawn as its envelope: a page cannot show more, and files stay small."""
+
+NARROW = 5.0
+"""Ratio of a logarithmic axis's ends below which its ticks are evenly spaced numbers."""
 
 
 def draw(drawing: Drawing) -> str:
@@ -64,12 +67,16 @@ def _panel(ax: Axes, panel: Panel, colours: dict[str, str]) -> None:
             ax.fill_between(line.x, line.low, line.high, color=colour, alpha=0.15, linewidth=0)
         x, y = _thinned(line.x, line.y)
         ax.plot(x, y, color=colour, alpha=0.9, marker="o" if line.marked else "", markersize=3.5)
+    if all(line.marked and np.array_equal(line.x, np.round(line.x)) for line in panel.lines):
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_ylabel(panel.y_label)
     if panel.title:
         ax.set_title(panel.title, fontsize=10)
     if panel.logarithmic:
         ax.set_yscale("log")
-        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        low, high = ax.get_ylim()
+        # 1, 2, 5 would leave one tick or none of a narrow range.
+        ax.yaxis.set_major_locator(MaxNLocator(5) if high < NARROW * low else LogLocator(subs=(1.0, 2.0, 5.0)))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         ax.yaxis.set_minor_formatter(NullFormatter())
 

@@ -10,6 +10,7 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.simulate.sections import Fault, Mooring, Payload
 from ferryid.simulate.series import read_series
 from ferryid.vessel import faults
+from ferryid.vessel.load import load_profile
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of
 
@@ -22,6 +23,10 @@ STEEPEST = 1.0 / 7.0
 REACH = 0.6
 """Share of the length within which a payload lies when the body origin is near midship."""
 LARGEST_LEVEL = 1.0
+LAST_S = 2.0**31
+"""First time since 1970 that stamps of ROS cannot hold [s]."""
+SPARE_S = 60.0
+"""For the way of a message to the recorder [s]."""
 
 Doubt = tuple[KeyPath, str]
 """A key of the file, and what is wrong with it."""
@@ -49,7 +54,10 @@ def disagreements(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Doubt
     for place, entry in _lasting(scenario):
         if entry.until_s <= entry.from_s:
             found = f"found {entry.until_s:g}"
-            yield (*place, "until_s"), f'"until_s" must come after "from_s" = {entry.from_s:g}, {found}'
+            yield (
+                (*place, "until_s"),
+                f'"until_s" must come after "from_s" = {entry.from_s:g}, {found}. Fix: make it later',
+            )
     for key, (low, high) in (("north_m", scenario.shallow.north_m), ("east_m", scenario.shallow.east_m)):
         if low > high:
             yield (
@@ -63,6 +71,7 @@ def disagreements(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Doubt
                 place,
                 'the fault does not say whose it is. Fix: add thruster = "NAME", as the vessel profile names it',
             )
+    yield from _time(scenario, data)
     yield from _files(scenario)
 
 
@@ -79,6 +88,25 @@ def check_against(scenario: Scenario, profile: Profile) -> None:
         scenario.where,
         [faults.Fault(line_of(lines, place), message) for place, message in _lacking(scenario, profile)],
     )
+
+
+def vessel_of(scenario: Scenario) -> Profile:
+    """Load the scenario's vessel profile.
+
+    Raises
+    ------
+    FerryIdError
+        When it cannot be read; names the scenario and the line, too.
+    """
+    try:
+        return load_profile(scenario.profile)
+    except FerryIdError as error:
+        raise FerryIdError(f'{scenario.where}:{line_in(scenario, "vessel")}: "vessel": {error}') from error
+
+
+def line_in(scenario: Scenario, *place: str | int) -> int:
+    """Return the line of a key in the scenario's file, or of what holds it."""
+    return line_of(key_lines(scenario.text), place)
 
 
 def raise_first(where: str, found: list[faults.Fault]) -> None:
@@ -103,6 +131,18 @@ def _manoeuvre(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Doubt]:
         yield (
             ("manoeuvre", "levels"),
             f'"levels" are shares of speed_rpm, from -1 to 1, found {largest:g}. Fix: set speed_rpm to the highest speed',
+        )
+
+
+def _time(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Doubt]:
+    """Yield an end that the stamps of a log cannot hold: seconds since 1970 in 32 bits, by the clock that is most ahead."""
+    sensors = scenario.sensors
+    ahead_s = 1e-3 * max(0.0, sensors.clock_offset_ms, sensors.thruster_clock_offset_ms)
+    if scenario.start_ns * 1e-9 + scenario.duration_s + ahead_s + SPARE_S > LAST_S:
+        yield (
+            ("start",) if "start" in data else (),
+            '"start" must lie so that the trial ends before 2038-01-19, the last day that stamps of ROS can hold. '
+            "Fix: start earlier",
         )
 
 

@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.simulate.logs import check_output, write_log
-from ferryid.simulate.scenario import list_scenarios, load_scenario
+from ferryid.simulate.logs import write_log
+from ferryid.simulate.places import check_output
+from ferryid.simulate.scenario import check_seed, list_scenarios, load_scenario
 from ferryid.simulate.trial import Simulation, simulate
 
 SCHEMA = "ferryid.simulate/1"
+FASTEST_MPS = 15.0
+FASTEST_DEGPS = 180.0
 
 
 def run_scenario(
@@ -23,6 +26,7 @@ def run_scenario(
     truth: Path | None = None,
     seed: int | None = None,
     overwrite: bool = False,
+    json: Path | None = None,
     progress: Callable[[str], None],
 ) -> dict[str, Any]:
     """Simulate a scenario, write its log and return what was written (``ferryid.simulate/1``).
@@ -35,11 +39,16 @@ def run_scenario(
         As for `ferryid.simulate.write_log`.
     seed
         Takes the place of the scenario's own.
+    json
+        Where the caller will write the result; looked at before anything is simulated.
     progress
         Called with the name of each stage.
     """
     asked = load_scenario(scenario)
-    check_output(out, truth, storage=storage, overwrite=overwrite)
+    if seed is not None:
+        check_seed(seed)
+    inputs = asked.inputs if asked.folder is None else (Path(scenario), *asked.inputs)
+    check_output(out, truth, storage=storage, overwrite=overwrite, json=json, inputs=inputs)
     progress("simulating (the first run after an installation compiles the simulator, some 20 s)")
     simulation = simulate(asked, seed)
     progress("writing the log")
@@ -63,7 +72,20 @@ def run_scenario(
         },
         "saturated_share": float(np.mean(control.saturated)),
         "undefined_aims": control.undefined_aims,
+        "warnings": _warnings(simulation),
     }
+
+
+def _warnings(simulation: Simulation) -> list[str]:
+    """Return what no vessel that ferryid is made for does: more likely a slip in the scenario or the profile."""
+    nu = np.abs(simulation.truth.nu)
+    speed_mps, turn_degps = float(np.hypot(nu[:, 0], nu[:, 1]).max()), float(np.degrees(nu[:, 2].max()))
+    if speed_mps <= FASTEST_MPS and turn_degps <= FASTEST_DEGPS:
+        return []
+    return [
+        f"the motion is not plausible: up to {speed_mps:.3g} m/s and {turn_degps:.3g} deg/s; "
+        "look at forces, gains and the hull's damping"
+    ]
 
 
 def _tracking(simulation: Simulation) -> tuple[float | None, float | None]:
@@ -99,6 +121,7 @@ def render_simulation(result: Mapping[str, Any]) -> str:
             f"too far from the path for the enclosure law in {result['undefined_aims']} control cycles: it aimed at the "
             "nearest point instead"
         )
+    lines += [f"warning: {warning}" for warning in result["warnings"]]
     return "\n".join(lines)
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -27,8 +27,46 @@ def source_stamp() -> str:
     return sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
+class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
+    """numba's files, each compiled function with its checksum behind it, where numba does not look."""
+
+    def _save_data(self, name: str, data: Any) -> None:
+        content = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(content + sha256(content).digest())
+
+    def _load_data(self, name: str) -> Any:
+        content = Path(self._data_path(name)).read_bytes()
+        if sha256(content[:-32]).digest() != content[-32:]:
+            raise ValueError(f"{name} is damaged")
+        return super()._load_data(name)
+
+
 class _StampedCache(FunctionCache):  # type: ignore[misc]
-    """numba's cache on disk, with the stamp in every key."""
+    """numba's cache on disk, with the stamp in every key; a file that cannot be used, or written, counts as none.
+
+    numba takes whatever stands in its files. What a full disk or a crash has damaged ends in any error of Python, and machine
+    code with wrong bits in worse, so that it is sealed with a checksum.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _SealedFile(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # noqa: BLE001 - see above
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except Exception:  # noqa: BLE001 - see above
+            self.disable()
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return (*super()._index_key(sig, codegen), source_stamp())
@@ -55,6 +93,6 @@ def borrowing(function: Callable[P, R]) -> Callable[P, R]:
 def _compiled(function: Callable[P, R], **options: bool) -> Callable[P, R]:
     dispatcher = numba.njit(function, **options)
     if not numba.config.DISABLE_JIT:
-        with suppress(RuntimeError):  # numba's word for "no folder to keep it in"
+        with suppress(RuntimeError, OSError):  # RuntimeError is numba's word for "no folder to keep it in"
             dispatcher._cache = _StampedCache(dispatcher.py_func)
     return cast("Callable[P, R]", dispatcher)

@@ -13,7 +13,11 @@ from rosbags.typesys.store import Typestore
 from ferryid.simulate.sensors import Stream
 
 CUSTOM = {
-    "ferry_msgs/msg/ThrusterState": "std_msgs/Header header\nfloat64 speed    # rpm\nfloat64 azimuth  # rad\n",
+    "ferry_msgs/msg/ThrusterState": (
+        "std_msgs/Header header\n"
+        "float64 speed    # rpm\n"
+        "float64 azimuth  # rad, where the thrust points, relative to the bow, positive to starboard\n"
+    ),
     "ferry_msgs/msg/Wind": (
         "std_msgs/Header header\n"
         "float32 speed      # m/s, apparent\n"
@@ -35,11 +39,21 @@ BLOCK = 4096
 
 @cache
 def typestore(ros_version: int) -> Typestore:
-    """Return the message types of ROS1 Noetic or ROS2 Humble together with the ferry's own."""
-    store = get_typestore(Stores.ROS1_NOETIC if ros_version == 1 else Stores.ROS2_HUMBLE)
+    """Return the message types of ROS1 Noetic or ROS2 Jazzy together with the ferry's own."""
+    store = get_typestore(Stores.ROS1_NOETIC if ros_version == 1 else Stores.ROS2_JAZZY)
     for name, text in CUSTOM.items():
         store.register(get_types_from_msg(text, name))
     return store
+
+
+@cache
+def definition(name: str, ros_version: int) -> tuple[str, str]:
+    """Return a type's definition with those of all types in it, and its hash; the ferry's own with their comments."""
+    text, digest = typestore(ros_version).generate_msgdef(name, ros_version=ros_version)
+    if name in CUSTOM:
+        _, line, others = text.partition("=" * 80)
+        text = CUSTOM[name] + line + others
+    return text, digest
 
 
 def serialised(stream: Stream, ros_version: int) -> Iterator[bytes]:

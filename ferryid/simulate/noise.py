@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ferryid.simulate.compiled import compiled
 from ferryid.simulate.elementary import cos, exp, log, sin
-from ferryid.simulate.scenario import Scenario, read_series
+from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Noise
 
 Floats = NDArray[np.float64]
@@ -23,9 +23,6 @@ Integers = NDArray[np.uint64]
 Flags = NDArray[np.bool_]
 State = tuple[float, float, float, float, float, float]
 Vector = tuple[float, float, float]
-
-PHASES_S = {"wind": 0.037, "current": 0.029, "payload": 0.043}
-"""When, after the start, the sensors of the surroundings take their first sample [s]."""
 
 
 class Random:
@@ -55,6 +52,10 @@ class Random:
         values = self.random(n + n % 2)
         _box_muller(values)
         return values[:n]
+
+    def normal_columns(self, n: int, columns: int) -> Floats:
+        """Return independent normal numbers, shape (n, columns); the first rows do not depend on how many follow."""
+        return self.standard_normal(n * columns).reshape(n, columns)
 
     def standard_exponential(self, n: int) -> Floats:
         """Return n numbers of the exponential distribution of mean 1."""
@@ -91,10 +92,12 @@ def smooth_noise(random: Random, n: int, step_s: float, std: float, rate_std: fl
     """Return stationary noise whose own standard deviation and that of its time derivative are both given, shape (n,).
 
     A critically damped second-order Gauss-Markov process, sampled exactly. Table 5.2 of Aurlien (2021) states the
-    noise of velocities and of accelerations; only coloured noise can have both.
+    noise of velocities and of accelerations; only coloured noise can have both. One that does not change at all is a constant.
     """
-    if std == 0.0 or rate_std == 0.0:
+    if std == 0.0:
         return np.zeros(n)
+    if rate_std == 0.0:
+        return np.full(n, std * float(random.standard_normal(1)[0]))
     w = rate_std / std
     e = exp(-w * step_s)
     # Transition of (x, x_dot), and the covariance Q = P - A P A' that one step adds, P the stationary one.
@@ -127,10 +130,15 @@ def _second_order(
         values[i] = x
 
 
-def measurement_noise(random: Random, n: int, step_s: float, std: float, rate_std: float, white_share: float) -> Floats:
-    """Return noise of standard deviation `std`, of which the share `white_share` (of `std`) is white, shape (n,)."""
-    white = white_share * std * random.standard_normal(n)
-    return white + smooth_noise(random, n, step_s, std * sqrt(1.0 - white_share * white_share), rate_std)
+def measurement_noise(
+    white: Random, coloured: Random, n: int, step_s: float, std: float, rate_std: float, white_share: float
+) -> Floats:
+    """Return noise of standard deviation `std`, of which the share `white_share` (of `std`) is white, shape (n,).
+
+    White and coloured part are drawn from streams of their own, so that more noise begins like less of it.
+    """
+    smooth = smooth_noise(coloured, n, step_s, std * sqrt(1.0 - white_share * white_share), rate_std)
+    return white_share * std * white.standard_normal(n) + smooth
 
 
 def gusts(random: Random, n: int, step_s: float, std: float, time_constant_s: float) -> Floats:
@@ -169,7 +177,8 @@ def gaps(random: Random, t: Floats, per_min: float, length_s: float) -> Flags:
     start = float(t[0])
     while start <= t[-1]:
         start += 60.0 / per_min * float(random.standard_exponential(1)[0])
-        lost |= (t > start) & (t <= start + length_s)
+        first, end = np.searchsorted(t, (start, start + length_s), side="right")
+        lost[first:end] = True
         start += length_s
     lost[0] = False
     return lost
@@ -220,7 +229,7 @@ def navigation_noise(noise: Noise, seed: int, n: int, step_s: float) -> Floats:
     """Return the errors of pose and velocities as a navigation filter leaves them, shape (n, 6) [m, rad, m/s, rad/s].
 
     The time derivative of a position's error is as large as the velocity's own error, and that of a velocity's error
-    as large as Table 5.2 states for the acceleration.
+    as large as Table 5.2 states for the acceleration, which is what one gets who differentiates the velocities.
     """
     turn, yaw = radians(noise.yaw_rate_degps), radians(noise.yaw_acceleration_degps2)
     channels = {
@@ -233,7 +242,9 @@ def navigation_noise(noise: Noise, seed: int, n: int, step_s: float) -> Floats:
     }
     return np.column_stack(
         [
-            measurement_noise(generator(seed, name), n, step_s, std, rate_std, noise.white_share)
+            measurement_noise(
+                generator(seed, f"{name} white"), generator(seed, name), n, step_s, std, rate_std, noise.white_share
+            )
             for name, (std, rate_std) in channels.items()
         ]
     )
@@ -300,62 +311,3 @@ def navigation_sent(scenario: Scenario, seed: int, n: int, step_s: float) -> Fla
     navigation = scenario.sensors.navigation
     t = np.arange(n, dtype=np.float64) * step_s
     return ~gaps(generator(seed, "navigation gaps"), t, navigation.dropouts_per_min, navigation.dropout_s)
-
-
-def controller_weather(
-    scenario: Scenario, seed: int, wind: Floats, current: Floats, payload: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Return wind, current and payload as the feedforward gets them, one row a control cycle.
-
-    Each is sampled at its topic's rate and phase, noisy, and held; zero before the first sample, and where the topic is left
-    out. The anemometer's errors act on both components alike.
-
-    Parameters
-    ----------
-    scenario, seed
-        Of the trial.
-    wind, current
-        Truth over ground, north and east, one row a control cycle [m/s], shape (m, 2).
-    payload
-        Truth, mass aboard [kg] and its place [m], shape (m, 2).
-    """
-    sensors, noise = scenario.sensors, scenario.sensors.noise
-    t = np.arange(len(wind), dtype=np.float64) / sensors.navigation_rate_hz
-    asked = (
-        ("wind", wind, sensors.wind_rate_hz, (noise.wind_speed_mps, noise.wind_speed_mps)),
-        ("current", current, sensors.current_rate_hz, (noise.current_mps, noise.current_mps)),
-        ("payload", payload, sensors.payload_rate_hz, (noise.payload_kg, 0.0)),
-    )
-    made = []
-    for name, truth, rate_hz, std in asked:
-        seen = np.zeros((len(t), 2))
-        if rate_hz > 0.0:
-            taken = sample_times(float(t[-1]), rate_hz, PHASES_S[name])
-            random = generator(seed, f"controller {name}")
-            values = interpolated(taken, t, truth)
-            for axis in range(2):
-                values[:, axis] += std[axis] * random.standard_normal(len(taken))
-            row = np.searchsorted(taken, t, side="right") - 1
-            seen[row >= 0] = values[row[row >= 0]]
-        made.append(seen)
-    return made[0], made[1], made[2]
-
-
-def wind_series(scenario: Scenario, seed: int, n: int, step_s: float) -> tuple[Floats, Floats]:
-    """Return the wind's north and east components [m/s] every `step_s` seconds: steady part, gusts, recorded series.
-
-    Raises
-    ------
-    FerryIdError
-        When the recorded series cannot be read.
-    """
-    wind = scenario.wind
-    north, east = (
-        steady + gusts(generator(seed, f"gust {axis}"), n, step_s, wind.gust_std_mps, wind.gust_time_s)
-        for axis, steady in (("north", wind.north_mps), ("east", wind.east_mps))
-    )
-    if wind.series:
-        grid, *recorded = read_series(scenario.file(wind.series))
-        series = interpolated(np.arange(n, dtype=np.float64) * step_s, grid, np.column_stack(recorded))
-        north, east = north + series[:, 0], east + series[:, 1]
-    return north, east

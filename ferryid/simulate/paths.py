@@ -12,6 +12,9 @@ Pose = tuple[float, float, float]
 Waypoint = tuple[float, float]
 """North, east [m]."""
 
+SAME_M = 1e-3
+"""Positions nearer than this to each other are one [m]: a leg between them has no direction."""
+
 TWELVE_CORNER: tuple[Pose, ...] = (
     *((0.0, -15.0, -90.0), (15.0, -15.0, 0.0), (15.0, 0.0, 0.0), (30.0, 0.0, 0.0)),
     *((30.0, -15.0, 0.0), (30.0, -15.0, 180.0), (15.0, -15.0, 180.0), (15.0, 0.0, 135.0)),
@@ -49,16 +52,16 @@ class SetPoints:
 
     @property
     def waypoints(self) -> tuple[Waypoint, ...]:
-        """Positions [m] from the start at 0, 0 on, for a guidance law; where only the heading changes there is but one."""
+        """Positions [m] from the start at 0, 0 on, for a guidance law; those alike in a row are one."""
         found: list[Waypoint] = [(0.0, 0.0)]
         for x, y, _ in self.poses:
-            if found[-1] != (x, y):
+            if (x - found[-1][0]) ** 2 + (y - found[-1][1]) ** 2 > SAME_M**2:
                 found.append((x, y))
         return tuple(found)
 
     def at(self, t: float) -> Pose:
         """Return the pose asked for at time `t` [s]; the last one holds."""
-        return self.poses[min(int(t / self.dwell_s), len(self.poses) - 1)]
+        return self.poses[int(min(t / self.dwell_s, len(self.poses) - 1))]
 
 
 def shorter_way(angle: float) -> float:

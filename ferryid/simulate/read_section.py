@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, Field, fields, is_dataclass
-from math import inf, isfinite
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from ferryid.simulate.sections import Gains
@@ -28,8 +27,8 @@ def read_section(table: TableReader, kind: type[Section], *, close: bool = True)
     """Read one table into its dataclass; a fault is noted for whatever does not fit, and the default taken.
 
     Fields are numbers, whole numbers, words, numbers of a fixed or any count, another section (a table inside this one)
-    or a tuple of sections (an array of tables). Metadata hold the limits (``low``, ``high``, ``above``) and a word's
-    ``options``.
+    or a tuple of sections (an array of tables). Metadata hold the limits (``low``,
+    ``high``, and ``least`` above ``low`` itself) and a word's ``options``.
 
     Parameters
     ----------
@@ -50,7 +49,6 @@ def read_section(table: TableReader, kind: type[Section], *, close: bool = True)
 def _value(table: TableReader, entry: Field[Any], hint: Any) -> Any:
     key, default = entry.name, entry.default
     low, high = entry.metadata.get("low", -1e6), entry.metadata.get("high", 1e6)
-    above = entry.metadata.get("above", -inf)
     parts = get_args(hint)
     if isinstance(hint, type) and is_dataclass(hint):
         if hint in FLATTENED:
@@ -68,13 +66,18 @@ def _value(table: TableReader, entry: Field[Any], hint: Any) -> Any:
             table, key, default, int(entry.metadata.get("low", 1)), int(entry.metadata.get("high", MOST_WHOLE))
         )
     assert hint is float, f"no reader for {hint}"
-    return table.number(key, default, at_least=low, at_most=high, above=above)
+    value = table.number(key, default, at_least=low, at_most=high)
+    least = entry.metadata.get("least", low)
+    if low < value < least:
+        table.fault(f'"{key}" must be {low:g}, or at least {least:g}, found {value:g}. Fix: give one of these', key)
+        return default
+    return value
 
 
 def _whole(table: TableReader, key: str, default: int, low: int, high: int) -> int:
     value = table.whole(key, default, at_least=low)
     if value > high:
-        table.fault(f'"{key}" must be at most {high}, found {value}', key)
+        table.fault(f'"{key}" must be at most {high}, found {value}. Fix: give a smaller one', key)
         return default
     return value
 
@@ -88,11 +91,16 @@ def _numbers(
         if table.data.get(key) == []:
             table.fault(f'"{key}" is empty. Fix: give at least one number, or leave the key out', key)
         return default
-    if not all(isfinite(value) and limits[0] <= value <= limits[1] for value in given):
-        table.fault(f'"{key}" must hold numbers of at least {limits[0]:g} and at most {limits[1]:g}', key)
+    if not all(limits[0] <= value <= limits[1] for value in given):
+        wrong = next(value for value in given if not limits[0] <= value <= limits[1])
+        table.fault(
+            f'"{key}" must hold numbers of at least {limits[0]:g} and at most {limits[1]:g}, found {wrong:g}. '
+            "Fix: keep to these limits",
+            key,
+        )
         return default
     if len(given) > MOST_ENTRIES:
-        table.fault(f'"{key}" must hold at most {MOST_ENTRIES} numbers, found {len(given)}', key)
+        table.fault(f'"{key}" must hold at most {MOST_ENTRIES} numbers, found {len(given)}. Fix: fewer', key)
         return default
     return given
 
@@ -105,6 +113,6 @@ def _entries(table: TableReader, key: str, kind: type[Any]) -> tuple[Any, ...]:
         table.fault(f'"{key}" must be an array of tables. Fix: head each entry with {header}', key)
         return ()
     if len(value) > MOST_ENTRIES:
-        table.fault(f"there must be at most {MOST_ENTRIES} entries of {header}, found {len(value)}", key)
+        table.fault(f"there must be at most {MOST_ENTRIES} entries of {header}, found {len(value)}. Fix: fewer", key)
         return ()
     return tuple(read_section(entry, kind) for entry in table.tables(key))

@@ -32,7 +32,7 @@ from ferryid.simulate.sections import (
 from ferryid.simulate.series import read_series
 from ferryid.vessel.faults import Fault, TableReader
 from ferryid.vessel.parse_hull import DAMPING_TERMS
-from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of
+from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of, too_deep
 
 __all__ = [
     "Environment",
@@ -46,6 +46,7 @@ __all__ = [
 
 SCHEMA = "ferryid.scenario/1"
 MASS = ("m11", "m22", "m23", "m32", "m33")
+SHORTEST_DWELL_S = 0.1
 LONGEST_S = 14_400.0
 """Longest trial [s]; longer ones would not fit into the memory of a small machine."""
 MOST_ROUNDS = 1000
@@ -121,9 +122,34 @@ class Scenario:
         """The file as messages name it."""
         return f"{self.name}.toml" if self.folder is None else str(self.folder / f"{self.name}.toml")
 
+    @property
+    def profile(self) -> str:
+        """The vessel profile as `load_profile` takes it: a bundled name, or a path, from the scenario's folder on first."""
+        beside = self.file(self.vessel)
+        return str(beside) if self.vessel.endswith(".toml") and beside.is_file() else self.vessel
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files that the scenario names, its vessel's among them."""
+        return Path(self.profile), *(self.file(name) for name in (self.wind.series, self.controller.model) if name)
+
     def file(self, name: str) -> Path:
         """Return the path of a file that the scenario names, relative to its own folder."""
         return (self.folder or Path()) / name
+
+
+def check_seed(seed: int) -> None:
+    """Refuse a seed that no scenario could have.
+
+    Raises
+    ------
+    FerryIdError
+        When it is negative or longer than TOML's numbers.
+    """
+    if not 0 <= seed < 2**63:
+        raise FerryIdError(
+            f"--seed: must be a whole number of at least 0 and less than 2^63, found {seed!r:.40}. Fix: give such a number"
+        )
 
 
 def list_scenarios() -> dict[str, str]:
@@ -152,7 +178,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
             f"{did_you_mean(name, list_scenarios())} Fix: use one of these or give the path of a TOML file"
         )
     try:
-        text = path.read_text("utf-8")
+        text = path.read_text("utf-8-sig")
     except OSError as error:
         raise FerryIdError(f"{name}: the scenario cannot be read, {error.strerror}. Fix: check the path") from error
     except UnicodeDecodeError as error:
@@ -179,9 +205,12 @@ def parse_scenario(text: str, where: str, folder: Path | None = None) -> Scenari
     """
     try:
         data = tomllib.loads(text)
+        deep = too_deep(data)
     # A number of thousands of digits, or thousands of brackets, ends in errors of Python rather than of TOML.
     except (ValueError, RecursionError) as error:
         raise FerryIdError(f"{where}: not valid TOML, {error}. Fix: correct the line") from error
+    if deep:
+        raise FerryIdError(f"{where}: {deep}")
     lines = key_lines(text)
     faults = [
         Fault(line_of(lines, place), "the number is too long. Fix: write fewer digits") for place in _long(data, ())
@@ -251,7 +280,7 @@ def _duration(top: TableReader, path: SetPoints, manoeuvre: Manoeuvre, guidance:
     """Return how long the trial takes: what the file says, or else what its path or manoeuvre takes."""
     given = top.has("duration_s")
     usual = manoeuvre.duration_s if manoeuvre.kind else path.duration_s
-    duration_s = top.number("duration_s", usual, above=0.0, at_most=LONGEST_S)
+    duration_s = top.number("duration_s", usual, at_least=1e-3, at_most=LONGEST_S)
     if duration_s > LONGEST_S:
         what, key = ("manoeuvre", "manoeuvre") if manoeuvre.kind else ("path", "path")
         top.fault(f"the {what} takes {duration_s:g} s, at most {LONGEST_S:g} s are simulated. Fix: set duration_s", key)
@@ -274,7 +303,7 @@ def _start(top: TableReader) -> int:
         return 0
     moment = value if value.tzinfo else value.replace(tzinfo=UTC)
     if not 2000 <= moment.year < 2100:
-        top.fault(f'"start" must lie between 2000 and 2100, found {moment.year}', "start")
+        top.fault(f'"start" must lie between 2000 and 2038, found {moment.year}. Fix: choose another year', "start")
         return 0
     return int(moment.timestamp()) * 10**9 + moment.microsecond * 1000
 
@@ -289,11 +318,11 @@ def _path(top: TableReader, *, moved: bool) -> SetPoints:
     if table is None:
         return NOWHERE
     kind = table.text("kind", required=True, options=(*PATHS, "points"))
-    dwell_s = table.number("dwell_s", 60.0, above=0.0, at_most=LONGEST_S)
-    size = table.number("size", 1.0, above=0.0, at_most=1e3)
+    dwell_s = table.number("dwell_s", 60.0, at_least=SHORTEST_DWELL_S, at_most=LONGEST_S)
+    size = table.number("size", 1.0, at_least=1e-3, at_most=1e3)
     rounds = table.whole("rounds", 1, at_least=1)
     if rounds > MOST_ROUNDS:
-        table.fault(f'"rounds" must be at most {MOST_ROUNDS}, found {rounds}', "rounds")
+        table.fault(f'"rounds" must be at most {MOST_ROUNDS}, found {rounds}. Fix: fewer rounds', "rounds")
         rounds = 1
     poses = NOWHERE.poses
     if kind == "points":

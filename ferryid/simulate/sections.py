@@ -6,7 +6,6 @@ A field's name is the key in the file; its unit ends the name. Reading is `ferry
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf
 from typing import Any
 
 Triple = tuple[float, float, float]
@@ -14,9 +13,9 @@ Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
-def limited(default: float, low: float = 0.0, high: float = 1e6, *, above: float = -inf) -> Any:
-    """Return the field of a number that must lie between two limits, and above a third where that is given."""
-    return field(default=default, metadata={"low": low, "high": high, "above": above})
+def limited(default: float, low: float = 0.0, high: float = 1e6) -> Any:
+    """Return the field of a number that must lie between two limits."""
+    return field(default=default, metadata={"low": low, "high": high, "least": low})
 
 
 def signed(default: float, size: float) -> Any:
@@ -24,9 +23,14 @@ def signed(default: float, size: float) -> Any:
     return limited(default, -size, size)
 
 
-def positive(default: float, high: float = 1e6) -> Any:
-    """Return the field of a number above zero."""
-    return limited(default, 0.0, high, above=0.0)
+def positive(default: float, high: float = 1e6, *, least: float = 1e-3) -> Any:
+    """Return the field of a number that is divided by, and so keeps a distance from zero."""
+    return limited(default, least, high)
+
+
+def off_or(default: float, least: float, high: float = 1e6) -> Any:
+    """Return the field of a number that is 0 where there is no such thing, and otherwise at least `least`."""
+    return field(default=default, metadata={"low": 0.0, "high": high, "least": least})
 
 
 def chosen(default: str, *options: str) -> Any:
@@ -36,7 +40,7 @@ def chosen(default: str, *options: str) -> Any:
 
 def several(default: tuple[float, ...], low: float, high: float) -> Any:
     """Return the field of as many numbers as the default has, each between two limits."""
-    return field(default=default, metadata={"low": low, "high": high, "above": -inf})
+    return field(default=default, metadata={"low": low, "high": high, "least": low})
 
 
 ALWAYS_S = 1e6
@@ -75,7 +79,7 @@ class Waves:
     order of 1; B is the width that the hull shows to the sea.
     """
 
-    significant_height_m: float = limited(0.0, 0.0, 20.0)
+    significant_height_m: float = off_or(0.0, 1e-6, 20.0)
     peak_period_s: float = limited(2.5, 0.5, 30.0)
     direction_deg: float = signed(0.0, 360.0)
     gamma: float = limited(3.3, 1.0, 10.0)
@@ -91,7 +95,7 @@ class Wake:
     """
 
     at_s: float = limited(60.0)
-    height_m: float = limited(0.3, 0.0, 10.0)
+    height_m: float = off_or(0.3, 1e-6, 10.0)
     period_s: float = limited(2.0, 0.5, 30.0)
     duration_s: float = positive(20.0)
     direction_deg: float = signed(90.0, 360.0)
@@ -162,13 +166,13 @@ class Thrusters:
     against the thrust. `interaction_fraction` is the loss where one thruster's wake points straight at another.
     """
 
-    speed_lag_s: float = limited(0.4, 0.0, 60.0)
-    speed_rate_rpmps: float = positive(600.0)
-    azimuth_lag_s: float = limited(0.2, 0.0, 60.0)
-    azimuth_rate_degps: float = positive(60.0)
-    rudder_lag_s: float = limited(0.2, 0.0, 60.0)
-    rudder_rate_degps: float = positive(20.0)
-    force_lag_s: float = limited(0.0, 0.0, 60.0)
+    speed_lag_s: float = off_or(0.4, 1e-3, 60.0)
+    speed_rate_rpmps: float = positive(600.0, least=1e-6)
+    azimuth_lag_s: float = off_or(0.2, 1e-3, 60.0)
+    azimuth_rate_degps: float = positive(60.0, least=1e-6)
+    rudder_lag_s: float = off_or(0.2, 1e-3, 60.0)
+    rudder_rate_degps: float = positive(20.0, least=1e-6)
+    force_lag_s: float = off_or(0.0, 1e-3, 60.0)
     inflow_loss_per_mps: float = limited(0.0, 0.0, 2.0)
     interaction_fraction: float = limited(0.0, 0.0, 1.0)
     faults: tuple[Fault, ...] = ()
@@ -178,23 +182,27 @@ class Thrusters:
 class Noise:
     """``[sensors.noise]``: standard deviations, Aurlien (2021), Table 5.2, then the other sensors.
 
-    `white_share` is the part of the navigation's standard deviations that is white; the rest is coloured.
+    `white_share` is the part of the navigation's standard deviations that is white; the rest is coloured. `acceleration_mps2`
+    and `yaw_acceleration_degps2` are those of the time derivative of the velocities' coloured noise; the IMU's own noise is
+    `imu_acceleration_mps2` and `imu_turn_degps`, white, on each axis.
     """
 
-    position_m: float = limited(0.02)
-    heading_deg: float = limited(0.2)
-    velocity_mps: float = limited(0.05)
-    yaw_rate_degps: float = limited(0.2)
-    acceleration_mps2: float = limited(0.01)
-    yaw_acceleration_degps2: float = limited(0.1)
+    position_m: float = off_or(0.02, 1e-9)
+    heading_deg: float = off_or(0.2, 1e-9)
+    velocity_mps: float = off_or(0.05, 1e-9)
+    yaw_rate_degps: float = off_or(0.2, 1e-9)
+    acceleration_mps2: float = off_or(0.01, 1e-9)
+    yaw_acceleration_degps2: float = off_or(0.1, 1e-9)
     white_share: float = limited(0.1, 0.0, 1.0)
-    attitude_deg: float = limited(0.05)
-    speed_rpm: float = limited(1.0)
-    azimuth_deg: float = limited(0.05)
-    wind_speed_mps: float = limited(0.15)
-    wind_direction_deg: float = limited(1.5)
-    current_mps: float = limited(0.02)
-    payload_kg: float = limited(10.0)
+    attitude_deg: float = off_or(0.05, 1e-9)
+    imu_acceleration_mps2: float = off_or(0.03, 1e-9)
+    imu_turn_degps: float = off_or(0.115, 1e-9)
+    speed_rpm: float = off_or(1.0, 1e-9)
+    azimuth_deg: float = off_or(0.05, 1e-9)
+    wind_speed_mps: float = off_or(0.15, 1e-9)
+    wind_direction_deg: float = off_or(1.5, 1e-9)
+    current_mps: float = off_or(0.02, 1e-9)
+    payload_kg: float = off_or(10.0, 1e-9)
 
 
 @dataclass(frozen=True)
@@ -210,8 +218,8 @@ class Navigation:
     heading_bias_deg: float = signed(0.0, 180.0)
     yaw_rate_factor: float = limited(1.0, 0.0, 10.0)
     delay_s: float = limited(0.0, 0.0, 5.0)
-    dropouts_per_min: float = limited(0.0, 0.0, 60.0)
-    dropout_s: float = limited(1.0, 0.0, 60.0)
+    dropouts_per_min: float = off_or(0.0, 1e-6, 60.0)
+    dropout_s: float = off_or(1.0, 1e-3, 60.0)
 
 
 @dataclass(frozen=True)
@@ -223,18 +231,18 @@ class Sensors:
     encoders read as integers (Aurlien 2021, section 4.8), 0 for none.
     """
 
-    navigation_rate_hz: float = positive(20.0, 200.0)
-    thruster_rate_hz: float = positive(20.0, 200.0)
-    wind_rate_hz: float = limited(0.0, 0.0, 200.0)
-    current_rate_hz: float = limited(0.0, 0.0, 200.0)
-    payload_rate_hz: float = limited(0.0, 0.0, 200.0)
-    imu_rate_hz: float = limited(100.0, 0.0, 1000.0)
-    camera_rate_hz: float = limited(1.0, 0.0, 1000.0)
+    navigation_rate_hz: float = positive(20.0, 200.0, least=0.01)
+    thruster_rate_hz: float = positive(20.0, 200.0, least=0.01)
+    wind_rate_hz: float = off_or(0.0, 0.01, 200.0)
+    current_rate_hz: float = off_or(0.0, 0.01, 200.0)
+    payload_rate_hz: float = off_or(0.0, 0.01, 200.0)
+    imu_rate_hz: float = off_or(100.0, 0.01, 1000.0)
+    camera_rate_hz: float = off_or(1.0, 0.01, 1000.0)
     clock_offset_ms: float = signed(0.0, 1e6)
     thruster_clock_offset_ms: float = signed(0.0, 1e4)
-    azimuth_step_deg: float = limited(0.0, 0.0, 45.0)
-    dropouts_per_min: float = limited(0.0, 0.0, 60.0)
-    dropout_s: float = limited(1.0, 0.0, 60.0)
+    azimuth_step_deg: float = off_or(0.0, 1e-3, 45.0)
+    dropouts_per_min: float = off_or(0.0, 1e-6, 60.0)
+    dropout_s: float = off_or(1.0, 1e-3, 60.0)
     navigation: Navigation = field(default_factory=Navigation)
     noise: Noise = field(default_factory=Noise)
 
@@ -307,6 +315,6 @@ class Manoeuvre:
     helm_deg: float = signed(20.0, 180.0)
     heading_deg: float = limited(20.0, 0.0, 180.0)
     lead_s: float = limited(30.0)
-    hold_s: float = positive(30.0)
+    hold_s: float = positive(30.0, least=0.1)
     levels: tuple[float, ...] = (0.4, 0.8, 0.2, 1.0, 0.0, -0.4)
     duration_s: float = positive(600.0)

@@ -11,17 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.simulate.elementary import directions, sines_cosines
-from ferryid.simulate.noise import PHASES_S, gaps, generator, interpolated, sample_times
+from ferryid.simulate.noise import gaps, generator, interpolated, sample_times
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.states import Control, Truth
+from ferryid.simulate.surroundings import CURRENT, PAYLOAD, WIND, Link, current_samples, payload_samples
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
 Nanoseconds = NDArray[np.int64]
 
 GRAVITY = 9.81
-IMU_ACCELERATION_STD = 0.03
-IMU_TURN_STD = 0.002
 
 
 @dataclass(frozen=True)
@@ -54,23 +53,14 @@ class Stream:
     blobs: tuple[bytes, ...] = ()
 
 
-@dataclass(frozen=True)
-class Link:
-    """How a topic gets from its sensor to the recorder: when it is sampled, how late it arrives [s]."""
-
-    phase_s: float
-    latency_s: float
-    jitter_s: float
-
-
 LINKS = {
     "/navigation/odometry": Link(0.0, 0.012, 0.002),
     "/control/tau_d": Link(0.0, 0.001, 0.0004),
     "command": Link(0.0, 0.0015, 0.0004),
     "state": Link(0.011, 0.006, 0.0012),
-    "/weather/wind": Link(PHASES_S["wind"], 0.045, 0.006),
-    "/weather/current": Link(PHASES_S["current"], 0.08, 0.01),
-    "/payload/waterline": Link(PHASES_S["payload"], 0.12, 0.02),
+    "/weather/wind": WIND,
+    "/weather/current": CURRENT,
+    "/payload/waterline": PAYLOAD,
     "/imu/data": Link(0.004, 0.0025, 0.0005),
     "/camera/image/compressed": Link(0.31, 0.085, 0.012),
 }
@@ -83,7 +73,9 @@ TURNING = ("azimuth", "propeller_rudder")
 def sense(scenario: Scenario, profile: Profile, seed: int, truth: Truth, control: Control) -> tuple[Stream, ...]:
     """Return the streams of every topic of a trial, as `ferryid.simulate.trial.simulate` puts them into a log."""
     sensors = scenario.sensors
-    made = [_odometry(scenario, seed, truth, control), _tau_d(scenario, seed, control)]
+    made = [_odometry(scenario, seed, truth, control)]
+    if not scenario.manoeuvre.kind:
+        made.append(_tau_d(scenario, seed, control))
     for index, actuator in enumerate(profile.actuators):
         turning = actuator.kind in TURNING
         made.append(_thruster_state(scenario, seed, truth, index, actuator.name, turning=turning))
@@ -96,7 +88,7 @@ def sense(scenario: Scenario, profile: Profile, seed: int, truth: Truth, control
         (sensors.camera_rate_hz, _camera),
     ):
         if rate_hz > 0.0:
-            made.append(make(scenario, seed, truth, rate_hz))
+            made.append(make(scenario, seed, truth))
     return tuple(made)
 
 
@@ -140,8 +132,11 @@ def _times(
     The recorder's clock is ahead of the senders' by the scenario's offset, the sender's own by `ahead_ms`.
     """
     taken = scenario.start_ns + np.rint(t * 1e9).astype(np.int64)
-    random = generator(seed, f"jitter {topic}")
-    jitter = 0.5 * link.jitter_s * (random.standard_exponential(len(t)) + random.standard_exponential(len(t)))
+    # From streams of their own, so that a longer trial begins like a shorter one; so is all noise, by stream or by row.
+    first, second = (
+        generator(seed, f"{name} {topic}").standard_exponential(len(t)) for name in ("jitter", "more jitter")
+    )
+    jitter = 0.5 * link.jitter_s * (first + second)
     late = link.latency_s + jitter + scenario.sensors.clock_offset_ms * 1e-3
     return taken + round(ahead_ms * 1e6), np.maximum.accumulate(taken + np.rint(late * 1e9).astype(np.int64))
 
@@ -167,11 +162,9 @@ def _odometry(scenario: Scenario, seed: int, truth: Truth, control: Control) -> 
     t = control.t[sent]
     x, y, psi, u, v, r = control.measured[sent].T
     noise = scenario.sensors.noise
-    random = generator(seed, topic)
-    roll, pitch = (
-        angle + radians(noise.attitude_deg) * random.standard_normal(len(control.t))[sent]
-        for angle in _at(truth, t - scenario.sensors.navigation.delay_s, truth.attitude)
-    )
+    errors = radians(noise.attitude_deg) * generator(seed, topic).normal_columns(len(control.t), 2)[sent]
+    tilt = interpolated(t - scenario.sensors.navigation.delay_s, truth.t, truth.attitude) + errors
+    roll, pitch = tilt.T.copy()
     q = quaternion(roll, pitch, _wrapped(psi))
     pose, twist = np.zeros(36), np.zeros(36)
     turn, attitude, yaw = (radians(std) for std in (noise.yaw_rate_degps, noise.attitude_deg, noise.heading_deg))
@@ -221,11 +214,11 @@ def _thruster_state(scenario: Scenario, seed: int, truth: Truth, index: int, nam
     topic = f"/{name}/state"
     link, sensors = LINKS["state"], scenario.sensors
     t = _sample_times(truth, sensors.thruster_rate_hz, link)
-    random = generator(seed, topic)
+    speed_noise, angle_noise = generator(seed, topic).normal_columns(len(t), 2).T
     speed, angle = _at(truth, t, truth.speeds[:, index], truth.angles[:, index])
-    speed += sensors.noise.speed_rpm * random.standard_normal(len(t))
+    speed += sensors.noise.speed_rpm * speed_noise
     if turning:
-        angle += radians(sensors.noise.azimuth_deg) * random.standard_normal(len(t))
+        angle += radians(sensors.noise.azimuth_deg) * angle_noise
         if sensors.azimuth_step_deg > 0.0:
             step = radians(sensors.azimuth_step_deg)
             angle = np.rint(angle / step) * step
@@ -241,15 +234,15 @@ def _thruster_state(scenario: Scenario, seed: int, truth: Truth, index: int, nam
     )
 
 
-def _wind(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
+def _wind(scenario: Scenario, seed: int, truth: Truth) -> Stream:
     topic = "/weather/wind"
     link, noise = LINKS[topic], scenario.sensors.noise
-    t = _sample_times(truth, rate_hz, link)
-    random = generator(seed, topic)
+    t = _sample_times(truth, scenario.sensors.wind_rate_hz, link)
+    speed_noise, direction_noise = generator(seed, topic).normal_columns(len(t), 2).T
     values = interpolated(t, truth.t, np.column_stack((truth.wind, truth.eta[:, 2], truth.nu)))
     true_speed, true_direction = apparent_wind(values[:, :2], values[:, 2].copy(), values[:, 3:])
-    speed = np.abs(true_speed + noise.wind_speed_mps * random.standard_normal(len(t)))
-    direction = true_direction + radians(noise.wind_direction_deg) * random.standard_normal(len(t))
+    speed = np.abs(true_speed + noise.wind_speed_mps * speed_noise)
+    direction = true_direction + radians(noise.wind_direction_deg) * direction_noise
     return Stream(
         topic,
         "ferry_msgs/msg/Wind",
@@ -262,42 +255,36 @@ def _wind(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream
     )
 
 
-def _current(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
+def _current(scenario: Scenario, seed: int, truth: Truth) -> Stream:
     topic = "/weather/current"
-    link, std = LINKS[topic], scenario.sensors.noise.current_mps
-    t = _sample_times(truth, rate_hz, link)
-    random = generator(seed, topic)
-    north, east = (values + std * random.standard_normal(len(t)) for values in _at(truth, t, truth.current))
+    t, values = current_samples(scenario, seed, truth.t, truth.current)
     return Stream(
         topic,
         "ferry_msgs/msg/Current",
         "ned",
-        *_times(scenario, seed, topic, link, t),
-        columns={"north": north, "east": east},
+        *_times(scenario, seed, topic, LINKS[topic], t),
+        columns={"north": values[:, 0], "east": values[:, 1]},
     )
 
 
-def _payload(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
-    """Return what a camera that reads the waterline makes of the mass aboard; a little noise may weigh less than nothing."""
+def _payload(scenario: Scenario, seed: int, truth: Truth) -> Stream:
     topic = "/payload/waterline"
-    link, std = LINKS[topic], scenario.sensors.noise.payload_kg
-    t = _sample_times(truth, rate_hz, link)
-    mass, x = _at(truth, t, truth.payload)
+    t, values = payload_samples(scenario, seed, truth.t, truth.payload)
     return Stream(
         topic,
         "ferry_msgs/msg/Payload",
         "body",
-        *_times(scenario, seed, topic, link, t),
-        columns={"mass": mass + std * generator(seed, topic).standard_normal(len(t)), "x": x},
+        *_times(scenario, seed, topic, LINKS[topic], t),
+        columns={"mass": values[:, 0], "x": values[:, 1]},
     )
 
 
-def _imu(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
+def _imu(scenario: Scenario, seed: int, truth: Truth) -> Stream:
     """Return attitude, turn rates and specific force at the body origin; heave is left out."""
     topic = "/imu/data"
-    link = LINKS[topic]
-    t = _sample_times(truth, rate_hz, link)
-    random = generator(seed, topic)
+    link, sensors = LINKS[topic], scenario.sensors
+    t = _sample_times(truth, sensors.imu_rate_hz, link)
+    errors = iter(generator(seed, topic).normal_columns(len(t), 6).T)
     rolling = np.gradient(truth.attitude, float(truth.t[1] - truth.t[0]), axis=0)
     psi, u, v, r, u_dot, v_dot, roll, pitch, roll_dot, pitch_dot = _at(
         truth, t, truth.eta[:, 2], truth.nu, truth.nu_dot[:, :2], truth.attitude, rolling
@@ -308,21 +295,21 @@ def _imu(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
     force = (u_dot - r * v + GRAVITY * s2, v_dot + r * u - GRAVITY * c2 * s1, -GRAVITY * c2 * c1)
     columns = {f"orientation.{axis}": values for axis, values in zip("xyzw", q, strict=True)}
     for field_name, std, values in (
-        ("angular_velocity", IMU_TURN_STD, rates),
-        ("linear_acceleration", IMU_ACCELERATION_STD, force),
+        ("angular_velocity", radians(sensors.noise.imu_turn_degps), rates),
+        ("linear_acceleration", sensors.noise.imu_acceleration_mps2, force),
     ):
         for axis, one in zip("xyz", values, strict=True):
-            columns[f"{field_name}.{axis}"] = one + std * random.standard_normal(len(t))
+            columns[f"{field_name}.{axis}"] = one + std * next(errors)
     return Stream(topic, "sensor_msgs/msg/Imu", "imu", *_times(scenario, seed, topic, link, t), columns=columns)
 
 
-def _camera(scenario: Scenario, seed: int, truth: Truth, rate_hz: float) -> Stream:
+def _camera(scenario: Scenario, seed: int, truth: Truth) -> Stream:
     """Return frames of random bytes between the markers of a JPEG: bulk of no content that a reader must skip."""
     topic = "/camera/image/compressed"
     link = LINKS[topic]
-    t = _sample_times(truth, rate_hz, link)
+    t = _sample_times(truth, scenario.sensors.camera_rate_hz, link)
     random = generator(seed, topic)
-    sizes = (900.0 + np.floor(600.0 * random.random(len(t)))).astype(np.int64).tolist()
+    sizes = (900.0 + np.floor(600.0 * generator(seed, f"sizes {topic}").random(len(t)))).astype(np.int64).tolist()
     return Stream(
         topic,
         "sensor_msgs/msg/CompressedImage",

@@ -42,13 +42,13 @@ def read_series(path: Path) -> tuple[Floats, Floats, Floats]:
             rows = list(csv.reader(file))
     except OSError as error:
         raise FerryIdError(f"{path}: the series cannot be read, {error.strerror}. Fix: check the path") from error
-    except (UnicodeDecodeError, csv.Error) as error:
+    # A name with a zero in it is a ValueError, as is text that is no UTF-8.
+    except (ValueError, csv.Error) as error:
         raise FerryIdError(f"{path}: the series is no CSV text, {error}. Fix: save it as CSV in UTF-8") from error
-    places = _places(path, rows[0] if rows else [])
+    filled = [(number, row) for number, row in enumerate(rows, start=1) if any(cell.strip() for cell in row)]
+    places = _places(path, filled[0][1] if filled else [])
     values: list[tuple[float, float, float]] = []
-    for number, row in enumerate(rows[1:], start=2):
-        if not any(cell.strip() for cell in row):
-            continue
+    for number, row in filled[1:]:
         now = _numbers(path, number, row, places)
         if values and now[0] <= values[-1][0]:
             raise FerryIdError(

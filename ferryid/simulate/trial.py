@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
+from ferryid.simulate.check_scenario import line_in, vessel_of
 from ferryid.simulate.control.allocation import build_allocation
 from ferryid.simulate.control.feedforward import build_feedforward
 from ferryid.simulate.control.guidance import build_guidance
@@ -17,21 +17,19 @@ from ferryid.simulate.control.manoeuvres import build_helm
 from ferryid.simulate.control.pid import build_pid
 from ferryid.simulate.control.reference import build_reference
 from ferryid.simulate.loop import RECORD, ROW, Loop, Measured, Memory, run
-from ferryid.simulate.noise import controller_weather, navigation_errors, navigation_noise, navigation_sent
+from ferryid.simulate.noise import navigation_errors, navigation_noise, navigation_sent
 from ferryid.simulate.plant.motion import build, payload_aboard, resting, roll_pitch
 from ferryid.simulate.scenario import Scenario, check_against
 from ferryid.simulate.sensors import Stream, sense
+from ferryid.simulate.size import check_size, steps_per_cycle
 from ferryid.simulate.states import Control, Truth
-from ferryid.vessel.load import load_profile
+from ferryid.simulate.surroundings import controller_weather
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
     from ferryid.identify.model import Model
 
 Floats = NDArray[np.float64]
-
-LONGEST_STEP_S = 0.02
-"""Longest integration step [s]: the plant runs at 50 Hz or faster, in whole steps per control cycle."""
 
 
 @dataclass(frozen=True)
@@ -63,28 +61,24 @@ def simulate(scenario: Scenario, seed: int | None = None, *, model: Model | None
     FerryIdError
         When the vessel has no hull model, or the scenario asks for what it lacks.
     """
-    profile = load_profile(scenario.vessel)
+    profile = vessel_of(scenario)
     number = scenario.seed if seed is None else seed
+    check_size(scenario, len(profile.actuators))
     truth, control = sail(scenario, profile, number, model)
     return Simulation(scenario, number, profile, truth, control, sense(scenario, profile, number, truth, control))
 
 
 def sail(scenario: Scenario, profile: Profile, seed: int, model: Model | None = None) -> tuple[Truth, Control]:
     """Run the closed loop without the log's sensors; parameters and errors as for `simulate`."""
-    if not profile.hull.has_model:
-        raise FerryIdError(
-            f"{profile.name}: the simulator needs the hull's damping, found no [hull.D] in the profile. "
-            "Fix: simulate a vessel with a hull model, such as milliampere"
-        )
     check_against(scenario, profile)
     cycle = 1.0 / scenario.sensors.navigation_rate_hz
-    steps = ceil(cycle / LONGEST_STEP_S - 1e-9)
+    steps = steps_per_cycle(scenario.sensors.navigation_rate_hz)
     h = cycle / steps
     cycles = round(scenario.duration_s / cycle)
     if cycles < 2:
         raise FerryIdError(
-            f"{scenario.name}: a trial needs at least two control cycles, found duration_s = {scenario.duration_s:g}. "
-            "Fix: make it longer"
+            f"{scenario.where}:{line_in(scenario, 'duration_s')}: a trial needs at least two control cycles, found "
+            f"duration_s = {scenario.duration_s:g}. Fix: make it longer"
         )
     plant = build(scenario, profile, seed, h, steps * cycles)
     thrusters = resting(plant)
@@ -108,17 +102,26 @@ def sail(scenario: Scenario, profile: Profile, seed: int, model: Model | None = 
     n = steps * cycles
     wind, current = plant.wind[: 2 * n : 2], plant.current[: 2 * n : 2]
     payload = payload_aboard(plant, n)
+    at = np.arange(cycles, dtype=np.float64) * cycle
     measured = Measured(
         navigation_noise(scenario.sensors.noise, seed, cycles, cycle),
         navigation_sent(scenario, seed, cycles, cycle),
-        *controller_weather(scenario, seed, wind[::steps], current[::steps], payload[::steps]),
+        *controller_weather(
+            scenario,
+            seed,
+            at,
+            np.add.outer(at, np.arange(steps, dtype=np.float64) * h).ravel(),
+            wind,
+            current,
+            payload,
+        ),
     )
     rows, records = np.empty((n, ROW + 2 * k)), np.empty((cycles, RECORD + 2 * k))
     run(loop, memory, measured, h, steps, rows, records)
     if not np.isfinite(rows).all():
         lost = int(np.argmin(np.isfinite(rows).all(axis=1)))
         raise FerryIdError(
-            f"{scenario.name}: the simulated motion grows without bound after {lost * h:.1f} s. "
+            f"{scenario.where}: the simulated motion grows without bound after {lost * h:.1f} s. "
             "Fix: smaller gains or forces; a hull whose damping drives instead of damping does this too"
         )
     attitude = roll_pitch(plant, rows[:, 0], rows[:, 1:4])

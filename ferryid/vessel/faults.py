@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ferryid.errors import did_you_mean
+from ferryid.errors import did_you_mean, one_line
 from ferryid.vessel.toml_lines import KeyPath, line_of
 
 
@@ -57,7 +57,7 @@ class TableReader:
 
     def fault(self, message: str, key: str | None = None, *, warning: bool = False) -> None:
         """Note a fault at `key`, or at the table's own line."""
-        self._faults.append(Fault(self.line(key), message, warning))
+        self._faults.append(Fault(self.line(key), one_line(message), warning))
 
     def has(self, key: str) -> bool:
         """Tell whether the file gives `key`."""
@@ -106,10 +106,10 @@ class TableReader:
         if value is None:
             return ()
         if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
-            self.fault(f'"{key}" must be an array of strings, found {_kind(value)}', key)
+            self.fault(f'"{key}" must be an array of strings, found {_kind(value)}. Fix: {key} = ["a", "b"]', key)
             return ()
         if count is not None and len(value) != count:
-            self.fault(f'"{key}" must name {count} fields, found {len(value)}', key)
+            self.fault(f'"{key}" must name {count} fields, found {len(value)}. Fix: name {count}', key)
             return ()
         return tuple(value)
 
@@ -129,18 +129,14 @@ class TableReader:
         if value is None:
             return default
         if not _is_number(value):
-            self.fault(f'"{key}" must be a number, found {_kind(value)}', key)
+            self.fault(f'"{key}" must be a number, found {_kind(value)}. Fix: write a number without quotes', key)
             return default
         if not math.isfinite(value) or value <= above or value < at_least or value > at_most:
-            limit = (
-                f"above {above:g}"
-                if math.isfinite(above)
-                else f"at least {at_least:g}"
-                if math.isfinite(at_least)
-                else "finite"
-            )
-            limit += f" and at most {at_most:g}" if math.isfinite(at_most) else ""
-            self.fault(f'"{key}" must be {limit}, found {value:g}', key)
+            limits = [f"above {above:g}"] if math.isfinite(above) else []
+            limits += [f"at least {at_least:g}"] if math.isfinite(at_least) and not limits else []
+            limits += [f"at most {at_most:g}"] if math.isfinite(at_most) else []
+            limit = " and ".join(limits) or "finite"
+            self.fault(f'"{key}" must be {limit}, found {value:g}. Fix: give a number that is {limit}', key)
             return default
         return float(value)
 
@@ -150,10 +146,12 @@ class TableReader:
         if value is None:
             return ()
         if not isinstance(value, list) or not all(_is_number(entry) and math.isfinite(entry) for entry in value):
-            self.fault(f'"{key}" must be an array of finite numbers, found {_kind(value)}', key)
+            self.fault(
+                f'"{key}" must be an array of finite numbers, found {_kind(value)}. Fix: {key} = [1.0, 2.0]', key
+            )
             return ()
         if count is not None and len(value) != count:
-            self.fault(f'"{key}" must hold {count} numbers, found {len(value)}', key)
+            self.fault(f'"{key}" must hold {count} numbers, found {len(value)}. Fix: give {count}', key)
             return ()
         return tuple(float(entry) for entry in value)
 
@@ -163,7 +161,9 @@ class TableReader:
         if value is None:
             return default
         if not isinstance(value, int) or isinstance(value, bool) or value < at_least:
-            self.fault(f'"{key}" must be a whole number of at least {at_least}, found {value!r}', key)
+            self.fault(
+                f'"{key}" must be a whole number of at least {at_least}, found {value!r:.40}. Fix: give one', key
+            )
             return default
         return value
 
@@ -173,7 +173,7 @@ class TableReader:
         if value is None:
             return default
         if not isinstance(value, bool):
-            self.fault(f'"{key}" must be true or false, found {_kind(value)}', key)
+            self.fault(f'"{key}" must be true or false, found {_kind(value)}. Fix: {key} = true', key)
             return default
         return value
 

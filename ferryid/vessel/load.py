@@ -15,7 +15,7 @@ from ferryid.vessel.parse_actuators import parse_actuators
 from ferryid.vessel.parse_hull import parse_hull, parse_wind
 from ferryid.vessel.parse_signals import parse_signals
 from ferryid.vessel.profile import Profile
-from ferryid.vessel.toml_lines import key_lines
+from ferryid.vessel.toml_lines import key_lines, too_deep
 
 SCHEMA = "ferryid.vessel/1"
 
@@ -88,7 +88,7 @@ def _source(name_or_path: str | Path) -> tuple[str, str]:
             f"{did_you_mean(name, bundled())} Fix: give the path of a TOML file, or one of {', '.join(bundled())}"
         )
     try:
-        return path.read_text(encoding="utf-8"), name
+        return path.read_text(encoding="utf-8-sig"), name
     except UnicodeDecodeError as error:
         raise FerryIdError(
             f"{name}: the vessel profile must be UTF-8 text, found byte {error.object[error.start]:#04x} at offset "
@@ -103,8 +103,12 @@ def _source(name_or_path: str | Path) -> tuple[str, str]:
 def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        deep = too_deep(data)
+    # A number of thousands of digits, or thousands of brackets, ends in errors of Python rather than of TOML.
+    except (ValueError, RecursionError) as error:
         return None, [_syntax_fault(text, str(error))]
+    if deep:
+        return None, [Fault(1, deep)]
     if not data:
         what = f'the file holds no key. Fix: begin with schema = "{SCHEMA}", or with a copy of a bundled profile'
         return None, [Fault(1, f"{what} (ferryid vessel show milliampere --toml)")]

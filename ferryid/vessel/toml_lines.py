@@ -6,6 +6,9 @@ import re
 
 KeyPath = tuple[str | int, ...]
 
+DEEPEST = 30
+"""Levels of tables and arrays in a file; no section has more than five."""
+
 _PART = re.compile(r"""\s*(?:"((?:[^"\\]|\\.)*)"|'([^']*)'|([A-Za-z0-9_-]+))\s*(\.|\]|=|$)""")
 
 
@@ -47,6 +50,24 @@ def key_lines(text: str) -> dict[KeyPath, int]:
         if not closing:
             depth = _bracket_balance(value)
     return found
+
+
+def too_deep(data: object) -> str:
+    """Return what is wrong with TOML data whose tables or arrays hold each other too often to be walked through, or "".
+
+    Thousands of levels would end in an error of Python.
+    """
+    level = [data]
+    for _ in range(DEEPEST):
+        level = [
+            value
+            for one in level
+            if isinstance(one, dict | list)
+            for value in (one.values() if isinstance(one, dict) else one)
+        ]
+    if not level:
+        return ""
+    return f"tables or arrays hold each other {DEEPEST} deep or more. Fix: write fewer brackets, or points in a key"
 
 
 def line_of(lines: dict[KeyPath, int], path: KeyPath) -> int:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -131,6 +134,34 @@ def test_an_interrupt_exits_with_130_and_leaves_nothing(
     assert not list((tmp_path / "out").rglob("*.part"))
     assert not list((tmp_path / "out").rglob("*.html"))
     assert [path.name for path in (tmp_path / "out" / "models").rglob("*")] == [".lock"]
+
+
+def test_a_terminated_command_cleans_up_and_exits_with_143(
+    ferryid, fixtures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import ferryid.report.fit_report as fit_report
+
+    def terminated(*_: object) -> str:
+        os.kill(os.getpid(), signal.SIGTERM)
+        return "never reached"
+
+    # Without a handler of ours the signal would end the tests.
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    monkeypatch.setattr(fit_report, "render", terminated)
+    try:
+        run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path / "out")
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert run.code == 143
+    assert not [path for path in (tmp_path / "out").rglob("*") if path.suffix in (".part", ".html")]
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+def test_closed_output_is_no_bug(closed: str) -> None:
+    run = "import sys; from ferryid.cli.main import main; sys.argv = ['ferryid', 'simulate', '--list']; main()"
+    command = f'"$0" -c "$1" {closed}'
+    done = subprocess.run(["sh", "-c", command, sys.executable, run], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_bug_of_ours_exits_with_1_and_asks_for_a_report(

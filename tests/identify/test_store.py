@@ -106,6 +106,9 @@ def test_a_wrong_reference_is_told(tmp_path: Path, reference: str, told: str) ->
         (lambda data: data.update(schema="something"), "not a ferryid model"),
         (lambda data: data.pop("coefficients"), "coefficients"),
         (lambda data: data["coefficients"]["yaw"].pop("u"), "missing or wrong"),
+        (lambda data: data.update(schema="ferryid.model/0"), "not a ferryid model"),
+        (lambda data: data["coefficients"]["yaw"]["u"].update(value=10**400), "missing or wrong"),
+        (lambda data: data["coefficients"]["yaw"]["u"].update(value=float("inf")), "not finite"),
     ],
 )
 def test_a_damaged_or_newer_file_is_told(tmp_path: Path, change, told: str) -> None:
@@ -124,3 +127,10 @@ def test_a_cut_file_is_told(tmp_path: Path) -> None:
     path.write_text(path.read_text(encoding="utf-8")[:500], encoding="utf-8")
     with pytest.raises(FerryIdError, match="not readable as a model file"):
         load_file(path)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"version": ' + "9" * 5000 + "}"])
+def test_what_breaks_the_json_reader_is_told(tmp_path: Path, text: str) -> None:
+    (tmp_path / "model.json").write_text(text, encoding="utf-8")
+    with pytest.raises(FerryIdError, match="not readable as a model file"):
+        load_file(tmp_path / "model.json")

@@ -96,3 +96,12 @@ def test_a_long_line_keeps_its_peaks_but_not_its_size() -> None:
     long = draw(Drawing("l", "", "x", (Panel("y", (Line("l", x, y),)),)))
     assert len(long) < 3 * len(short)
     assert ">5<" in long
+
+
+def test_ticks_of_counts_are_whole_and_a_narrow_logarithmic_axis_has_several() -> None:
+    x = np.arange(1.0, 19.0)
+    narrow = Line("l", x, np.linspace(0.72, 1.3, 18), marked=True)
+    text = draw(Drawing("t", "", "x", (Panel("y", (narrow,), logarithmic=True),)))
+    labels = [element.text for element in ET.fromstring(text).iter() if element.tag.endswith("}text") and element.text]
+    assert not {"2.5", "7.5", "17.5"} & set(labels)
+    assert sum("." in label for label in labels) >= 3  # 0.75, 0.9, 1.05 ...

@@ -34,10 +34,10 @@ def test_noise_is_stationary_from_its_first_sample():
 
 
 def test_white_share():
-    white = measurement_noise(generator(2, "x"), N, 0.05, 0.02, 0.05, 1.0)
+    white = measurement_noise(generator(2, "w"), generator(2, "x"), N, 0.05, 0.02, 0.05, 1.0)
     assert white.std() == pytest.approx(0.02, rel=0.02)
     assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.01
-    mixed = measurement_noise(generator(2, "x"), N, 0.05, 0.02, 0.02, 0.1)
+    mixed = measurement_noise(generator(2, "w"), generator(2, "x"), N, 0.05, 0.02, 0.02, 0.1)
     assert mixed.std() == pytest.approx(0.02, rel=0.08)
 
 
@@ -45,6 +45,28 @@ def test_noise_that_hardly_moves_stays_a_constant():
     x = smooth_noise(generator(1, "u"), 100, 0.05, 0.05, 1e-9)
     assert np.ptp(x) < 1e-8
     assert x[0] != 0.0
+
+
+def test_noise_that_does_not_move_at_all_is_the_limit():
+    """A constant within a trial, of the standard deviation asked for between trials."""
+    for seed in (1, 2):
+        still = smooth_noise(generator(seed, "u"), 100, 0.05, 0.05, 0.0)
+        assert np.ptp(still) == 0.0
+        np.testing.assert_allclose(still, smooth_noise(generator(seed, "u"), 100, 0.05, 0.05, 1e-9), atol=1e-8)
+    assert np.std([smooth_noise(generator(seed, "u"), 1, 0.05, 0.05, 0.0)[0] for seed in range(1500)]) == pytest.approx(
+        0.05, rel=0.08
+    )
+
+
+def test_more_noise_begins_like_less():
+    for make in (
+        lambda n: measurement_noise(generator(4, "w"), generator(4, "x"), n, 0.05, 0.02, 0.05, 0.5),
+        lambda n: generator(4, "x").normal_columns(n, 3),
+        lambda n: generator(4, "x").standard_exponential(n),
+    ):
+        np.testing.assert_array_equal(make(501)[:100], make(100))
+    columns = generator(4, "x").normal_columns(N // 10, 3)
+    assert np.abs(np.corrcoef(columns.T) - np.eye(3)).max() < 0.03
 
 
 def test_gusts_forget_with_their_time_constant():

@@ -66,3 +66,12 @@ def test_operational_path_looks_where_it_goes_and_has_two_quick_changes() -> Non
     assert lengths[north - 1] < 20.0
     assert lengths[north] < 20.0
     assert 350.0 < sum(lengths) < 500.0
+
+
+def test_points_within_a_millimetre_are_one() -> None:
+    path = SetPoints(((0.0009, 0.0, 0.0), (5.0, 0.0, 0.0), (5.0006, 0.0006, 0.0), (5.0, 0.0011, 0.0)), 1.0)
+    assert path.waypoints == ((0.0, 0.0), (5.0, 0.0), (5.0, 0.0011))
+
+
+def test_the_last_pose_holds_however_short_the_others_are() -> None:
+    assert SetPoints(((0.0, 0.0, 0.0), (5.0, 0.0, 0.0)), 1e-310).at(10.0) == (5.0, 0.0, 0.0)

@@ -12,9 +12,10 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.simulate import list_scenarios, load_scenario, parse_scenario
+from ferryid.simulate.check_scenario import vessel_of
 from ferryid.simulate.scenario import Scenario, check_against, read_series
 from ferryid.simulate.sections import Fault, Payload, Sensors, Wake
-from ferryid.vessel import load_profile
+from ferryid.vessel import load_profile, parse_profile
 
 GOOD = """schema = "ferryid.scenario/1"
 vessel = "milliampere"
@@ -174,14 +175,26 @@ def test_a_manoeuvre_takes_the_place_of_the_path() -> None:
         ("points = [[10, 0, 0], [10, 5, 90]]", "points = [[10, 0]]", 9, "rows of [north_m, east_m, heading_deg]"),
         ("points = [[10, 0, 0], [10, 5, 90]]", "points = 3", 9, "rows of [north_m, east_m, heading_deg]"),
         ("[[10, 0, 0], [10, 5, 90]]", "[[0, 0, 0], [0, 0, 90]]", 9, "at least two waypoints that lie apart, found 1"),
-        ("dwell_s = 20", "dwell_s = 0", 10, "above 0"),
+        ("dwell_s = 20", "dwell_s = 0", 10, "at least 0.1 and at most 14400"),
+        ("dwell_s = 20", "dwell_s = 1e-300", 10, "at least 0.1"),
+        ("dwell_s = 20", "size = 5e-324", 10, "at least 0.001"),
+        ("[[10, 0, 0], [10, 5, 90]]", "[[0.5, 0, 0], [0, 0.5, 90]]\nsize = 0.001", 9, "found 1. Fix: add points"),
         ("seed = 5", "seed = -5", 3, "at least 0"),
         ("seed = 5", f"seed = {2**63}", 3, "the number is too long"),
         ("[10, 5, 90]", f"[{10**400}, 5, 90]", 9, "the number is too long"),
-        ("duration_s = 40", "duration_s = nan", 4, "above 0"),
+        ("duration_s = 40", "duration_s = nan", 4, "at least 0.001"),
         ("duration_s = 40\n", "", 56, 'lacks "duration_s"'),
         ("2022-06-01T08:30:00.25Z", '"noon"', 5, "date and time"),
-        ("2022-06-01T08:30:00.25Z", "1022-06-01T08:30:00Z", 5, "between 2000 and 2100"),
+        ("2022-06-01T08:30:00.25Z", "1022-06-01T08:30:00Z", 5, "between 2000 and 2038"),
+        ("2022-06-01T08:30:00.25Z", "2038-01-19T03:13:00Z", 5, "the trial ends before 2038-01-19"),
+        ("2022-06-01T08:30:00.25Z", "2050-01-01T00:00:00Z", 5, "the trial ends before 2038-01-19"),
+        ("wind_rate_hz = 10", "wind_rate_hz = 5e-324", 20, "must be 0, or at least 0.01"),
+        ("wind_rate_hz = 10", "navigation_rate_hz = 1e-3", 20, "at least 0.01"),
+        ("wind_rate_hz = 10", "azimuth_step_deg = 1e-9", 20, "must be 0, or at least 0.001"),
+        ("velocity_mps = 0.02", "velocity_mps = 1e-300", 23, "must be 0, or at least 1e-09"),
+        ("delta = 0.4", 'model = "a\\u0000b.json"', 13, r"there is no file a\x00b.json"),
+        ("north_mps = -3.0", 'series = "a\\u0000b.csv"', 17, "embedded null byte"),
+        ("ferryid.scenario/1", "a\\nb\\u001b[2J", 1, r'cannot be "a\nb\x1b[2J"'),
         ("[100, 100, 400]", "[100, 100, -400]", 14, "at least 0"),
         ("[100, 100, 400]", "[100, 100]", 14, "3 numbers"),
         ("[100, 100, 400]", "[]", 14, "must hold 3 numbers, found 0"),
@@ -246,12 +259,54 @@ def _faulty(text: str, line: int, words: str) -> None:
     message = str(raised.value)
     assert message.startswith(f"mine.toml:{line}: ")
     assert words in message
-    assert "\n" not in message
+    assert "Fix: " in message
+    assert message.isprintable()
 
 
 def test_no_path_no_trial() -> None:
     with pytest.raises(FerryIdError, match=r'lacks "path".*\[manoeuvre\]'):
         parse_scenario('schema = "ferryid.scenario/1"\nvessel = "milliampere"\n', "mine.toml")
+
+
+@pytest.mark.parametrize("text", ["a" + ".a" * 900 + " = 1", "[a" + ".a" * 900 + "]", "a = " + "[" * 40 + "]" * 40])
+def test_what_is_nested_too_deep(text: str) -> None:
+    with pytest.raises(FerryIdError, match=r"^mine.toml: tables or arrays hold each other .* deep") as raised:
+        parse_scenario(text, "mine.toml")
+    assert "Fix: " in str(raised.value)
+    with pytest.raises(FerryIdError, match=r"^mine.toml:1: tables or arrays hold each other .* deep"):
+        parse_profile(text, "mine.toml")
+
+
+@pytest.mark.parametrize("text", ["seed = " + "9" * 5000, "seed = " + "[" * 5000])
+def test_a_profile_that_breaks_the_reader(text: str) -> None:
+    with pytest.raises(FerryIdError, match=r"^mine.toml:1: not valid TOML: "):
+        parse_profile(text, "mine.toml")
+
+
+def test_a_mark_of_byte_order_is_no_fault(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(GOOD, encoding="utf-8-sig")
+    assert load_scenario(path).seed == 5
+    text = load_profile("milliampere").text
+    path.write_text(text, encoding="utf-8-sig")
+    assert load_profile(path).text == text
+
+
+def test_a_vessel_beside_the_scenario_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine.toml").write_text(GOOD.replace('"milliampere"', '"boat.toml"'), encoding="utf-8")
+    scenario = load_scenario(tmp_path / "mine.toml")
+    with pytest.raises(FerryIdError, match=r'mine\.toml:2: "vessel": boat\.toml: the vessel profile cannot be read'):
+        vessel_of(scenario)
+    text = load_profile("milliampere").text
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    Path("boat.toml").write_text(text.replace('name = "milliampere"', 'name = "there"'), encoding="utf-8")
+    assert vessel_of(scenario).name == "there"
+    (tmp_path / "boat.toml").write_text(text.replace('name = "milliampere"', 'name = "beside"'), encoding="utf-8")
+    assert vessel_of(scenario).name == "beside"
+    (tmp_path / "boat.toml").write_text(text + "[nothing]\n", encoding="utf-8")
+    with pytest.raises(FerryIdError, match=r'mine\.toml:2: "vessel": .*boat\.toml:\d+: unknown key "nothing"'):
+        vessel_of(scenario)
 
 
 @pytest.mark.parametrize("text", ["seed = 1\nschema = \n", "seed = " + "9" * 5000, "seed = " + "[" * 5000])
@@ -288,6 +343,8 @@ def test_a_series_by_any_order_of_columns(tmp_path: Path) -> None:
     path.write_text("time_s, East_mps ,gauge,north\n0,2,x,1\n\n5.5,4,x,-3\n", encoding="utf-8-sig")
     t, north, east = read_series(path)
     assert (t.tolist(), north.tolist(), east.tolist()) == ([0.0, 5.5], [1.0, -3.0], [2.0, 4.0])
+    path.write_text("\n\ntime,north,east\n0,1,2\n", encoding="utf-8")
+    assert [column.tolist() for column in read_series(path)] == [[0.0], [1.0], [2.0]]
 
 
 @pytest.mark.parametrize(
@@ -303,6 +360,7 @@ def test_a_series_by_any_order_of_columns(tmp_path: Path) -> None:
         ("time,north,east\n0,1,61\n", ':2: "east" must be at most 60'),
         ("time,north,east\n1,1,2\n1,1,2\n", ":3: the time must rise"),
         ("time,north,east\n\xff0,1,2\n", "no CSV text"),
+        ("time,north,east\n0,1,\x002\n", r':2: "east" must be a number, found "\x002"'),
     ],
 )
 def test_a_malformed_series(tmp_path: Path, text: str, words: str) -> None:

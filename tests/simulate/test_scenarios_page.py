@@ -75,6 +75,10 @@ def _shown(default: Any) -> str:
     return "`never`" if isinstance(default, float) and default == ALWAYS_S else f"`{default:g}`"
 
 
+def _number(value: float) -> str:
+    return re.sub(r"e([+-])0", r"e\1", f"{value:g}").replace("e+", "e")
+
+
 @pytest.mark.parametrize(("heading", "kind"), _sections(), ids=lambda value: value if isinstance(value, str) else "")
 def test_every_key_stands_there_with_default_unit_and_limits(heading: str, kind: type[Any]) -> None:
     rows = _rows(heading)
@@ -92,7 +96,8 @@ def test_every_key_stands_there_with_default_unit_and_limits(heading: str, kind:
         assert default == _shown(entry.default)
         assert all(f"`{option}`" in limits for option in entry.metadata.get("options", ()))
         if "high" in entry.metadata:
-            assert limits.endswith(f"to {entry.metadata['high']:g}".replace("e+0", "e"))
+            low, least, high = (_number(entry.metadata[key]) for key in ("low", "least", "high"))
+            assert limits == (f"{low} to {high}" if low == least else f"{low}, or {least} to {high}")
 
 
 def test_every_path_and_factor_is_named() -> None:

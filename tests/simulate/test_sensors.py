@@ -10,16 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ferryid.simulate import load_scenario
-from ferryid.simulate.noise import (
-    controller_weather,
-    measure,
-    navigation_errors,
-    navigation_sent,
-    wind_series,
-)
-from ferryid.simulate.sections import Navigation, Noise, Wind
+from ferryid.simulate.noise import measure, navigation_errors, navigation_sent
+from ferryid.simulate.sections import Manoeuvre, Navigation, Noise, Wind
 from ferryid.simulate.sensors import quaternion, sense
 from ferryid.simulate.states import Control, Truth
+from ferryid.simulate.surroundings import controller_weather, wind_series
 from ferryid.vessel.load import load_profile
 
 RADIUS_M, RATE_RADPS, SPEED_MPS = 20.0, 0.08, 1.6
@@ -131,6 +126,8 @@ def test_attitude_of_the_odometry_is_as_old_as_the_rest():
 def test_imu_feels_rates_and_gravity_of_roll_and_pitch():
     """Body rates and specific force against the rotation matrix, differentiated."""
     asked = scenario()
+    noise = replace(QUIET, imu_acceleration_mps2=0.06, imu_turn_degps=0.2)
+    asked = replace(asked, sensors=replace(asked.sensors, noise=noise))
     stream = streams(asked)["/imu/data"]
     t = taken(stream, asked)
     inside = (t > 1.0) & (t < END_S - 1.0)
@@ -145,12 +142,12 @@ def test_imu_feels_rates_and_gravity_of_roll_and_pitch():
     down = rotation(t).inv().apply(np.array([0.0, 0.0, 9.81]))
     for i, axis in enumerate("xyz"):
         rate = stream.columns[f"angular_velocity.{axis}"] - rates[:, i]
-        assert abs(rate[inside].mean()) < 1e-4
-        assert rate[inside].std() == pytest.approx(0.002, rel=0.05)
+        assert abs(rate[inside].mean()) < 2e-4
+        assert rate[inside].std() == pytest.approx(radians(0.2), rel=0.05)
         centripetal = SPEED_MPS * RATE_RADPS if axis == "y" else 0.0
         force = stream.columns[f"linear_acceleration.{axis}"] + down[:, i] - centripetal
-        assert abs(force[inside].mean()) < 2e-3
-        assert force[inside].std() == pytest.approx(0.03, rel=0.05)
+        assert abs(force[inside].mean()) < 4e-3
+        assert force[inside].std() == pytest.approx(0.06, rel=0.05)
 
 
 def test_current_and_payload_are_measured_where_asked():
@@ -251,21 +248,81 @@ def test_a_biased_heading_turns_the_velocity_and_keeps_the_course():
 
 
 def test_the_feedforward_gets_only_what_is_measured():
-    m = 400
-    wind = np.column_stack((np.arange(m) * 0.05, np.full(m, 3.0)))
-    current, payload = np.full((m, 2), 0.3), np.column_stack((np.full(m, 200.0), np.ones(m)))
-    for values in controller_weather(scenario(), 1, wind, current, payload):
+    t, cycles = np.arange(1000) * 0.02, np.arange(400) * 0.05
+    wind = np.column_stack((t, np.full(1000, 3.0)))
+    current, payload = np.full((1000, 2), 0.3), np.column_stack((np.full(1000, 200.0), np.ones(1000)))
+    for values in controller_weather(scenario(), 1, cycles, t, wind, current, payload):
         assert not values.any()
     asked = scenario(wind_rate_hz=10.0, current_rate_hz=2.0, payload_rate_hz=1.0)
-    seen_wind, seen_current, seen_payload = controller_weather(asked, 1, wind, current, payload)
-    old = wind[:, 0] - seen_wind[:, 0]
-    # Held between samples of 10 Hz, zero before the first.
-    assert (seen_wind[0] == 0.0).all()
-    assert old[1:].min() >= -1e-12
-    assert old[1:].max() < 0.1
-    assert (seen_wind[1:, 1] == 3.0).all()
-    assert (seen_current[1:] == 0.3).all()
-    assert (seen_payload[1:] == (200.0, 1.0)).all()
+    seen_wind, seen_current, seen_payload = controller_weather(asked, 1, cycles, t, wind, current, payload)
+    old = cycles - seen_wind[:, 0]
+    # Held between samples of 10 Hz, each 0.045 s on its way; zero before the first.
+    assert (seen_wind[:2] == 0.0).all()
+    assert old[2:].min() >= 0.045 - 1e-12
+    assert old[2:].max() < 0.145
+    assert (seen_wind[2:, 1] == 3.0).all()
+    assert (seen_current[3:] == 0.3).all()
+    assert (seen_payload[4:] == (200.0, 1.0)).all()
+
+
+def test_the_controller_gets_the_samples_of_the_log_once_they_are_there():
+    """Current (0.08 s on its way) and payload (0.12 s), noise and all, against the streams."""
+    noise = replace(QUIET, current_mps=0.02, payload_kg=10.0)
+    asked = scenario(current_rate_hz=2.0, payload_rate_hz=4.0)
+    asked = replace(asked, sensors=replace(asked.sensors, noise=noise))
+    truth, control = trial()
+    found = streams(asked)
+    _, current, payload = controller_weather(asked, 1, control.t, truth.t, truth.wind, truth.current, truth.payload)
+    for seen, topic, names, late_s in (
+        (current, "/weather/current", ("north", "east"), 0.08),
+        (payload, "/payload/waterline", ("mass", "x"), 0.12),
+    ):
+        stream = found[topic]
+        logged = np.column_stack([stream.columns[name] for name in names])
+        for k in range(0, len(seen), 7):
+            there = np.flatnonzero(taken(stream, asked) + late_s <= control.t[k] + 1e-9)
+            np.testing.assert_array_equal(seen[k], logged[there[-1]] if len(there) else 0.0)
+
+
+def test_sensor_rates_do_not_change_the_weather():
+    asked = replace(scenario(), wind=Wind(north_mps=1.0, gust_std_mps=0.8, gust_time_s=3.0))
+    coarse, fine = (np.column_stack(wind_series(asked, 1, n, h)) for n, h in ((301, 0.1), (3601, 1.0 / 120.0)))
+    np.testing.assert_allclose(coarse, fine[::12], atol=1e-12)
+    assert coarse.std(axis=0).min() > 0.2
+    # Linear within 0.02 s, so that the finer grid adds no quicker gusts.
+    between = np.column_stack(wind_series(asked, 1, 1501, 0.02))
+    half = np.column_stack(wind_series(asked, 1, 3001, 0.01))
+    np.testing.assert_allclose(half[1::2], 0.5 * (between[1:] + between[:-1]), atol=1e-12)
+
+
+def test_a_longer_trial_begins_like_a_shorter_one():
+    """Every stream of it: stamps, times of receipt, values and frames."""
+    asked = scenario(
+        wind_rate_hz=10.0, current_rate_hz=2.0, payload_rate_hz=4.0, dropouts_per_min=6.0, navigation=Navigation()
+    )
+    asked = replace(asked, sensors=replace(asked.sensors, noise=Noise()))
+    truth, control = trial()
+    part = {
+        "truth": {name: values[:2000] for name, values in vars(truth).items()},
+        "control": {name: values[:799] for name, values in vars(control).items() if name != "undefined_aims"},
+    }
+    profile = load_profile("milliampere")
+    short = sense(asked, profile, 1, replace(truth, **part["truth"]), replace(control, **part["control"]))
+    for one, two in zip(short, sense(asked, profile, 1, truth, control), strict=True):
+        # The last sample but one, as the rates of roll and pitch are differences.
+        n = len(one.stamp_ns) - 2
+        assert n > 5
+        np.testing.assert_array_equal(one.stamp_ns[:n], two.stamp_ns[:n])
+        np.testing.assert_array_equal(one.receive_ns[:n], two.receive_ns[:n])
+        assert one.blobs[:n] == two.blobs[:n]
+        for path, values in one.columns.items():
+            np.testing.assert_array_equal(values[:n], two.columns[path][:n])
+
+
+def test_a_manoeuvre_has_no_desired_force():
+    asked = scenario()
+    assert "/control/tau_d" in streams(asked)
+    assert set(streams(asked)) - set(streams(replace(asked, manoeuvre=Manoeuvre(kind="zigzag")))) == {"/control/tau_d"}
 
 
 def test_a_recorded_wind_is_added_and_held(tmp_path):

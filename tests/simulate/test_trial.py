@@ -12,7 +12,8 @@ from ferryid.errors import FerryIdError
 from ferryid.simulate import list_scenarios, load_scenario, simulate
 from ferryid.simulate.sections import Control as Controller
 from ferryid.simulate.sections import Noise, Thrusters
-from ferryid.simulate.sensors import Link, _times, apparent_wind
+from ferryid.simulate.sensors import _times, apparent_wind
+from ferryid.simulate.surroundings import Link
 from ferryid.simulate.trial import sail
 from ferryid.vessel.hull import inverse_dynamics
 from ferryid.vessel.load import load_profile
@@ -205,9 +206,9 @@ def test_the_trial_tells_the_hull_from_the_scaled_base_model():
 
 def test_vessels_that_cannot_be_simulated_are_refused():
     scenario = load_scenario("twelve-corner")
-    with pytest.raises(FerryIdError, match=r"needs the hull's damping"):
+    with pytest.raises(FerryIdError, match=r"^twelve-corner\.toml:\d+: the simulator needs the hull's damping"):
         simulate(replace(scenario, vessel="vtec-usv"))
-    with pytest.raises(FerryIdError, match="at least two control cycles"):
+    with pytest.raises(FerryIdError, match=r"^twelve-corner\.toml:\d+: a trial needs at least two control cycles"):
         simulate(replace(scenario, duration_s=0.01))
 
 

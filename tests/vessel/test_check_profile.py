@@ -91,7 +91,11 @@ CASES = {
     "unknown table": ("[wind]", "[winds]@", 'unknown key "winds"'),
     "no mass": ("[hull]\nlength_m = 5.0\nmass_kg = 1000.0", "[hull]@\nlength_m = 5.0", 'lacks "mass_kg"'),
     "negative mass": ("mass_kg = 1000.0", "mass_kg = -1.0@", "must be above 0, found -1"),
-    "mass beyond any float": ("mass_kg = 1000.0", "mass_kg = 1" + 400 * "0" + "@", "must be a number, found one of more"),
+    "mass beyond any float": (
+        "mass_kg = 1000.0",
+        "mass_kg = 1" + 400 * "0" + "@",
+        "must be a number, found one of more",
+    ),
     "mass as text": ("mass_kg = 1000.0", 'mass_kg = "1000"@', "must be a number, found a string"),
     "mass not finite": ("mass_kg = 1000.0", "mass_kg = inf@", "must be above 0, found inf"),
     "no inertia": (

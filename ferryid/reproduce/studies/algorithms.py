@@ -151,7 +151,7 @@ def _findings(
     outcomes: list[Outcome], faster: tuple[float, ...], share: tuple[float, ...], explained: Floats
 ) -> list[str]:
     seconds = [1e3 * median([one.seconds[k] for one in outcomes]) for k in (0, 1)]
-    enough = int(np.argmax(np.cumsum(np.median(explained, axis=0)) >= 0.99) + 1)
+    enough = int(np.argmax(np.median(np.cumsum(explained, axis=1), axis=0) >= 0.99) + 1)
     return [
         f"SIMPLS takes {number(seconds[0])} ms, NIPALS {number(seconds[1])} ms: {spread(faster)} times. SIMPLS "
         f"here works on "

@@ -48,6 +48,8 @@ CONTROLLERS = (
     "measured, basis of the thesis",
     "measured, basis of the paper",
 )
+ALIKE = 0.9
+"""Of two errors, the lower counts as lower below this ratio."""
 MOST = 30
 """More components than any basis has functions: nothing is held back where bases are compared."""
 
@@ -275,13 +277,13 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
             + " (surge, sway, yaw)."
         )
         closer = [
-            "thesis" if table[1, j] < 0.98 * table[2, j] else "paper" if table[2, j] < 0.98 * table[1, j] else ""
+            "thesis" if table[1, j] < ALIKE * table[2, j] else "paper" if table[2, j] < ALIKE * table[1, j] else ""
             for j in range(3)
         ]
         told.append(
             f"Between the two {what} bases: "
             + ", ".join(
-                f"{axis} {f'the {whose} one is better' if whose else 'no difference'}"
+                f"{axis} {f'the {whose} one is better' if whose else 'less than a tenth between them'}"
                 for axis, whose in zip(AXES, closer, strict=True)
             )
             + "."

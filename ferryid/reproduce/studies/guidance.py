@@ -315,7 +315,11 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         ),
         "Distance from the legs (rms): "
         + ", ".join(f"{law} {number(value)} m" for law, value in off.items())
-        + f"; {min(off, key=lambda law: off[law])} stays nearest.",
+        + (
+            f"; {min(off, key=lambda law: off[law])} stays nearest."
+            if min(off.values()) < 0.9 * max(off.values())
+            else ": less than a tenth between them."
+        ),
     ]
     shift = [
         median(changes([one.rounds[1, j] for one in outcomes], [one.rounds[0, j] for one in outcomes]))

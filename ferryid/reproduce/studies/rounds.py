@@ -187,13 +187,12 @@ def _with_constant(flights: tuple[Flight, ...], profile: Profile) -> Floats:
 def _findings(outcomes: list[Outcome]) -> list[str]:
     told = []
     for name in MEASURES:
-        first, second, third = (median([one.measures[name][k] for one in outcomes]) for k in range(3))
         told.append(
             f"{name}: "
             f"{spread([change(one.measures[name][1], one.measures[name][0]) for one in outcomes], '%', signed=True)} "
             f"with Model 1 and "
             f"{spread([change(one.measures[name][2], one.measures[name][1]) for one in outcomes], '%', signed=True)} "
-            f"more with Model 2 (medians {first:.4g}, {second:.4g}, {third:.4g})."
+            "more with Model 2."
         )
     floor = np.sqrt(np.median([one.master for one in outcomes], axis=0))
     gain = [median(changes([one.model[j] for one in outcomes], [one.master[j] for one in outcomes])) for j in range(3)]

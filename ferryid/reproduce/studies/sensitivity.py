@@ -59,7 +59,7 @@ def study(lab: Lab) -> Study:
             "Changes from round 1 to round 3 [%], and the largest feedback force in round 3; median (least to greatest).",
             ("", *MEASURES, "largest feedback force [N]"),
             (
-                ("thesis", *(percent(value) for value in THEIRS), "100 to 200"),
+                ("thesis", *(f"{percent(value)} %" for value in THEIRS), "100 to 200"),
                 *(
                     (
                         label,
@@ -78,7 +78,7 @@ def study(lab: Lab) -> Study:
             "the log of round 3 [%]; median (least to greatest).",
             ("", *(f"feedback, {axis}" for axis in AXES), *(f"force MSE, {axis}" for axis in AXES)),
             (
-                ("thesis", *(percent(value) for value in (*FEEDBACK, *FORCE))),
+                ("thesis", *(f"{percent(value)} %" for value in (*FEEDBACK, *FORCE))),
                 *(
                     (
                         label,

@@ -212,12 +212,17 @@ def _nsca(allocation: Allocation, tau_d: Triple, before: Floats, after: Floats) 
 
 @borrowing
 def _order_azimuth(curves: Curves, i: int, along: float, across: float, before: Floats, after: Floats) -> float:
-    """Order a surge and sway force of azimuth thruster i and return its size [N]."""
+    """Order a surge and sway force of azimuth thruster i and return its size [N].
+
+    One that keeps its angle gives the part of the force that lies along it, and nothing where that would be against it.
+    """
     size = sqrt(along * along + across * across)
-    angle = before[i, 1]
+    push, angle = size, before[i, 1]
     if size > HELD_BELOW * largest_force(curves, i, True):
         angle += shorter_way(atan2(across, along) - angle)
-    after[i, 0], after[i, 1] = speed_for(curves, i, size), angle
+    else:
+        push = max(along * cos(angle) + across * sin(angle), 0.0)
+    after[i, 0], after[i, 1] = speed_for(curves, i, push), angle
     return float(size)
 
 

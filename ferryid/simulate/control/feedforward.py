@@ -83,7 +83,8 @@ def build_feedforward(scenario: Scenario, profile: Profile, model: Model | None)
     Raises
     ------
     FerryIdError
-        When the model cannot be read, or needs wind or current that the scenario's sensors do not measure.
+        When the model cannot be read, is of another vessel, or needs wind or current that the scenario does
+        not measure.
     """
     control, sensors = scenario.controller, scenario.sensors
     if model is None and control.model:
@@ -91,6 +92,11 @@ def build_feedforward(scenario: Scenario, profile: Profile, model: Model | None)
     if model is None:
         return feedforward_of(Estimator(profile, {"delta": control.delta, "sigma": control.sigma}))
     estimated = estimator(model)
+    if estimated.profile.name != profile.name:
+        raise FerryIdError(
+            f"{scenario.where}: the controller's model {model.name}@{model.version} belongs to {estimated.profile.name}, found "
+            f"the vessel {profile.name}. Fix: fit a model of this vessel, or simulate the other"
+        )
     for needed, rate_hz, what in (
         (estimated.basis is not None and estimated.basis.needs_wind, sensors.wind_rate_hz, "wind"),
         (estimated.basis is not None and estimated.basis.needs_current, sensors.current_rate_hz, "current"),

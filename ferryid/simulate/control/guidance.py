@@ -98,7 +98,7 @@ def guide(guidance: Guidance, gstate: Floats, t: float, eta: Triple) -> Triple:
     Aurlien (2021), section 3.1 and Appendix B; Fossen (2021), section 12.3 on both forms of line-of-sight steering.
     """
     if guidance.law == SET_POINTS:
-        i = min(int(t / guidance.dwell_s), len(guidance.poses) - 1)
+        i = int(min(t / guidance.dwell_s, len(guidance.poses) - 1.0))
         return guidance.poses[i, 0], guidance.poses[i, 1], guidance.poses[i, 2]
     points, radius = guidance.points, guidance.radius
     leg, last = int(gstate[LEG]), len(points) - 2

@@ -131,6 +131,12 @@ def _spin(actuator: Actuator) -> tuple[float, float]:
 
 
 @borrowing
+def _count(holds: float) -> int:
+    """Return how many times something was held; compiled, a number too large for an integer would become any number."""
+    return int(min(holds, 1e15))
+
+
+@borrowing
 def helm(manoeuvre: Helm, mstate: Floats, t: float, eta: Triple, nu: Triple, orders: Floats) -> None:
     """Write the orders of one cycle.
 
@@ -148,7 +154,7 @@ def helm(manoeuvre: Helm, mstate: Floats, t: float, eta: Triple, nu: Triple, ord
         Speed [rpm] and angle of thruster or rudder [rad] of each actuator, shape (k, 2), overwritten.
     """
     if manoeuvre.kind == ON_THE_SPOT:
-        turns = 0 if t < manoeuvre.lead_s else 1 + int((t - manoeuvre.lead_s) / manoeuvre.hold_s)
+        turns = 0 if t < manoeuvre.lead_s else 1 + _count((t - manoeuvre.lead_s) / manoeuvre.hold_s)
         side = 1.0 if turns % 2 == 0 else -1.0
         for i in range(len(orders)):
             # Azimuth thrusters turn round; those with a fixed direction run backwards.
@@ -158,7 +164,7 @@ def helm(manoeuvre: Helm, mstate: Floats, t: float, eta: Triple, nu: Triple, ord
         return
     speed = manoeuvre.speed
     if manoeuvre.kind == RPM_STEPS:
-        speed *= manoeuvre.levels[int(t / manoeuvre.hold_s) % len(manoeuvre.levels)]
+        speed *= manoeuvre.levels[_count(t / manoeuvre.hold_s) % len(manoeuvre.levels)]
     elif t >= manoeuvre.lead_s:
         if mstate[SIDE] == 0.0:
             mstate[SIDE], mstate[START] = manoeuvre.side, eta[2]

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import cos, sin
-from ferryid.simulate.noise import wind_series
 from ferryid.simulate.plant import rolling
 from ferryid.simulate.plant.current import current_series, turn_rate
 from ferryid.simulate.plant.hull import (
@@ -24,12 +23,12 @@ from ferryid.simulate.plant.hull import (
     perturbed,
 )
 from ferryid.simulate.plant.mooring import Spring, mooring_load
-from ferryid.simulate.plant.payload import Masses
 from ferryid.simulate.plant.phases import Phases, phases_of
 from ferryid.simulate.plant.shallow import Patch, damping_factor, patch_of
 from ferryid.simulate.plant.thrusters import Gear, gear_of, move, thrust_load
 from ferryid.simulate.plant.waves import Sea, sea_of, wave_load
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
+from ferryid.simulate.surroundings import wind_series
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
@@ -41,12 +40,11 @@ Floats = NDArray[np.float64]
 class Plant(NamedTuple):
     """All that the vessel's motion depends on. One run at a time: `gear.acting` and `sea.terms` are written to.
 
-    `added` is the added mass in the order of `hull.MASS`. `wind` and `current` (2 steps + 1, 2) are velocities over ground,
+    `wind` and `current` (2 steps + 1, 2) are velocities over ground,
     north and east [m/s], every half step.
     """
 
     p: Hydrodynamics
-    added: Masses
     areas: Areas
     wind: Floats
     current: Floats
@@ -73,20 +71,19 @@ def build(scenario: Scenario, profile: Profile, seed: int, h: float, steps: int)
         )
     hull = fouled(perturbed(profile.hull, scenario.true_hull), scenario.fouling)
     p = hydrodynamics(hull)
-    m, x_g, I_z = float(hull.mass_kg), float(hull.x_g_m), float(hull.inertia_z)
+    m, I_z = float(hull.mass_kg), float(hull.inertia_z)
     n = 2 * steps + 1
     current, mooring = scenario.current, scenario.mooring
     turn_radps = turn_rate(current)
     return Plant(
         p=p,
-        added=(p[0] - m, p[1] - m, p[2] - m * x_g, p[3] - m * x_g, p[4] - I_z),
         areas=areas_of(profile.wind),
         wind=np.column_stack(wind_series(scenario, seed, n, 0.5 * h)),
         current=current_series(float(current.north_mps), float(current.east_mps), turn_radps, n, 0.5 * h),
         turn_radps=turn_radps,
         phases=phases_of(p, profile, scenario.payload, mooring, scenario.thrusters.faults, h, steps),
         gear=gear_of(profile, scenario.thrusters, h),
-        sea=sea_of(profile, scenario.waves, scenario.wakes, seed),
+        sea=sea_of(profile, scenario.waves, scenario.wakes, seed, (p[0] - m, p[1] - m, p[4] - I_z)),
         spring=Spring(
             float(mooring.north_m),
             float(mooring.east_m),
@@ -121,8 +118,9 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     """Return the state's time derivative, the force of the actuators and that of the waves [N, N, N·m].
 
     Rigid-body terms act on nu and added-mass terms on ``nu_r = nu - nu_c``. For an irrotational current the two add up to the
-    whole M and C acting on nu_r, with ``[r v_c, -r u_c, 0]`` added at the end; what is left is the force of a current
-    that changes over ground, on added mass alone.
+    whole M and C acting on nu_r, with ``[r v_c, -r u_c, 0]`` added at the end. A current that changes over ground adds its
+    acceleration there too: the pressure gradient that accelerates the water pushes what the hull displaces,
+    which weighs as much as the hull, and the added mass goes with the water anyway.
 
     Parameters
     ----------
@@ -156,19 +154,15 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     if plant.phases.moored[phase] > 0.0:
         held = mooring_load(plant.spring, x, y, c, s)
         X, Y = X + held[0], Y + held[1]
-    if plant.turn_radps != 0.0:
-        # R^T dV/dt of a current that turns clockwise: the current itself, a quarter turn on.
-        u_t, v_t = -plant.turn_radps * v_c, plant.turn_radps * u_c
-        X += plant.added[0] * u_t
-        Y += plant.added[1] * v_t
-        N += plant.added[3] * v_t
+    # nu_c_dot: [r v_c, -r u_c, 0], and R^T dV/dt of a current that turns clockwise, the current itself a quarter turn on.
+    turn = r - plant.turn_radps
     inv = plant.phases.inverse[phase]
     rates = (
         c * u - s * v,
         s * u + c * v,
         r,
-        inv[0] * X + r * v_c,
-        inv[1] * Y + inv[2] * N - r * u_c,
+        inv[0] * X + turn * v_c,
+        inv[1] * Y + inv[2] * N - turn * u_c,
         inv[3] * Y + inv[4] * N,
     )
     return rates, tau, wave

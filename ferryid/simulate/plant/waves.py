@@ -4,6 +4,12 @@ The Froude-Krylov force: the pressure of the undisturbed waves on the wetted sur
 draught around the body origin. By Gauss's theorem it is the integral of the pressure's gradient over the box, which
 has a closed form. Phases are taken where the vessel is, so the encounter frequency follows. Deep water; the current does
 not change the waves.
+
+The diffraction force comes on top of it in the approximation for long waves (Faltinsen 1990, Sea Loads, ch. 3): the added mass
+times the acceleration of the water. Each amplitude of the Froude-Krylov force, which is that acceleration times the
+displaced mass, is multiplied by ``1 + A / (rho V)``, so that in long waves the hull moves as the water does. This
+neglects the diffraction of waves as short as the hull, which is weaker and out of phase; the coupling of sway and yaw by added
+mass; and the orbital velocity in the damping, which acts on the velocity against the current alone.
 """
 
 from __future__ import annotations
@@ -44,7 +50,8 @@ class Sea(NamedTuple):
     (HEADINGS + 1, 3, K) holds the amplitudes of surge and sway force, which go with the sine of the phase, and of the yaw
     moment, with the cosine.
     `wakes` (W, 2) holds middle and standard deviation [s] of each envelope. `drift` is the mean force per metre of width
-    shown [N/m], `go` its direction (north, east). `box` is length, beam and draught [m]. `terms` (3, K) is written anew.
+    shown [N/m], `go` its direction (north, east). `box` is length, beam and draught [m], `diffraction` what the Froude-Krylov
+    force in surge, sway and yaw has been multiplied by. `terms` (3, K) is written anew.
     """
 
     sea: int
@@ -57,11 +64,27 @@ class Sea(NamedTuple):
     drift: float
     go: tuple[float, float]
     box: tuple[float, float, float]
+    diffraction: tuple[float, float, float]
     terms: Floats
 
 
-def sea_of(profile: Profile, waves: Waves, wakes: Sequence[Wake], seed: int) -> Sea:
+def sea_of(
+    profile: Profile,
+    waves: Waves,
+    wakes: Sequence[Wake],
+    seed: int,
+    added: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Sea:
     """Return the sea and the wakes that a vessel meets.
+
+    Parameters
+    ----------
+    profile
+        The vessel.
+    waves, wakes, seed
+        What it meets.
+    added
+        Added mass A_11, A_22 [kg] and A_66 [kg·m²]; zero leaves the Froude-Krylov force alone.
 
     Raises
     ------
@@ -87,6 +110,13 @@ def sea_of(profile: Profile, waves: Waves, wakes: Sequence[Wake], seed: int) -> 
         phase[i] = -frequency[i] * wake.at_s
     number = np.array([deep_water(float(f), GRAVITY) for f in frequency])
     c, s = (np.array([turn(float(angle)) for angle in direction]) for turn in (cos, sin))
+    table = amplitudes(number, amplitude, direction, box)
+    L, B, T = box
+    displaced = FRESH_WATER * L * B * T
+    inertia = displaced * (L * L + B * B) / 12.0
+    diffraction = (1.0 + added[0] / displaced, 1.0 + added[1] / displaced, 1.0 + added[2] / inertia)
+    for axis in range(3):
+        table[:, axis] *= diffraction[axis]
     height, toward = waves.significant_height_m, waves.direction_deg * pi / 180.0
     return Sea(
         sea=n,
@@ -94,11 +124,12 @@ def sea_of(profile: Profile, waves: Waves, wakes: Sequence[Wake], seed: int) -> 
         north=number * c / (2.0 * pi),
         east=number * s / (2.0 * pi),
         phase=phase,
-        table=amplitudes(number, amplitude, direction, box),
+        table=table,
         wakes=np.array([(wake.at_s, 0.25 * wake.duration_s) for wake in passing]).reshape(-1, 2),
         drift=waves.drift_coefficient * FRESH_WATER * GRAVITY * height * height / 16.0,
         go=(cos(toward), sin(toward)),
         box=box,
+        diffraction=diffraction,
         terms=np.zeros((3, count)),
     )
 
@@ -135,7 +166,7 @@ def lever(p: float) -> float:
 
 @compiled
 def amplitudes(number: Floats, amplitude: Floats, direction: Floats, box: tuple[float, float, float]) -> Floats:
-    """Return the amplitudes of the force of every component at every heading, shape (HEADINGS + 1, 3, K) [N, N, N·m].
+    """Return the amplitudes of each component's Froude-Krylov force, shape (HEADINGS + 1, 3, K) [N, N, N·m].
 
     Parameters
     ----------
@@ -164,7 +195,7 @@ def amplitudes(number: Floats, amplitude: Floats, direction: Floats, box: tuple[
 
 @borrowing
 def first_order(sea: Sea, t: float, x: float, y: float, psi: float) -> Force:
-    """Return the Froude-Krylov force [N, N, N·m] at a time [s] on a vessel at a place [m] and heading [rad]."""
+    """Return the first-order force [N, N, N·m] at a time [s] on a vessel at a place [m] and heading [rad]."""
     count = len(sea.frequency)
     if count == 0:
         return 0.0, 0.0, 0.0
@@ -231,4 +262,4 @@ def slopes(sea: Sea, t: float, x: float, y: float, psi: float) -> tuple[float, f
     """
     X, Y, _ = first_order(sea, t, x, y, psi)
     weight = FRESH_WATER * GRAVITY * sea.box[0] * sea.box[1] * sea.box[2]
-    return -X / weight, -Y / weight
+    return -X / (weight * sea.diffraction[0]), -Y / (weight * sea.diffraction[1])

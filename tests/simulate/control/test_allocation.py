@@ -183,6 +183,17 @@ def test_an_idle_thruster_keeps_its_angle():
     assert (orders[:, 1] == 0.5).all()
 
 
+@pytest.mark.parametrize("name", ["nsca", "pseudo-inverse"])
+def test_an_idle_thruster_never_pushes_against_the_force_wanted(name):
+    """2 N ahead of each: one at angle 0.5 has 2 cos 0.5 N of it along its own way, one at angle 3 looks astern."""
+    allocation = allocation_of(FERRY, name)
+    _, orders = allocated(allocation, (4.0, 0.0, 0.0), [(100.0, 0.5), (100.0, 3.0)])
+    np.testing.assert_array_equal(orders[:, 1], (0.5, 3.0))
+    forces = np.hypot(*acting(FERRY, orders)[:, :2].T)
+    np.testing.assert_allclose(forces, [2.0 * cos(0.5), 0.0], atol=1e-3)
+    assert orders[1, 0] == 0.0
+
+
 def test_angles_turn_the_shorter_way_over_many_turns():
     _, orders = allocated(allocation_of(FERRY), (-100.0, 1.0, 0.0), [(100.0, 4.0 * pi - 3.0), (100.0, -3.0)])
     np.testing.assert_allclose(orders[:, 1], [3.0 * pi - 0.01, -pi - 0.01], atol=1e-4)

@@ -142,6 +142,12 @@ def test_a_model_that_needs_what_is_not_measured_is_refused(scenario, model, nam
         build_feedforward(scenario(), PROFILE, model(name))
 
 
+def test_a_model_of_another_vessel_is_refused(scenario, model):
+    made = model("modulus")
+    with pytest.raises(FerryIdError, match=r"boat@3 belongs to milliampere, found the vessel other\. Fix: "):
+        build_feedforward(scenario(), replace(PROFILE, name="other"), made)
+
+
 def test_a_missing_model_file_is_told_in_one_line(scenario, tmp_path):
     with pytest.raises(FerryIdError, match=r"nowhere\.json: not readable .* Fix: [^\n]*$"):
         build_feedforward(scenario(controller=Control(model="nowhere.json"), folder=tmp_path), PROFILE, None)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ferryid.errors import FerryIdError
 from ferryid.simulate.control.angle import shorter_way
-from ferryid.simulate.control.guidance import LEG, UNDEFINED, Guidance, build_guidance, guide
+from ferryid.simulate.control.guidance import LEG, SET_POINTS, UNDEFINED, Guidance, build_guidance, guide
 from ferryid.simulate.paths import OPERATION, TWELVE_CORNER
 from ferryid.simulate.sections import Guidance as Section
 
@@ -166,3 +166,9 @@ def test_shorter_way_wraps_to_the_half_open_interval():
     assert shorter_way(pi) == pytest.approx(pi)
     assert shorter_way(-pi) == pytest.approx(pi)
     assert shorter_way(3.5 * pi) == pytest.approx(-0.5 * pi)
+
+
+def test_the_last_set_point_holds_beyond_any_whole_number():
+    poses = np.array([[0.0, 0.0, 0.0], [5.0, 1.0, 2.0]])
+    guidance = Guidance(SET_POINTS, poses, 1e-310, np.zeros((1, 2)), 5.0, 10.0)
+    assert guide(guidance, np.zeros(3), 10.0, (0.0, 0.0, 0.0)) == (5.0, 1.0, 2.0)

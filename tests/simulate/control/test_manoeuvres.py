@@ -157,3 +157,13 @@ def test_a_manoeuvre_without_the_means_is_refused(steering, profile, kind, told)
 
 def test_without_a_manoeuvre_there_is_nothing_to_check(scenario):
     build_helm(scenario(), MIXED)
+
+
+@pytest.mark.parametrize("kind", ["rpm-steps", "on-the-spot-turn"])
+def test_orders_stay_orders_beyond_any_whole_number(scenario, kind):
+    manoeuvre, state = build_helm(scenario(manoeuvre=Manoeuvre(kind=kind, lead_s=0.0)), load_profile("milliampere"))
+    orders = np.zeros((2, 2))
+    # Compiled, the number would wrap round; in plain Python there is none.
+    for function in (helm, getattr(helm, "py_func", helm)):
+        function(manoeuvre._replace(hold_s=1e-310), state, 10.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), orders)
+        assert np.abs(orders[:, 0]).max() in {abs(500.0 * level) for level in (1.0, *Manoeuvre().levels)}

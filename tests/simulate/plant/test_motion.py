@@ -21,6 +21,7 @@ from ferryid.simulate.sections import (
     Payload,
     Shallow,
     Thrusters,
+    Wake,
     Waves,
     Wind,
 )
@@ -59,8 +60,8 @@ def split_rates(eta, nu, tau, wind, current, *, turning=0.0, payload=(0.0, 0.0),
     R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
     V = np.array([*current, 0.0])
     nu_c = R.T @ V
-    nu_c_dot = np.array([nu[2] * nu_c[1], -nu[2] * nu_c[0], 0.0])
-    nu_c_dot += R.T @ (turning * np.array([-V[1], V[0], 0.0]))
+    V_dot = R.T @ (turning * np.array([-V[1], V[0], 0.0]))
+    nu_c_dot = np.array([nu[2] * nu_c[1], -nu[2] * nu_c[0], 0.0]) + V_dot
     n = nu - nu_c
     u, v, r = np.abs(n)
     d = HULL.D
@@ -81,6 +82,8 @@ def split_rates(eta, nu, tau, wind, current, *, turning=0.0, payload=(0.0, 0.0),
     )
     load = wind_force(PROFILE.wind, np.array([wind]), np.array([eta[2]]), nu[None, :])[0]
     right = tau + load - skew(M_RB, nu) @ nu - skew(M_A, n) @ n - shallow * D @ n + M_A @ nu_c_dot
+    # Archimedes in accelerating water: the vessel displaces its own mass, and what carries its weight goes through its centre.
+    right += M_RB @ V_dot
     return np.concatenate([R @ nu, np.linalg.solve(M_RB + M_A, right)])
 
 
@@ -108,7 +111,7 @@ def test_rates_equal_the_split_into_rigid_body_and_added_mass(adrift, state, tau
 
 
 def pressure_force(sea, t, x, y, psi):
-    """Froude-Krylov force by Gauss-Legendre quadrature of the pressure over the six sides of the box."""
+    """Wave force: Gauss-Legendre quadrature of the pressure over the sides of the box, and added mass for diffraction."""
     L, B, T = sea.box
     points, weights = leggauss(24)
     k = 2.0 * pi * np.hypot(sea.north, sea.east)
@@ -132,7 +135,10 @@ def pressure_force(sea, t, x, y, psi):
     Xs, Z = np.meshgrid(xs, z, indexing="ij")
     W = np.outer(wx, wz)
     starboard, port = (p(Xs, np.full_like(Xs, end), Z) for end in (0.5 * B, -0.5 * B))
-    return np.array([X, -(W * (starboard - port)).sum(), N - (W * Xs * (starboard - port)).sum()])
+    froude_krylov = np.array([X, -(W * (starboard - port)).sum(), N - (W * Xs * (starboard - port)).sum()])
+    m = 1000.0 * L * B * T
+    inertia = np.array([m, m, m * (L**2 + B**2) / 12.0])
+    return froude_krylov * (inertia + np.diag(HULL.M) - [HULL.mass_kg, HULL.mass_kg, HULL.inertia_z]) / inertia
 
 
 WAVES = Waves(significant_height_m=0.2, peak_period_s=3.0, direction_deg=50.0, components=6, drift_coefficient=0.0)
@@ -306,6 +312,46 @@ def test_mean_drift_by_hand(adrift):
             one.step = 0
             forces.append(one.push((0.0, 0.0, psi, 0.0, 0.0, 0.0), NONE, 0.02)[1][0, 12:15])
         assert tuple(forces[0] - forces[1])[:2] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(("direction", "psi"), [(0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (60.0, 0.3), (0.0, 0.5 * pi)])
+def test_in_a_long_wave_group_an_undamped_hull_moves_as_the_water_does(adrift, direction, psi):
+    """Particles by linear wave theory, integrated from rest; waves of 100 m against a hull of 5 m."""
+    height, period, middle, duration = 0.2, 8.0, 100.0, 100.0
+    w = 2.0 * pi / period
+    k = w**2 / 9.81
+    go = np.array([cos(np.radians(direction)), sin(np.radians(direction))])
+    undamped = replace(AIRLESS, hull=replace(HULL, D=dict.fromkeys(HULL.D, 0.0)))
+    run = adrift(undamped, h=0.05, seconds=200.0, wakes=(Wake(middle, height, period, duration, direction),))
+    _, rows = run.push((0.0, 0.0, psi, 0.0, 0.0, 0.0), NONE, 200.0)
+    t = 0.05 * np.arange(len(rows))
+
+    def rates(t, y):
+        envelope = exp(-0.5 * ((t - middle) / (0.25 * duration)) ** 2)
+        # The water's acceleration is g times the slope of the surface, downhill: -g d/dx of a cos(w t - k x).
+        a = -9.81 * k * 0.5 * height * envelope * sin(w * (t - middle) - k * (go @ y[:2]))
+        return [*y[2:], *(a * go)]
+
+    water = solve_ivp(rates, (0.0, 200.0), np.zeros(4), t_eval=t, rtol=1e-8, atol=1e-10).y.T
+    c, s = np.cos(rows[:, 2]), np.sin(rows[:, 2])
+    u, v = rows[:, 3], rows[:, 4]
+    hull = np.column_stack((rows[:, :2], c * u - s * v, s * u + c * v))
+    largest = np.abs(water[:, 2:] @ go).max()
+    # By hand: orbital speed w a at the surface.
+    assert largest == pytest.approx(w * 0.5 * height, rel=0.01)
+    assert np.abs(hull[:, 2:] - water[:, 2:]).max() < 0.02 * largest
+    # A hull with its masses off the middle is turned a little on the way, and drifts.
+    assert np.abs(hull[:, :2] - water[:, :2]).max() < 0.05 * 0.5 * height
+
+
+def test_a_turning_current_carries_an_undamped_hull_along(adrift):
+    """A particle that goes with the water at the start goes with it for good, whatever turns the water."""
+    undamped = replace(AIRLESS, hull=replace(HULL, D=dict.fromkeys(HULL.D, 0.0)))
+    run = adrift(undamped, seconds=60.0, current=Current(0.4, -0.1, 90.0), payload=(Payload(200.0, 1.0),))
+    state, _ = run.push((0.0, 0.0, 0.0, 0.4, -0.1, 0.0), NONE, 60.0)
+    # A quarter turn clockwise in 60 s.
+    assert state[3:] == pytest.approx((0.1, 0.4, 0.0), abs=1e-6)
+    assert state[2] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_same_seed_same_run_and_another_seed_another(make):

@@ -132,6 +132,19 @@ def test_long_waves_push_with_weight_times_slope():
     assert slopes(sea, 1000.0 + 0.25 * period, 0.0, 0.0, 0.0)[0] == pytest.approx(k, rel=1e-3)
 
 
+def test_diffraction_multiplies_the_force_and_leaves_the_slope():
+    # Displaced: 1670 kg, and 1670 (25 + 7.84) / 12 = 4570.2 kg m2 about the vertical.
+    waves = Waves(0.4, 3.0, 40.0)
+    plain, whole = sea_of(PROFILE, waves, (), 1), sea_of(PROFILE, waves, (), 1, (334.0, 1670.0, 9140.4))
+    for t in (0.0, 3.3, 7.1):
+        np.testing.assert_allclose(
+            first_order(whole, t, 1.0, 2.0, 0.3),
+            first_order(plain, t, 1.0, 2.0, 0.3) * np.array([1.2, 2.0, 3.0]),
+            rtol=1e-5,
+        )
+        assert slopes(whole, t, 1.0, 2.0, 0.3) == pytest.approx(slopes(plain, t, 1.0, 2.0, 0.3), rel=1e-12)
+
+
 def test_encounter_frequency_is_that_of_the_moving_vessel():
     # Head sea of 3 s met at 2 m/s: 1/3 + k U / 2 pi = 0.333 + 2/14.05 = 0.4757 per second.
     sea = sea_of(PROFILE, Waves(), (Wake(100.0, 0.2, 3.0, 1e4, 180.0),), 1)
