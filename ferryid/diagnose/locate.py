@@ -32,7 +32,7 @@ FEWEST = 4
 BREAK = 2.3
 """Kuiper's statistic of changes of the mean, as of which they are believed: one in a thousand without any."""
 MOST_BREAKS = 6
-ACTS = 0.15
+ACTS = 0.25
 """An interval acts whose mean excess is more than this part of the strongest one's."""
 TELLS = 4.0
 """Standard errors by which a profile must differ from an even one to name a regime."""
@@ -150,7 +150,7 @@ def locate(trial: Trial, before: Fit, after: Fit, scene: Scene | None = None) ->
     strength = (white**2 if unexplained else white**2 - calm**2) @ axes
     middle, seconds = trial.windows.middle_s, trial.windows.scene.t
     reach = 0.5 * len(trial.windows.weight) * trial.windows.scene.step_s
-    intervals = acting(middle[kept], strength, reach, (float(seconds[0]), float(seconds[-1])))
+    intervals = acting(middle[kept], strength, reach, (float(seconds[0]), float(seconds[-1])), steady=unexplained)
     onset = None if not intervals or intervals[0][0] <= middle[0] else intervals[0][0]
     offset = None if not intervals or intervals[-1][1] >= middle[-1] else intervals[-1][1]
     return Location(
@@ -198,7 +198,7 @@ def whitened(errors: tuple[Floats, Floats], runs: tuple[tuple[int, int], ...]) -
 
 
 def acting(
-    times: Floats, strength: Floats, reach_s: float, whole: tuple[float, float]
+    times: Floats, strength: Floats, reach_s: float, whole: tuple[float, float], *, steady: bool = False
 ) -> tuple[tuple[float, float], ...]:
     """Return the intervals [s] in which a strength's mean is large, by binary segmentation at changes of its mean.
 
@@ -207,22 +207,26 @@ def acting(
     times, strength
         Shape (m,).
     reach_s
-        Half the length of a window: a change at one window's middle is one of the log at that time.
+        Half the length of a window: intervals that are no further apart are one.
     whole
         First and last time of the log, for intervals that never begin or end.
+    steady
+        True where the strength is that of noise as well, so that only what it has above its calmest interval counts.
 
     References
     ----------
-    Kuiper (1960) for the statistic, Vostrikova (1981) for the segmentation; the standard deviation of the mean is that of blocks, since strength is correlated.
+    Kuiper (1960) for the statistic, Vostrikova (1981) for the segmentation. The standard deviation of the mean is that of
+    blocks, since neighbours are correlated.
     """
     edges = [0, *sorted(_breaks(strength, 0, len(strength), MOST_BREAKS)), len(strength)]
     means = [float(strength[a:b].mean()) for a, b in pairwise(edges)]
+    calm = min(means) if steady and len(means) > 1 else 0.0
     top = max(means)
-    if top <= 0.0:
+    if top <= calm:
         return ()
     found: list[tuple[float, float]] = []
-    for a, b, mean in zip(edges[:-1], edges[1:], means, strict=True):
-        if mean <= ACTS * top:
+    for (a, b), mean in zip(pairwise(edges), means, strict=True):
+        if mean - calm <= ACTS * (top - calm):
             continue
         start = whole[0] if a == 0 else float(0.5 * (times[a - 1] + times[a]))
         end = whole[1] if b == len(strength) else float(0.5 * (times[b - 1] + times[b]))
@@ -273,7 +277,7 @@ def _breaks(strength: Floats, first: int, end: int, most: int) -> list[int]:
     if n < 4 * FEWEST or most <= 0:
         return []
     part = strength[first:end]
-    # Large squares are rare and heavy: ranks would lose the size, a root keeps both.
+    # Large squares are rare and heavy: their roots vary less.
     part = np.sign(part) * np.sqrt(np.abs(part))
     away = np.concatenate([[0.0], np.cumsum(part - part.mean())])
     # From its lowest to its highest point the sum gains most: one of the two ends of what differs, or both.

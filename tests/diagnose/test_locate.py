@@ -20,10 +20,10 @@ SECONDS, STEP_S = 600.0, 0.2
 
 
 def trial_on(push: Floats | None = None) -> Trial:
-    """A turning vessel that drifts about, whose thrusters give what its hull needs, less a push that nobody measured, with noise."""
+    """A turning vessel whose thrusters give what its hull needs less a push that nobody measured, with noise."""
     rng = np.random.default_rng(5)
     t = np.arange(0.0, SECONDS, STEP_S)
-    speed, drift = np.sin(t / 31.0), 0.7 * np.sin(t / 53.0)
+    speed, drift = np.sin(t / 23.0), 0.7 * np.sin(t / 53.0)
     rate = np.full(len(t), 2.0 * np.pi / 100.0)
     psi = rate * t
     nu = np.column_stack([speed, drift, rate])
@@ -34,7 +34,7 @@ def trial_on(push: Floats | None = None) -> Trial:
     eta = eta + rng.standard_normal(eta.shape) * [0.02, 0.02, 0.002]
     seen = Scene(FERRY, t, eta, noisy, nu, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
     bare = Picture(seen, hull_of(FERRY), seen.parts, seen.angles, np.zeros((len(t), 3)))
-    accelerated = np.column_stack([np.cos(t / 31.0) / 31.0, 0.7 / 53.0 * np.cos(t / 53.0), np.zeros_like(t)])
+    accelerated = np.column_stack([np.cos(t / 23.0) / 23.0, 0.7 / 53.0 * np.cos(t / 53.0), np.zeros_like(t)])
     # Inverse dynamics with the picture's own equations: its force is what is left of the motion it gives without any.
     needed = (accelerated - acceleration(bare)) @ FERRY.hull.M.T
     gone = np.zeros((len(t), 3)) if push is None else push
