@@ -16,8 +16,8 @@ NAMES = ("north", "east", "heading", "surge", "sway", "yaw rate")
 USUAL = 4.0
 """Runs this many times as long as the usual one are not explained by the sensor's rate."""
 SHORTEST_ROWS, SHORTEST_S = 5, 0.4
-COARSE = 0.5
-"""A sensor that has fewer values than this share of its changes repeats by its resolution; a hold then has to end in a jump."""
+COARSE = 0.1
+"""A sensor whose changes are so few different ones has a resolution that makes repeats; a hold has to end in a jump then."""
 JUMP = 4.0
 LEAST_SHARE, LEAST_S = 0.005, 2.0
 """Holds that are neither this share of the log nor one as long as this do no harm."""
@@ -61,7 +61,7 @@ def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArr
     lengths = edges[:, 1] - edges[:, 0] + 1
     usual = float(np.median(np.concatenate([lengths, np.ones(max(len(changes) - len(lengths), 0))])))
     long = lengths > max(USUAL * usual, SHORTEST_ROWS, SHORTEST_S / step_s)
-    coarse = np.unique(values[usable]).size < COARSE * len(changes)
+    coarse = np.unique(np.round(changes, 9)).size < COARSE * len(changes)
     for first, last in edges[long].tolist():
         missed = abs(float(values[min(last + 1, len(values) - 1)] - values[last]))
         if values[first] != 0.0 and (not coarse or missed > JUMP * float(np.median(changes))):

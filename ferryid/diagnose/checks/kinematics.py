@@ -15,6 +15,7 @@ well, which is why a finding has to be one in both.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,8 +126,27 @@ class _Data:
         return self.derivatives(p, np.column_stack([u, v]) * p[SCALE])
 
 
+class _Same:
+    """A scene that equals itself only, as several checks ask for the kinematics of the same one."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.scene is self.scene
+
+    def __hash__(self) -> int:
+        return id(self.scene)
+
+
 def kinematics(scene: Scene) -> Kinematics | None:
     """Compare positions and velocities; None where the scene has too little of them."""
+    return _compared(_Same(scene))
+
+
+@lru_cache(maxsize=1)
+def _compared(same: _Same) -> Kinematics | None:
+    scene = same.scene
     trial, both = spans(scene, np.hstack([scene.eta, scene.nu_raw[:, :2]]))
     if len(trial.starts) < 8:
         return None

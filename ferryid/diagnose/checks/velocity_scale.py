@@ -11,6 +11,8 @@ from ferryid.diagnose.checks.kinematics import SCALE, kinematics
 from ferryid.effects.picture import Scene
 
 LEAST = 0.03
+NARROW = 0.25
+"""An interval that is wider than this share of its factor says nothing of units."""
 UNITS = {
     1.0 / 0.514444: "m/s read as knots",
     0.514444: "knots read as m/s",
@@ -26,8 +28,10 @@ def find(scene: Scene) -> SensorFinding | None:
     if found is None or not found.found(SCALE, LEAST):
         return None
     factor = found.solution.estimate(SCALE, "-")
-    unit = [text for value, text in UNITS.items() if abs(factor.value / value - 1.0) < LEAST]
-    scale = np.array([factor.value, factor.value, 1.0])
+    narrow = factor.high - factor.low < NARROW * factor.value
+    unit = [(value, text) for value, text in UNITS.items() if narrow and factor.low <= value <= factor.high]
+    right = unit[0][0] if unit else factor.value
+    scale = np.array([right, right, 1.0])
 
     def correct(seen: Scene) -> Scene:
         return replace(seen, nu_raw=seen.nu_raw / scale, nu=seen.nu / scale)
@@ -35,7 +39,7 @@ def find(scene: Scene) -> SensorFinding | None:
     return SensorFinding(
         "velocity_scale",
         {"factor": factor},
-        f"The speed measured is {factor.value:.3f} times that of the positions{', ' + unit[0] if unit else ''}.",
+        f"The speed measured is {factor.value:.3f} times that of the positions{': ' + unit[0][1] if unit else ''}.",
         correct,
         found.evidence(SCALE),
     )
