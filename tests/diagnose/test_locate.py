@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.hypothesis import HULL_SPREAD, Fit, Suspect, Trial, fit, trial_of
-from ferryid.diagnose.locate import FEWEST, MOST_BREAKS, _breaks, acting, locate, profile_of, whitened
+from ferryid.diagnose.locate import FEWEST, MOST_BREAKS, _breaks, _in_words, acting, locate, profile_of, whitened
 from ferryid.diagnose.weak import windows
 from ferryid.effects import Parameter, effects
 from ferryid.effects.picture import Picture, Scene, acceleration, hull_of
@@ -183,3 +183,11 @@ def test_whitening_leaves_noise_of_unit_variance_without_memory() -> None:
     np.testing.assert_allclose(double, 2.0 * white)
     np.testing.assert_allclose(np.mean(white**2, axis=0), 1.0)
     assert np.abs(np.mean(white[1:] * white[:-1], axis=0)).max() < 0.05
+
+
+def test_a_regime_across_north_is_one_range() -> None:
+    heading = np.arange(0.5, 360.0)
+    loud = np.where((heading > 330.0) | (heading < 60.0), 3.0, 1.0)
+    white = np.random.default_rng(6).standard_normal((360, 3)) * loud[:, None]
+    one = profile_of("heading", "deg", heading, np.linspace(0.0, 360.0, 13), white, white)
+    assert _in_words([one], np.full(3, 1.0 / 3.0)) == "headings 330 to 60 deg"
