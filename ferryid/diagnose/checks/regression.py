@@ -14,7 +14,7 @@ from scipy.stats import t as student
 from ferryid.diagnose.result import Estimate
 from ferryid.vessel.profile import Floats
 
-FALSE_ALARM = 1e-3
+FALSE_ALARM = 1e-4
 """Probability at which a value that is not neutral counts as one, before the practical threshold."""
 
 

@@ -14,10 +14,10 @@ LEAST = 0.03
 NARROW = 0.25
 """An interval that is wider than this share of its factor says nothing of units."""
 UNITS = {
-    1.0 / 0.514444: "m/s read as knots",
-    0.514444: "knots read as m/s",
+    1.0 / 0.514444: "knots read as m/s",
+    0.514444: "m/s read as knots",
     3.6: "km/h read as m/s",
-    1 / 3.6: "m/s read as km/h",
+    1.0 / 3.6: "m/s read as km/h",
 }
 """Factors of mistaken units, measured over true."""
 
