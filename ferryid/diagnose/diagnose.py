@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import exp
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ FEWEST_WINDOWS = 60
 UNSEEN = 0.5
 """An effect whose parameters a log leaves as uncertain as this share of their usual size cannot be seen in it."""
 SHOWN_RIVALS = 3
+ONSET_DROP = 2.0
+"""Fall of the logarithm of the evidence at the ends of an onset's interval."""
 WITHHELD_EFFECTS = {"wind": "wind", "current": "current", "payload": "payload"}
 
 
@@ -86,7 +89,7 @@ def _one(
     notes = list(survey.doubts)
     if len(seen.starts) < FEWEST_WINDOWS:
         notes.append(
-            f"Only {len(seen.starts)} stretches of {window_lengths(profile)[0]:.0f} s without a gap: too little to tell anything. "
+            f"Only {len(seen.starts)} stretches of {window_lengths(profile)[0]:.0f} s without a gap: too little to tell. "
             "Record at least ten minutes that excite every axis."
         )
         return Diagnosis(name, profile.name, "not_testable", _of_sensors(sensors), {}, {}, tuple(notes))
@@ -166,8 +169,8 @@ def _proved(trial: Trial, kept: Fit, proof: Evidence) -> tuple[Fit, Evidence | N
             holds.append(one.suspect)
         else:
             told.append(
-                f"{one.suspect.effect.title} was suspected, but does not improve held-out stretches beyond what a placebo does: "
-                "it is no finding."
+                f"{one.suspect.effect.title} was suspected, but does not improve held-out stretches beyond what a placebo "
+                "does: it is no finding."
             )
     if not told:
         return kept, proof, told
@@ -176,9 +179,7 @@ def _proved(trial: Trial, kept: Fit, proof: Evidence) -> tuple[Fit, Evidence | N
     return again, evidence(trial, again) if holds else None, told
 
 
-def _findings(
-    found: Search, trial: Trial, base: Fit, kept: Fit, proof: Evidence | None, scene: Scene
-) -> list[Finding]:
+def _findings(found: Search, trial: Trial, base: Fit, kept: Fit, proof: Evidence | None, scene: Scene) -> list[Finding]:
     made = []
     for i, suspect in enumerate(kept.suspects):
         others = [j for j in range(len(kept.suspects)) if j != i]
@@ -186,7 +187,9 @@ def _findings(
         without = fit(trial, rest, [kept.values[j] for j in others])
         rivals, probability = _rivals(trial, suspect, kept, rest, without)
         unresolved = tuple(
-            dict.fromkeys(rival.effect for rival in rivals if rival.delta_score > -NEAR and rival.effect != suspect.effect.id)
+            dict.fromkeys(
+                rival.effect for rival in rivals if rival.delta_score > -NEAR and rival.effect != suspect.effect.id
+            )
         )
         place = locate(trial, without, kept, scene)
         values = dict(zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True))
@@ -225,7 +228,9 @@ def _rivals(
         if other.key in taken:
             continue
         neutral = np.array([parameter.neutral for parameter in other.parameters])
-        stand_in = Suspect(other.effect, other.instance, other.parameters, suspect.onset_s if other.effect.onset else 0.0)
+        stand_in = Suspect(
+            other.effect, other.instance, other.parameters, suspect.onset_s if other.effect.onset else 0.0
+        )
         made = fit(trial, [*rest, stand_in], [*without.values, neutral])
         rivals.append(Rival(other.effect.id, other.instance, made.evidence - kept.evidence))
     rivals.sort(key=lambda one: -one.delta_score)
@@ -241,10 +246,24 @@ def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[st
         low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
         estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
     if suspect.onset_s > 0.0:
-        # An onset is known to about the stride of the windows.
-        reach = 0.5 * len(trial.windows.weight) * trial.windows.scene.step_s
-        estimates["onset"] = Estimate(suspect.onset_s, suspect.onset_s - reach, suspect.onset_s + reach, "s")
+        early, late = (_onset_end(trial, kept, index, side) for side in (-1.0, 1.0))
+        estimates["onset"] = Estimate(suspect.onset_s, early, late, "s")
     return estimates
+
+
+def _onset_end(trial: Trial, kept: Fit, index: int, side: float) -> float:
+    """Return how far an onset can be moved to one side before the evidence falls: an idle thruster hides its fault."""
+    suspect = kept.suspects[index]
+    times = trial.windows.middle_s
+    onset = suspect.onset_s
+    step = 0.25 * len(trial.windows.weight) * trial.windows.scene.step_s
+    while True:
+        onset += side * step
+        if not times[0] < onset < times[-1]:
+            return float(np.clip(onset, times[0], times[-1]))
+        moved = [replace(one, onset_s=onset) if i == index else one for i, one in enumerate(kept.suspects)]
+        if fit(trial, moved, kept.values).evidence < kept.evidence - ONSET_DROP:
+            return onset
 
 
 def _intervals(trial: Trial, suspect: Suspect) -> tuple[tuple[float, float], ...]:
@@ -257,7 +276,9 @@ def _figure(trial: Trial, without: Fit, kept: Fit, place: Location) -> dict[str,
     axis = int(np.argmax(place.shares))
     before, after = place.before[:, axis], place.after[:, axis]
     columns = {"t": place.middle_s, "before": before, "after": after, "explained": before - after}
-    labels = {"residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'} left over [{'N·m' if axis == 2 else 'N'}]"}
+    labels = {
+        "residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'} left over [{'N·m' if axis == 2 else 'N'}]"
+    }
     windows_ = trial.windows
     heading = np.degrees(np.mod(windows_.mean(windows_.scene.psi[:, None])[:, 0], 2.0 * np.pi))
     return {
@@ -286,9 +307,7 @@ def _usual(parameter: Parameter) -> float:
     return float(np.clip(parameter.neutral + parameter.size, parameter.low, parameter.high))
 
 
-def _scores(
-    trial: Trial, base: Fit, kept: Fit, proof: Evidence | None
-) -> tuple[dict[str, Any], dict[str, Any]]:
+def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple[dict[str, Any], dict[str, Any]]:
     if proof is None:
         errors = force_errors(trial.windows, imagined(trial.plain, base), trial.plain)
         mse = dict(zip(AXES, np.mean(errors**2, axis=0).tolist(), strict=True))
@@ -339,8 +358,10 @@ def _withheld(survey: Survey, scene: Scene, findings: Sequence[Finding]) -> tupl
         names = ("mass", "x") if signal == "payload" else ("north", "east")
         measured = dict(zip(names, mean.tolist(), strict=True))
         shown = ", ".join(f"{name} {value:.2f}" for name, value in measured.items())
-        told = "nothing of it was found" if found is None else "found: " + ", ".join(
-            f"{name} {found.parameters[name].value:.2f}" for name in names
+        told = (
+            "nothing of it was found"
+            if found is None
+            else "found: " + ", ".join(f"{name} {found.parameters[name].value:.2f}" for name in names)
         )
         made.append(
             Withheld(

@@ -102,9 +102,7 @@ class Trial:
         return Trial(self.windows, self.plain, noise_of(gaps, self.windows.runs), self.hull_spread)
 
 
-def fit(
-    trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | None = None, *, steps: int = STEPS
-) -> Fit:
+def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | None = None, *, steps: int = STEPS) -> Fit:
     """Fit a hypothesis by Gauss-Newton steps on the posterior.
 
     Every parameter is believed to be about its neutral value, give or take its size, and the hull's coefficients to be
@@ -126,7 +124,7 @@ def fit(
     neutral = np.array([parameter.neutral for parameter in every])
     low = (np.array([parameter.low for parameter in every]) - neutral) / size if every else np.empty(0)
     high = (np.array([parameter.high for parameter in every]) - neutral) / size if every else np.empty(0)
-    cuts = np.cumsum([len(suspect.parameters) for suspect in suspects])[:-1] if every else []
+    cuts = np.cumsum([len(suspect.parameters) for suspect in suspects])[:-1].tolist()
     q, h = len(every), len(trial.hull_spread)
 
     def gaps(z: Floats) -> Floats:
@@ -172,7 +170,7 @@ def fit(
         z, w, cost = new, w_new, new_cost
         if gained < 1e-3:
             break
-    covariance = np.linalg.inv(A)[h:, h:] * np.outer(size, size)
+    covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1])
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
     hull = trial.plain.hull + trial.hull_spread * z[:h]
@@ -194,18 +192,20 @@ def trial_of(windows: Windows, plain: Picture, hull_spread: Floats) -> Trial:
 def _from(before: Picture, after: Picture, rows: NDArray[np.bool_]) -> Picture:
     """Return the one picture before and the other from an onset on."""
 
-    def mixed(old: Floats | None, new: Floats | None) -> Floats | None:
-        if old is new:
-            return old
-        blank = np.zeros_like(new if new is not None else old)
-        first, second = (blank if old is None else old), (blank if new is None else new)
-        return np.where(rows.reshape(-1, *[1] * (first.ndim - 1)), second, first)
+    def mixed(old: Floats, new: Floats) -> Floats:
+        return np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+
+    def either(old: Floats | None, new: Floats | None) -> Floats | None:
+        if old is None and new is None:
+            return None
+        blank = np.zeros_like(new if old is None else old)
+        return mixed(blank if old is None else old, blank if new is None else new)
 
     return replace(
         after,
         parts=mixed(before.parts, after.parts),
         angles=mixed(before.angles, after.angles),
         external=mixed(before.external, after.external),
-        flow=mixed(before.flow, after.flow),
-        load=mixed(before.load, after.load),
+        flow=either(before.flow, after.flow),
+        load=either(before.load, after.load),
     )

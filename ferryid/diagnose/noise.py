@@ -42,7 +42,7 @@ class Noise:
             parts.append(left)
         every = np.concatenate(parts) if parts else np.empty((0, *gaps.shape[1:]))
         mixed = np.einsum("ij,nj...->ni...", self.unmix, every)
-        return mixed.reshape(-1, *gaps.shape[2:])
+        return np.asarray(mixed.reshape(-1, *gaps.shape[2:]))
 
 
 def noise_of(gaps: Floats, runs: tuple[tuple[int, int], ...]) -> Noise:

@@ -22,7 +22,7 @@ MOST = 4
 ONSETS = 12
 """Onsets tried at first, evenly over the log; then ever finer around the best."""
 VOID = 0.02
-"""An effect that removes less than this share of the gaps' variance on every channel is of no use to anybody."""
+"""An effect whose acceleration is less than this share of the measured one, by every channel's root mean square, is void."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         rounds.append(done)
         taken = {suspect.key for suspect in chosen.suspects}
         good = [one for one in found[:1] if done.none < 0.5 and one.suspect.key not in taken]
-        if not good or len(chosen.suspects) == MOST or _void(trial, current, good[0].fit):
+        if not good or len(chosen.suspects) == MOST or _void(trial, good[0].fit):
             break
         chosen = good[0].fit
         trial = trial.with_noise_of(chosen.gaps)
@@ -153,10 +153,15 @@ def _round(found: Sequence[Candidate]) -> Round:
     return Round(tuple(found), tuple(weight / total for weight in weights), none / total)
 
 
-def _void(trial: Trial, before: Fit, after: Fit) -> bool:
-    """Tell whether an effect leaves the gaps as they were for all practical purposes."""
-    share = 1.0 - after.gaps.var(axis=0) / np.maximum(before.gaps.var(axis=0), 1e-300)
-    return bool((share < VOID).all())
+def _void(trial: Trial, made: Fit) -> bool:
+    """Tell whether the last effect of a fit moves the vessel too little to matter to anybody."""
+    seen = trial.windows
+    hull = replace(trial.plain, hull=made.hull)
+    for suspect, values in zip(made.suspects[:-1], made.values[:-1], strict=True):
+        hull = suspect.act(hull, values)
+    moved = seen.gap(made.suspects[-1].act(hull, made.values[-1])) - seen.gap(hull)
+    size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
+    return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
 
 
 def _pruned(trial: Trial, chosen: Fit) -> Fit:

@@ -1,9 +1,9 @@
 """The weak form: equations of motion averaged over windows, so that no noisy signal is ever differentiated.
 
 A window's weight w and its first derivatives vanish at both ends, so that integration by parts moves every derivative
-onto w: ``∫ w p'' = ∫ w'' p`` for a position, ``∫ w nu' = -∫ w' nu`` for a velocity. Both are compared with the acceleration that
-a picture of the forces gives, averaged with the same weight. Where positions were measured they alone are used: what they leave is
-free of the closed loop's bias, and steadier over the seconds in which forces act.
+onto w: ``∫ w p'' = ∫ w'' p`` for a position, ``∫ w nu' = -∫ w' nu`` for a velocity. Either is compared with the
+acceleration that a picture of the forces gives, averaged with the same weight. Where positions were measured they alone
+are used: what they leave is free of the closed loop's bias, and steadier over the seconds in which forces act.
 
 References
 ----------
@@ -80,8 +80,8 @@ FORCES_HZ = 5.0
 def windows(scene: Scene, length_s: float, stride_s: float) -> Windows:
     """Return windows of `length_s` every `stride_s` seconds, as many as lie wholly in measured data.
 
-    The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full rate, the
-    scene for the forces thinned to `FORCES_HZ`.
+    The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full
+    rate, and the scene for the forces is thinned to `FORCES_HZ`.
     """
     every = max(1, round(1.0 / (FORCES_HZ * scene.step_s)))
     thin = _thinned(scene, every)
@@ -96,8 +96,8 @@ def windows(scene: Scene, length_s: float, stride_s: float) -> Windows:
             runs.append((before, len(starts)))
     rows = np.array(starts, dtype=np.int64)
     known = bool(np.isfinite(scene.eta[scene.usable, :2]).all())
-    # A controller answers the errors of the velocity with thrust within a window, so that they and the force belong together and
-    # a delay is seen where none is; those of the position are shorter and hardly felt.
+    # A controller answers the errors of the velocity with thrust within a window, so that they and the force belong
+    # together and a delay is seen where none is; those of the position are shorter and hardly felt.
     channels = np.repeat([known, not known], 3)
     eta = np.where(np.isfinite(scene.eta), scene.eta, 0.0)
     nu = np.where(np.isfinite(scene.nu_raw), scene.nu_raw, 0.0)
@@ -145,7 +145,7 @@ def _thinned(scene: Scene, every: int) -> Scene:
         nu=mean(scene.nu),
         parts=mean(scene.parts),
         angles=mean(scene.angles),
-        usable=scene.usable[: n * every].reshape(n, every).all(axis=1),
+        usable=np.asarray(scene.usable[: n * every].reshape(n, every).all(axis=1)),
         wind=some(scene.wind),
         current=some(scene.current),
         payload=some(scene.payload),

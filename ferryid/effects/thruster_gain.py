@@ -40,5 +40,13 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
 
 
 EFFECT = Effect(
-    "thruster_gain", "Thruster force", parameters_of, apply, says, scenario, instances=instances, onset=True, vessel=True
+    "thruster_gain",
+    "Thruster force",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    instances=instances,
+    onset=True,
+    vessel=True,
 )
