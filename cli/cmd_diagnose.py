@@ -23,7 +23,7 @@ def command(
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """Say which physics a model left out of a recording, with its evidence, and add it to the model."""
+    """Say which physics a model left out of a recording, and what shows it."""
     from ferryid.diagnose.diagnose import diagnose
     from ferryid.report.diagnosis_report import patient, report
 

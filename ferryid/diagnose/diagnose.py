@@ -107,6 +107,11 @@ def _one(
     left = locate(trial, kept, kept, scene)
     findings = [*_of_sensors(sensors), *_findings(found, trial, base, kept, proof, scene)]
     unseen = _unseen(trial, kept)
+    if model is None and not profile.hull.has_model:
+        notes.append(
+            "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
+            "stand in for what a hull model would explain. Take them as hints."
+        )
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
     if unseen:
         notes.append(f"This log could not have shown, at their usual size: {', '.join(unseen)}.")

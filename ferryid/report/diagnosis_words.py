@@ -30,18 +30,20 @@ def title(effect: str, instance: str | None = None) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
-    names = listed([_inline(title(one.effect, one.instance)) for one in diagnosis.findings])
+    physics = [_inline(title(one.effect, one.instance)) for one in diagnosis.findings if one.effect in effects()]
+    sensors = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect not in effects()]
+    parts = [f"the model left out {listed(physics)}"] if physics else []
+    parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
+    names = "; ".join(parts)
     change = changed({axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()})
     told = (
         f"; with {'them' if len(diagnosis.findings) > 1 else 'it'}, the squared force error on held-out data {change}"
     )
-    more = told if change else ""
+    more = told if change and physics else ""
     if diagnosis.verdict == "explained":
-        return f"Explained: the model left out {names}{more}."
+        return f"Explained: {names}{more}."
     if diagnosis.verdict == "partly_explained":
-        return (
-            f"Partly explained: the model left out {names}{more}. More is missing, which nothing known here explains."
-        )
+        return f"Partly explained: {names}{more}. More is missing, which nothing known here explains."
     if diagnosis.verdict == "unexplained":
         return "Unexplained: the recording differs from the model, and nothing known here accounts for it."
     if diagnosis.verdict == "not_testable":
