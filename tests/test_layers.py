@@ -12,7 +12,20 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-ORDER = ("errors", "files", "ingest", "vessel", "signals", "identify", "simulate", "report", "reproduce", "cli")
+ORDER = (
+    "errors",
+    "files",
+    "ingest",
+    "vessel",
+    "signals",
+    "effects",
+    "identify",
+    "diagnose",
+    "simulate",
+    "report",
+    "reproduce",
+    "cli",
+)
 HOMES = {
     "matplotlib": ("report",),
     "jinja2": ("report",),

@@ -59,7 +59,8 @@ def _figure(
     return figure
 
 
-def _canvas(rows: int, height: float, *, top: float = 0.35) -> tuple[Figure, list[Axes]]:
+def canvas(rows: int, height: float, *, top: float = 0.35) -> tuple[Figure, list[Axes]]:
+    """Return a figure of panels below one another that share their horizontal axis."""
     figure = _figure(height, top=top)
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
     for ax in axes[:, 0]:
@@ -67,7 +68,7 @@ def _canvas(rows: int, height: float, *, top: float = 0.35) -> tuple[Figure, lis
     return figure, list(axes[:, 0])
 
 
-def _legend(figure: Figure, ax: Axes, columns: int, title: str = "") -> None:
+def legend_above(figure: Figure, ax: Axes, columns: int, title: str = "") -> None:
     """Put one legend for the whole figure along its upper edge."""
     handles, labels = ax.get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper center", ncols=columns, title=title, borderaxespad=0.1)
@@ -83,7 +84,8 @@ def _plain_log(ax: Axes, *, x: bool, y: bool) -> None:
             axis.set_minor_formatter(NullFormatter())
 
 
-def _svg(figure: Figure) -> str:
+def svg_text(figure: Figure) -> str:
+    """Return the drawing of a figure, the same for the same figure."""
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     drawing = text.getvalue()
@@ -93,13 +95,13 @@ def _svg(figure: Figure) -> str:
 def forces(log: LogFit, first_s: float | None = None, last_s: float | None = None) -> str:
     """Measured force against the estimates of base and new model over time; validation stretches are shaded."""
     with mpl.rc_context(STYLE):
-        figure, axes = _canvas(3, 5.2)
+        figure, axes = canvas(3, 5.2)
         t = log.motion.t
         inside = np.ones(len(t), dtype=bool) if first_s is None else (t >= first_s) & (t <= (last_s or t[-1]))
         rows = np.flatnonzero(inside)
         shown = np.where(log.motion.valid[:, None], 1.0, np.nan)
         for j, ax in enumerate(axes):
-            _shade(ax, t[rows], log.validation[rows])
+            shade(ax, t[rows], log.validation[rows])
             for values, colour, label in (
                 (log.motion.tau, MEASURED, "measured"),
                 (log.tau_base, BASE, "base model"),
@@ -110,11 +112,12 @@ def forces(log: LogFit, first_s: float | None = None, last_s: float | None = Non
             _limits(ax, log, rows, j)
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")
-        _legend(figure, axes[0], 3)
-        return _svg(figure)
+        legend_above(figure, axes[0], 3)
+        return svg_text(figure)
 
 
-def _shade(ax: Axes, t: Floats, marked: NDArray[np.bool_]) -> None:
+def shade(ax: Axes, t: Floats, marked: NDArray[np.bool_]) -> None:
+    """Shade the stretches of time that are marked."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         ax.axvspan(t[first], t[last - 1], color=SHADE, linewidth=0)
@@ -133,7 +136,7 @@ def _limits(ax: Axes, log: LogFit, rows: NDArray[np.int64], j: int) -> None:
 def residual_spectrum(logs: Sequence[LogFit]) -> str:
     """Power spectral density of the force residual before and after, longest unbroken stretch of each log."""
     with mpl.rc_context(STYLE):
-        figure, axes = _canvas(3, 5.2)
+        figure, axes = canvas(3, 5.2)
         for j, ax in enumerate(axes):
             for name, colour, label in (("tau_base", BASE, "base model"), ("tau_model", NEW, "new model")):
                 for i, log in enumerate(logs):
@@ -145,14 +148,14 @@ def residual_spectrum(logs: Sequence[LogFit]) -> str:
             ax.set_ylabel(f"{AXES[j]} [({UNITS[j]})²/Hz]")
             _plain_log(ax, x=True, y=True)
         axes[-1].set_xlabel("frequency [Hz]")
-        _legend(figure, axes[0], 2)
-        return _svg(figure)
+        legend_above(figure, axes[0], 2)
+        return svg_text(figure)
 
 
 def residual_autocorrelation(logs: Sequence[LogFit]) -> str:
     """Autocorrelation of the residual that remains; white noise would stay inside the dashed band."""
     with mpl.rc_context(STYLE):
-        figure, axes = _canvas(3, 4.6)
+        figure, axes = canvas(3, 4.6)
         for j, ax in enumerate(axes):
             for name, colour, label in (("tau_base", BASE, "base model"), ("tau_model", NEW, "new model")):
                 for i, log in enumerate(logs):
@@ -166,14 +169,14 @@ def residual_autocorrelation(logs: Sequence[LogFit]) -> str:
             ax.set_ylabel(AXES[j])
             ax.set_ylim(-1.05, 1.05)
         axes[-1].set_xlabel("lag [s]")
-        _legend(figure, axes[0], 2)
-        return _svg(figure)
+        legend_above(figure, axes[0], 2)
+        return svg_text(figure)
 
 
 def components(curve: ComponentCurve) -> str:
     """Normalised MSE against the number of components, training and validation."""
     with mpl.rc_context(STYLE):
-        figure, (ax,) = _canvas(1, 3.2, top=0.55)
+        figure, (ax,) = canvas(1, 3.2, top=0.55)
         for j, (axis, colour) in enumerate(zip(AXES, ("#0072b2", "#009e73", "#cc79a7"), strict=True)):
             ax.plot(curve.components, curve.validation[:, j], color=colour, marker="o", markersize=3, label=axis)
             ax.plot(curve.components, curve.training[:, j], color=colour, linestyle=":", linewidth=1.0)
@@ -184,8 +187,8 @@ def components(curve: ComponentCurve) -> str:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set_xlabel(f"number of components (chosen: {curve.chosen})")
         ax.set_ylabel("MSE over the base model's [-]")
-        _legend(figure, ax, 3, "validation; training dotted")
-        return _svg(figure)
+        legend_above(figure, ax, 3, "validation; training dotted")
+        return svg_text(figure)
 
 
 def coefficient_intervals(
@@ -214,7 +217,7 @@ def coefficient_intervals(
             ax.set_title(AXES[j], fontsize=9)
         columns[0].set_yticks(place, terms)
         columns[1].set_xlabel("coefficient over half the width of its 95 % interval")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
@@ -238,7 +241,7 @@ def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
                 ax.plot(nu[:, i], nu[:, j], ".", markersize=1.2, alpha=0.5, rasterized=True)
             ax.set_xlabel(x_label)
             ax.set_ylabel(y_label)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def free_run_errors(base: FreeRun, new: FreeRun) -> str:
@@ -259,13 +262,13 @@ def free_run_errors(base: FreeRun, new: FreeRun) -> str:
         for ax in grid[1]:
             ax.set_xlabel("horizon [s]")
         grid[0, 0].legend()
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def free_run_example(base: FreeRun, new: FreeRun) -> str:
     """One free run: measured velocities and those that the models predict from the first instant on."""
     with mpl.rc_context(STYLE):
-        figure, axes = _canvas(3, 4.8)
+        figure, axes = canvas(3, 4.8)
         factor = (1.0, 1.0, np.degrees(1.0))
         for j, (ax, label) in enumerate(zip(axes, ("u [m/s]", "v [m/s]", "r [deg/s]"), strict=True)):
             example = new.example or base.example
@@ -281,14 +284,14 @@ def free_run_example(base: FreeRun, new: FreeRun) -> str:
                     )
             ax.set_ylabel(label)
         axes[-1].set_xlabel("time since the start of the run [s]")
-        _legend(figure, axes[0], 3)
-        return _svg(figure)
+        legend_above(figure, axes[0], 3)
+        return svg_text(figure)
 
 
 def track(logs: Sequence[LogFit]) -> str:
     """Where the vessel went, north up."""
     with mpl.rc_context(STYLE):
-        figure, (ax,) = _canvas(1, 4.0, top=0.15)
+        figure, (ax,) = canvas(1, 4.0, top=0.15)
         for log in logs:
             eta = np.where(log.motion.valid[:, None], log.motion.eta, np.nan)
             step = max(1, len(eta) // 2000)
@@ -298,4 +301,4 @@ def track(logs: Sequence[LogFit]) -> str:
         ax.set_ylabel("north [m]")
         if 1 < len(logs) <= 6:
             ax.legend(fontsize=7)
-        return _svg(figure)
+        return svg_text(figure)

@@ -92,6 +92,29 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     conforms(ferryid("models", "milliampere@1", "--out", out, "--json", "-").out)
 
 
+def test_diagnose_one_log_and_two(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    log, other = fixtures / "short.mcap", fixtures / "short.bag"
+    run = ferryid("diagnose", log, "--vessel", "milliampere", "--out", tmp_path, "--json", "-")
+    assert run.code == 0, run.err
+    one = conforms(run.out)
+    conforms((Path(one["report"]).parent / "diagnosis.json").read_text(encoding="utf-8"))
+    page = Path(one["report"]).read_text(encoding="utf-8")
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page), (
+        "the page must not need another file or a network"
+    )
+
+    run = ferryid("diagnose", log, other, "--vessel", "milliampere", "--out", tmp_path, "--json", tmp_path / "two.json")
+    assert run.code == 0, run.err
+    both = conforms((tmp_path / "two.json").read_text(encoding="utf-8"))
+    assert len(both["logs"]) == 2
+    assert both["logs"][0]["verdict"] == one["verdict"]
+    assert run.out.startswith("Of 2 logs, ")
+
+    refused = ferryid("diagnose", log, "--out", tmp_path)
+    assert refused.code == 2
+    assert "Fix: give --vessel" in refused.err
+
+
 def test_two_fits_of_one_log_are_the_same_file(ferryid, fixtures: Path, tmp_path: Path) -> None:
     texts = []
     for name in ("a", "b"):

@@ -1,0 +1,36 @@
+"""ferryid diagnose."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ferryid.cli.options import OUT, Json, Logs, MaybeVessel, Out, Verify
+from ferryid.cli.output import emit, progress
+
+
+def command(
+    logs: Logs,
+    vessel: MaybeVessel = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model to examine: path, name or name@version; the profile's hull if left out.")
+    ] = None,
+    withhold: Annotated[
+        list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")
+    ] = None,
+    verify: Verify = False,
+    out: Out = OUT,
+    json: Json = None,
+) -> None:
+    """Say which physics a model left out of a recording, and what shows it."""
+    from ferryid.diagnose.diagnose import diagnose
+    from ferryid.report.diagnosis_report import patient, report
+
+    profile, examined = patient(vessel, model, out)
+    hidden = tuple(withhold or ())
+    diagnoses = diagnose(logs, profile, out, model=examined, withhold=hidden, verify=verify, progress=progress)
+    progress("writing the report")
+    outcome = report(diagnoses, out)
+    progress("")
+    emit(outcome.json, outcome.text, json)

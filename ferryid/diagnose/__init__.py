@@ -1,0 +1,1 @@
+"""What a model left out: sensor checks, hypotheses, evidence, verdict."""

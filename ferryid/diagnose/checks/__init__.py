@@ -1,0 +1,37 @@
+"""Checks of the sensors before any force is fitted: a module here with a ``CHECK`` is one.
+
+All of them compare measurements with each other: positions with velocities, headings with yaw rates. What position, velocity
+and heading have in common (an antenna that both were measured at, a heading with which a receiver resolved its own velocity, a
+delay of them all) leaves no trace in them, and only forces can tell: see `ferryid.effects.lever_arm`,
+`ferryid.effects.heading_bias` and `ferryid.effects.time_delay`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.effects.picture import Scene
+
+__all__ = ["Check", "SensorFinding", "checks", "examine"]
+
+
+@cache
+def checks() -> tuple[Check, ...]:
+    """Return every check, in the order in which they act."""
+    modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
+    found = [module.CHECK for module in modules if hasattr(module, "CHECK")]
+    return tuple(sorted(found, key=lambda check: (check.place, check.id)))
+
+
+def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
+    """Return what is wrong with the sensors of a scene, and the scene without it."""
+    findings = []
+    for check in checks():
+        finding = check.find(scene)
+        if finding is not None:
+            findings.append(finding)
+            scene = finding.correct(scene)
+    return tuple(findings), scene

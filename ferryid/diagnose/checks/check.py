@@ -1,0 +1,55 @@
+"""What a check of the sensors is, and what it finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from ferryid.diagnose.result import Estimate
+from ferryid.effects.picture import Scene
+from ferryid.vessel.profile import Floats
+
+
+@dataclass(frozen=True)
+class SensorFinding:
+    """An error of the sensors.
+
+    Attributes
+    ----------
+    effect
+        Its id in results.
+    parameters
+        By name, with 95 % intervals.
+    says
+        One sentence in plain words.
+    correct
+        Returns the scene without the error.
+    evidence
+        Columns for the figure that shows it: name to values.
+    """
+
+    effect: str
+    parameters: Mapping[str, Estimate]
+    says: str
+    correct: Callable[[Scene], Scene]
+    evidence: Mapping[str, Floats] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check.
+
+    Attributes
+    ----------
+    id, title
+        Name in results, and for people.
+    find
+        Returns what is wrong with a scene, None where nothing is, or where the scene cannot tell.
+    place
+        Checks act in ascending order, each on what those before it corrected.
+    """
+
+    id: str
+    title: str
+    find: Callable[[Scene], SensorFinding | None]
+    place: int

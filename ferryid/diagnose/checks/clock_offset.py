@@ -1,0 +1,58 @@
+"""Clock offset within the navigation: positions that are later than velocities, or earlier.
+
+Which of the two is right is not for kinematics to say. Measurements are late rather than early, so the later one is moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.kinematics import LATE, kinematics
+from ferryid.effects.picture import Scene
+from ferryid.vessel.frames import to_body, to_world
+from ferryid.vessel.profile import Floats
+
+LEAST_S = 0.1
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return how late the positions are."""
+    found = kinematics(scene)
+    if found is None or not found.found(LATE, LEAST_S):
+        return None
+    late = found.solution.estimate(LATE, "s")
+    word = "later" if late.value > 0.0 else "earlier"
+
+    def correct(seen: Scene) -> Scene:
+        when = seen.t + abs(late.value)
+        inside = np.interp(when, seen.t, seen.usable.astype(np.float64), left=0.0, right=0.0) >= 1.0
+        usable = seen.usable & inside
+        if late.value > 0.0:
+            return replace(seen, eta=np.column_stack([_at(when, seen, seen.eta[:, :2]), seen.psi]), usable=usable)
+        moved = (_earlier(when, seen, nu) for nu in (seen.nu_raw, seen.nu))
+        return replace(seen, nu_raw=next(moved), nu=next(moved), usable=usable)
+
+    return SensorFinding(
+        "clock_offset",
+        {"seconds": late},
+        f"The positions are {abs(late.value):.2f} s {word} than the velocities.",
+        correct,
+        found.evidence(LATE),
+    )
+
+
+def _at(when: Floats, seen: Scene, values: Floats) -> Floats:
+    known = seen.usable
+    return np.column_stack([np.interp(when, seen.t[known], column[known]) for column in values.T])
+
+
+def _earlier(when: Floats, seen: Scene, nu: Floats) -> Floats:
+    """Return velocities, yaw rate excepted, of a later row; what is late is the velocity over ground."""
+    over_ground = _at(when, seen, np.column_stack(to_world(nu[:, 0], nu[:, 1], seen.psi)))
+    return np.column_stack([*to_body(over_ground[:, 0], over_ground[:, 1], seen.psi), nu[:, 2]])
+
+
+CHECK = Check("clock_offset", "Clocks of position and velocity", find, place=30)

@@ -1,0 +1,42 @@
+"""Heading bias: the course over ground that positions give is turned from the one that heading and body velocity give.
+
+A current cannot do that, both are over ground. A receiver that resolves its own velocity over ground with the biased heading
+hides the bias from this check; see `ferryid.effects.heading_bias`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import degrees
+
+import numpy as np
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.kinematics import ANGLE, kinematics
+from ferryid.effects.picture import Scene
+
+LEAST_DEG = 1.0
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return the heading's bias against the velocity's axes, positive where the heading measured is too large."""
+    found = kinematics(scene)
+    if found is None or not found.found(ANGLE, np.radians(LEAST_DEG)):
+        return None
+    angle = found.solution.estimate(ANGLE, "deg", degrees(1.0))
+    side = "clockwise" if angle.value > 0.0 else "anticlockwise"
+    bias = float(found.solution.values[ANGLE])
+
+    def correct(seen: Scene) -> Scene:
+        return replace(seen, eta=seen.eta - np.array([0.0, 0.0, bias]))
+
+    return SensorFinding(
+        "heading_bias",
+        {"angle": angle},
+        f"The heading is {abs(angle.value):.1f} deg too far {side} of the axes in which the velocity was measured.",
+        correct,
+        found.evidence(ANGLE),
+    )
+
+
+CHECK = Check("heading_bias", "Heading against course over ground", find, place=50)

@@ -1,0 +1,65 @@
+"""Heading interpolated through the wrap: between 359 and 1 deg some samples of 240 or 120 deg, which the vessel never had."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.result import Estimate
+from ferryid.effects.picture import Scene
+from ferryid.vessel.frames import wrap
+from ferryid.vessel.profile import Floats
+
+FAST_RADPS = 1.5
+"""What heading and yaw rate may differ by."""
+NEAR_RAD = 0.5
+"""How near a heading is to the wrap before and after, and to what the yaw rate makes of it."""
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return how many samples lie within a turn of heading that the yaw rate knows nothing of."""
+    inside, psi = repaired(scene)
+    count = float(inside.sum())
+    if count == 0.0:
+        return None
+
+    def correct(seen: Scene) -> Scene:
+        return replace(seen, eta=np.column_stack([seen.eta[:, :2], psi]))
+
+    return SensorFinding(
+        "heading_wrap",
+        {"samples": Estimate(count, count, count, "-")},
+        f"The heading was interpolated the long way round at the wrap: {count:.0f} samples in between are false.",
+        correct,
+        {"time_s": scene.t[inside], "heading_rad": scene.psi[inside], "repaired_rad": psi[inside]},
+    )
+
+
+def repaired(scene: Scene) -> tuple[NDArray[np.bool_], Floats]:
+    """Return which headings are false, and all headings with these interpolated the short way."""
+    psi, dt = scene.psi.copy(), scene.step_s
+    rate = np.where(np.isfinite(scene.nu_raw[:, 2]), scene.nu_raw[:, 2], 0.0)
+    odd = np.abs(np.diff(psi) - 0.5 * dt * (rate[1:] + rate[:-1])) > FAST_RADPS * dt
+    inside = np.zeros(len(psi), dtype=np.bool_)
+    # A step that looks right between two that do not is part of the same turn.
+    odd[1:-1] |= odd[:-2] & odd[2:]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], odd, [False]]).astype(np.int8)))
+    for first, last in edges.reshape(-1, 2).tolist():
+        before, after = float(psi[first]), float(psi[last])
+        short = float(wrap(np.array(after - before)))
+        turned = float(rate[first : last + 1].mean()) * (last - first) * dt
+        at_wrap = max(abs(float(wrap(np.array(value - pi)))) for value in (before, after)) < NEAR_RAD
+        away = float(np.abs(psi[first : last + 1] - before).max())
+        if last - first < 2 or not at_wrap or abs(short - turned) > NEAR_RAD or away < 2.0 * NEAR_RAD:
+            continue
+        inside[first + 1 : last] = True
+        psi[last:] += before + short - after
+        psi[first : last + 1] = np.linspace(before, before + short, last - first + 1)
+    return inside, psi
+
+
+CHECK = Check("heading_wrap", "Heading through the wrap", find, place=10)

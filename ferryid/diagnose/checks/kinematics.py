@@ -1,0 +1,240 @@
+"""Position against velocity, in the weak form: what does not fit between them, all at once.
+
+With p the measured position, psi the heading and nu the velocity, a receiver `l` from where the velocity is measured, a heading
+that is `b` too large, a velocity that is multiplied by `k`, positions that are `T` late and a drift `d` of the position
+(water under a log that measures through water)::
+
+    d/dt (p - R(psi - b) l) = R(psi(t - T) - b) nu(t - T) / k + d
+
+Both sides are averaged over windows whose weight takes the derivative. Parameters are let in one after the other, the most
+certain first. Velocities are noisy, and noise in a regressor makes its factor too small; so the regressors' instruments are
+made of positions, and made of velocities in a second solution. The truth lies between the two where positions are noisy as
+well, which is why a finding has to be one in both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from ferryid.diagnose.checks.regression import Solution, step
+from ferryid.diagnose.checks.spans import Spans, spans
+from ferryid.effects.picture import Scene
+from ferryid.vessel.frames import to_body, to_world
+from ferryid.vessel.profile import Floats
+
+SCALE, ANGLE, X, Y, LATE, NORTH, EAST = range(7)
+"""Places of k [-], b [rad], l [m], T [s] and the drift [m/s] among the parameters."""
+NEUTRAL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+SIZE = np.array([0.5, 0.5, 10.0, 10.0, 2.0, 1.0, 1.0])
+TINY = np.array([1e-4, 1e-4, 1e-2, 1e-2, 1e-2, 1e-3, 1e-3])
+STEPS = 12
+GROSS = 0.2
+"""A factor or an angle that is so far off is let in from the start: no first step would be short enough."""
+OUTLIER = 6.0
+"""Windows whose residual is this many times the usual one are left out: a position that jumps says nothing of velocities."""
+SLOW_MPS = 0.02
+"""Below this root mean square of the speed, positions and velocities are compared in vain."""
+DERIVATIVE_S = 2.0
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """What does not fit between position and velocity.
+
+    Attributes
+    ----------
+    active
+        Which parameters were let in, shape (7,).
+    solution
+        With instruments made of positions; neutral and without error where not let in.
+    rival
+        Values with instruments made of velocities, shape (7,).
+    middle_s
+        Middle of the windows that were used [s], shape (J,).
+    regressors
+        Derivatives of the residual by the parameters, north and east, shape (J, 2, 7).
+    left
+        Residual [m/s], shape (J, 2).
+    """
+
+    active: NDArray[np.bool_]
+    solution: Solution
+    rival: Floats
+    middle_s: Floats
+    regressors: Floats
+    left: Floats
+
+    def found(self, index: int, least: float) -> bool:
+        """Return whether a parameter is certainly not neutral, and by at least `least`, in both solutions alike."""
+        if not self.active[index]:
+            return False
+        one, other = self.solution.values[index] - NEUTRAL[index], self.rival[index] - NEUTRAL[index]
+        both = min(abs(one), abs(other)) >= least and one * other > 0.0
+        return bool(both and self.solution.certain(index, float(NEUTRAL[index])))
+
+    def evidence(self, index: int) -> dict[str, Floats]:
+        """Return what one parameter explains: its regressor against what is left without it."""
+        regressor = -self.regressors[:, :, index]
+        share = (self.solution.values[index] - NEUTRAL[index]) * regressor
+        return {
+            "time_s": np.repeat(self.middle_s, 2),
+            "regressor": regressor.ravel(),
+            "difference_mps": (self.left + share).ravel(),
+        }
+
+
+@dataclass(frozen=True)
+class _Data:
+    """Windows with what is compared in them: pose, body velocity measured, and velocity over ground that positions give."""
+
+    trial: Spans
+    eta: Floats
+    velocity: Floats
+    pulled: Floats
+
+    def residual(self, p: Floats, velocity: Floats | None = None) -> Floats:
+        """Return what is left between position and velocity [m/s], shape (J, 2)."""
+        heading = self.eta[:, 2] - p[ANGLE]
+        u, v = (self.velocity if velocity is None else velocity).T
+        lever = np.column_stack(to_world(np.full_like(heading, p[X]), np.full_like(heading, p[Y]), heading))
+        over_ground = np.column_stack(to_world(u, v, heading)) / p[SCALE]
+        if p[LATE] != 0.0:
+            row = np.arange(len(heading), dtype=np.float64)
+            late = p[LATE] / self.trial.step_s
+            over_ground = np.column_stack([np.interp(row - late, row, one) for one in over_ground.T])
+        moved = self.trial.rate(self.eta[:, :2] - lever)
+        return np.asarray(moved - self.trial.mean(over_ground) - p[NORTH:])
+
+    def derivatives(self, p: Floats, velocity: Floats | None = None) -> Floats:
+        """Return the residual's derivatives by the parameters, shape (J, 2, 7)."""
+        columns = []
+        for k, tiny in enumerate(TINY):
+            more, less = p.copy(), p.copy()
+            more[k] += tiny
+            less[k] -= tiny
+            columns.append((self.residual(more, velocity) - self.residual(less, velocity)) / (2.0 * tiny))
+        return np.stack(columns, axis=-1)
+
+    def instruments(self, p: Floats) -> Floats:
+        """Return derivatives in which the velocity is that of the positions, shape (J, 2, 7)."""
+        u, v = to_body(self.pulled[:, 0], self.pulled[:, 1], self.eta[:, 2] - p[ANGLE])
+        return self.derivatives(p, np.column_stack([u, v]) * p[SCALE])
+
+
+class _Same:
+    """A scene that equals itself only, as several checks ask for the kinematics of the same one."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.scene is self.scene
+
+    def __hash__(self) -> int:
+        return id(self.scene)
+
+
+def kinematics(scene: Scene) -> Kinematics | None:
+    """Compare positions and velocities; None where the scene has too little of them."""
+    return _compared(_Same(scene))
+
+
+@lru_cache(maxsize=1)
+def _compared(same: _Same) -> Kinematics | None:
+    scene = same.scene
+    trial, both = spans(scene, np.hstack([scene.eta, scene.nu_raw[:, :2]]))
+    if len(trial.starts) < 8:
+        return None
+    eta, velocity = both[:, :3], both[:, 3:]
+    if np.sqrt(2.0 * np.mean(trial.rate(eta[:, :2]) ** 2)) < SLOW_MPS:
+        return None
+    m = 2 * max(2, round(0.5 * DERIVATIVE_S / trial.step_s)) + 1
+    pulled = np.asarray(savgol_filter(eta[:, :2], m, 2, deriv=1, delta=trial.step_s, axis=0))
+    data = _Data(trial, eta, velocity, pulled)
+    p, active = _start(data)
+    searched = _search(data, p, active)
+    if searched is None:
+        return None
+    size = np.abs(data.residual(searched[0])).max(axis=1)
+    data = _Data(trial.only(size <= OUTLIER * max(float(np.median(size)), 1e-9)), eta, velocity, pulled)
+    searched = _search(data, p, active)
+    if searched is None:
+        return None
+    p, solution, active = searched
+    rival = _solve(data, p, active, own=True)
+    if rival is None:
+        return None
+    return Kinematics(active, solution, rival[0], data.trial.middle_s, data.derivatives(p), data.residual(p))
+
+
+def _start(data: _Data) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return parameters to begin with and those let in: one factor and one rotation where they are gross, and the drift."""
+    pulled = data.trial.rate(data.eta[:, :2])
+    u, v = data.velocity.T
+    pushed = data.trial.mean(np.column_stack(to_world(u, v, data.eta[:, 2])))
+    a, b = pulled[:, 0] + 1j * pulled[:, 1], pushed[:, 0] + 1j * pushed[:, 1]
+    product, power = complex(np.vdot(a, b)), float(np.vdot(a, a).real)
+    start, active = NEUTRAL.copy(), np.zeros(7, dtype=np.bool_)
+    active[NORTH:] = True
+    scale, angle = abs(product) / power, float(np.angle(product))
+    if scale > 0.1 and max(abs(scale - 1.0), abs(angle)) > GROSS:
+        start[SCALE], start[ANGLE] = scale, angle
+        active[[SCALE, ANGLE]] = True
+    return start, active
+
+
+def _search(data: _Data, start: Floats, active: NDArray[np.bool_]) -> tuple[Floats, Solution, NDArray[np.bool_]] | None:
+    """Let parameters in, the most certain first, until none of the others is certain."""
+    p, active = start, active.copy()
+    while True:
+        solved = _solve(data, p, active)
+        if solved is None:
+            return None
+        p, solution = solved
+        e, J, Z = data.residual(p), data.derivatives(p), data.instruments(p)
+        scores = []
+        for k in np.flatnonzero(~active).tolist():
+            more = active.copy()
+            more[k] = True
+            change = _step(data, p, more, e, J, Z)
+            if change is not None and change.certain(k):
+                scores.append((change.score(k), k))
+        if not scores:
+            return p, solution, active
+        chosen = max(scores)[1]
+        active[[X, Y] if chosen in (X, Y) else chosen] = True
+
+
+def _step(data: _Data, p: Floats, active: NDArray[np.bool_], e: Floats, J: Floats, Z: Floats) -> Solution | None:
+    """Return the change of the parameters that were let in, zero for the others."""
+    Z, J = Z[:, :, active], J[:, :, active]
+    change = step(Z, J, e, data.trial.place, SIZE[active], (p - NEUTRAL)[active])
+    if change is None:
+        return None
+    values, errors = np.zeros(7), np.zeros(7)
+    values[active], errors[active] = change.values, change.errors
+    return Solution(values, errors, change.freedom)
+
+
+def _solve(
+    data: _Data, start: Floats, active: NDArray[np.bool_], *, own: bool = False
+) -> tuple[Floats, Solution] | None:
+    """Return values and solution; instruments made of the velocities themselves where `own`."""
+    p, solution = start.copy(), None
+    for _ in range(STEPS):
+        e, J = data.residual(p), data.derivatives(p)
+        change = _step(data, p, active, e, J, J if own else data.instruments(p))
+        if change is None:
+            return None
+        moved = np.clip(change.values, -SIZE, SIZE)
+        p = p + moved
+        p[SCALE] = max(p[SCALE], 1e-2)
+        solution = Solution(p, change.errors, change.freedom)
+        if np.all(np.abs(moved) <= 0.05 * change.errors + 1e-9):
+            break
+    return None if solution is None else (p, solution)

@@ -1,0 +1,49 @@
+"""Lever arm: positions of an antenna against velocities of another point.
+
+Which of the two is the body origin is not for kinematics to say. Where both belong to the antenna, they agree and this check
+is silent; see `ferryid.effects.lever_arm`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.kinematics import X, Y, kinematics
+from ferryid.effects.picture import Scene
+from ferryid.vessel.frames import to_world
+
+LEAST_M = 0.15
+LEAST_OF_LENGTH = 0.02
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return where positions were measured, seen from where velocities were."""
+    found = kinematics(scene)
+    if found is None:
+        return None
+    length = scene.profile.hull.length_m
+    least = max(LEAST_M, LEAST_OF_LENGTH * length) if np.isfinite(length) else LEAST_M
+    if not (found.found(X, least) or found.found(Y, least)):
+        return None
+    x, y = found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
+    at = np.array([x.value, y.value])
+
+    def correct(seen: Scene) -> Scene:
+        one = np.ones(len(seen.t))
+        arm = np.column_stack([*to_world(at[0] * one, at[1] * one, seen.psi), 0.0 * one])
+        return replace(seen, eta=seen.eta - arm)
+
+    ends = ("ahead" if at[0] >= 0.0 else "astern", "to starboard" if at[1] >= 0.0 else "to port")
+    return SensorFinding(
+        "lever_arm",
+        {"x": x, "y": y},
+        f"Positions belong to a point {abs(at[0]):.2f} m {ends[0]} and {abs(at[1]):.2f} m {ends[1]} of where velocities do.",
+        correct,
+        found.evidence(X if abs(at[0]) >= abs(at[1]) else Y),
+    )
+
+
+CHECK = Check("lever_arm", "Position against velocity in turns", find, place=60)

@@ -1,0 +1,103 @@
+"""Regression with instruments, and errors that hold for correlated residuals.
+
+Nothing is whitened: vessels move slowly, whitening would weigh the fast rest, in which positions are noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from ferryid.diagnose.result import Estimate
+from ferryid.vessel.profile import Floats
+
+FALSE_ALARM = 1e-4
+"""Probability at which a value that is not neutral counts as one, before the practical threshold."""
+
+
+MEMORY = 15
+"""Residuals of windows that are as many strides apart are taken as independent."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Solved parameters.
+
+    Attributes
+    ----------
+    values, errors
+        Parameters and their standard errors, shape (q,).
+    freedom
+        Degrees of freedom of the errors.
+    """
+
+    values: Floats
+    errors: Floats
+    freedom: int
+
+    def estimate(self, index: int, unit: str, scale: float = 1.0) -> Estimate:
+        """Return a parameter with its 95 % interval, multiplied by `scale`."""
+        value, reach = float(self.values[index]), float(student.ppf(0.975, self.freedom) * self.errors[index])
+        low, high = sorted((scale * (value - reach), scale * (value + reach)))
+        return Estimate(scale * value, low, high, unit)
+
+    def score(self, index: int, neutral: float = 0.0) -> float:
+        """Return how many standard errors a parameter is off its neutral value."""
+        return abs(float(self.values[index]) - neutral) / max(float(self.errors[index]), 1e-300)
+
+    def certain(self, index: int, neutral: float = 0.0) -> bool:
+        """Return whether a parameter is not neutral, beyond reasonable doubt."""
+        return self.score(index, neutral) > float(student.ppf(1.0 - 0.5 * FALSE_ALARM, self.freedom))
+
+
+def step(Z: Floats, J: Floats, e: Floats, place: NDArray[np.int64], size: Floats, away: Floats) -> Solution | None:
+    """Return the change p for which ``e + J p`` has nothing of the instruments in it; None where there is too little data.
+
+    The errors are the larger of two: from sums over blocks, which hold whatever the noise is like but trust a few strong
+    blocks too much, and from the residual's autocovariance, as if the noise were the same throughout.
+
+    Parameters
+    ----------
+    Z, J
+        Instruments and derivatives in c channels, shape (m, c, q).
+    e
+        Residual, shape (m, c).
+    place
+        Number of each window, in strides from the start, ascending, shape (m,).
+    size
+        How large a parameter can be thought to be, shape (q,): what the data do not tell stays within it.
+    away
+        How far the parameters are from their neutral values already, shape (q,).
+    """
+    block = np.unique(place // MEMORY, return_inverse=True)[1]
+    count, (m, c, q) = int(block.max(initial=-1)) + 1, J.shape
+    freedom = count - q
+    if freedom < 3:
+        return None
+    Z, J = Z * size, J * size
+    flat = Z.reshape(m * c, q)
+    variance = max(float(np.mean(e**2)), 1e-18)
+    inverse = np.linalg.inv(flat.T @ J.reshape(m * c, q) + variance * np.eye(q))
+    p = -inverse @ (flat.T @ e.ravel() + variance * away / size)
+    left = e + J @ p
+    variance = float(np.mean(left**2))
+    sums = np.zeros((count, q))
+    np.add.at(sums, block, np.einsum("ncq,nc->nq", Z, left))
+    whole = np.arange(place[-1] - place[0] + 1)
+    row = place - place[0]
+    all_Z, all_left, known = np.zeros((len(whole), c, q)), np.zeros((len(whole), c)), np.zeros(len(whole))
+    all_Z[row], all_left[row], known[row] = Z, left, 1.0
+    even = np.zeros((q, q))
+    for lag in range(min(MEMORY, len(whole) - 1)):
+        pairs = c * float(known[lag:] @ known[: len(whole) - lag])
+        if pairs == 0.0:
+            continue
+        covariance = float(np.sum(all_left[lag:] * all_left[: len(whole) - lag])) / pairs * (1.0 - lag / MEMORY)
+        product = np.einsum("ncq,ncp->qp", all_Z[lag:], all_Z[: len(whole) - lag])
+        even += covariance * (product if lag == 0 else product + product.T)
+    prior = variance**2 * np.eye(q)
+    spreads = [np.diag(inverse @ (middle * (count / freedom) + prior) @ inverse.T) for middle in (sums.T @ sums, even)]
+    return Solution(size * p, size * np.sqrt(np.maximum(*spreads)), freedom)

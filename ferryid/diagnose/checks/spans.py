@@ -1,0 +1,107 @@
+"""Windows for the checks; `ferryid.diagnose.weak` has those for forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.effects.picture import Scene
+from ferryid.vessel.profile import Floats
+
+LENGTH_S, STRIDE_S = 8.0, 2.0
+RATE_HZ = 5.0
+"""Measurements are averaged down to this, all alike: windows are long against it."""
+
+
+@dataclass(frozen=True)
+class Spans:
+    """Windows that lie wholly in measured data.
+
+    Attributes
+    ----------
+    starts
+        First row of every window, shape (J,).
+    middle_s
+        Time of its middle [s], shape (J,).
+    weight, slope, bend
+        ``sin^4`` of unit area and its first two derivatives [1/s, 1/s², 1/s³], shape (m,).
+    step_s
+        Distance of two rows [s].
+    stride
+        Distance of two windows, in rows.
+    """
+
+    starts: NDArray[np.int64]
+    middle_s: Floats
+    weight: Floats
+    slope: Floats
+    bend: Floats
+    step_s: float
+    stride: int
+
+    @property
+    def place(self) -> NDArray[np.int64]:
+        """Number of each window, in strides from the start, shape (J,)."""
+        return np.asarray(self.starts // self.stride, dtype=np.int64)
+
+    def only(self, chosen: NDArray[np.bool_]) -> Spans:
+        """Return some of the windows."""
+        return replace(self, starts=self.starts[chosen], middle_s=self.middle_s[chosen])
+
+    def mean(self, values: Floats) -> Floats:
+        """Return ``∫ w f``, shape (J,) or (J, c)."""
+        return self._sum(values, self.weight)
+
+    def rate(self, values: Floats) -> Floats:
+        """Return ``∫ w f' = -∫ w' f``, shape (J,) or (J, c)."""
+        return -self._sum(values, self.slope)
+
+    def curvature(self, values: Floats) -> Floats:
+        """Return ``∫ w f'' = ∫ w'' f``, shape (J,) or (J, c)."""
+        return self._sum(values, self.bend)
+
+    def _sum(self, values: Floats, weight: Floats) -> Floats:
+        rows = np.lib.stride_tricks.sliding_window_view(values, len(weight), axis=0)[self.starts]
+        return np.asarray(rows @ weight) * self.step_s
+
+
+def spans(scene: Scene, needed: Floats) -> tuple[Spans, Floats]:
+    """Return the windows in which all of some measurements are finite and usable, and these at `RATE_HZ`.
+
+    Parameters
+    ----------
+    scene
+        Where they come from.
+    needed
+        Measurements, shape (n, c).
+
+    Returns
+    -------
+    Spans
+        The windows.
+    Floats
+        Measurements, zero where not finite, shape (n', c).
+    """
+    every = max(1, round(1.0 / (RATE_HZ * scene.step_s)))
+    n = len(needed) // every
+    thin = needed[: n * every].reshape(n, every, -1).mean(axis=1)
+    good = scene.usable[: n * every].reshape(n, every).all(axis=1) & np.isfinite(thin).all(axis=1)
+    dt = scene.step_s * every
+    m = max(8, round(LENGTH_S / dt))
+    x = (np.arange(m) + 0.5) / m
+    T = m * dt
+    sine, cosine = np.sin(pi * x), np.cos(pi * x)
+    weight = sine**4
+    scale = 1.0 / (weight.sum() * dt)
+    slope = 4.0 * sine**3 * cosine * (pi / T)
+    bend = (12.0 * sine**2 * cosine**2 - 4.0 * sine**4) * (pi / T) ** 2
+    until = np.concatenate([[0], np.cumsum(good)])
+    stride = max(1, round(STRIDE_S / dt))
+    starts = np.arange(0, n - m + 1, stride, dtype=np.int64)
+    starts = starts[until[starts + m] - until[starts] == m]
+    middle_s = scene.t[0] + (starts + 0.5 * m) * dt - 0.5 * scene.step_s
+    found = Spans(starts, middle_s, scale * weight, scale * slope, scale * bend, dt, stride)
+    return found, np.where(good[:, None], np.where(np.isfinite(thin), thin, 0.0), 0.0)

@@ -1,0 +1,48 @@
+"""Velocity scale: velocities measured in another unit, or by an instrument that reads too much or too little."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.kinematics import SCALE, kinematics
+from ferryid.effects.picture import Scene
+
+LEAST = 0.03
+NARROW = 0.25
+"""An interval that is wider than this share of its factor says nothing of units."""
+UNITS = {
+    1.0 / 0.514444: "knots read as m/s",
+    0.514444: "m/s read as knots",
+    3.6: "km/h read as m/s",
+    1.0 / 3.6: "m/s read as km/h",
+}
+"""Factors of mistaken units, measured over true."""
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return the factor, measured over true, where speed over ground is not what positions give."""
+    found = kinematics(scene)
+    if found is None or not found.found(SCALE, LEAST):
+        return None
+    factor = found.solution.estimate(SCALE, "-")
+    narrow = factor.high - factor.low < NARROW * factor.value
+    unit = [(value, text) for value, text in UNITS.items() if narrow and factor.low <= value <= factor.high]
+    right = unit[0][0] if unit else factor.value
+    scale = np.array([right, right, 1.0])
+
+    def correct(seen: Scene) -> Scene:
+        return replace(seen, nu_raw=seen.nu_raw / scale, nu=seen.nu / scale)
+
+    return SensorFinding(
+        "velocity_scale",
+        {"factor": factor},
+        f"The speed measured is {factor.value:.3f} times that of the positions{': ' + unit[0][1] if unit else ''}.",
+        correct,
+        found.evidence(SCALE),
+    )
+
+
+CHECK = Check("velocity_scale", "Position against integrated velocity", find, place=40)

@@ -1,0 +1,379 @@
+"""From a log to a diagnosis, in the order in which an expert would go about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import exp
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.diagnose.checks import examine
+from ferryid.diagnose.checks.check import SensorFinding
+from ferryid.diagnose.evidence import Evidence, FreeRuns, Improvement, evidence, force_errors, imagined
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, trial_of
+from ferryid.diagnose.locate import TELLS, Location, locate
+from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding, Rival, Withheld
+from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
+from ferryid.diagnose.search import NEAR, ODDS, Search, search, suspects_of
+from ferryid.diagnose.separate import manoeuvre
+from ferryid.diagnose.weak import Windows, windows
+from ferryid.effects.effect import Parameter
+from ferryid.effects.picture import Scene
+from ferryid.identify.model import Model
+from ferryid.vessel.profile import Profile
+
+FEWEST_WINDOWS = 60
+"""Windows below which nothing is tested."""
+UNSEEN = 0.5
+"""An effect whose parameters a log leaves as uncertain as this share of their usual size cannot be seen in it."""
+SHOWN_RIVALS = 3
+ONSET_DROP = 2.0
+"""Fall of the logarithm of the evidence at the ends of an onset's interval."""
+WITHHELD_EFFECTS = {"wind": "wind", "current": "current", "payload": "payload"}
+
+
+def diagnose(
+    logs: Sequence[str],
+    profile: Profile,
+    out: Path | None,
+    *,
+    model: Model | None = None,
+    withhold: Sequence[str] = (),
+    verify: bool = False,
+    progress: Callable[[str], None],
+) -> tuple[Diagnosis, ...]:
+    """Say of every log which physics the model left out, and what shows it.
+
+    Parameters
+    ----------
+    logs
+        Paths; parts of one recording joined by ``+``.
+    profile
+        The vessel.
+    out
+        Output folder, whose ``logs`` keep the ingested tables; None keeps none.
+    model
+        A fitted model to examine; the profile's hull where None.
+    withhold
+        Signals to hide from the diagnosis.
+    verify
+        Check every checksum.
+    progress
+        Called with the name of each stage.
+
+    Raises
+    ------
+    FerryIdError
+        For input that cannot be used.
+    """
+    return tuple(_one(path, profile, out, model, withhold, verify, progress) for path in logs)
+
+
+def _one(
+    path: str,
+    profile: Profile,
+    out: Path | None,
+    model: Model | None,
+    withhold: Sequence[str],
+    verify: bool,
+    progress: Callable[[str], None],
+) -> Diagnosis:
+    scene, survey = scene_of(path, profile, out, withhold=withhold, verify=verify, progress=progress)
+    progress("checking the sensors against each other")
+    sensors, scene = examine(scene)
+    seen = windows(scene, *window_lengths(profile))
+    name = survey.motion.log
+    notes = list(survey.doubts)
+    if len(seen.starts) < FEWEST_WINDOWS:
+        notes.append(
+            f"Only {len(seen.starts)} stretches of {window_lengths(profile)[0]:.0f} s without a gap: too little to tell. "
+            "Record at least ten minutes that excite every axis."
+        )
+        return Diagnosis(name, profile.name, "not_testable", _of_sensors(sensors), {}, {}, tuple(notes))
+    plain, spread = plain_picture(seen.scene, profile, model)
+    trial = trial_of(seen, plain, spread)
+    found = search(trial, progress)
+    trial, kept = found.trial, found.fit
+    progress("judging on held-out stretches")
+    proof = evidence(trial, kept) if kept.suspects else None
+    if proof is not None:
+        kept, proof, dropped = _proved(trial, kept, proof)
+        notes += dropped
+    base = fit(trial, ())
+    progress("locating")
+    left = locate(trial, kept, kept, scene)
+    findings = [*_of_sensors(sensors), *_findings(found, trial, base, kept, proof, scene)]
+    unseen = _unseen(trial, kept)
+    if model is None and not profile.hull.has_model:
+        notes.append(
+            "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
+            "stand in for what a hull model would explain. Take them as hints."
+        )
+    notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
+    if unseen:
+        notes.append(f"This log could not have shown, at their usual size: {', '.join(unseen)}.")
+    more = left.profiles[0].statistic >= TELLS if left.profiles else False
+    if more:
+        notes.append(f"Something is left over that nothing in the library explains: it shows most at {left.regime}.")
+    tested = len(suspects_of(seen.scene)[0])
+    verdict = _verdict(bool(findings), more, len(unseen), tested)
+    before, after = _scores(trial, base, kept, proof)
+    return Diagnosis(
+        name,
+        profile.name,
+        verdict,
+        tuple(findings),
+        before,
+        after,
+        tuple(notes),
+        evidence=_leftover(trial, base, kept),
+        withheld=_withheld(survey, scene, findings),
+    )
+
+
+def _verdict(found: bool, more: bool, unseen: int, tested: int) -> str:
+    if found:
+        return "partly_explained" if more else "explained"
+    if 2 * unseen > tested:
+        return "not_testable"
+    return "unexplained" if more else "matched"
+
+
+def _of_sensors(sensors: Sequence[SensorFinding]) -> tuple[Finding, ...]:
+    """Return what the checks found as findings: kinematics alone shows them, so that no force is improved."""
+    return tuple(
+        Finding(
+            effect=one.effect,
+            instance=None,
+            probability=1.0,
+            parameters=one.parameters,
+            axes=dict.fromkeys(AXES, 0.0),
+            intervals=(),
+            onset_s=None,
+            regime="",
+            improvement={},
+            held_out=False,
+            rivals=(),
+            unresolved_with=(),
+            separating_manoeuvre=None,
+            says=one.says,
+        )
+        for one in sensors
+    )
+
+
+def _proved(trial: Trial, kept: Fit, proof: Evidence) -> tuple[Fit, Evidence | None, list[str]]:
+    """Drop what does not help on held-out data, or no more than a placebo, and judge the rest again."""
+    told = []
+    holds = []
+    for one in proof.proofs:
+        if one.holds:
+            holds.append(one.suspect)
+        else:
+            told.append(
+                f"{one.suspect.effect.title} was suspected, but does not improve held-out stretches beyond what a placebo "
+                "does: it is no finding."
+            )
+    if not told:
+        return kept, proof, told
+    start = [values for suspect, values in zip(kept.suspects, kept.values, strict=True) if suspect in holds]
+    again = fit(trial, holds, start)
+    return again, evidence(trial, again) if holds else None, told
+
+
+def _findings(found: Search, trial: Trial, base: Fit, kept: Fit, proof: Evidence | None, scene: Scene) -> list[Finding]:
+    made = []
+    for i, suspect in enumerate(kept.suspects):
+        others = [j for j in range(len(kept.suspects)) if j != i]
+        rest = [kept.suspects[j] for j in others]
+        without = fit(trial, rest, [kept.values[j] for j in others])
+        rivals, probability = _rivals(trial, suspect, kept, rest, without)
+        unresolved = tuple(
+            dict.fromkeys(
+                rival.effect for rival in rivals if rival.delta_score > -NEAR and rival.effect != suspect.effect.id
+            )
+        )
+        place = locate(trial, without, kept, scene)
+        values = dict(zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True))
+        if suspect.effect.onset:
+            values["onset"] = suspect.onset_s
+        improved = None if proof is None else proof.proofs[i].improvement
+        made.append(
+            Finding(
+                effect=suspect.effect.id,
+                instance=suspect.instance,
+                probability=probability,
+                parameters=_estimates(trial, suspect, kept, i),
+                axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
+                intervals=_intervals(trial, suspect),
+                onset_s=suspect.onset_s if suspect.onset_s > 0.0 else None,
+                regime=place.regime,
+                improvement={} if improved is None else dict(zip(AXES, improved.removed.tolist(), strict=True)),
+                held_out=improved is not None,
+                rivals=rivals[:SHOWN_RIVALS],
+                unresolved_with=unresolved,
+                separating_manoeuvre=manoeuvre(suspect.effect.id, unresolved),
+                says=suspect.effect.says(values, suspect.instance),
+                **_figure(trial, without, kept, place),
+            )
+        )
+    return sorted(made, key=lambda one: -sum(one.improvement.values()))
+
+
+def _rivals(
+    trial: Trial, suspect: Suspect, kept: Fit, rest: Sequence[Suspect], without: Fit
+) -> tuple[tuple[Rival, ...], float]:
+    """Return what else could stand in a finding's place, the nearest first, and how probable the finding is."""
+    taken = {one.key for one in kept.suspects}
+    rivals = []
+    for other in suspects_of(trial.plain.scene)[0]:
+        if other.key in taken:
+            continue
+        neutral = np.array([parameter.neutral for parameter in other.parameters])
+        stand_in = Suspect(
+            other.effect, other.instance, other.parameters, suspect.onset_s if other.effect.onset else 0.0
+        )
+        made = fit(trial, [*rest, stand_in], [*without.values, neutral])
+        rivals.append(Rival(other.effect.id, other.instance, made.evidence - kept.evidence))
+    rivals.sort(key=lambda one: -one.delta_score)
+    none = without.evidence - kept.evidence + ODDS
+    against = exp(min(none, 50.0)) + sum(exp(min(one.delta_score, 50.0)) for one in rivals)
+    return tuple(rivals), 1.0 / (1.0 + against)
+
+
+def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[str, Estimate]:
+    error = kept.errors(index)
+    estimates = {}
+    for parameter, value, spread in zip(suspect.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
+        low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
+        estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
+    if suspect.onset_s > 0.0:
+        early, late = (_onset_end(trial, kept, index, side) for side in (-1.0, 1.0))
+        estimates["onset"] = Estimate(suspect.onset_s, early, late, "s")
+    return estimates
+
+
+def _onset_end(trial: Trial, kept: Fit, index: int, side: float) -> float:
+    """Return how far an onset can be moved to one side before the evidence falls: an idle thruster hides its fault."""
+    suspect = kept.suspects[index]
+    times = trial.windows.middle_s
+    onset = suspect.onset_s
+    step = 0.25 * len(trial.windows.weight) * trial.windows.scene.step_s
+    while True:
+        onset += side * step
+        if not times[0] < onset < times[-1]:
+            return float(np.clip(onset, times[0], times[-1]))
+        moved = [replace(one, onset_s=onset) if i == index else one for i, one in enumerate(kept.suspects)]
+        if fit(trial, moved, kept.values).evidence < kept.evidence - ONSET_DROP:
+            return onset
+
+
+def _intervals(trial: Trial, suspect: Suspect) -> tuple[tuple[float, float], ...]:
+    t = trial.windows.scene.t
+    return ((max(suspect.onset_s, float(t[0])), float(t[-1])),)
+
+
+def _figure(trial: Trial, without: Fit, kept: Fit, place: Location) -> dict[str, Any]:
+    """Return the columns of a finding's figure, on the axis that shows it best."""
+    axis = int(np.argmax(place.shares))
+    before, after = place.before[:, axis], place.after[:, axis]
+    columns = {"t": place.middle_s, "before": before, "after": after, "explained": before - after}
+    labels = {
+        "residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'} left over [{'N·m' if axis == 2 else 'N'}]"
+    }
+    windows_ = trial.windows
+    heading = np.degrees(np.mod(windows_.mean(windows_.scene.psi[:, None])[:, 0], 2.0 * np.pi))
+    return {
+        "evidence": {**columns, "regressor": heading},
+        "labels": {**labels, "regressor": "heading [deg]"},
+    }
+
+
+def _unseen(trial: Trial, kept: Fit) -> list[str]:
+    """Return the effects that would have stayed as uncertain as they were before the log, at their usual size."""
+    taken = {one.key for one in kept.suspects}
+    names = []
+    for suspect in suspects_of(trial.plain.scene)[0]:
+        if suspect.key in taken:
+            continue
+        usual = np.array([_usual(parameter) for parameter in suspect.parameters])
+        start = [*kept.values, usual]
+        made = fit(trial, [*kept.suspects, suspect], start, steps=0)
+        size = np.array([parameter.size for parameter in suspect.parameters])
+        if (made.errors(len(kept.suspects))[:1] > UNSEEN * size[:1]).any():
+            names.append(suspect.effect.title.lower() + (f" ({suspect.instance})" if suspect.instance else ""))
+    return names
+
+
+def _usual(parameter: Parameter) -> float:
+    return float(np.clip(parameter.neutral + parameter.size, parameter.low, parameter.high))
+
+
+def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple[dict[str, Any], dict[str, Any]]:
+    if proof is None:
+        errors = force_errors(trial.windows, imagined(trial.plain, base), trial.plain)
+        mse = dict(zip(AXES, np.mean(errors**2, axis=0).tolist(), strict=True))
+        return {"mse": mse, "rows": len(errors)}, {"mse": mse}
+    whole: Improvement = proof.whole
+    before: dict[str, Any] = {
+        "mse": dict(zip(AXES, whole.mse_before.tolist(), strict=True)),
+        "rows": len(whole.before),
+        "free_run": _free_run(proof.free_runs, proof.free_runs.before),
+    }
+    after: dict[str, Any] = {
+        "mse": dict(zip(AXES, whole.mse_after.tolist(), strict=True)),
+        "ratio": {
+            axis: {"value": 1.0 - float(removed), "low": 1.0 - float(high), "high": 1.0 - float(low)}
+            for axis, removed, low, high in zip(AXES, whole.removed, whole.low, whole.high, strict=True)
+        },
+        "free_run": _free_run(proof.free_runs, proof.free_runs.after),
+    }
+    return before, after
+
+
+def _free_run(runs: FreeRuns, errors: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, Any]:
+    if runs.starts == 0:
+        return {}
+    names = ("position_m", "heading_rad", "speed_mps", "yaw_rate_radps")
+    columns = {name: errors[:, k].tolist() for k, name in enumerate(names)}
+    return {"horizons_s": runs.horizons_s.tolist(), **columns, "starts": runs.starts, "note": ""}
+
+
+def _leftover(trial: Trial, base: Fit, kept: Fit) -> dict[str, Any]:
+    seen: Windows = trial.windows
+    psi = seen.mean(seen.scene.psi[:, None])[:, 0]
+    speed = seen.mean(np.hypot(seen.scene.nu[:, 0], seen.scene.nu[:, 1])[:, None])[:, 0]
+    return {
+        "t": seen.middle_s,
+        "before": force_errors(seen, imagined(trial.plain, base), trial.plain),
+        "after": force_errors(seen, imagined(trial.plain, kept), trial.plain),
+        "heading": np.degrees(np.mod(psi, 2.0 * np.pi)),
+        "speed": speed,
+    }
+
+
+def _withheld(survey: Survey, scene: Scene, findings: Sequence[Finding]) -> tuple[Withheld, ...]:
+    made = []
+    for signal, hidden in survey.hidden.items():
+        mean = np.nanmean(hidden[scene.usable], axis=0)
+        found = next((one for one in findings if one.effect == WITHHELD_EFFECTS.get(signal)), None)
+        names = ("mass", "x") if signal == "payload" else ("north", "east")
+        measured = dict(zip(names, mean.tolist(), strict=True))
+        shown = ", ".join(f"{name} {value:.2f}" for name, value in measured.items())
+        told = (
+            "nothing of it was found"
+            if found is None
+            else "found: " + ", ".join(f"{name} {found.parameters[name].value:.2f}" for name in names)
+        )
+        made.append(
+            Withheld(
+                signal,
+                {} if found is None else {name: found.parameters[name] for name in names},
+                measured,
+                f"{signal} was hidden; measured on average: {shown}; {told}.",
+            )
+        )
+    return tuple(made)

@@ -1,0 +1,211 @@
+"""One hypothesis: some effects at once, their parameters and the hull's fitted together, and the evidence for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.diagnose.noise import Noise, noise_of
+from ferryid.diagnose.weak import Windows
+from ferryid.effects.effect import Effect, Parameter
+from ferryid.effects.picture import Picture
+from ferryid.vessel.profile import Floats
+
+HULL_SPREAD = 0.12
+"""Standard deviation of what is believed of each of the hull's coefficients, as a share of it."""
+STEPS = 8
+TRUST = 4.0
+"""Longest Gauss-Newton step, in sizes of a parameter."""
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An effect in one instance, acting from `onset_s` on (0: all along)."""
+
+    effect: Effect
+    instance: str | None
+    parameters: tuple[Parameter, ...]
+    onset_s: float = 0.0
+
+    @property
+    def key(self) -> tuple[str, str | None]:
+        """Effect and instance."""
+        return self.effect.id, self.instance
+
+    def act(self, picture: Picture, p: Floats) -> Picture:
+        """Return the picture with the effect in it."""
+        after = self.effect.apply(picture, p, self.instance)
+        if self.onset_s <= 0.0:
+            return after
+        return _from(picture, after, picture.scene.t >= self.onset_s)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted hypothesis.
+
+    Attributes
+    ----------
+    suspects
+        What it holds responsible.
+    values
+        Parameters of each suspect, in its own units.
+    spread
+        Covariance of all of them together, in their own units, in the same order, shape (q, q).
+    hull
+        The hull's coefficients, shape (22,).
+    evidence
+        Logarithm of the evidence (Laplace) over that of a hypothesis whose parameters are all zero wide.
+    gaps
+        What it leaves of the gaps, shape (J, c).
+    """
+
+    suspects: tuple[Suspect, ...]
+    values: tuple[Floats, ...]
+    spread: Floats
+    hull: Floats
+    evidence: float
+    gaps: Floats
+
+    def errors(self, index: int) -> Floats:
+        """Return the standard deviations of one suspect's parameters."""
+        first = sum(len(values) for values in self.values[:index])
+        return np.sqrt(np.diag(self.spread)[first : first + len(self.values[index])])
+
+
+@dataclass(frozen=True)
+class Trial:
+    """All that hypotheses about one log share: windows, the picture without effects, and the noise."""
+
+    windows: Windows
+    plain: Picture
+    noise: Noise
+    hull_spread: Floats
+
+    @cached_property
+    def by_hull(self) -> Floats:
+        """Whitened derivatives of the gaps by each of the hull's coefficients, in their spreads; shape (w, 22)."""
+        base = self.windows.gap(self.plain)
+        columns = []
+        for k, spread in enumerate(self.hull_spread):
+            hull = self.plain.hull.copy()
+            hull[k] += 0.1 * spread
+            columns.append((self.windows.gap(replace(self.plain, hull=hull)) - base) / 0.1)
+        return self.noise.white(np.stack(columns, axis=-1), self.windows.runs)
+
+    def with_noise_of(self, gaps: Floats) -> Trial:
+        """Return the trial with the noise that these gaps have."""
+        return Trial(self.windows, self.plain, noise_of(gaps, self.windows.runs), self.hull_spread)
+
+
+def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | None = None, *, steps: int = STEPS) -> Fit:
+    """Fit a hypothesis by Gauss-Newton steps on the posterior.
+
+    Every parameter is believed to be about its neutral value, give or take its size, and the hull's coefficients to be
+    about the profile's; the scale of the forces is that of the thrust curves, which nothing here may change freely.
+
+    Parameters
+    ----------
+    trial
+        From `trial_of`.
+    suspects
+        Effects, in the order in which they act.
+    start
+        Parameters to begin with; the neutral ones where None.
+    steps
+        Most Gauss-Newton steps; with 0 the spread is that at the start.
+    """
+    every = [parameter for suspect in suspects for parameter in suspect.parameters]
+    size = np.array([parameter.size for parameter in every])
+    neutral = np.array([parameter.neutral for parameter in every])
+    low = (np.array([parameter.low for parameter in every]) - neutral) / size if every else np.empty(0)
+    high = (np.array([parameter.high for parameter in every]) - neutral) / size if every else np.empty(0)
+    cuts = np.cumsum([len(suspect.parameters) for suspect in suspects])[:-1].tolist()
+    q, h = len(every), len(trial.hull_spread)
+
+    def gaps(z: Floats) -> Floats:
+        picture = replace(trial.plain, hull=trial.plain.hull + trial.hull_spread * z[:h])
+        for suspect, p in zip(suspects, np.split(neutral + size * z[h:], cuts), strict=True) if every else ():
+            picture = suspect.act(picture, p)
+        return trial.windows.gap(picture)
+
+    def white(z: Floats) -> Floats:
+        return trial.noise.white(gaps(z), trial.windows.runs)
+
+    z = np.zeros(h + q)
+    if start is not None and every:
+        z[h:] = (np.concatenate(start) - neutral) / size
+    w = white(z)
+    cost = float(w @ w + z @ z)
+    A = np.eye(h + q)
+    for count in range(max(steps, 1)):
+        J = np.empty((len(w), h + q))
+        J[:, :h] = trial.by_hull
+        for k in range(q):
+            moved = z.copy()
+            d = 1e-2 if z[h + k] + 1e-2 <= high[k] else -1e-2
+            moved[h + k] += d
+            J[:, h + k] = (white(moved) - w) / d
+        A = J.T @ J + np.eye(h + q)
+        if count == steps:
+            break
+        step = -np.linalg.solve(A, J.T @ w + z)
+        step *= min(1.0, TRUST / max(float(np.abs(step).max()), 1e-12))
+        better = False
+        for share in (1.0, 0.5, 0.25, 0.1):
+            new = z + share * step
+            new[h:] = np.clip(new[h:], low, high)
+            w_new = white(new)
+            new_cost = float(w_new @ w_new + new @ new)
+            if new_cost < cost:
+                better = True
+                break
+        if not better:
+            break
+        gained = cost - new_cost
+        z, w, cost = new, w_new, new_cost
+        if gained < 1e-3:
+            break
+    covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
+    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1])
+    values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
+    hull = trial.plain.hull + trial.hull_spread * z[:h]
+    return Fit(tuple(suspects), values, covariance, hull, evidence, gaps(z))
+
+
+def trial_of(windows: Windows, plain: Picture, hull_spread: Floats) -> Trial:
+    """Return the trial with the noise that is left when the hull alone is refitted.
+
+    What an effect leaves in the gaps is in that noise too, until a hypothesis that holds takes it out: see
+    `ferryid.diagnose.search`.
+    """
+    trial = Trial(windows, plain, noise_of(windows.gap(plain), windows.runs), hull_spread)
+    for _ in range(2):
+        trial = trial.with_noise_of(fit(trial, ()).gaps)
+    return trial
+
+
+def _from(before: Picture, after: Picture, rows: NDArray[np.bool_]) -> Picture:
+    """Return the one picture before and the other from an onset on."""
+
+    def mixed(old: Floats, new: Floats) -> Floats:
+        return np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+
+    def either(old: Floats | None, new: Floats | None) -> Floats | None:
+        if old is None and new is None:
+            return None
+        blank = np.zeros_like(new if old is None else old)
+        return mixed(blank if old is None else old, blank if new is None else new)
+
+    return replace(
+        after,
+        parts=mixed(before.parts, after.parts),
+        angles=mixed(before.angles, after.angles),
+        external=mixed(before.external, after.external),
+        flow=either(before.flow, after.flow),
+        load=either(before.load, after.load),
+    )

@@ -1,0 +1,411 @@
+"""From a log to a scene, and from a profile or a model to the picture of the forces that it has in mind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.diagnose.hypothesis import HULL_SPREAD
+from ferryid.diagnose.velocity import steadied
+from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, acceleration, hull_of
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.estimate import Estimator, estimator
+from ferryid.identify.model import Model
+from ferryid.identify.residual import scaled
+from ferryid.signals.align import align
+from ferryid.signals.recording import Recording, data_quality, record
+from ferryid.signals.smooth import Measured, measure, moving_mean, odd_rows, smooth_measured
+from ferryid.signals.track import Motion, Track
+from ferryid.vessel import actuator_columns, applied_force
+from ferryid.vessel.hull import current_in_body
+from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.wind import wind_force
+
+Flags = NDArray[np.bool_]
+
+WITHHELD = {
+    "wind": ("wind_N", "wind_E"),
+    "current": ("current_N", "current_E"),
+    "payload": ("payload_kg", "payload_x"),
+}
+"""What may be kept from the diagnosis, to be compared with what it finds, and the columns of it."""
+WINDOW_S, WINDOW_LENGTH_M = 8.0, 5.0
+"""Length of the weak form's windows for a vessel of this length; slower for longer ones, by Froude's law of time."""
+STRIDES = 4
+_POSITION_SHARE = 0.8
+_WATER = 1000.0
+_BLOCK = 0.7
+"""Usual part of the box around a hull that it fills."""
+_MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {
+    "X_u": (("u", 0),),
+    "X_|u|u": (("|u|u", 0), ("sgn(u)u^2", 0)),
+    "X_uuu": (("u^3", 0),),
+    "Y_v": (("v", 1),),
+    "Y_|v|v": (("|v|v", 1), ("sgn(v)v^2", 1)),
+    "Y_|r|v": (("|r|v", 1),),
+    "Y_vvv": (("v^3", 1),),
+    "Y_r": (("r", 1),),
+    "Y_|v|r": (("|v|r", 1),),
+    "Y_|r|r": (("|r|r", 1), ("sgn(r)r^2", 1)),
+    "N_v": (("v", 2),),
+    "N_|v|v": (("|v|v", 2), ("sgn(v)v^2", 2)),
+    "N_|r|v": (("|r|v", 2),),
+    "N_r": (("r", 2),),
+    "N_|v|r": (("|v|r", 2),),
+    "N_|r|r": (("|r|r", 2), ("sgn(r)r^2", 2)),
+    "N_rrr": (("r^3", 2),),
+    "m11": (("u_dot", 0),),
+    "m22": (("v_dot", 1),),
+    "m23": (("r_dot", 1),),
+    "m32": (("v_dot", 2),),
+    "m33": (("r_dot", 2),),
+}
+"""The terms of a fitted model, with their axes, that stand for each of the hull's coefficients."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What is known of a log besides its scene.
+
+    Attributes
+    ----------
+    recording
+        The log's signals.
+    motion
+        Smoothed as for a fit: for free runs and figures.
+    quality, doubts
+        As in `ferryid.signals.prepare.Prepared`; here no doubt stops anything.
+    hidden
+        What was withheld, by name: shape (n, 2), NaN where it was not measured.
+    t0_ns
+        Absolute time of the scene's first row [ns].
+    """
+
+    recording: Recording
+    motion: Motion
+    quality: Mapping[str, Any]
+    doubts: tuple[str, ...]
+    hidden: Mapping[str, Floats]
+    t0_ns: int
+
+
+def quiet(_stage: str) -> None:
+    """Show no progress."""
+
+
+def scene_of(
+    path: str,
+    profile: Profile,
+    out: Path | None,
+    *,
+    withhold: Sequence[str] = (),
+    window_s: float = 1.0,
+    verify: bool = False,
+    progress: Callable[[str], None] = quiet,
+) -> tuple[Scene, Survey]:
+    """Return the scene that a log shows, and what else is known of the log.
+
+    Positions, heading and `nu_raw` are as measured; `nu`, wind and current pass through a moving mean, as they enter
+    products. Across gaps all signals are bridged so that filters can run on, but no row there is `usable`.
+
+    Parameters
+    ----------
+    path
+        A file or folder; parts of one recording joined by ``+``.
+    profile
+        The vessel.
+    out
+        Output folder, whose ``logs`` keep the ingested tables; None keeps none.
+    withhold
+        Signals to hide, of `WITHHELD`.
+    window_s
+        Moving mean [s].
+    verify
+        Check every checksum.
+    progress
+        Called with the name of each stage.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be used, one without actuators or heading, and a signal to withhold that it does not have.
+    """
+    _check_withheld(withhold)
+    if not profile.actuators:
+        raise FerryIdError(
+            f"{profile.path}: a diagnosis weighs motion against the actuators' force, found no actuator in the profile. "
+            "Fix: describe them in [[actuator]] and map their signals"
+        )
+    progress(f"reading {Path(path).name}")
+    recording = record(path, profile, out, verify=verify)
+    track = align(recording, profile)
+    track, hidden = _without(track, withhold)
+    measured = measure(track, profile)
+    motion = smooth_measured(measured, window_s)
+    scene = _scene(track, measured, profile, window_s)
+    doubts = tuple(doubt.says for doubt in track.doubts)
+    survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns)
+    return scene, survey
+
+
+def window_lengths(profile: Profile) -> tuple[float, float]:
+    """Return length and stride [s] of the weak form's windows for a vessel."""
+    length_s = WINDOW_S * sqrt(_dimensions(profile)[0] / WINDOW_LENGTH_M)
+    return length_s, length_s / STRIDES
+
+
+def plain_picture(scene: Scene, profile: Profile, model: Model | None = None) -> tuple[Picture, Floats]:
+    """Return the picture before any effect, and how far each of its hull's coefficients is believed to be off.
+
+    The air is still where no wind was measured, and the water too. A model's coefficients of acceleration and damping
+    become the hull's; all the rest of it, such as its own Coriolis terms, wind terms and intercept, is an external force, so
+    that the picture's force at the measured motion is the model's.
+
+    Parameters
+    ----------
+    scene
+        From `scene_of`.
+    profile
+        The vessel.
+    model
+        A fitted model to start from; the profile's hull where None.
+
+    Returns
+    -------
+    Picture
+        Without effects.
+    ndarray
+        Standard deviations, shape (22,), in the units of the coefficients: `HULL_SPREAD` of each where a hull model is
+        known (with the model's own intervals added), and what a vessel of this size may have at most where it is not.
+
+    Raises
+    ------
+    FerryIdError
+        For a model of another vessel, or one whose inertia couples surge to sway and yaw.
+    """
+    load = None
+    if scene.payload is not None:
+        mass, place = scene.payload.T
+        load = np.column_stack([mass, mass * place, mass * place**2])
+    bare = Picture(scene, hull_of(profile), scene.parts, scene.angles, np.zeros((len(scene.t), 3)), scene.current, load)
+    if model is not None:
+        return _modelled(bare, profile, model)
+    air = np.zeros((len(scene.t), 2)) if scene.wind is None else scene.wind
+    external = bare.external if profile.wind is None else wind_force(profile.wind, air, scene.psi, scene.nu)
+    spread = HULL_SPREAD * np.abs(bare.hull) if profile.hull.has_model else broad_spread(scene, profile)
+    return replace(bare, external=external), spread
+
+
+def broad_spread(scene: Scene, profile: Profile) -> Floats:
+    """Return how large the hull's coefficients may be for a vessel of this size and speed, shape (22,).
+
+    Added mass of a half-immersed cylinder of the hull's draught, cross-flow drag with a coefficient of 1 along the hull, lift
+    and friction in proportion to the usual speed; Faltinsen (1990), chapters 3 and 6; Fossen (2021), chapter 6.
+    """
+    length, beam, draught = _dimensions(profile)
+    hull = profile.hull
+    speed = float(np.quantile(np.hypot(scene.nu[scene.usable, 0], scene.nu[scene.usable, 1]), 0.9))
+    usual = max(speed, 0.1 * sqrt(9.81 * length) * 0.5)
+    turning = usual / length
+    time_s = 20.0 * sqrt(length / WINDOW_LENGTH_M)
+    plate = 0.5 * _WATER * length * draught
+    cylinder = 0.5 * np.pi * _WATER * draught**2 * length
+    m11 = 0.3 * hull.mass_kg
+    m22 = max(0.5 * hull.mass_kg, cylinder)
+    m33 = max(0.5 * hull.inertia_z, cylinder * length**2 / 12.0)
+    m23 = 0.05 * hull.mass_kg * length
+    second = {
+        "X_|u|u": 0.15 * _WATER * beam * draught,
+        "Y_|v|v": plate,
+        "Y_|r|v": plate * length / 4.0,
+        "Y_|v|r": plate * length / 4.0,
+        "Y_|r|r": plate * length**2 / 24.0,
+        "N_|v|v": plate * length / 8.0,
+        "N_|r|v": plate * length**2 / 12.0,
+        "N_|v|r": plate * length**2 / 12.0,
+        "N_|r|r": plate * length**3 / 32.0,
+    }
+    lift = 0.4 * plate * usual
+    first = {
+        "X_u": hull.mass_kg / time_s,
+        "Y_v": max(hull.mass_kg / time_s, lift),
+        "Y_r": max(hull.mass_kg * 0.1 * length / time_s, 0.5 * lift * length),
+        "N_v": max(hull.mass_kg * 0.1 * length / time_s, 0.5 * lift * length),
+        "N_r": max(hull.inertia_z / time_s, 0.25 * lift * length**2),
+    }
+    third = {
+        "X_uuu": second["X_|u|u"] / usual,
+        "Y_vvv": second["Y_|v|v"] / usual,
+        "N_rrr": second["N_|r|r"] / turning,
+    }
+    every = {"m11": m11, "m22": m22, "m23": m23, "m32": m23, "m33": m33, **first, **second, **third}
+    return np.array([every[name] for name in COEFFICIENTS])
+
+
+def _modelled(bare: Picture, profile: Profile, model: Model) -> tuple[Picture, Floats]:
+    force = estimator(model)
+    _check_model(force, profile, model)
+    hull, spread = _hull_of_model(force, model)
+    if not force.profile.hull.has_model:
+        # What the base does not know, the fit had to learn; terms that it left out may be anything.
+        spread = np.where(hull == 0.0, broad_spread(bare.scene, profile), spread)
+    scene, functions = bare.scene, force.basis
+    still = np.zeros((len(scene.t), 2))
+    wind, current = scene.wind, scene.current
+    if wind is None and functions is not None and functions.needs_wind:
+        wind = still
+    if current is None and functions is not None and functions.needs_current:
+        current = still
+    at_rest = np.zeros_like(scene.nu)
+    needed = force(at_rest, scene.nu, scene.psi, wind, current)
+    # What the picture's own hull needs for the same motion: its acceleration without any force, times its mass.
+    alone = replace(bare, hull=hull, parts=np.zeros_like(bare.parts), load=None)
+    external = -needed - acceleration(alone) @ _mass(hull).T
+    return replace(bare, hull=hull, external=external), spread
+
+
+def _check_model(force: Estimator, profile: Profile, model: Model) -> None:
+    if force.profile.name != profile.name:
+        raise FerryIdError(
+            f"{model.name}@{model.version}: a model of {force.profile.name} says nothing about {profile.name}. "
+            "Fix: give a model and logs of one vessel"
+        )
+    cross = [
+        (term, axis)
+        for axes in (("u_dot", 1), ("u_dot", 2), ("v_dot", 0), ("r_dot", 0))
+        for term, axis in (axes,)
+        if term in model.terms and model.theta[model.terms.index(term), axis] != 0.0
+    ]
+    if cross:
+        told = ", ".join(f"{term} in {('surge', 'sway', 'yaw')[axis]}" for term, axis in cross)
+        raise FerryIdError(
+            f"{model.name}@{model.version}: a diagnosis needs a mass matrix that keeps surge apart from sway and yaw, found "
+            f"coefficients of {told}. Fix: fit the model with --structure decoupled"
+        )
+
+
+def _hull_of_model(force: Estimator, model: Model) -> tuple[Floats, Floats]:
+    zeta = float(model.scale.get("zeta", 1.0))
+    hull = hull_of(replace(force.profile, hull=scaled(force.profile.hull, model.scale))) / zeta
+    variance = np.zeros_like(hull)
+    for index, name in enumerate(COEFFICIENTS):
+        picked = [(model.terms.index(term), axis) for term, axis in _MAPPED[name] if term in model.terms]
+        if not picked:
+            continue
+        rows, axis = np.array([row for row, _ in picked]), picked[0][1]
+        # Mass takes force to accelerate; a SNAME coefficient gives the force that the water exerts.
+        hull[index] += (1.0 if name.startswith("m") else -1.0) * float(model.theta[rows, axis].sum())
+        variance[index] = float(model.covariance[axis][np.ix_(rows, rows)].sum())
+    return hull, np.sqrt((HULL_SPREAD * hull) ** 2 + np.maximum(variance, 0.0))
+
+
+def _mass(hull: Floats) -> Floats:
+    m11, m22, m23, m32, m33 = hull[:5]
+    return np.array([[m11, 0.0, 0.0], [0.0, m22, m23], [0.0, m32, m33]])
+
+
+def _dimensions(profile: Profile) -> tuple[float, float, float]:
+    """Return length, beam and draught [m], from mass and inertia where the profile does not state them."""
+    hull = profile.hull
+    # The radius of gyration is about a quarter of the length.
+    length = hull.length_m if isfinite(hull.length_m) else 4.0 * sqrt(hull.inertia_z / hull.mass_kg)
+    beam = hull.beam_m if isfinite(hull.beam_m) else 0.4 * length
+    draught = hull.draught_m if isfinite(hull.draught_m) else hull.mass_kg / (_BLOCK * _WATER * length * beam)
+    return length, beam, draught
+
+
+def _check_withheld(withhold: Collection[str]) -> None:
+    for name in withhold:
+        if name not in WITHHELD:
+            raise FerryIdError(
+                f'--withhold: "{name}" is not a signal that can be withheld.{did_you_mean(name, WITHHELD)} '
+                f"Fix: choose one of {', '.join(WITHHELD)}"
+            )
+
+
+def _without(track: Track, withhold: Sequence[str]) -> tuple[Track, dict[str, Floats]]:
+    columns, hidden = dict(track.columns), {}
+    for name in withhold:
+        pair = [columns.pop(column, None) for column in WITHHELD[name]]
+        first, second = pair
+        if first is None or second is None or not np.any(np.isfinite(first + second)):
+            raise FerryIdError(
+                f"{track.log}: the {name} cannot be withheld, found none in the log. Fix: leave out --withhold {name}"
+            )
+        hidden[name] = np.column_stack([first, second])
+    return replace(track, columns=columns), hidden
+
+
+def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) -> Scene:
+    rows = odd_rows(window_s, track.rate_hz)
+    usable = measured.usable & np.isfinite(measured.eta[:, 2])
+    if not usable.any():
+        raise FerryIdError(
+            f"{track.log}: a diagnosis needs the heading, to tell the world's forces from the vessel's, found none while "
+            "velocities and actuators were measured. Fix: map [signals.heading] in the profile, or use a log that has it"
+        )
+    eta = measured.eta
+    placed: Flags = np.asarray(np.isfinite(eta[:, :2]).all(axis=1))
+    if float(np.mean(placed[usable])) >= _POSITION_SHARE:
+        usable &= placed
+    else:
+        eta = np.column_stack([np.full((len(eta), 2), np.nan), eta[:, 2]])
+    current = None if measured.current is None else _bridged(measured.current, usable)
+    eta = np.column_stack([_bridged(column[:, None], usable) for column in eta.T])
+    through_water = (
+        measured.nu if measured.current is None else measured.nu - current_in_body(measured.current, eta[:, 2])
+    )
+    columns = track.columns
+    chosen, _ = actuator_columns(profile, columns)
+    parts, angles = [], []
+    for actuator in profile.actuators:
+        alone = replace(profile, actuators=(actuator,))
+        parts.append(_bridged(applied_force(alone, columns, through_water)[0], usable))
+        if actuator.kind == "azimuth":
+            angle = columns[chosen[actuator.name, "angle"]]
+            angles.append(_bridged(angle[:, None], usable)[:, 0])
+        else:
+            angles.append(np.full(len(track.t), np.nan))
+    nu_raw = _bridged(measured.nu, usable)
+    return Scene(
+        profile=profile,
+        t=measured.t,
+        eta=eta,
+        nu_raw=nu_raw,
+        nu=steadied(_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
+        parts=np.stack(parts, axis=1),
+        angles=np.column_stack(angles),
+        usable=usable,
+        wind=None if measured.wind is None else _mean(_bridged(measured.wind, usable), rows),
+        current=None if current is None else _mean(current, rows),
+        payload=None if measured.payload is None else _bridged(measured.payload, usable, held=True),
+    )
+
+
+def _bridged(values: Floats, usable: Flags, *, held: bool = False) -> Floats:
+    """Return values with NaN replaced by what lies between, or was last, on usable rows; all NaN stays so."""
+    result = values.copy()
+    rows = np.arange(len(values))
+    for column in result.T:
+        missing = ~np.isfinite(column)
+        known = np.flatnonzero(usable & ~missing)
+        if not missing.any() or known.size == 0:
+            continue
+        if held:
+            column[missing] = column[known[np.maximum(np.searchsorted(known, rows[missing]) - 1, 0)]]
+        else:
+            column[missing] = np.interp(rows[missing], known, column[known])
+    return result
+
+
+def _mean(values: Floats, rows: int) -> Floats:
+    """Return the moving mean with the ends carried on, so that no row is lost."""
+    half = rows // 2
+    padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
+    return np.ascontiguousarray(moving_mean(padded, rows)[half : half + len(values)])

@@ -1,0 +1,179 @@
+"""Which effects a log speaks for: selection by evidence, one after the other, with every rival kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import exp, log
+
+import numpy as np
+
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit
+from ferryid.effects import effects
+from ferryid.effects.picture import Scene
+from ferryid.vessel.profile import Floats
+
+ODDS = 8.0
+"""Logarithm of the evidence that an effect must show over none before it is as likely as none."""
+NEAR = 3.0
+"""Rivals whose evidence is less than this behind are not told apart."""
+MOST = 4
+"""Effects looked for at once."""
+ONSETS = 12
+"""Onsets tried at first, evenly over the log; then ever finer around the best."""
+VOID = 0.02
+"""An effect whose acceleration is less than this share of the measured one, by every channel's root mean square, is void."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A suspect with its fit beside what is selected already, and its evidence over that."""
+
+    suspect: Suspect
+    fit: Fit
+    gain: float
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of selection: every candidate, the best first, and the probability of each."""
+
+    candidates: tuple[Candidate, ...]
+    probabilities: tuple[float, ...]
+    none: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """What the log speaks for.
+
+    Attributes
+    ----------
+    trial
+        With the noise that the selected effects leave.
+    base, fit
+        Fits without and with the selected effects.
+    rounds
+        One per selected effect, and the last, in which none was good enough.
+    untested
+        Effect (and instance) to why it could not be tested.
+    """
+
+    trial: Trial
+    base: Fit
+    fit: Fit
+    rounds: tuple[Round, ...]
+    untested: dict[str, str]
+
+
+def suspects_of(scene: Scene) -> tuple[list[Suspect], dict[str, str]]:
+    """Return every effect that the scene can show, and why it cannot show the others."""
+    suspects, untested = [], {}
+    for effect in effects().values():
+        reason = effect.cannot(scene)
+        if reason:
+            untested[effect.id] = reason
+            continue
+        parameters = effect.parameters_of(scene.profile)
+        suspects += [Suspect(effect, instance, parameters) for instance in effect.instances(scene.profile)]
+    return suspects, untested
+
+
+def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Suspect] | None = None) -> Search:
+    """Select effects as long as one is more likely than none, then drop those that the others have made idle.
+
+    Parameters
+    ----------
+    trial
+        From `ferryid.diagnose.hypothesis.trial_of`.
+    progress
+        Called with the name of each stage.
+    known
+        The suspects; the whole library where None.
+    """
+    suspects, untested = suspects_of(trial.plain.scene)
+    if known is not None:
+        suspects = list(known)
+    chosen = base = fit(trial, ())
+    rounds: list[Round] = []
+    while True:
+        progress(f"weighing {len(suspects)} hypotheses beside {len(chosen.suspects) or 'none'} found")
+        current = fit(trial, chosen.suspects, chosen.values)
+        tried = [_best(trial, current, suspect) for suspect in suspects]
+        found = sorted(tried, key=lambda candidate: -candidate.gain)
+        done = _round(found)
+        rounds.append(done)
+        taken = {suspect.key for suspect in chosen.suspects}
+        good = [one for one in found[:1] if done.none < 0.5 and one.suspect.key not in taken]
+        if not good or len(chosen.suspects) == MOST or _void(trial, good[0].fit):
+            break
+        chosen = good[0].fit
+        trial = trial.with_noise_of(chosen.gaps)
+        chosen = fit(trial, chosen.suspects, chosen.values)
+        suspects = [suspect for suspect in suspects if suspect.key != good[0].suspect.key]
+    chosen = _pruned(trial, chosen)
+    return Search(trial, fit(trial, ()) if chosen.suspects else base, chosen, tuple(rounds), untested)
+
+
+def _best(trial: Trial, current: Fit, suspect: Suspect) -> Candidate:
+    """Return a suspect's best fit beside the current ones, over all onsets where it can have one."""
+
+    def tried(one: Suspect, values: Floats | None = None) -> Candidate:
+        neutral = np.array([parameter.neutral for parameter in one.parameters])
+        start = (*current.values, neutral if values is None else values)
+        made = fit(trial, (*current.suspects, one), start)
+        penalty = 0.0 if one.onset_s <= 0.0 else log(len(trial.windows.starts))
+        return Candidate(one, made, made.evidence - current.evidence - penalty)
+
+    best = tried(suspect)
+    if not suspect.effect.onset:
+        return best
+    times = trial.windows.middle_s
+    first, last = float(times[0]), float(times[-1])
+    step = (last - first) / (ONSETS + 1)
+    for onset in first + step * np.arange(1, ONSETS + 1):
+        best = max(best, tried(replace(suspect, onset_s=float(onset))), key=lambda one: one.gain)
+    if best.suspect.onset_s <= 0.0 or best.gain < 0.5 * ODDS:
+        return best
+    while step > 1.0:
+        step *= 0.5
+        middle = best.suspect.onset_s
+        for onset in (middle - step, middle + step):
+            if first < onset < last:
+                moved = tried(replace(suspect, onset_s=onset), best.fit.values[-1])
+                best = max(best, moved, key=lambda one: one.gain)
+    return best
+
+
+def _round(found: Sequence[Candidate]) -> Round:
+    top = max([ODDS, *(one.gain for one in found)])
+    weights = [exp(one.gain - top) for one in found]
+    none = exp(ODDS - top)
+    total = sum(weights) + none
+    return Round(tuple(found), tuple(weight / total for weight in weights), none / total)
+
+
+def _void(trial: Trial, made: Fit) -> bool:
+    """Tell whether the last effect of a fit moves the vessel too little to matter to anybody."""
+    seen = trial.windows
+    hull = replace(trial.plain, hull=made.hull)
+    for suspect, values in zip(made.suspects[:-1], made.values[:-1], strict=True):
+        hull = suspect.act(hull, values)
+    moved = seen.gap(made.suspects[-1].act(hull, made.values[-1])) - seen.gap(hull)
+    size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
+    return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
+
+
+def _pruned(trial: Trial, chosen: Fit) -> Fit:
+    """Drop one by one what the others explain as well without it."""
+    while len(chosen.suspects) > 1:
+        without = []
+        for i in range(len(chosen.suspects)):
+            rest = [j for j in range(len(chosen.suspects)) if j != i]
+            start = [chosen.values[j] for j in rest]
+            without.append(fit(trial, [chosen.suspects[j] for j in rest], start))
+        best = max(without, key=lambda one: one.evidence)
+        if chosen.evidence - best.evidence >= ODDS:
+            break
+        chosen = best
+    return chosen

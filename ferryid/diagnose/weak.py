@@ -1,0 +1,157 @@
+"""The weak form: equations of motion averaged over windows, so that no noisy signal is ever differentiated.
+
+A window's weight w and its first derivatives vanish at both ends, so that integration by parts moves every derivative
+onto w: ``∫ w p'' = ∫ w'' p`` for a position, ``∫ w nu' = -∫ w' nu`` for a velocity. Either is compared with the
+acceleration that a picture of the forces gives, averaged with the same weight. Where positions were measured they alone
+are used: what they leave is free of the closed loop's bias, and steadier over the seconds in which forces act.
+
+References
+----------
+Shinbrot (1957); Messenger and Bortz (2021), Weak SINDy, for the choice of test functions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.effects.picture import Picture, Scene, acceleration
+from ferryid.vessel.profile import Floats
+
+CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
+"""Where the measured acceleration comes from: second derivative of the first three, first of the others."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows of a scene.
+
+    Attributes
+    ----------
+    scene
+        What was measured, at the rate of the forces.
+    starts
+        First row of every window, shape (J,); every window lies in measured data.
+    runs
+        Windows of an unbroken series, as (first, end) of `starts`.
+    weight
+        w [1/s] on the rows of a window, shape (m,).
+    measured
+        Measured accelerations in the order of `CHANNELS`, shape (J, 6).
+    channels
+        Which of them are used: those of position and heading, or the others where there is no position, shape (6,).
+    """
+
+    scene: Scene
+    starts: NDArray[np.int64]
+    runs: tuple[tuple[int, int], ...]
+    weight: Floats
+    measured: Floats
+    channels: NDArray[np.bool_]
+
+    @property
+    def middle_s(self) -> Floats:
+        """Time of the middle of every window [s], shape (J,)."""
+        return self.scene.t[self.starts] + 0.5 * (len(self.weight) - 1) * self.scene.step_s
+
+    def mean(self, values: Floats) -> Floats:
+        """Return ``∫ w f dt`` in every window, shape (J,) or (J, c), of values with n rows."""
+        return _means(values, self.weight, self.starts, self.scene.step_s)
+
+    def gap(self, picture: Picture) -> Floats:
+        """Return the picture's acceleration less the measured one in every window, shape (J, channels)."""
+        scene = self.scene
+        rates = acceleration(picture)
+        u, v, r = scene.nu.T
+        c, s = np.cos(scene.psi), np.sin(scene.psi)
+        ahead, across = rates[:, 0] - r * v, rates[:, 1] + r * u
+        north, east = c * ahead - s * across, s * ahead + c * across
+        all_six = np.column_stack([north, east, rates[:, 2], rates])
+        return (self.mean(all_six) - self.measured)[:, self.channels]
+
+
+FORCES_HZ = 5.0
+"""Rate at which forces are averaged over windows; they change slowly against it, and hypotheses cost a quarter."""
+
+
+def windows(scene: Scene, length_s: float, stride_s: float) -> Windows:
+    """Return windows of `length_s` every `stride_s` seconds, as many as lie wholly in measured data.
+
+    The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full
+    rate, and the scene for the forces is thinned to `FORCES_HZ`.
+    """
+    every = max(1, round(1.0 / (FORCES_HZ * scene.step_s)))
+    thin = _thinned(scene, every)
+    m = max(8, round(length_s / thin.step_s))
+    stride = max(1, round(stride_s / thin.step_s))
+    starts: list[int] = []
+    runs: list[tuple[int, int]] = []
+    for first, end in _stretches(thin.usable):
+        before = len(starts)
+        starts += range(first, end - m + 1, stride)
+        if len(starts) > before:
+            runs.append((before, len(starts)))
+    rows = np.array(starts, dtype=np.int64)
+    known = bool(np.isfinite(scene.eta[scene.usable, :2]).all())
+    # A controller answers the errors of the velocity with thrust within a window, so that they and the force belong
+    # together and a delay is seen where none is; those of the position are shorter and hardly felt.
+    channels = np.repeat([known, not known], 3)
+    eta = np.where(np.isfinite(scene.eta), scene.eta, 0.0)
+    nu = np.where(np.isfinite(scene.nu_raw), scene.nu_raw, 0.0)
+    _, slope, bend = _weights(m * every, scene.step_s)
+    measured = np.hstack(
+        [_means(eta, bend, rows * every, scene.step_s), -_means(nu, slope, rows * every, scene.step_s)]
+    )
+    return Windows(thin, rows, tuple(runs), _weights(m, thin.step_s)[0], measured, channels)
+
+
+def _weights(m: int, step_s: float) -> tuple[Floats, Floats, Floats]:
+    """Return w, w' and w'' in the middle of m rows that share a window evenly, shape (m,) each."""
+    x = (np.arange(m) + 0.5) / m
+    T = m * step_s
+    sine, cosine = np.sin(pi * x), np.cos(pi * x)
+    weight = sine**4
+    scale = 1.0 / (weight.sum() * step_s)
+    slope = 4.0 * sine**3 * cosine * (pi / T)
+    bend = (12.0 * sine**2 * cosine**2 - 4.0 * sine**4) * (pi / T) ** 2
+    return scale * weight, scale * slope, scale * bend
+
+
+def _means(values: Floats, weight: Floats, starts: NDArray[np.int64], step_s: float) -> Floats:
+    view = np.lib.stride_tricks.sliding_window_view(values, len(weight), axis=0)[starts]
+    return np.asarray(view @ weight) * step_s
+
+
+def _thinned(scene: Scene, every: int) -> Scene:
+    """Return the scene with every so many rows replaced by their mean; a row is usable where all of them are."""
+    if every == 1:
+        return scene
+    n = len(scene.t) // every
+
+    def mean(values: Floats) -> Floats:
+        return np.asarray(values[: n * every].reshape(n, every, *values.shape[1:]).mean(axis=1))
+
+    def some(values: Floats | None) -> Floats | None:
+        return None if values is None else mean(values)
+
+    return replace(
+        scene,
+        t=mean(scene.t),
+        eta=mean(scene.eta),
+        nu_raw=mean(scene.nu_raw),
+        nu=mean(scene.nu),
+        parts=mean(scene.parts),
+        angles=mean(scene.angles),
+        usable=np.asarray(scene.usable[: n * every].reshape(n, every).all(axis=1)),
+        wind=some(scene.wind),
+        current=some(scene.current),
+        payload=some(scene.payload),
+    )
+
+
+def _stretches(usable: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], usable, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

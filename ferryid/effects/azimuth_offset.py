@@ -1,0 +1,52 @@
+"""Azimuth offset: one thruster points elsewhere than its encoder says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import radians
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return how far the true angle is ahead of the measured one, clockwise from above."""
+    return (Parameter("angle", "deg", 6.0, -60.0, 60.0),)
+
+
+def instances(profile: Profile) -> tuple[str | None, ...]:
+    """Return the azimuth thrusters."""
+    return tuple(actuator.name for actuator in profile.actuators if actuator.kind == "azimuth")
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Turn the force of the thruster."""
+    k = picture.scene.names.index(str(instance))
+    x, y = picture.scene.profile.actuators[k].position_m
+    c, s = np.cos(radians(p[0])), np.sin(radians(p[0]))
+    parts, angles = picture.parts.copy(), picture.angles.copy()
+    X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
+    parts[:, k, 0], parts[:, k, 1] = c * X - s * Y, s * X + c * Y
+    parts[:, k, 2] = x * parts[:, k, 1] - y * parts[:, k, 0]
+    angles[:, k] += radians(p[0])
+    return replace(picture, parts=parts, angles=angles)
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    side = "clockwise" if values["angle"] > 0.0 else "counterclockwise"
+    return f"{instance} points {abs(values['angle']):.1f} deg further {side} than its encoder says."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's fault."""
+    return {"thrusters": {"faults": [{"thruster": instance, "offset_deg": values["angle"]}]}}
+
+
+EFFECT = Effect(
+    "azimuth_offset", "Azimuth offset", parameters_of, apply, says, scenario, instances=instances, vessel=True
+)

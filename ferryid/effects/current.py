@@ -1,0 +1,44 @@
+"""Current: water that moves steadily over ground, felt through the relative velocity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import atan2, degrees, hypot
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture, Scene
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return the current's components, where the water goes to."""
+    return (Parameter("north", "m/s", 0.2, -3.0, 3.0), Parameter("east", "m/s", 0.2, -3.0, 3.0))
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Let the water move."""
+    flow = np.broadcast_to(p, (len(picture.scene.t), 2))
+    return replace(picture, flow=flow if picture.flow is None else picture.flow + flow)
+
+
+def cannot(scene: Scene) -> str:
+    """Say why the scene cannot show a current."""
+    return "the current was measured and is part of the model" if scene.current is not None else ""
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    north, east = values["north"], values["east"]
+    towards = degrees(atan2(east, north)) % 360.0
+    return f"A current of {hypot(north, east):.2f} m/s towards {towards:.0f} deg was left out."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's current."""
+    return {"environment": {"current": {"north_mps": values["north"], "east_mps": values["east"]}}}
+
+
+EFFECT = Effect("current", "Current", parameters_of, apply, says, scenario, cannot=cannot)

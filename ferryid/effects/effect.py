@@ -1,0 +1,68 @@
+"""What an effect is: parameters, how it changes the picture of the forces, and how a simulated trial shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ferryid.effects.picture import Picture, Scene
+from ferryid.vessel.profile import Floats, Profile
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    `size` is what a parameter of moderate size is, in `unit`: the standard deviation of what is believed of it before a log is
+    seen. `low` and `high` are the ends of what is possible. `neutral` changes nothing.
+    """
+
+    name: str
+    unit: str
+    size: float
+    low: float
+    high: float
+    neutral: float = 0.0
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Physics that a model may have left out.
+
+    Attributes
+    ----------
+    id, title
+        Name in results, and for people.
+    parameters
+        Scales and limits; those that depend on the vessel come from ``parameters_of``.
+    parameters_of
+        Parameters for a vessel.
+    apply
+        ``apply(picture, p, instance)`` returns the picture with the effect in it; `p` has one value per parameter.
+    instances
+        The thrusters that it can be an effect of; ``(None,)`` where it is one of the whole vessel.
+    cannot
+        Why the scene cannot show it, as a sentence; empty where it can.
+    onset
+        True where it may begin during the log.
+    says
+        One sentence on a finding, from its values by name and its instance.
+    scenario
+        What has to stand in a scenario file for the effect to act, from its values by name: nested tables as in TOML.
+    vessel
+        True for a property of hull or actuators, which carries over to other logs; False for a condition of one log.
+    """
+
+    id: str
+    title: str
+    parameters_of: Callable[[Profile], tuple[Parameter, ...]]
+    apply: Callable[[Picture, Floats, str | None], Picture]
+    says: Callable[[Values, str | None], str]
+    scenario: Callable[[Values, str | None], dict[str, Any]]
+    instances: Callable[[Profile], tuple[str | None, ...]] = lambda profile: (None,)
+    cannot: Callable[[Scene], str] = lambda scene: ""
+    onset: bool = False
+    vessel: bool = False

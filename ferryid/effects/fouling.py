@@ -1,0 +1,49 @@
+"""Fouling: damping of second order grown by a factor on each axis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import COEFFICIENTS, Picture, Scene
+from ferryid.vessel.profile import Floats, Profile
+
+SECOND_ORDER = (
+    ("X_|u|u",),
+    ("Y_|v|v", "Y_|r|v", "Y_|v|r", "Y_|r|r"),
+    ("N_|v|v", "N_|r|v", "N_|v|r", "N_|r|r"),
+)
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return a factor for each axis."""
+    return tuple(Parameter(axis, "-", 0.4, 0.3, 6.0, neutral=1.0) for axis in ("surge", "sway", "yaw"))
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Multiply the coefficients."""
+    hull = picture.hull.copy()
+    for names, factor in zip(SECOND_ORDER, p.tolist(), strict=True):
+        for name in names:
+            hull[COEFFICIENTS.index(name)] *= factor
+    return replace(picture, hull=hull)
+
+
+def cannot(scene: Scene) -> str:
+    """Say why the scene cannot show fouling."""
+    return "" if scene.profile.hull.has_model else "the profile has no damping that could have grown"
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    parts = ", ".join(f"{axis} {100.0 * (values[axis] - 1.0):+.0f} %" for axis in ("surge", "sway", "yaw"))
+    return f"Damping at speed has changed ({parts}): the hull is fouled, or cleaner than the model."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's fouling."""
+    return {"fouling": {axis: values[axis] for axis in ("surge", "sway", "yaw")}}
+
+
+EFFECT = Effect("fouling", "Fouling", parameters_of, apply, says, scenario, cannot=cannot, vessel=True)

@@ -1,0 +1,55 @@
+"""Heading bias: the heading is off, and so is the velocity that the navigation resolves along the vessel with it.
+
+Kinematics cannot tell, as the velocity over ground is right; forces can, as thrust and hull keep to the true axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, radians, sin
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.lever_arm import with_acceleration
+from ferryid.effects.picture import Picture
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return by how much the heading measured is too large, clockwise."""
+    return (Parameter("angle", "deg", 4.0, -90.0, 90.0),)
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Turn heading and velocity to the true axes, for all that depends on them.
+
+    What is compared stays along the axes measured: with R the turn from these to the true ones and a the measured
+    acceleration, ``a_true - R a`` is compared as ``(a_true + (1 - R) a) - a``: (1 - R) a comes in as the force that it takes.
+    """
+    b = radians(float(p[0]))
+    if b == 0.0:
+        return picture
+    scene = picture.scene
+    c, s = cos(b), sin(b)
+    u, v, r = scene.nu.T
+    nu = np.column_stack([c * u - s * v, s * u + c * v, r])
+    eta = scene.eta - np.array([0.0, 0.0, b])
+    u_dot, v_dot = np.gradient(u, scene.step_s), np.gradient(v, scene.step_s)
+    force = with_acceleration(picture, (1.0 - c) * u_dot + s * v_dot, (1.0 - c) * v_dot - s * u_dot)
+    return replace(picture, scene=replace(scene, eta=eta, nu=nu), external=picture.external + force)
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    side = "clockwise" if values["angle"] > 0.0 else "anticlockwise"
+    return f"The heading is {abs(values['angle']):.1f} deg too far {side}, against the axes of hull and thrusters."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's bias."""
+    return {"sensors": {"navigation": {"heading_bias_deg": values["angle"]}}}
+
+
+EFFECT = Effect("heading_bias", "Heading bias", parameters_of, apply, says, scenario, vessel=True)

@@ -1,0 +1,64 @@
+"""Lever arm: position and velocity are those of an antenna that is not at the body origin.
+
+Kinematics cannot tell, as both belong to the antenna; forces can, as the antenna swings round the body origin in turns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture
+from ferryid.vessel.frames import to_world
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return where the antenna is, ahead and to starboard of the body origin."""
+    length = profile.hull.length_m
+    half = 0.5 * length if np.isfinite(length) else profile.hull.mass_kg ** (1.0 / 3.0)
+    return tuple(Parameter(axis, "m", 0.4 * half, -2.0 * half, 2.0 * half) for axis in ("x", "y"))
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Move position and velocity to the body origin, for all that depends on them.
+
+    What is compared stays the antenna's: its acceleration along the body's axes is the body origin's and
+    ``[-y dr/dt, x dr/dt, 0]``, which comes in as the force that it takes. The measured yaw acceleration stands for the true
+    one; a window's weight averages it as ``-∫ w' r``, so that its noise matters no more than that of r.
+    """
+    x, y = float(p[0]), float(p[1])
+    if x == 0.0 and y == 0.0:
+        return picture
+    scene = picture.scene
+    r = scene.nu[:, 2]
+    nu = scene.nu + np.column_stack([r * y, -r * x, np.zeros_like(r)])
+    arm = to_world(np.full_like(r, x), np.full_like(r, y), scene.psi)
+    eta = scene.eta - np.column_stack([*arm, np.zeros_like(r)])
+    force = with_acceleration(picture, -y * np.gradient(r, scene.step_s), x * np.gradient(r, scene.step_s))
+    return replace(picture, scene=replace(scene, eta=eta, nu=nu), external=picture.external + force)
+
+
+def with_acceleration(picture: Picture, surge: Floats, sway: Floats) -> Floats:
+    """Return the force that gives the vessel, with its load, an acceleration more [m/s²], shape (n, 3)."""
+    m11, m22, m32 = picture.hull[0], picture.hull[1], picture.hull[3]
+    m, mx = (0.0, 0.0) if picture.load is None else (picture.load[:, 0], picture.load[:, 1])
+    return np.column_stack([(m11 + m) * surge, (m22 + m) * sway, (m32 + mx) * sway])
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    x, y = values["x"], values["y"]
+    ends = ("ahead" if x >= 0.0 else "astern", "to starboard" if y >= 0.0 else "to port")
+    return f"Position and velocity belong to a point {abs(x):.2f} m {ends[0]} and {abs(y):.2f} m {ends[1]} of the body origin."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's antenna."""
+    return {"sensors": {"navigation": {"antenna_m": [values["x"], values["y"]]}}}
+
+
+EFFECT = Effect("lever_arm", "Antenna off the body origin", parameters_of, apply, says, scenario, vessel=True)

@@ -1,0 +1,59 @@
+"""Mooring: a spring from the vessel to a point, with a stiffness of its own along north and east."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture, Scene
+from ferryid.vessel.frames import to_body
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return stiffness and place; a spring of moderate size swings the vessel in a minute or two."""
+    stiff = profile.hull.mass_kg * 0.004
+    return (
+        Parameter("stiffness_north", "N/m", stiff, 0.0, 1e3 * stiff),
+        Parameter("stiffness_east", "N/m", stiff, 0.0, 1e3 * stiff),
+        Parameter("north", "m", 20.0, -1e4, 1e4),
+        Parameter("east", "m", 20.0, -1e4, 1e4),
+    )
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Add the spring's pull on the body origin."""
+    scene = picture.scene
+    X, Y = to_body(-p[0] * (scene.eta[:, 0] - p[2]), -p[1] * (scene.eta[:, 1] - p[3]), scene.psi)
+    return replace(picture, external=picture.external + np.column_stack([X, Y, np.zeros_like(X)]))
+
+
+def cannot(scene: Scene) -> str:
+    """Say why the scene cannot show a mooring."""
+    return "" if np.isfinite(scene.eta[scene.usable, :2]).all() else "the log has no position"
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    return (
+        f"Something holds the vessel like a spring of {values['stiffness_north']:.1f} N/m (north) and "
+        f"{values['stiffness_east']:.1f} N/m (east) from {values['north']:.0f} m north, {values['east']:.0f} m east: a mooring "
+        "line or a tow."
+    )
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's mooring."""
+    spring = {
+        "north_m": values["north"],
+        "east_m": values["east"],
+        "stiffness_north_Npm": values["stiffness_north"],
+        "stiffness_east_Npm": values["stiffness_east"],
+    }
+    return {"environment": {"mooring": spring}}
+
+
+EFFECT = Effect("mooring", "Mooring", parameters_of, apply, says, scenario, cannot=cannot)

@@ -1,0 +1,49 @@
+"""Payload: rigid mass aboard, which enters the vessel's own mass matrix; it may board during the log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture, Scene
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return mass and place; both in proportion to the hull."""
+    mass, length = profile.hull.mass_kg, profile.hull.length_m
+    half = 0.5 * length if np.isfinite(length) else mass ** (1.0 / 3.0)
+    return (
+        Parameter("mass", "kg", 0.15 * mass, -0.5 * mass, 2.0 * mass),
+        Parameter("x", "m", 0.3 * half, -half, half),
+    )
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Put the mass aboard."""
+    m, x = float(p[0]), float(p[1])
+    load = np.broadcast_to([m, m * x, m * x * x], (len(picture.scene.t), 3))
+    return replace(picture, load=load if picture.load is None else picture.load + load)
+
+
+def cannot(scene: Scene) -> str:
+    """Say why the scene cannot show a payload."""
+    return "the payload was measured and is part of the model" if scene.payload is not None else ""
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    word = "more" if values["mass"] > 0.0 else "less"
+    place = f"{abs(values['x']):.1f} m {'forward' if values['x'] >= 0.0 else 'aft'} of midship"
+    return f"The vessel carried {abs(values['mass']):.0f} kg {word} than the model knows, {place}."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's payload."""
+    return {"payload": [{"mass_kg": values["mass"], "x_m": values["x"], "from_s": values.get("onset", 0.0)}]}
+
+
+EFFECT = Effect("payload", "Payload", parameters_of, apply, says, scenario, cannot=cannot, onset=True)

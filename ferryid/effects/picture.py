@@ -1,0 +1,182 @@
+"""What moves a vessel, as one imagines it: a scene that was measured, and a picture of the forces in it.
+
+An effect takes a picture and returns another, in which its own physics acts. Effects so combine in any number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.vessel.frames import to_body
+from ferryid.vessel.profile import Floats, Profile
+
+MASS = ("m11", "m22", "m23", "m32", "m33")
+SURGE = ("X_u", "X_|u|u", "X_uuu")
+SWAY = ("Y_v", "Y_|v|v", "Y_|r|v", "Y_vvv", "Y_r", "Y_|v|r", "Y_|r|r")
+YAW = ("N_v", "N_|v|v", "N_|r|v", "N_r", "N_|v|r", "N_|r|r", "N_rrr")
+COEFFICIENTS = (*MASS, *SURGE, *SWAY, *YAW)
+"""Order of the hull's coefficients in `Picture.hull`."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What was measured, n rows on a uniform grid, and the vessel that it was measured on.
+
+    Attributes
+    ----------
+    profile
+        The vessel.
+    t
+        Time [s], shape (n,).
+    eta
+        North, east [m] and heading [rad, unwrapped] as measured, shape (n, 3).
+    nu_raw, nu
+        Velocities over ground as measured and lightly smoothed [m/s, m/s, rad/s], shape (n, 3).
+    parts
+        Force of each actuator on the hull [N, N, N·m], shape (n, k, 3).
+    angles
+        Measured angle of each azimuth thruster [rad], NaN for other actuators, shape (n, k).
+    wind, current
+        Where air and water go to, north and east [m/s], shape (n, 2), or None where not measured.
+    payload
+        Mass [kg] and place [m] aboard, shape (n, 2), or None.
+    usable
+        Rows on which everything was measured, shape (n,).
+    """
+
+    profile: Profile
+    t: Floats
+    eta: Floats
+    nu_raw: Floats
+    nu: Floats
+    parts: Floats
+    angles: Floats
+    usable: NDArray[np.bool_]
+    wind: Floats | None = None
+    current: Floats | None = None
+    payload: Floats | None = None
+
+    @property
+    def step_s(self) -> float:
+        """Distance of two rows [s]."""
+        return float(self.t[1] - self.t[0])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the actuators, in the order of `parts`."""
+        return tuple(actuator.name for actuator in self.profile.actuators)
+
+    @property
+    def psi(self) -> Floats:
+        """Heading [rad], shape (n,)."""
+        return self.eta[:, 2]
+
+    @cached_property
+    def regressors(self) -> tuple[Floats, Floats, Floats]:
+        """Damping regressors over ground; see `damping_regressors`."""
+        return damping_regressors(self.nu)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A scene with the forces imagined in it.
+
+    Attributes
+    ----------
+    scene
+        What was measured.
+    hull
+        Coefficients in the order of `COEFFICIENTS`, shape (22,).
+    parts, angles
+        As in the scene, with what the effects make of them.
+    external
+        All other forces on the hull [N, N, N·m], shape (n, 3).
+    flow
+        Where the water goes to, north and east [m/s], shape (n, 2), or None for still water.
+    load
+        Mass aboard and its first and second moment about the body origin [kg, kg·m, kg·m²], shape (n, 3), or None.
+    damping_factor
+        Factor on all damping, shape (n,), or None.
+    """
+
+    scene: Scene
+    hull: Floats
+    parts: Floats
+    angles: Floats
+    external: Floats
+    flow: Floats | None = None
+    load: Floats | None = None
+    damping_factor: Floats | None = None
+
+
+def damping_regressors(nu: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the products that the coefficients of `SURGE`, `SWAY` and `YAW` multiply, shapes (n, 3), (n, 7), (n, 7)."""
+    u, v, r = np.ascontiguousarray(nu.T)
+    av, ar = np.abs(v), np.abs(r)
+    vv, rv, vr, rr = av * v, ar * v, av * r, ar * r
+    return (
+        np.column_stack([u, np.abs(u) * u, u * u * u]),
+        np.column_stack([v, vv, rv, v * v * v, r, vr, rr]),
+        np.column_stack([v, vv, rv, r, vr, rr, r * r * r]),
+    )
+
+
+def hull_of(profile: Profile) -> Floats:
+    """Return the coefficients of a profile's hull in the order of `COEFFICIENTS`, zero where unknown."""
+    M, D = profile.hull.M, profile.hull.D
+    mass = (M[0, 0], M[1, 1], M[1, 2], M[2, 1], M[2, 2])
+    return np.array([*mass, *(D.get(name, 0.0) for name in COEFFICIENTS[5:])], dtype=np.float64)
+
+
+def named(hull: Floats) -> Mapping[str, float]:
+    """Return coefficients by name."""
+    return dict(zip(COEFFICIENTS, hull.tolist(), strict=True))
+
+
+def body_current(picture: Picture) -> tuple[Floats, Floats]:
+    """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n,) each."""
+    flow, scene = picture.flow, picture.scene
+    if flow is None:
+        still = np.zeros(len(scene.t))
+        return still, still
+    return to_body(flow[:, 0], flow[:, 1], scene.psi)
+
+
+def acceleration(picture: Picture) -> Floats:
+    """Return the acceleration over ground that a picture gives at the measured velocities, shape (n, 3).
+
+    ``M nu_dot = tau + external - C(nu_r) nu_r - D(nu_r) nu_r``, with ``[r v_c, -r u_c, 0]`` added for the water that the body
+    frame turns through; Fossen (2021), section 10.3.
+    """
+    scene, hull = picture.scene, picture.hull
+    m11, m22, m23, m32, m33 = hull[:5]
+    if picture.flow is None:
+        nu, (X_D, Y_D, N_D) = scene.nu, scene.regressors
+    else:
+        u_c, v_c = body_current(picture)
+        nu = scene.nu - np.column_stack([u_c, v_c, np.zeros_like(u_c)])
+        X_D, Y_D, N_D = damping_regressors(nu)
+    u, v, r = nu.T
+    force = picture.parts.sum(axis=1) + picture.external
+    D = np.column_stack([X_D @ hull[5:8], Y_D @ hull[8:15], N_D @ hull[15:22]])
+    if picture.damping_factor is not None:
+        D = D * picture.damping_factor[:, None]
+    if picture.load is not None:
+        m, mx, mxx = picture.load.T
+        m11, m22, m33 = m11 + m, m22 + m, m33 + mxx
+        m23, m32 = m23 + mx, m32 + mx
+    c13, c23 = -m22 * v - 0.5 * (m23 + m32) * r, m11 * u
+    X = force[:, 0] + D[:, 0] - c13 * r
+    Y = force[:, 1] + D[:, 1] - c23 * r
+    N = force[:, 2] + D[:, 2] + c13 * u + c23 * v
+    det = m22 * m33 - m23 * m32
+    rates = np.column_stack([X / m11, (m33 * Y - m23 * N) / det, (m22 * N - m32 * Y) / det])
+    if picture.flow is not None:
+        rates[:, 0] += scene.nu[:, 2] * v_c
+        rates[:, 1] -= scene.nu[:, 2] * u_c
+    return rates

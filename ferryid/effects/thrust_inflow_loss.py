@@ -1,0 +1,45 @@
+"""Inflow loss: thrust falls with the water's velocity into the propeller."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture, body_current
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return the share lost per m/s."""
+    return (Parameter("per_mps", "s/m", 0.2, -0.2, 2.0),)
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Take ``k V_a`` off each force, V_a the velocity of the thruster through the water along its own push."""
+    scene = picture.scene
+    u_c, v_c = body_current(picture)
+    u, v, r = scene.nu.T
+    parts = picture.parts.copy()
+    for k, actuator in enumerate(scene.profile.actuators):
+        x, y = actuator.position_m
+        X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
+        size = np.hypot(X, Y)
+        along = (X * (u - u_c - r * y) + Y * (v - v_c + r * x)) / np.where(size > 0.0, size, 1.0)
+        parts[:, k] *= (1.0 - np.clip(p[0] * along, -1.0, 1.0))[:, None]
+    return replace(picture, parts=parts)
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    return f"Thrust falls by {100.0 * values['per_mps']:.0f} % per m/s of water flowing into the propellers."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's loss."""
+    return {"thrusters": {"inflow_loss_per_mps": values["per_mps"]}}
+
+
+EFFECT = Effect("thrust_inflow_loss", "Inflow loss", parameters_of, apply, says, scenario, vessel=True)

@@ -1,0 +1,52 @@
+"""Thruster gain: one thruster gives more or less force than its curve says, from the start or from a time on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return the factor on the force."""
+    return (Parameter("factor", "-", 0.2, 0.0, 3.0, neutral=1.0),)
+
+
+def instances(profile: Profile) -> tuple[str | None, ...]:
+    """Return the actuators."""
+    return tuple(actuator.name for actuator in profile.actuators)
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Multiply the force of the thruster."""
+    k = picture.scene.names.index(str(instance))
+    parts = picture.parts.copy()
+    parts[:, k] *= p[0]
+    return replace(picture, parts=parts)
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    return f"{instance} gives {100.0 * values['factor']:.0f} % of the force that its curve says."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's fault."""
+    fault = {"thruster": instance, "factor": values["factor"], "from_s": values.get("onset", 0.0)}
+    return {"thrusters": {"faults": [fault]}}
+
+
+EFFECT = Effect(
+    "thruster_gain",
+    "Thruster force",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    instances=instances,
+    onset=True,
+    vessel=True,
+)

@@ -1,0 +1,60 @@
+"""Thruster interaction: a thruster loses force while another's wake points at it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture, Scene
+from ferryid.vessel.profile import Floats, Profile
+
+SHARPNESS = 16
+"""Power of the cosine of the angle beside the wake: half of the loss is left at 17 degrees."""
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return the loss in a full wake that points straight at a thruster."""
+    return (Parameter("fraction", "-", 0.2, 0.0, 1.0),)
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Take the loss off, which grows with the root of the force behind the wake as a jet's speed does."""
+    actuators = picture.scene.profile.actuators
+    parts = picture.parts.copy()
+    size = np.hypot(picture.parts[:, :, 0], picture.parts[:, :, 1])
+    full = np.maximum(size.max(axis=0), 1e-9)
+    for i, hit in enumerate(actuators):
+        for j, source in enumerate(actuators):
+            dx, dy = hit.position_m[0] - source.position_m[0], hit.position_m[1] - source.position_m[1]
+            apart = hypot(dx, dy)
+            if i == j or apart == 0.0:
+                continue
+            push = picture.parts[:, j]
+            towards = -(push[:, 0] * dx + push[:, 1] * dy) / (np.maximum(size[:, j], 1e-9) * apart)
+            loss = np.maximum(towards, 0.0) ** SHARPNESS * np.sqrt(size[:, j] / full[j])
+            parts[:, i] *= (1.0 - p[0] * loss)[:, None]
+    return replace(picture, parts=parts)
+
+
+def cannot(scene: Scene) -> str:
+    """Say why the scene cannot show it."""
+    return "" if len(scene.names) > 1 else "there is one actuator only"
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    return f"A thruster in the wake of another loses up to {100.0 * values['fraction']:.0f} % of its force."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's interaction."""
+    return {"thrusters": {"interaction_fraction": values["fraction"]}}
+
+
+EFFECT = Effect(
+    "thruster_interaction", "Thruster interaction", parameters_of, apply, says, scenario, cannot=cannot, vessel=True
+)

@@ -1,0 +1,43 @@
+"""Time delay: the navigation's data are older than their stamps, against the actuators'."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.picture import Picture
+from ferryid.vessel.profile import Floats, Profile
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return how late the navigation is."""
+    return (Parameter("seconds", "s", 0.3, -3.0, 3.0),)
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Look the actuators' forces up at the time that the motion was measured at."""
+    if p[0] == 0.0:
+        return picture
+    t = picture.scene.t
+    shape = picture.parts.shape
+    flat = picture.parts.reshape(len(t), -1)
+    when = t - p[0]
+    parts = np.column_stack([np.interp(when, t, column) for column in flat.T]).reshape(shape)
+    return replace(picture, parts=parts)
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    word = "later" if values["seconds"] > 0.0 else "earlier"
+    return f"The navigation's data are {abs(values['seconds']):.2f} s {word} than the actuators'."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's delay."""
+    return {"sensors": {"navigation": {"delay_s": values["seconds"]}}}
+
+
+EFFECT = Effect("time_delay", "Time delay", parameters_of, apply, says, scenario)

@@ -1,0 +1,206 @@
+"""A diagnosis as one HTML page that needs nothing else, and as text for a terminal."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from importlib.resources import files
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment
+
+from ferryid.diagnose.result import AXES, Diagnosis, Finding
+from ferryid.identify.result import FreeRun
+from ferryid.report import diagnosis_figures, diagnosis_words, figures
+from ferryid.report.figures import Floats
+
+MAX_LOGS = 6
+"""Logs whose evidence is drawn; the page stays readable."""
+TEXT_COLUMNS = 100
+UNITS = ("[N]", "[N]", "[N·m]")
+
+
+def render(diagnoses: Sequence[Diagnosis], title: str) -> tuple[str, dict[str, str]]:
+    """Return the page on one log or several, and its drawings (SVG) by name."""
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    source = files("ferryid.report").joinpath("templates", "diagnosis.html").read_text(encoding="utf-8")
+    several = len(diagnoses) > 1
+    logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS) for k, one in enumerate(diagnoses, 1)]
+    left = [one.log for one in diagnoses[MAX_LOGS:]]
+    page = environment.from_string(source).render(
+        title=title,
+        verdict=diagnosis_words.overall(diagnoses),
+        headline=diagnosis_words.summary(diagnoses),
+        several=several,
+        logs=logs,
+        axes=list(zip(AXES, UNITS, strict=True)),
+        omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
+    )
+    drawings = {
+        figure["file"]: figure["svg"]
+        for log in logs
+        for figure in (
+            *log["figures"],
+            *log["free_run_figures"],
+            *(one for finding in log["findings"] for one in finding["figures"]),
+        )
+    }
+    return page, drawings
+
+
+def as_text(diagnoses: Sequence[Diagnosis]) -> str:
+    """Return the same for a terminal, short."""
+    blocks = [diagnosis_words.summary(diagnoses)] if len(diagnoses) > 1 else []
+    for one in diagnoses:
+        lines = [f"{one.log}: {diagnosis_words.headline(one)}"]
+        for k, finding in enumerate(one.findings, 1):
+            lines += ["", f"{k}. {finding.says}", *(f"   {line}" for line in _lines(finding))]
+        rows = diagnosis_words.force_rows(one)
+        if rows:
+            lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]
+            lines.append(f"{'':<44}" + "".join(f"{unit:>22}" for unit in UNITS))
+            lines += [f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"]) for row in rows]
+        runs = diagnosis_words.free_run_rows(one)
+        if runs:
+            names = ("without", "with", "with over without") if one.findings else ("error",)
+            lines += ["", f"{'free run on held-out data':<44}" + "".join(f"{name:>22}" for name in names)]
+            for row in runs:
+                lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
+        hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
+        remarks = [*hidden, *(f"note: {note}" for note in one.notes)]
+        lines += ["", *remarks] if remarks else []
+        lines += ["", f"model   {one.model}"] if one.model else [""]
+        blocks.append("\n".join(_folded(line) for line in lines))
+    return "\n\n".join(blocks)
+
+
+def _lines(finding: Finding) -> list[str]:
+    lines = [
+        diagnosis_words.numbers(finding),
+        diagnosis_words.where(finding),
+        diagnosis_words.trust(finding),
+        *diagnosis_words.rivals(finding),
+    ]
+    return [line for line in lines if line]
+
+
+def _folded(line: str) -> str:
+    """Break prose at the width of a page; tables stay as they are."""
+    if len(line) <= TEXT_COLUMNS or "  " in line.strip():
+        return line
+    indent = " " * (len(line) - len(line.lstrip()))
+    hanging = indent + ("   " if re.match(r"\d+\. ", line) else "")
+    return fill(
+        line.strip(),
+        TEXT_COLUMNS,
+        initial_indent=indent,
+        subsequent_indent=hanging,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
+
+
+def _log(diagnosis: Diagnosis, prefix: str, drawn: bool) -> dict[str, Any]:
+    force_rows, free_run_rows = diagnosis_words.force_rows(diagnosis), diagnosis_words.free_run_rows(diagnosis)
+    return {
+        "name": diagnosis.log,
+        "vessel": diagnosis.vessel,
+        "verdict": diagnosis.verdict,
+        "headline": diagnosis_words.headline(diagnosis),
+        "findings": [_finding(one, f"{prefix}finding-{k}", drawn) for k, one in enumerate(diagnosis.findings, 1)],
+        "names": [diagnosis_words.title(one.effect, one.instance) for one in diagnosis.findings],
+        "force_rows": force_rows,
+        "free_run_rows": free_run_rows,
+        "free_run_figures": _free_run_figures(diagnosis, prefix) if drawn else [],
+        "intervals": any(" to " in cell for row in (*force_rows, *free_run_rows) for cell in row["cells"]),
+        "free_run_note": diagnosis.before.get("free_run", {}).get("note", ""),
+        "figures": [
+            {"file": f"{prefix}{name}", "svg": svg, "caption": caption}
+            for name, svg, caption in (diagnosis_figures.figures_of(diagnosis) if drawn else ())
+        ],
+        "withheld": [
+            {
+                "signal": one.signal,
+                "says": one.says,
+                "rows": [
+                    {
+                        "name": name.replace("_", " "),
+                        "found": diagnosis_words.estimate(value),
+                        "measured": f"{one.measured[name]:.3g}" if name in one.measured else "–",
+                    }
+                    for name, value in one.found.items()
+                ],
+            }
+            for one in diagnosis.withheld
+        ],
+        "notes": diagnosis.notes,
+        "model": diagnosis.model,
+    }
+
+
+def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
+    shown = []
+    if drawn and diagnosis_figures.drawable(finding):
+        what = finding.labels.get("regressor", "") if "regressor" in finding.evidence else ""
+        against = what.partition(" [")[0] or "what the finding adds"
+        shown = [
+            {
+                "file": f"{file}-evidence",
+                "svg": diagnosis_figures.on_regressor(finding),
+                "caption": f"What is left over, against {against}. Points: windows of the recording; marks: their means with "
+                "95 % intervals. "
+                "Where the finding holds, orange follows the black line, and blue is flat.",
+            },
+            {
+                "file": f"{file}-time",
+                "svg": diagnosis_figures.in_time(finding),
+                "caption": "The same over time; shaded: when it acts.",
+            },
+        ]
+    return {
+        "title": diagnosis_words.title(finding.effect, finding.instance),
+        "says": finding.says,
+        "lines": [
+            line
+            for line in (
+                diagnosis_words.numbers(finding),
+                diagnosis_words.where(finding),
+                diagnosis_words.trust(finding),
+            )
+            if line
+        ],
+        "rivals": diagnosis_words.rivals(finding),
+        "figures": shown,
+    }
+
+
+def _free_run_figures(diagnosis: Diagnosis, prefix: str) -> list[dict[str, str]]:
+    before, after = diagnosis.before.get("free_run", {}), diagnosis.after.get("free_run", {})
+    if not (before.get("horizons_s") and after.get("horizons_s") and diagnosis.findings):
+        return []
+    return [
+        {
+            "file": f"{prefix}free-run-errors",
+            "svg": figures.free_run_errors(_free_run(before), _free_run(after)),
+            "caption": f"Root-mean-square error of {before.get('starts', 0)} free runs on held-out data: each takes the "
+            "measured state once and then only the measured actuator forces. New model: with the findings.",
+        }
+    ]
+
+
+def _free_run(plain: dict[str, Any]) -> FreeRun:
+    def column(name: str) -> Floats:
+        return np.array([np.nan if value is None else value for value in plain[name]], dtype=np.float64)
+
+    return FreeRun(
+        horizons_s=column("horizons_s"),
+        position_m=column("position_m"),
+        heading_rad=column("heading_rad"),
+        speed_mps=column("speed_mps"),
+        yaw_rate_radps=column("yaw_rate_radps"),
+        starts=int(plain.get("starts", 0)),
+        example={},
+        note=plain.get("note", ""),
+    )

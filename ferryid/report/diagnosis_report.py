@@ -1,0 +1,130 @@
+"""From diagnoses to files: a page, its figures, JSON and text; what ``ferryid diagnose`` leaves."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from ferryid.diagnose.result import AXES, SCHEMA, Diagnosis, to_json
+from ferryid.errors import FerryIdError
+from ferryid.files import dump_json, finite, replacing
+from ferryid.identify.model import Model
+from ferryid.identify.store import load
+from ferryid.report.diagnosis_page import as_text, render
+from ferryid.report.diagnosis_words import overall
+from ferryid.vessel import load_profile, parse_profile
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The page, and the same as JSON and as text for a terminal."""
+
+    report: Path
+    json: dict[str, Any]
+    text: str
+
+
+def patient(vessel: str | None, model: str | None, out: Path) -> tuple[Profile, Model | None]:
+    """Return the profile, and the model where one is to be examined; its own profile serves where no vessel is given.
+
+    Raises
+    ------
+    FerryIdError
+        When neither is given, cannot be loaded, or one is of another vessel than the other.
+    """
+    loaded = load(model, out) if model else None
+    if loaded is None:
+        if not vessel:
+            raise FerryIdError(
+                "diagnose: the log alone does not say whose it is, --vessel and --model are both left out. "
+                "Fix: give --vessel a bundled profile's name or a TOML file"
+            )
+        return load_profile(vessel), None
+    own = parse_profile(loaded.profile_text, loaded.name)
+    profile = load_profile(vessel) if vessel else own
+    if profile.name != own.name:
+        raise FerryIdError(
+            f"{loaded.name}@{loaded.version}: a model of {own.name} says nothing about {profile.name}. "
+            "Fix: give a model and logs of one vessel"
+        )
+    return profile, loaded
+
+
+def report(diagnoses: Sequence[Diagnosis], out: Path) -> Outcome:
+    """Write page, figures and JSON to a folder of their own in ``reports``; a later diagnosis of the same logs replaces it.
+
+    Raises
+    ------
+    FerryIdError
+        For a folder that cannot be written; nothing half-written is left.
+    """
+    folder = out / "reports" / _folder(diagnoses)
+    names = ", ".join(one.log for one in diagnoses[:2]) + (
+        f" and {len(diagnoses) - 2} more" if len(diagnoses) > 2 else ""
+    )
+    page, drawings = render(diagnoses, f"{diagnoses[0].vessel} · {names}")
+    file = folder / "report.html"
+    plain = {**finite(as_json(diagnoses)), "report": str(file)}
+    with replacing(folder) as temporary:
+        temporary.mkdir()
+        (temporary / file.name).write_text(page, encoding="utf-8")
+        for name, drawing in drawings.items():
+            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8")
+        (temporary / "diagnosis.json").write_text(dump_json(plain), encoding="utf-8")
+    return Outcome(file, plain, f"{as_text(diagnoses)}\nreport  {file}")
+
+
+def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
+    """Return one object in the form of schema ``ferryid.diagnosis/1``, on one log or several.
+
+    On several, `findings` holds those of all logs, each with its ``log``; errors are pooled over their rows where these are
+    known; and ``logs`` holds the diagnosis of each.
+    """
+    if len(diagnoses) == 1:
+        return to_json(diagnoses[0])
+    logs = [to_json(one) for one in diagnoses]
+    return {
+        "schema": SCHEMA,
+        "log": None,
+        "vessel": diagnoses[0].vessel,
+        "verdict": overall(diagnoses),
+        "findings": [{**finding, "log": one["log"]} for one in logs for finding in one["findings"]],
+        "before": {"mse": _pooled(diagnoses, "before"), "free_run": {}},
+        "after": {"mse": _pooled(diagnoses, "after"), "free_run": {}},
+        "notes": [],
+        "withheld": [],
+        "model": None,
+        "logs": [{key: value for key, value in one.items() if key != "schema"} for one in logs],
+    }
+
+
+def _pooled(diagnoses: Sequence[Diagnosis], part: str) -> dict[str, float | None]:
+    """Return the mean of the squared force error over the rows of all logs; None where a log does not tell how many it has."""
+    pooled: dict[str, float | None] = {}
+    for axis in AXES:
+        total, count, known = 0.0, 0, True
+        for one in diagnoses:
+            # Without findings nothing changes, and `after` need not say so.
+            mse = (getattr(one, part).get("mse") or one.before.get("mse", {})).get(axis)
+            if mse is None or not isfinite(mse):
+                continue
+            known = known and "rows" in one.before
+            rows = int(one.before.get("rows", 0))
+            total, count = total + rows * mse, count + rows
+        pooled[axis] = total / count if known and count else None
+    return pooled
+
+
+def _folder(diagnoses: Sequence[Diagnosis]) -> str:
+    parts = ["diagnosis", diagnoses[0].log]
+    if len(diagnoses) > 1:
+        parts.append(f"and-{len(diagnoses) - 1}-more")
+    hidden = dict.fromkeys(one.signal for diagnosis in diagnoses for one in diagnosis.withheld)
+    if hidden:
+        parts.append(f"without-{'-'.join(hidden)}")
+    return re.sub(r"[^\w.+-]+", "_", "-".join(parts))

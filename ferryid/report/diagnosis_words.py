@@ -1,0 +1,267 @@
+"""What a diagnosis says in words, the same on the page and on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import exp, isfinite, log
+from typing import Any
+
+from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding
+from ferryid.effects import effects
+
+RIVALS = 4
+"""Rivals that are told; the others are in the JSON."""
+SMALL = 0.02
+"""A smaller change of the squared error is not told."""
+FREE_RUN = (
+    ("position_m", "position", "m", 1.0),
+    ("heading_rad", "heading", "deg", 57.29577951308232),
+    ("speed_mps", "speed", "m/s", 1.0),
+    ("yaw_rate_radps", "yaw rate", "deg/s", 57.29577951308232),
+)
+
+
+def title(effect: str, instance: str | None = None) -> str:
+    """Return the name of an effect for people."""
+    known = effects().get(effect)
+    name = known.title if known else effect.replace("_", " ").capitalize()
+    return f"{name} ({instance})" if instance else name
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Return the verdict in one sentence."""
+    physics = [_inline(title(one.effect, one.instance)) for one in diagnosis.findings if one.effect in effects()]
+    sensors = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect not in effects()]
+    parts = [f"the model left out {listed(physics)}"] if physics else []
+    parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
+    names = "; ".join(parts)
+    change = changed({axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()})
+    told = (
+        f"; with {'them' if len(diagnosis.findings) > 1 else 'it'}, the squared force error on held-out data {change}"
+    )
+    more = told if change and physics else ""
+    if diagnosis.verdict == "explained":
+        return f"Explained: {names}{more}."
+    if diagnosis.verdict == "partly_explained":
+        return f"Partly explained: {names}{more}. More is missing, which nothing known here explains."
+    if diagnosis.verdict == "unexplained":
+        return "Unexplained: the recording differs from the model, and nothing known here accounts for it."
+    if diagnosis.verdict == "not_testable":
+        return "Not testable: this log cannot show whether anything is missing from the model."
+    return "Matched: nothing that this log could show is missing from the model."
+
+
+def changed(shares: Mapping[str, float]) -> str:
+    """Return by how much the squared force error falls or rises, from the share removed on each axis."""
+    falls = [f"{_percent(shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) >= SMALL]
+    rises = [f"{_percent(-shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) <= -SMALL]
+    parts = [f"{word} by {listed(axes)}" for word, axes in (("falls", falls), ("rises", rises)) if axes]
+    return " and ".join(parts) if parts or not shares else "stays as it was"
+
+
+def ratio_of(diagnosis: Diagnosis) -> dict[str, Estimate]:
+    """Return force error after over before by axis; ends of the interval are NaN where they are not known."""
+    given: Mapping[str, Any] = diagnosis.after.get("ratio", {})
+    if given:
+        return {
+            axis: _estimated(given[axis])
+            for axis in AXES
+            if axis in given and isfinite(_number(given[axis].get("value")))
+        }
+    before, after = diagnosis.before.get("mse", {}), diagnosis.after.get("mse", {})
+    return {
+        axis: _bare(after[axis] / before[axis])
+        for axis in AXES
+        if _number(before.get(axis)) > 0.0 and isfinite(_number(after.get(axis)))
+    }
+
+
+def numbers(finding: Finding) -> str:
+    """Return the parameters with intervals and units."""
+    parts = [f"{name.replace('_', ' ')} {estimate(one)}" for name, one in finding.parameters.items()]
+    return f"{_upper('; '.join(parts))} (95 % intervals)." if parts else ""
+
+
+def estimate(one: Estimate) -> str:
+    """Return a value with its interval and unit, to the digits that the interval supports."""
+    width = one.high - one.low
+    digits = min(max(1 - _exponent(width), 0), 6) if isfinite(width) and width > 0.0 else 3
+    unit = "" if one.unit in ("-", "") else f" {one.unit}"
+    value = f"{one.value:.{digits}f}{unit}"
+    if not isfinite(width):
+        return value
+    return f"{value} ({one.low:.{digits}f} to {one.high:.{digits}f})"
+
+
+def where(finding: Finding) -> str:
+    """Return since when a finding acts, and where it shows."""
+    if finding.onset_s is not None:
+        told = f"It began at {finding.onset_s:.0f} s"
+    elif len(finding.intervals) > 1:
+        spans = [f"{first:.0f}–{last:.0f} s" for first, last in finding.intervals[:4]]
+        more = " and later" if len(finding.intervals) > 4 else ""
+        told = f"It acts in {listed(spans)}{more}"
+    elif finding.intervals:
+        first, last = finding.intervals[0]
+        told = f"It acts from {first:.0f} s to {last:.0f} s"
+    else:
+        told = "It acts all along"
+    shares = sorted(finding.axes.items(), key=lambda pair: -pair[1])
+    shown = [f"{axis} ({_percent(share)})" for axis, share in shares if share >= 0.05]
+    if shown:
+        told += f", and shows in {listed(shown)}"
+    return f"{told}; clearest at {finding.regime}." if finding.regime else f"{told}."
+
+
+def trust(finding: Finding) -> str:
+    """Return the probability, and what the finding removes of the squared force error."""
+    told = f"Probability {probability(finding.probability)}."
+    change = changed(finding.improvement)
+    if not change:
+        return told
+    data = "data that it was not fitted to" if finding.held_out else "the very data that it was fitted to"
+    return f"{told} With it, the squared force error on {data} {change}."
+
+
+def probability(value: float) -> str:
+    """Return a probability without pretending to certainty."""
+    return "above 0.99" if value > 0.99 else "below 0.01" if value < 0.01 else f"{value:.2f}"
+
+
+def rivals(finding: Finding) -> list[str]:
+    """Return what else was considered, and what would tell it apart."""
+    lines = []
+    if finding.unresolved_with:
+        names = listed([_inline(title(name)) for name in finding.unresolved_with], "or")
+        lines.append(f"This log cannot tell it from {names}.")
+    shown = sorted(finding.rivals, key=lambda rival: -rival.delta_score)[:RIVALS]
+    if shown:
+        parts = [f"{_inline(title(one.effect, one.instance))} {_odds(one.delta_score)}" for one in shown]
+        lines.append(f"In its place, by the evidence of this log: {'; '.join(parts)}.")
+    if finding.separating_manoeuvre:
+        manoeuvre = finding.separating_manoeuvre.rstrip(".")
+        lines.append(f"To tell them apart, record this: {manoeuvre}.")
+    return lines
+
+
+def overall(diagnoses: Sequence[Diagnosis]) -> str:
+    """Return one verdict for several logs: the worst of those that could be tested."""
+    verdicts = {one.verdict for one in diagnoses} - {"not_testable"}
+    if not verdicts:
+        return "not_testable"
+    if verdicts & {"partly_explained", "unexplained"}:
+        return "partly_explained" if any(one.findings for one in diagnoses) else "unexplained"
+    return "explained" if "explained" in verdicts else "matched"
+
+
+def summary(diagnoses: Sequence[Diagnosis]) -> str:
+    """Return the verdict in one sentence, of one log or of several."""
+    if len(diagnoses) == 1:
+        return headline(diagnoses[0])
+    counts = [
+        f"{sum(one.verdict == verdict for one in diagnoses)} {verdict.replace('_', ' ')}"
+        for verdict in dict.fromkeys(one.verdict for one in diagnoses)
+    ]
+    found = dict.fromkeys(_inline(title(f.effect, f.instance)) for one in diagnoses for f in one.findings)
+    left_out = f" The model left out {listed(list(found))}." if found else ""
+    return f"Of {len(diagnoses)} logs, {listed(counts)}.{left_out}"
+
+
+def force_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return the rows of the table before and after: a name and a cell per axis."""
+    rows = []
+    for name, part in (("without the findings", diagnosis.before), ("with the findings", diagnosis.after)):
+        mse = part.get("mse", {})
+        if mse and (part is diagnosis.before or diagnosis.findings):
+            label = f"root-mean-square error, {name}" if diagnosis.findings else "root-mean-square error"
+            rows.append({"name": label, "cells": [_cell(mse.get(axis), root=True) for axis in AXES]})
+    if not diagnosis.findings:
+        return rows
+    ratios = ratio_of(diagnosis)
+    if ratios:
+        rows.append({"name": "squared error, with over without", "cells": [_ratio(ratios.get(axis)) for axis in AXES]})
+    before = diagnosis.before.get("mse", {})
+    for name, mse in diagnosis.after.get("placebos", {}).items():
+        cells = [_cell(_over(mse.get(axis), before.get(axis))) for axis in AXES]
+        rows.append({"name": f"the same with a placebo: {name}", "cells": cells})
+    return rows
+
+
+def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return free-run error before, after and their ratio, a row a quantity, at the horizon of the ratios or the last."""
+    before, after = diagnosis.before.get("free_run", {}), diagnosis.after.get("free_run", {})
+    if not before.get("horizons_s"):
+        return []
+    ratios = diagnosis.after.get("free_run_ratio", {})
+    horizons = list(before["horizons_s"])
+    k = horizons.index(ratios["horizon_s"]) if ratios.get("horizon_s") in horizons else len(horizons) - 1
+    rows = []
+    for key, name, unit, factor in FREE_RUN:
+        one, other = (_number(run[key][k]) * factor if run.get(key) else float("nan") for run in (before, after))
+        given = ratios.get(key)
+        ratio = _estimated(given) if given else _bare(other / one if one > 0.0 else float("nan"))
+        rows.append(
+            {"name": f"{name} after {horizons[k]:g} s [{unit}]", "cells": [_cell(one), _cell(other), _ratio(ratio)]}
+        )
+    return rows
+
+
+def listed(parts: Sequence[str], word: str = "and") -> str:
+    """Return "a, b and c"."""
+    return f" {word} ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
+
+
+def _estimated(given: Mapping[str, Any]) -> Estimate:
+    return Estimate(_number(given.get("value")), _number(given.get("low")), _number(given.get("high")), "-")
+
+
+def _bare(value: float) -> Estimate:
+    """Return a ratio whose interval is not known."""
+    return Estimate(value, float("nan"), float("nan"), "-")
+
+
+def _odds(delta: float) -> str:
+    if delta > -0.7:
+        return "is as likely"
+    if delta > -log(1000.0):
+        return f"is {exp(-delta):.2g} times less likely"
+    power = str(round(-delta / log(10.0))).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"is less likely by a factor of 10{power}"
+
+
+def _inline(name: str) -> str:
+    return name[:1].lower() + name[1:]
+
+
+def _upper(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %" if isfinite(share) else "an unknown share"
+
+
+def _exponent(value: float) -> int:
+    return int(f"{value:e}".partition("e")[2])
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else float(value)
+
+
+def _over(value: float | None, base: float | None) -> float:
+    return _number(value) / _number(base) if _number(base) > 0.0 else float("nan")
+
+
+def _cell(value: float | None, *, root: bool = False) -> str:
+    number = _number(value)
+    if not isfinite(number):
+        return "–"
+    return f"{number**0.5 if root else number:.3g}"
+
+
+def _ratio(one: Estimate | None) -> str:
+    if one is None or not isfinite(one.value):
+        return "–"
+    interval = f" ({one.low:.2f} to {one.high:.2f})" if isfinite(one.low) and isfinite(one.high) else ""
+    return f"{one.value:.2f}{interval}"

@@ -1,0 +1,82 @@
+"""Every effect of the library: injected into a simulated trial it is found and sized; left out, nothing is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.hypothesis import trial_of
+from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
+from ferryid.diagnose.search import Search, search
+from ferryid.diagnose.weak import windows
+from ferryid.effects import effects
+from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+
+FERRY = load_profile("milliampere")
+BASE = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "twelve-corner" }
+controller = { delta = 0.7, sigma = 0.7 }
+"""
+HULL = ("m11", "m22", "m33", "X_u", "X_|u|u", "Y_v", "Y_|v|v", "Y_|r|v", "Y_|v|r", "N_r", "N_|r|r", "N_|r|v")
+"""Coefficients that the true vessel has ten per cent off the profile's, either way."""
+NAMES = tuple(effects())
+MODERATE = {
+    "payload": {"mass": 300.0, "x": 0.7},
+    "mooring": {"stiffness_north": 6.0, "stiffness_east": 5.0, "north": 5.0, "east": -5.0},
+    "thruster_gain": {"factor": 0.8},
+    "fouling": {"surge": 1.5, "sway": 1.5, "yaw": 1.5},
+    "wind": {"north": -2.0, "east": 1.5},
+    "current": {"north": 0.1, "east": -0.08},
+}
+"""Where one size of every parameter would be gross, or no place for a ferry."""
+
+
+def inline(value: Any) -> str:
+    """Return a value as TOML."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {inline(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(inline(entry) for entry in value) + "]"
+    return f'"{value}"' if isinstance(value, str) else repr(float(value))
+
+
+def found_in(tables: dict[str, Any], seed: int, folder: Path) -> Search:
+    """Simulate a round with these tables in its scenario, and search its log."""
+    sensors = {"imu_rate_hz": 0.0, "camera_rate_hz": 0.0, **tables.get("sensors", {})}
+    text = BASE + "".join(f"{key} = {inline(value)}\n" for key, value in {**tables, "sensors": sensors}.items())
+    scenario = parse_scenario(text, "effect")
+    signs = np.random.default_rng(seed).choice([0.9, 1.1], len(HULL)).tolist()
+    log = folder / "trial.mcap"
+    write_log(simulate(replace(scenario, true_hull=dict(zip(HULL, signs, strict=True))), seed), log)
+    scene, _ = scene_of(str(log), FERRY, None)
+    seen = windows(scene, *window_lengths(FERRY))
+    plain, spread = plain_picture(seen.scene, FERRY)
+    return search(trial_of(seen, plain, spread), lambda stage: None)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
+    effect = effects()[name]
+    instance = effect.instances(FERRY)[-1]
+    parameters = effect.parameters_of(FERRY)
+    usual = {one.name: one.neutral + one.size for one in parameters}
+    truth = {**usual, **MODERATE.get(name, {})}
+    result = found_in(effect.scenario(truth, instance), 3, tmp_path)
+    assert [(one.effect.id, one.instance) for one in result.fit.suspects[:1]] == [(name, instance)]
+    assert effect.says(truth, instance)
+    for one, value, error in zip(parameters, result.fit.values[0], result.fit.errors(0), strict=True):
+        assert abs(value - truth[one.name]) < max(4.0 * error, 0.15 * one.size), one.name
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_is_found_where_nothing_acts(seed: int, tmp_path: Path) -> None:
+    result = found_in({}, seed, tmp_path)
+    assert result.fit.suspects == ()
+    assert result.rounds[0].none > 0.9

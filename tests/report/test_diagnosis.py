@@ -1,0 +1,358 @@
+"""The report of a diagnosis: verdict first, every number with its unit, every verdict in its schema."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, Rival, Withheld
+from ferryid.errors import FerryIdError
+from ferryid.files import dump_json
+from ferryid.report.diagnosis_figures import binned
+from ferryid.report.diagnosis_page import as_text, render
+from ferryid.report.diagnosis_report import patient, report
+from ferryid.report.diagnosis_words import changed, estimate, headline, numbers, overall, ratio_of, rivals, trust, where
+
+T = np.arange(0.0, 720.0, 2.0)
+
+
+def by_axis(surge: float, sway: float, yaw: float) -> dict[str, float]:
+    return {"surge": surge, "sway": sway, "yaw": yaw}
+
+
+def wind() -> Finding:
+    heading = (T * 1.3) % 360.0
+    explained = 40.0 * np.sin(np.radians(heading - 135.0))
+    noise = 6.0 * np.random.default_rng(1).standard_normal(T.size)
+    return Finding(
+        effect="wind",
+        instance=None,
+        probability=0.998,
+        parameters={"north": Estimate(-3.02, -3.21, -2.83, "m/s"), "east": Estimate(2.96, 2.81, 3.11, "m/s")},
+        axes=by_axis(0.1, 0.6, 0.3),
+        intervals=((0.0, 720.0),),
+        onset_s=None,
+        regime="headings 150-210 deg",
+        improvement=by_axis(0.41, 0.9, 0.95),
+        held_out=True,
+        rivals=(Rival("current", None, -310.0), Rival("heading_bias", None, -4.0)),
+        unresolved_with=("current",),
+        separating_manoeuvre="a slow turn on the spot through all headings",
+        says="A steady wind of 4.2 m/s towards 135 deg was left out.",
+        evidence={
+            "t": T,
+            "before": explained + noise,
+            "after": noise,
+            "explained": explained,
+            "regressor": heading,
+        },
+        labels={"residual": "sway force left over [N]", "regressor": "heading [deg]"},
+    )
+
+
+def gain() -> Finding:
+    late = T >= 312.0
+    explained = np.where(late, -0.15 * (200.0 + 120.0 * np.sin(T / 23.0)), 0.0)
+    noise = 9.0 * np.random.default_rng(2).standard_normal(T.size)
+    return Finding(
+        effect="thruster_gain",
+        instance="thruster1",
+        probability=0.93,
+        parameters={"factor": Estimate(0.8497, 0.8312, 0.8683, "-"), "onset": Estimate(312.0, 308.5, 315.1, "s")},
+        axes=by_axis(0.7, 0.04, 0.26),
+        intervals=((312.0, 720.0),),
+        onset_s=312.0,
+        regime="",
+        improvement=by_axis(0.6, -0.05, 0.01),
+        held_out=False,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says="thruster1 gives 85 % of the force that its speed promises.",
+        evidence={"t": T, "before": explained + noise, "after": noise, "explained": explained},
+        labels={"residual": "surge force left over [N]"},
+    )
+
+
+def run(scale: float) -> dict[str, Any]:
+    horizons = [5.0, 10.0, 20.0, 30.0]
+    errors = [0.1 * scale * h for h in horizons]
+    return {
+        "horizons_s": horizons,
+        "position_m": errors,
+        "heading_rad": [0.02 * e for e in errors],
+        "speed_mps": [0.1 * e for e in errors],
+        "yaw_rate_radps": [0.002 * e for e in errors],
+        "starts": 12,
+        "note": "",
+    }
+
+
+def diagnosis(verdict: str, log: str = "trial") -> Diagnosis:
+    """Return a diagnosis made by hand, with everything that its verdict can have."""
+    findings = {"explained": (wind(), gain()), "partly_explained": (wind(),)}.get(verdict, ())
+    bend = np.column_stack([20.0 * np.sin(T / 40.0), 60.0 * np.sin(np.radians(T * 1.3)), 15.0 * np.cos(T / 60.0)])
+    noise = np.random.default_rng(3).standard_normal((T.size, 3)) * [5.0, 8.0, 6.0]
+    structure = 0.0 if verdict in ("matched", "not_testable") else bend
+    evidence = {
+        "t": T,
+        "before": structure + noise,
+        "after": noise,
+        "heading": (T * 1.3) % 360.0,
+        "speed": 1.0 + 0.8 * np.sin(T / 70.0),
+    }
+    before = {"mse": by_axis(400.0, 3600.0, 900.0), "free_run": run(1.0), "rows": 100}
+    after = {
+        "mse": by_axis(100.0, 360.0, 45.0),
+        "free_run": run(0.3),
+        "ratio": {
+            axis: {"value": value, "low": value - 0.04, "high": value + 0.05}
+            for axis, value in by_axis(0.25, 0.1, 0.05).items()
+        },
+        "free_run_ratio": {"horizon_s": 20.0, "position_m": {"value": 0.3, "low": 0.25, "high": 0.37}},
+        "placebos": {"time shifted": by_axis(404.0, 3564.0, 918.0)},
+    }
+    notes = [
+        "Current was not tested: the log never turns.",
+        "Waves: the band above 0.1 Hz is as the noise of the model.",
+    ]
+    made = Diagnosis(
+        log=log,
+        vessel="milliampere",
+        verdict=verdict,
+        findings=findings,
+        before=before,
+        after=after if findings else {},
+        notes=tuple(notes),
+        model="ferryid-out/models/milliampere/2.json" if findings else None,
+        evidence=evidence,
+        withheld=(
+            Withheld(
+                "wind",
+                {"north": Estimate(-3.02, -3.21, -2.83, "m/s")},
+                {"north": -2.9},
+                "The wind that was hidden blew at 4.1 m/s towards 134 deg: 1 deg and 0.1 m/s from what was found.",
+            ),
+        )
+        if findings
+        else (),
+    )
+    return replace(made, before={}, evidence={}) if verdict == "not_testable" else made
+
+
+@cache
+def explained() -> tuple[str, dict[str, str]]:
+    """Return page and drawings of the richest diagnosis."""
+    return render((diagnosis("explained"),), "trial")
+
+
+def conforms(data: dict[str, Any]) -> None:
+    schema = json.loads(files("ferryid.schemas").joinpath("diagnosis.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(data, schema)
+
+
+class Structure(HTMLParser):
+    """Checks that tags close in order, and counts captions and figures."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.counts = {"figure": 0, "figcaption": 0}
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        if tag != "meta":
+            self.open.append(tag)
+        if tag in self.counts:
+            self.counts[tag] += 1
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_keeps_to_the_schema_and_leaves_a_whole_page(verdict: str, tmp_path: Path) -> None:
+    outcome = report((diagnosis(verdict),), tmp_path)
+    conforms(outcome.json)
+    folder = outcome.report.parent
+    written = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+    assert written == json.loads(dump_json(outcome.json))
+    assert written["verdict"] == verdict
+    page = outcome.report.read_text(encoding="utf-8")
+    structure = Structure()
+    structure.feed(page)
+    assert structure.open == []
+    assert structure.counts["figure"] == structure.counts["figcaption"] == len(list(folder.glob("*.svg")))
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page), "the page must not need another file"
+    assert headline(diagnosis(verdict)) in page
+    assert headline(diagnosis(verdict)) in outcome.text.replace("\n", " ")
+    assert str(outcome.report) in outcome.text
+    assert page.count("<svg") == {"not_testable": 0, "explained": 8, "partly_explained": 6}.get(verdict, 3)
+
+
+def test_the_letter_has_its_order() -> None:
+    page = explained()[0]
+    places = [
+        page.index(text)
+        for text in (
+            "Explained: the model left out steady wind and thruster force (thruster1)",
+            wind().says,
+            "North -3.02 m/s",
+            "<svg",
+            "This log cannot tell it from current.",
+            gain().says,
+            "Current was not tested",
+            "with over without",
+            "Where the recording and the model differ",
+        )
+    ]
+    assert places == sorted(places)
+
+
+def test_a_verdict_is_told_with_what_changed() -> None:
+    assert headline(diagnosis("explained")) == (
+        "Explained: the model left out steady wind and thruster force (thruster1); with them, the squared force error on "
+        "held-out data falls by 75 % in surge, 90 % in sway and 95 % in yaw."
+    )
+    assert headline(diagnosis("matched")).startswith("Matched: nothing")
+
+
+def test_a_finding_is_told_in_numbers() -> None:
+    assert numbers(wind()) == "North -3.02 m/s (-3.21 to -2.83); east 2.96 m/s (2.81 to 3.11) (95 % intervals)."
+    assert where(wind()) == (
+        "It acts from 0 s to 720 s, and shows in sway (60 %), yaw (30 %) and surge (10 %); clearest at headings 150-210 deg."
+    )
+    assert where(gain()) == "It began at 312 s, and shows in surge (70 %) and yaw (26 %)."
+    assert trust(wind()) == (
+        "Probability above 0.99. With it, the squared force error on data that it was not fitted to falls by 41 % in surge, "
+        "90 % in sway and 95 % in yaw."
+    )
+    assert trust(gain()) == (
+        "Probability 0.93. With it, the squared force error on the very data that it was fitted to falls by 60 % in surge "
+        "and rises by 5 % in sway."
+    )
+
+
+def test_rivals_are_told_by_how_much_less_likely_they_are() -> None:
+    told = rivals(wind())
+    assert told[0] == "This log cannot tell it from current."
+    # exp(310) is 10 to the 134.6; exp(4) is 54.6. The nearest comes first.
+    assert "heading bias is 55 times less likely; current is less likely by a factor of 10¹³⁵" in told[1]
+    assert told[2] == "To tell them apart, record this: a slow turn on the spot through all headings."
+    assert rivals(gain()) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (Estimate(0.8497, 0.8312, 0.8683, "-"), "0.850 (0.831 to 0.868)"),
+        (Estimate(512.3, 470.1, 555.0, "kg"), "512 kg (470 to 555)"),
+        (Estimate(0.4, float("nan"), float("nan"), "s"), "0.400 s"),
+    ],
+)
+def test_a_value_has_the_digits_that_its_interval_supports(given: Estimate, told: str) -> None:
+    assert estimate(given) == told
+
+
+def test_what_changed_says_falls_and_rises_and_keeps_silent_on_trifles() -> None:
+    assert changed(by_axis(0.5, -0.1, 0.01)) == "falls by 50 % in surge and rises by 10 % in sway"
+    assert changed(by_axis(0.0, 0.01, -0.01)) == "stays as it was"
+    assert changed({}) == ""
+
+
+def test_ratio_comes_from_the_errors_where_none_is_given() -> None:
+    one = replace(diagnosis("explained"), after={"mse": by_axis(100.0, 360.0, 45.0)})
+    assert {axis: ratio_of(one)[axis].value for axis in AXES} == pytest.approx(by_axis(0.25, 0.1, 0.05))
+
+
+def test_tables_hold_roots_ratios_and_placebos() -> None:
+    page = re.sub(r"<svg.*?</svg>", "", explained()[0], flags=re.DOTALL)
+    for cell in ("20", "60", "30", "0.25 (0.21 to 0.30)", "0.10 (0.06 to 0.15)", "1.01", "0.99", "1.02"):
+        assert f"<td>{cell}</td>" in page
+    # The free run at the horizon that has an interval, 20 s: 2 m without and 0.6 m with.
+    assert "position after 20 s [m]</td><td>2</td><td>0.6</td><td>0.30 (0.25 to 0.37)" in page
+
+
+def test_terminal_text_holds_the_same() -> None:
+    text = as_text((diagnosis("explained"),))
+    for part in (wind().says, "North -3.02 m/s", "note: Current was not tested", "withheld wind", "2.json"):
+        assert part in text
+    assert max(len(line) for line in text.splitlines()) <= 110
+
+
+def test_names_and_sentences_are_escaped() -> None:
+    evil = "<script>alert(1)</script>"
+    one = replace(diagnosis("explained"), log=evil, notes=(evil,))
+    one = replace(one, findings=(replace(one.findings[0], says=evil, labels={"residual": evil, "regressor": evil}),))
+    assert evil not in render((one,), evil)[0]
+
+
+def test_figures_carry_units_and_only_what_there_is() -> None:
+    drawings = explained()[1]
+    assert "sway force left over [N]" in drawings["finding-1-evidence"]
+    assert "heading [deg]" in drawings["finding-1-evidence"]
+    assert ">onset</text>" in drawings["finding-2-time"]
+    assert ">onset</text>" not in drawings["finding-1-time"]
+    bare = replace(diagnosis("explained"), findings=(replace(wind(), evidence={}, labels={}),), evidence={})
+    assert set(render((bare,), "trial")[1]) == {"free-run-errors"}
+    assert render((diagnosis("explained"),), "trial") == explained()
+
+
+def test_several_logs_are_one_object_and_one_page(tmp_path: Path) -> None:
+    several = (diagnosis("matched", "a"), diagnosis("explained", "b"), diagnosis("not_testable", "c"))
+    outcome = report(several, tmp_path)
+    conforms(outcome.json)
+    assert outcome.json["verdict"] == "explained"
+    assert [one["log"] for one in outcome.json["logs"]] == ["a", "b", "c"]
+    assert {one["log"] for one in outcome.json["findings"]} == {"b"}
+    # 100 rows each of a and b; nothing changes in a.
+    assert outcome.json["before"]["mse"]["surge"] == pytest.approx(400.0)
+    assert outcome.json["after"]["mse"]["surge"] == pytest.approx(250.0)
+    assert outcome.text.startswith("Of 3 logs, 1 matched, 1 explained and 1 not testable.")
+    assert outcome.report.parent.name == "diagnosis-a-and-2-more-without-wind"
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "one"),
+    [
+        (("matched", "matched"), "matched"),
+        (("matched", "explained"), "explained"),
+        (("explained", "unexplained"), "partly_explained"),
+        (("matched", "unexplained"), "unexplained"),
+        (("not_testable", "not_testable"), "not_testable"),
+    ],
+)
+def test_one_verdict_on_several_logs(verdicts: tuple[str, ...], one: str) -> None:
+    assert overall([diagnosis(verdict) for verdict in verdicts]) == one
+
+
+def test_bins_hold_the_mean_and_an_interval_that_knows_what_is_independent() -> None:
+    """A slope comes back; the interval is as wide as separate visits scatter, not as narrow as single values would have it."""
+    rng = np.random.default_rng(0)
+    x = np.tile(np.linspace(0.0, 1.0, 200), 30)
+    offset = np.repeat(rng.standard_normal(30), 200)
+    places, means, halves = binned(x, 5.0 * x + offset)
+    truth = 5.0 * places
+    assert len(places) == 10
+    assert np.mean(np.abs(means - truth) <= halves) == 1.0
+    # Student's t of 29 degrees of freedom, 97.5 %, from the tables: 2.045.
+    expected = 2.045 * np.std(offset[::200], ddof=1) / np.sqrt(30)
+    np.testing.assert_allclose(halves, expected, rtol=0.05)
+    once = binned(np.linspace(0.0, 1.0, 50), np.zeros(50))[2]
+    assert np.isnan(once).all()
+
+
+def test_whose_log_it_is_must_be_known(tmp_path: Path) -> None:
+    with pytest.raises(FerryIdError, match=r"--vessel.*Fix:"):
+        patient(None, None, tmp_path)
+    assert patient("milliampere", None, tmp_path)[0].name == "milliampere"
