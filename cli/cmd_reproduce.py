@@ -10,11 +10,30 @@ import typer
 from ferryid.cli.options import OUT, Json
 from ferryid.cli.output import emit, progress
 
+STUDIES = (
+    *(
+        "rounds",
+        "master",
+        "calm",
+        "sensitivity",
+        "tuning",
+        "waves",
+        "encoder",
+        "residuals",
+        "flows",
+        "updates",
+        "guidance",
+    ),
+    "algorithms",
+)
+
 
 def command(
     what: Annotated[str, typer.Argument(help="What to reproduce: thesis.")],
     out: Annotated[Path, typer.Option("--out", help="Folder for the page and its figures.")] = OUT,
-    only: Annotated[list[str] | None, typer.Option("--only", help="A study by name; may be given again.")] = None,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", help=f"A study by name: {', '.join(STUDIES)}. May be given again.")
+    ] = None,
     seeds: Annotated[int, typer.Option(help="Repetitions of every study, each with other weather and noise.")] = 7,
     processes: Annotated[int, typer.Option(help="Processes to share the work among.")] = 2,
     json: Json = None,

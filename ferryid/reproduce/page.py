@@ -10,7 +10,7 @@ HEAD = """# The thesis reproduced
 
 Made by `make thesis` (`ferryid reproduce thesis`): the trials of Aurlien (2021), *Multivariate Modeling and Adaptive Control of
 Autonomous Ferries*, flown again in the built-in simulator, logged, and learnt from the logs as from any recording. *Theirs* is
-what the thesis states, one trial each; *ours* is the median of {count} runs with other weather and noise, least and greatest in
+what the thesis states, one trial each; *ours* is the median of {runs} with other weather and noise, least and greatest in
 brackets. No setting was chosen to bring the two together; where they differ, the text says what was found out. What the
 thesis leaves open and we had to choose stands [at the end](#chosen).
 """
@@ -50,13 +50,33 @@ def page(studies: Sequence[Study], seeds: Sequence[int], folder: str) -> str:
     folder
         Where the figures lie, as seen from the page.
     """
-    lines = [HEAD.format(count=len(seeds))]
+    lines = [HEAD.format(runs=f"{len(seeds)} run" + "s" * (len(seeds) > 1)), *summary(studies)]
     lines += [f"- [{study.title}](#{study.name})" for study in studies]
     lines += ["- [What was chosen, and when](#chosen)"]
     for study in studies:
         lines += section(study, folder)
     lines += ["", CHOSEN]
     return "\n".join(lines) + "\n"
+
+
+def summary(studies: Sequence[Study]) -> list[str]:
+    """Return what became of the thesis's numbers, as lines of Markdown; rows without a number of theirs do not count."""
+    lines = [
+        "| of the thesis's numbers | within the range of our runs | outside, same direction | other |",
+        "|---|---|---|---|",
+    ]
+    for study in studies:
+        met = [_met(row.theirs, row) for row in study.rows if isinstance(row.theirs, int | float)]
+        if met:
+            counts = (met.count(kind) for kind in ("within", "direction", "other"))
+            lines.append(f"| [{study.title}](#{study.name}): {len(met)} | " + " | ".join(map(str, counts)) + " |")
+    return [*lines, ""] if len(lines) > 2 else []
+
+
+def _met(theirs: float, row: Row) -> str:
+    if low(row.ours) <= theirs <= high(row.ours):
+        return "within"
+    return "direction" if row.unit == "%" and theirs * row.median > 0.0 else "other"
 
 
 def section(study: Study, folder: str) -> list[str]:

@@ -58,6 +58,18 @@ def disagreements(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Doubt
                 (*place, "until_s"),
                 f'"until_s" must come after "from_s" = {entry.from_s:g}, {found}. Fix: make it later',
             )
+        if entry.from_s >= scenario.duration_s:
+            yield (
+                (*place, "from_s"),
+                f'"from_s" = {entry.from_s:g} comes after the end of the trial at {scenario.duration_s:g} s. '
+                "Fix: make it earlier, or the trial longer",
+            )
+    scaled = [key for key in ("delta", "sigma") if key in data.get("controller", {})]
+    if scenario.controller.model and scaled:
+        yield (
+            ("controller", scaled[0]),
+            f'"{scaled[0]}" scales the profile\'s hull, in whose place "model" stands. Fix: leave out one of the two',
+        )
     for key, (low, high) in (("north_m", scenario.shallow.north_m), ("east_m", scenario.shallow.east_m)):
         if low > high:
             yield (

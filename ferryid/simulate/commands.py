@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.identify.store import load_file
 from ferryid.simulate.logs import write_log
 from ferryid.simulate.places import check_output
-from ferryid.simulate.scenario import check_seed, list_scenarios, load_scenario
+from ferryid.simulate.scenario import Scenario, check_seed, list_scenarios, load_scenario
 from ferryid.simulate.trial import Simulation, simulate
 
 SCHEMA = "ferryid.simulate/1"
@@ -72,8 +73,16 @@ def run_scenario(
         },
         "saturated_share": float(np.mean(control.saturated)),
         "undefined_aims": control.undefined_aims,
-        "warnings": _warnings(simulation),
+        "warnings": [*_rejected(asked), *_warnings(simulation)],
     }
+
+
+def _rejected(scenario: Scenario) -> list[str]:
+    """Say where the controller's model is one that its fit did not accept."""
+    name = scenario.controller.model
+    if not name or load_file(scenario.file(name)).accepted:
+        return []
+    return [f"the controller's model {name} was rejected by its fit: it steers, but do not trust it"]
 
 
 def _warnings(simulation: Simulation) -> list[str]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pkgutil import iter_modules
 
 import numpy as np
 import pytest
 
+from ferryid.cli.cmd_reproduce import STUDIES
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.report.thesis_figures import LONGEST, draw
+from ferryid.reproduce import studies
 from ferryid.reproduce.page import page
 from ferryid.reproduce.study import Row, Study, Table, change, changes, number, plain, spread
 
@@ -43,6 +47,21 @@ def test_theirs_stands_beside_the_median_and_range_of_ours() -> None:
     assert "[at the end](#chosen)" in text
     assert '<a id="chosen"></a>' in text
     assert "| a | b |\n|---|---|\n| 1 | 2 |" in text
+
+
+def test_the_page_begins_with_what_became_of_their_numbers() -> None:
+    text = page([STUDY], (1, 2, 3), "thesis")
+    # -75 lies outside -30 to -10 on the same side; 5 lies outside 4 to 4 likewise; the others give no number.
+    assert "| [A study](#made-up): 2 | 0 | 2 | 0 |" in text
+    met = replace(
+        STUDY, rows=(Row("a", "%", -20.0, (-30.0, -10.0)), Row("b", "%", -20.0, (10.0,)), Row("c", "s", 1.0, (2.0,)))
+    )
+    assert "| [A study](#made-up): 3 | 1 | 0 | 2 |" in page([met], (1,), "thesis")
+    assert "median of 1 run with" in page([met], (1,), "thesis")
+
+
+def test_the_command_names_every_study() -> None:
+    assert set(STUDIES) == {study.name for study in iter_modules(studies.__path__)}
 
 
 def test_json_holds_every_value() -> None:

@@ -214,6 +214,8 @@ def test_a_manoeuvre_takes_the_place_of_the_path() -> None:
         ("until_s = 30", "until_s = 10", 31, '"until_s" must come after "from_s" = 10'),
         ("until_s = 15", "until_s = 0", 49, '"until_s" must come after "from_s" = 0'),
         ("until_s = 35", "until_s = 5", 55, '"until_s" must come after "from_s" = 25'),
+        ("from_s = 10\nuntil_s = 30", "from_s = 4000", 30, "comes after the end of the trial"),
+        ("delta = 0.4", 'delta = 0.4\nmodel = "s.toml"', 13, '"delta" scales the profile'),
         ("significant_height_m = 0.2", "peak_period_s = 0", 38, "at least 0.5"),
         ("significant_height_m = 0.2", "significant_height_m = 2", 38, "steeper waves break"),
         ("significant_height_m = 0.2", "components = 0", 38, "whole number of at least 1"),
