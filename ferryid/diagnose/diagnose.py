@@ -12,8 +12,9 @@ import numpy as np
 
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
-from ferryid.diagnose.evidence import Evidence, FreeRuns, Improvement, evidence, force_errors, imagined
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, trial_of
+from ferryid.diagnose.evidence import Evidence, Improvement, evidence, force_errors
+from ferryid.diagnose.free_runs import FreeRuns
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
 from ferryid.diagnose.locate import TELLS, Location, locate
 from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding, Rival, Withheld
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths

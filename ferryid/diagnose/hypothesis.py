@@ -177,6 +177,14 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
     return Fit(tuple(suspects), values, covariance, hull, evidence, gaps(z))
 
 
+def imagined(plain: Picture, made: Fit) -> Picture:
+    """Return the picture that a fit has of the log."""
+    picture = replace(plain, hull=made.hull)
+    for suspect, values in zip(made.suspects, made.values, strict=True):
+        picture = suspect.act(picture, values)
+    return picture
+
+
 def trial_of(windows: Windows, plain: Picture, hull_spread: Floats) -> Trial:
     """Return the trial with the noise that is left when the hull alone is refitted.
 

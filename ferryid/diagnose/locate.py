@@ -15,8 +15,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.evidence import force_errors, imagined
-from ferryid.diagnose.hypothesis import Fit, Trial
+from ferryid.diagnose.evidence import force_errors
+from ferryid.diagnose.hypothesis import Fit, Trial, imagined
 from ferryid.diagnose.noise import ORDER, noise_of
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.effects.picture import Picture, Scene

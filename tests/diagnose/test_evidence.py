@@ -8,18 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ferryid.diagnose.evidence import (
-    FOLDS,
-    HEADING,
-    evidence,
-    folds_of,
-    force_errors,
-    free_runs,
-    held_out,
-    mass_of,
-    placebos,
-    subset,
-)
+from ferryid.diagnose.evidence import HEADING, evidence, force_errors, held_out, mass_of, placebos
+from ferryid.diagnose.folds import FOLDS, folds_of, subset
+from ferryid.diagnose.free_runs import free_runs
 from ferryid.diagnose.hypothesis import HULL_SPREAD, Suspect, Trial, fit, trial_of
 from ferryid.diagnose.weak import windows
 from ferryid.effects import effects
