@@ -31,6 +31,8 @@ FEWEST_WINDOWS = 60
 UNSEEN = 0.5
 """An effect whose parameters a log leaves as uncertain as this share of their usual size cannot be seen in it."""
 SHOWN_RIVALS = 3
+OUT_OF_STEP = ("time_delay", "thruster_lag")
+"""Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
 ONSET_DROP = 2.0
 """Fall of the logarithm of the evidence at the ends of an onset's interval."""
 WITHHELD_EFFECTS = {"wind": "wind", "current": "current", "payload": "payload"}
@@ -119,6 +121,7 @@ def _one(
     more = left.profiles[0].statistic >= TELLS if left.profiles else False
     if more:
         notes.append(f"Something is left over that nothing in the library explains: it shows most at {left.regime}.")
+        findings = [_doubted(one) for one in findings]
     tested = len(suspects_of(seen.scene)[0])
     verdict = _verdict(bool(findings), more, len(unseen), tested)
     before, after = _scores(trial, base, kept, proof)
@@ -132,6 +135,21 @@ def _one(
         tuple(notes),
         evidence=_leftover(trial, base, kept),
         withheld=_withheld(survey, scene, findings),
+    )
+
+
+def _doubted(finding: Finding) -> Finding:
+    """Return a finding as it stands beside something unsteady that nobody measured.
+
+    A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
+    """
+    if finding.effect not in OUT_OF_STEP:
+        return finding
+    return replace(
+        finding,
+        probability=min(finding.probability, 0.5),
+        unresolved_with=(*finding.unresolved_with, "gusts"),
+        separating_manoeuvre="the same manoeuvres in calm air",
     )
 
 

@@ -1,0 +1,52 @@
+"""Whole diagnoses of simulated logs: what is named, how large, since when, and what is left in doubt."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ferryid.diagnose.diagnose import diagnose
+from ferryid.diagnose.result import Diagnosis
+from ferryid.simulate import load_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+
+
+def diagnosed(name: str, folder: Path) -> Diagnosis:
+    log = folder / f"{name}.mcap"
+    write_log(simulate(load_scenario(name)), log)
+    return diagnose([str(log)], load_profile("milliampere"), None, progress=lambda stage: None)[0]
+
+
+def test_a_thruster_that_gives_up_half_way_and_a_breeze(tmp_path: Path) -> None:
+    result = diagnosed("thruster-fault", tmp_path)
+    assert result.verdict == "explained"
+    fault, wind = result.findings
+    assert (fault.effect, fault.instance, wind.effect) == ("thruster_gain", "thruster2", "wind")
+    assert fault.parameters["factor"].value == pytest.approx(0.6, abs=0.02)
+    onset = fault.parameters["onset"]
+    assert onset.low - 1.0 <= 720.0 <= onset.high + 1.0
+    assert wind.parameters["north"].value == pytest.approx(0.6, abs=0.1)
+    assert wind.parameters["east"].value == pytest.approx(-0.4, abs=0.1)
+    assert min(fault.probability, wind.probability) > 0.95
+    assert fault.improvement["yaw"] > 0.8
+    assert result.after["mse"]["yaw"] < 0.2 * result.before["mse"]["yaw"]
+
+
+def test_gusts_make_a_delay_doubtful(tmp_path: Path) -> None:
+    result = diagnosed("twelve-corner-gusty", tmp_path)
+    wind = next(one for one in result.findings if one.effect == "wind")
+    scenario = load_scenario("twelve-corner-gusty")
+    assert wind.parameters["north"].value == pytest.approx(scenario.wind.north_mps, abs=0.5)
+    assert wind.parameters["east"].value == pytest.approx(scenario.wind.east_mps, abs=0.5)
+    assert result.verdict == "partly_explained"
+    for one in result.findings:
+        if one.effect in ("time_delay", "thruster_lag"):
+            assert one.probability <= 0.5
+            assert "gusts" in one.unresolved_with
+
+
+def test_a_calm_log_matches(tmp_path: Path) -> None:
+    result = diagnosed("twelve-corner-calm", tmp_path)
+    assert result.verdict == "matched"
+    assert result.findings == ()
