@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from importlib.resources import files
 from textwrap import fill
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment
 
 from ferryid.diagnose.result import AXES, Diagnosis, Finding
 from ferryid.identify.result import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
 from ferryid.report.figures import Floats
+from ferryid.report.html import template
 
 MAX_LOGS = 6
 """Logs whose evidence is drawn; the page stays readable."""
@@ -24,12 +23,10 @@ UNITS = ("[N]", "[N]", "[N·m]")
 
 def render(diagnoses: Sequence[Diagnosis], title: str) -> tuple[str, dict[str, str]]:
     """Return the page on one log or several, and its drawings (SVG) by name."""
-    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    source = files("ferryid.report").joinpath("templates", "diagnosis.html").read_text(encoding="utf-8")
     several = len(diagnoses) > 1
     logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS) for k, one in enumerate(diagnoses, 1)]
     left = [one.log for one in diagnoses[MAX_LOGS:]]
-    page = environment.from_string(source).render(
+    page = template("diagnosis.html").render(
         title=title,
         verdict=diagnosis_words.overall(diagnoses),
         headline=diagnosis_words.summary(diagnoses),

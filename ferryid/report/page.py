@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment
 
 from ferryid.identify.excitation import RANGE_UNITS
 from ferryid.identify.inertia import effective_mass
 from ferryid.identify.result import AXES, FitResult, LogFit
 from ferryid.report import figures
+from ferryid.report.html import template
 from ferryid.report.structure import remainder, worst_and_best_minute
 from ferryid.vessel import parse_profile
 from ferryid.vessel.parse_hull import rigid_mass
@@ -23,10 +22,8 @@ MAX_LOGS = 6
 
 def render(result: FitResult) -> tuple[str, dict[str, str]]:
     """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name."""
-    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    source = files("ferryid.report").joinpath("templates", "fit.html").read_text(encoding="utf-8")
     context = _context(result)
-    return environment.from_string(source).render(context), dict(_drawings(context))
+    return template("fit.html").render(context), dict(_drawings(context))
 
 
 def _drawings(part: Any) -> Iterator[tuple[str, str]]:
