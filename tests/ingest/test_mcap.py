@@ -273,6 +273,18 @@ def test_a_flipped_byte_costs_at_most_its_chunk_and_is_told(
     assert told == missing or any(loss.messages is None for loss in log.losses)
 
 
+def test_a_message_turned_into_the_end_of_the_data_is_told() -> None:
+    samples, content = plain_log(use_chunking=False, enable_data_crcs=True)
+    damaged = bytearray(content)
+    place = content.index(record_bytes(samples[0], 0))
+    assert damaged[place] == 0x05
+    damaged[place] = 0x0F
+    log = opened(bytes(damaged))
+    for topic in PATHS:
+        values(log, topic, verify=True)
+    assert log.losses
+
+
 @settings(max_examples=80, deadline=None)
 @given(st.data())
 def test_a_flipped_byte_outside_chunks_costs_one_message(data: st.DataObject) -> None:

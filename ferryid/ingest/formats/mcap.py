@@ -217,7 +217,13 @@ class McapLog:
         end = self._index.data_end
         # A DataEnd record closes the data section: just before the summary, or where the walk found it.
         at = end if end < len(self._file) and self._file[end] == DATA_END else end - RECORD_HEADER - 4
-        if at < len(MAGIC) or record_header(self._file, at) != (DATA_END, 4):
+        if at < len(MAGIC):
+            return []
+        opcode, size = record_header(self._file, at)
+        if opcode == DATA_END and size != 4 and at == end:
+            # A record whose first byte was turned into that of a DataEnd looks like the end of all data.
+            return [Loss(self._name, "the record that closes the data is damaged: what stands after it is not read")]
+        if (opcode, size) != (DATA_END, 4):
             return []
         crc = int.from_bytes(self._file[at + RECORD_HEADER : at + RECORD_HEADER + 4], "little")
         if crc == 0 or crc32(self._file[:at]) == crc:
