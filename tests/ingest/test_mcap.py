@@ -276,7 +276,8 @@ def test_a_flipped_byte_costs_at_most_its_chunk_and_is_told(
 def test_a_message_turned_into_the_end_of_the_data_is_told() -> None:
     samples, content = plain_log(use_chunking=False, enable_data_crcs=True)
     damaged = bytearray(content)
-    place = content.index(record_bytes(samples[0], 0))
+    first = record_bytes(samples[0], 0)
+    place = content.index(first) + len(first)
     assert damaged[place] == 0x05
     damaged[place] = 0x0F
     log = opened(bytes(damaged))
