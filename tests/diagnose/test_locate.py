@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ferryid.diagnose.changes import MOST_BREAKS, _breaks, acting
 from ferryid.diagnose.hypothesis import HULL_SPREAD, Fit, Suspect, Trial, fit, trial_of
-from ferryid.diagnose.locate import FEWEST, MOST_BREAKS, _breaks, _in_words, acting, locate, profile_of, whitened
+from ferryid.diagnose.locate import locate, whitened
+from ferryid.diagnose.profiles import FEWEST, in_words, profile_of
 from ferryid.diagnose.weak import windows
 from ferryid.effects import Parameter, effects
 from ferryid.effects.picture import Picture, Scene, acceleration, hull_of
@@ -190,4 +192,4 @@ def test_a_regime_across_north_is_one_range() -> None:
     loud = np.where((heading > 330.0) | (heading < 60.0), 3.0, 1.0)
     white = np.random.default_rng(6).standard_normal((360, 3)) * loud[:, None]
     one = profile_of("heading", "deg", heading, np.linspace(0.0, 360.0, 13), white, white)
-    assert _in_words([one], np.full(3, 1.0 / 3.0)) == "headings 330 to 60 deg"
+    assert in_words([one], np.full(3, 1.0 / 3.0)) == "headings 330 to 60 deg"
