@@ -6,8 +6,9 @@ An effect takes a picture and returns another, in which its own physics acts. Ef
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,13 @@ SWAY = ("Y_v", "Y_|v|v", "Y_|r|v", "Y_vvv", "Y_r", "Y_|v|r", "Y_|r|r")
 YAW = ("N_v", "N_|v|v", "N_|r|v", "N_r", "N_|v|r", "N_|r|r", "N_rrr")
 COEFFICIENTS = (*MASS, *SURGE, *SWAY, *YAW)
 """Order of the hull's coefficients in `Picture.hull`."""
+UNITS = (
+    *("kg", "kg", "kg·m", "kg·m", "kg·m²"),
+    *("kg/s", "kg/m", "kg·s/m²"),
+    *("kg/s", "kg/m", "kg", "kg·s/m²", "kg·m/s", "kg", "kg·m"),
+    *("kg·m/s", "kg", "kg·m", "kg·m²/s", "kg·m", "kg·m²", "kg·m²·s"),
+)
+"""Units of `COEFFICIENTS`, radians left out."""
 
 
 @dataclass(frozen=True)
@@ -153,16 +161,44 @@ def acceleration(picture: Picture) -> Floats:
     ``M nu_dot = tau + external - C(nu_r) nu_r - D(nu_r) nu_r``, with ``[r v_c, -r u_c, 0]`` added for the water that the body
     frame turns through; Fossen (2021), section 10.3.
     """
+    (m11, m22, m23, m32, m33), rest, turning = _balance(picture)
+    X, Y, N = (picture.parts.sum(axis=1) + rest).T
+    det = m22 * m33 - m23 * m32
+    rates = np.column_stack([X / m11, (m33 * Y - m23 * N) / det, (m22 * N - m32 * Y) / det])
+    return rates if turning is None else rates + turning
+
+
+def required_force(picture: Picture, nu_dot: Floats) -> Floats:
+    """Return the force that the actuators need for an acceleration over ground [N, N, N·m], shape (n, 3).
+
+    The inverse of `acceleration`: what `parts` add up to plays no part.
+
+    Parameters
+    ----------
+    picture
+        Hull, water, load and all other forces.
+    nu_dot
+        Shape (n, 3) [m/s², m/s², rad/s²].
+    """
+    (m11, m22, m23, m32, m33), rest, turning = _balance(picture)
+    u_dot, v_dot, r_dot = (nu_dot if turning is None else nu_dot - turning).T
+    return np.column_stack([m11 * u_dot, m22 * v_dot + m23 * r_dot, m32 * v_dot + m33 * r_dot]) - rest
+
+
+def _balance(picture: Picture) -> tuple[tuple[Any, ...], Floats, Floats | None]:
+    """Return the mass matrix's entries, all forces but the actuators', and the acceleration of turning water."""
     scene, hull = picture.scene, picture.hull
     m11, m22, m23, m32, m33 = hull[:5]
+    turning = None
     if picture.flow is None:
         nu, (X_D, Y_D, N_D) = scene.nu, scene.regressors
     else:
         u_c, v_c = body_current(picture)
         nu = scene.nu - np.column_stack([u_c, v_c, np.zeros_like(u_c)])
         X_D, Y_D, N_D = damping_regressors(nu)
+        r = scene.nu[:, 2]
+        turning = np.column_stack([r * v_c, -r * u_c, np.zeros_like(r)])
     u, v, r = nu.T
-    force = picture.parts.sum(axis=1) + picture.external
     D = np.column_stack([X_D @ hull[5:8], Y_D @ hull[8:15], N_D @ hull[15:22]])
     if picture.damping_factor is not None:
         D = D * picture.damping_factor[:, None]
@@ -171,12 +207,30 @@ def acceleration(picture: Picture) -> Floats:
         m11, m22, m33 = m11 + m, m22 + m, m33 + mxx
         m23, m32 = m23 + mx, m32 + mx
     c13, c23 = -m22 * v - 0.5 * (m23 + m32) * r, m11 * u
-    X = force[:, 0] + D[:, 0] - c13 * r
-    Y = force[:, 1] + D[:, 1] - c23 * r
-    N = force[:, 2] + D[:, 2] + c13 * u + c23 * v
-    det = m22 * m33 - m23 * m32
-    rates = np.column_stack([X / m11, (m33 * Y - m23 * N) / det, (m22 * N - m32 * Y) / det])
-    if picture.flow is not None:
-        rates[:, 0] += scene.nu[:, 2] * v_c
-        rates[:, 1] -= scene.nu[:, 2] * u_c
-    return rates
+    C = np.column_stack([c13 * r, c23 * r, -c13 * u - c23 * v])
+    return (m11, m22, m23, m32, m33), picture.external + D - C, turning
+
+
+def from_onset(before: Picture, after: Picture, onset_s: float) -> Picture:
+    """Return the one picture before an onset [s] and the other from it on, whose hull and scene it has all along."""
+    rows = before.scene.t >= onset_s
+
+    def mixed(old: Floats, new: Floats) -> Floats:
+        return np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+
+    def either(old: Floats | None, new: Floats | None, blank: float = 0.0) -> Floats | None:
+        known = new if old is None else old
+        if known is None:
+            return None
+        nothing = np.full_like(known, blank)
+        return mixed(nothing if old is None else old, nothing if new is None else new)
+
+    return replace(
+        after,
+        parts=mixed(before.parts, after.parts),
+        angles=mixed(before.angles, after.angles),
+        external=mixed(before.external, after.external),
+        flow=either(before.flow, after.flow),
+        load=either(before.load, after.load),
+        damping_factor=either(before.damping_factor, after.damping_factor, 1.0),
+    )
