@@ -16,6 +16,9 @@ def command(
     model: Annotated[
         str | None, typer.Option(help="Model to examine: path, name or name@version; the profile's hull if left out.")
     ] = None,
+    against: Annotated[
+        str | None, typer.Option(help="A simulated log of the trial to hold the recording against, instead of a model.")
+    ] = None,
     withhold: Annotated[
         list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")
     ] = None,
@@ -29,7 +32,9 @@ def command(
 
     profile, examined = patient(vessel, model, out)
     hidden = tuple(withhold or ())
-    diagnoses = diagnose(logs, profile, out, model=examined, withhold=hidden, verify=verify, progress=progress)
+    diagnoses = diagnose(
+        logs, profile, out, model=examined, against=against, withhold=hidden, verify=verify, progress=progress
+    )
     progress("writing the report")
     outcome = report(diagnoses, out)
     progress("")

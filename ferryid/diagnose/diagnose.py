@@ -10,6 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.diagnose.against import (
+    Paths,
+    Simulated,
+    base_picture,
+    differing,
+    differing_sensors,
+    learn,
+    paths,
+    plain_against,
+)
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.evidence import Evidence, Improvement, evidence, force_errors
@@ -18,11 +28,12 @@ from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, tria
 from ferryid.diagnose.locate import TELLS, Location, locate
 from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding, Rival, Withheld
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
-from ferryid.diagnose.search import NEAR, ODDS, Search, search, suspects_of
+from ferryid.diagnose.search import NEAR, ODDS, search, suspects_of
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.effects.effect import Parameter
 from ferryid.effects.picture import Scene
+from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.vessel.profile import Profile
 
@@ -44,6 +55,7 @@ def diagnose(
     out: Path | None,
     *,
     model: Model | None = None,
+    against: str | None = None,
     withhold: Sequence[str] = (),
     verify: bool = False,
     progress: Callable[[str], None],
@@ -60,6 +72,8 @@ def diagnose(
         Output folder, whose ``logs`` keep the ingested tables; None keeps none.
     model
         A fitted model to examine; the profile's hull where None.
+    against
+        Path of a simulated log of the trial: what is found is the difference to that simulation.
     withhold
         Signals to hide from the diagnosis.
     verify
@@ -72,7 +86,13 @@ def diagnose(
     FerryIdError
         For input that cannot be used.
     """
-    return tuple(_one(path, profile, out, model, withhold, verify, progress) for path in logs)
+    if against is not None and model is not None:
+        raise FerryIdError(
+            "diagnose: a recording is held against one thing at a time, found both --model and --against. "
+            "Fix: leave out one of the two"
+        )
+    simulated = None if against is None else learn(against, profile, out, verify=verify, progress=progress)
+    return tuple(_one(path, profile, out, model, simulated, withhold, verify, progress) for path in logs)
 
 
 def _one(
@@ -80,6 +100,7 @@ def _one(
     profile: Profile,
     out: Path | None,
     model: Model | None,
+    simulated: Simulated | None,
     withhold: Sequence[str],
     verify: bool,
     progress: Callable[[str], None],
@@ -96,9 +117,20 @@ def _one(
             "Record at least ten minutes that excite every axis."
         )
         return Diagnosis(name, profile.name, "not_testable", _of_sensors(sensors), {}, {}, tuple(notes))
-    plain, spread = plain_picture(seen.scene, profile, model)
+    if simulated is None:
+        plain, spread = plain_picture(seen.scene, profile, model)
+        library = suspects_of(seen.scene)[0]
+        compared = {}
+    else:
+        path_errors = paths(simulated.scene, scene)
+        shift_s = path_errors.shift_s if isinstance(path_errors, Paths) else 0.0
+        plain, spread = base_picture(simulated, seen.scene, shift_s)
+        library = differing(simulated, seen.scene, shift_s)
+        compared = plain_against(simulated, path_errors)
+        sensors, told = differing_sensors(simulated, sensors, scene)
+        notes += [compared["says"], *told]
     trial = trial_of(seen, plain, spread)
-    found = search(trial, progress)
+    found = search(trial, progress, known=library)
     trial, kept = found.trial, found.fit
     progress("judging on held-out stretches")
     proof = evidence(trial, kept) if kept.suspects else None
@@ -108,8 +140,8 @@ def _one(
     base = fit(trial, ())
     progress("locating")
     left = locate(trial, kept, kept, scene)
-    findings = [*_of_sensors(sensors), *_findings(found, trial, base, kept, proof, scene)]
-    unseen = _unseen(trial, kept)
+    findings = [*_of_sensors(sensors), *_findings(library, trial, base, kept, proof, scene)]
+    unseen = _unseen(trial, kept, library)
     if model is None and not profile.hull.has_model:
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
@@ -122,8 +154,7 @@ def _one(
     if more:
         notes.append(f"Something is left over that nothing in the library explains: it shows most at {left.regime}.")
         findings = [_doubted(one) for one in findings]
-    tested = len(suspects_of(seen.scene)[0])
-    verdict = _verdict(bool(findings), more, len(unseen), tested)
+    verdict = _verdict(bool(findings), more, len(unseen), len(library))
     before, after = _scores(trial, base, kept, proof)
     return Diagnosis(
         name,
@@ -135,6 +166,7 @@ def _one(
         tuple(notes),
         evidence=_leftover(trial, base, kept),
         withheld=_withheld(survey, scene, findings),
+        against=compared,
     )
 
 
@@ -203,13 +235,15 @@ def _proved(trial: Trial, kept: Fit, proof: Evidence) -> tuple[Fit, Evidence | N
     return again, evidence(trial, again) if holds else None, told
 
 
-def _findings(found: Search, trial: Trial, base: Fit, kept: Fit, proof: Evidence | None, scene: Scene) -> list[Finding]:
+def _findings(
+    library: Sequence[Suspect], trial: Trial, base: Fit, kept: Fit, proof: Evidence | None, scene: Scene
+) -> list[Finding]:
     made = []
     for i, suspect in enumerate(kept.suspects):
         others = [j for j in range(len(kept.suspects)) if j != i]
         rest = [kept.suspects[j] for j in others]
         without = fit(trial, rest, [kept.values[j] for j in others])
-        rivals, probability = _rivals(trial, suspect, kept, rest, without)
+        rivals, probability = _rivals(trial, suspect, kept, rest, without, library)
         unresolved = tuple(
             dict.fromkeys(
                 rival.effect for rival in rivals if rival.delta_score > -NEAR and rival.effect != suspect.effect.id
@@ -243,12 +277,12 @@ def _findings(found: Search, trial: Trial, base: Fit, kept: Fit, proof: Evidence
 
 
 def _rivals(
-    trial: Trial, suspect: Suspect, kept: Fit, rest: Sequence[Suspect], without: Fit
+    trial: Trial, suspect: Suspect, kept: Fit, rest: Sequence[Suspect], without: Fit, library: Sequence[Suspect]
 ) -> tuple[tuple[Rival, ...], float]:
     """Return what else could stand in a finding's place, the nearest first, and how probable the finding is."""
     taken = {one.key for one in kept.suspects}
     rivals = []
-    for other in suspects_of(trial.plain.scene)[0]:
+    for other in library:
         if other.key in taken:
             continue
         neutral = np.array([parameter.neutral for parameter in other.parameters])
@@ -311,11 +345,11 @@ def _figure(trial: Trial, without: Fit, kept: Fit, place: Location) -> dict[str,
     }
 
 
-def _unseen(trial: Trial, kept: Fit) -> list[str]:
+def _unseen(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> list[str]:
     """Return the effects that would have stayed as uncertain as they were before the log, at their usual size."""
     taken = {one.key for one in kept.suspects}
     names = []
-    for suspect in suspects_of(trial.plain.scene)[0]:
+    for suspect in library:
         if suspect.key in taken:
             continue
         usual = np.array([_usual(parameter) for parameter in suspect.parameters])

@@ -140,6 +140,8 @@ class Diagnosis:
         shape (m, 3); optionally ``heading`` [deg] and ``speed`` [m/s], shape (m,).
     withheld
         Signals that were hidden from the diagnosis.
+    against
+        The simulation that a recording was held against, as `ferryid.diagnose.against.plain_against` gives it, or empty.
     """
 
     log: str
@@ -152,6 +154,7 @@ class Diagnosis:
     model: str | None = None
     evidence: Mapping[str, Floats] = field(default_factory=dict)
     withheld: tuple[Withheld, ...] = ()
+    against: Mapping[str, Any] = field(default_factory=dict)
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -175,6 +178,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
             for one in diagnosis.withheld
         ],
         "model": diagnosis.model,
+        **({"against": dict(diagnosis.against)} if diagnosis.against else {}),
     }
 
 
