@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
+from ferryid.compiled import compiled
 from ferryid.simulate.control.allocation import Allocation, allocate
 from ferryid.simulate.control.feedforward import Feedforward
 from ferryid.simulate.control.guidance import Guidance, guide

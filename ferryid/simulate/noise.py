@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
+from ferryid.compiled import compiled
 from ferryid.simulate.elementary import cos, exp, log, sin
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Noise

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.control.angle import shorter_way
 from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.thrust import Curves, largest_force, speed_for

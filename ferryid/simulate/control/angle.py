@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 
 
 @borrowing

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import DIMENSIONS
 from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.residual import scaled
 from ferryid.identify.store import load_file
-from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.hull import Hydrodynamics, hydrodynamics, required_force
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load

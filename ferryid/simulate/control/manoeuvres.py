@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import borrowing
 from ferryid.vessel.profile import Actuator, Profile
 
 if TYPE_CHECKING:

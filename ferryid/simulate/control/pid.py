@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 from ferryid.simulate.control.angle import shorter_way
 from ferryid.simulate.control.feedforward import Feedforward, ahead_of
 from ferryid.simulate.control.reference import body_reference

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import compiled
+from ferryid.compiled import compiled
 from ferryid.simulate.elementary import cos, sin
 from ferryid.simulate.sections import Current
 

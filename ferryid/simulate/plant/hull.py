@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeAlias
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 from ferryid.simulate.sections import Fouling
 from ferryid.vessel.profile import Hull
 

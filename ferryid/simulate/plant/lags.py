@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 from ferryid.simulate.elementary import exp
 
 Weights = tuple[float, float, float, float]

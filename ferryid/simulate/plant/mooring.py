@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 from ferryid.simulate.plant.hull import Force
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import borrowing
 from ferryid.simulate.elementary import cos, sin
 from ferryid.simulate.plant import rolling
 from ferryid.simulate.plant.current import current_series, turn_rate

@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 from ferryid.simulate.elementary import cos, exp, sin
 from ferryid.simulate.plant.waves import GRAVITY, Sea, slopes
 

@@ -7,7 +7,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.hull import Force
 from ferryid.vessel.profile import Actuator

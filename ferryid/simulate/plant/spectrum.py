@@ -7,7 +7,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import borrowing, compiled
+from ferryid.compiled import borrowing, compiled
 from ferryid.simulate.elementary import exp, log
 
 Floats = NDArray[np.float64]

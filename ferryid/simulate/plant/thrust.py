@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import borrowing
 from ferryid.vessel.profile import Actuator, Profile, ThrustCurve
 from ferryid.vessel.thrusters import FRESH_WATER
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 from ferryid.simulate.elementary import cos, sin
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.lags import Weights, decay_of, follow, lag_weights

@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.compiled import borrowing, compiled
 from ferryid.errors import FerryIdError
-from ferryid.simulate.compiled import borrowing, compiled
 from ferryid.simulate.elementary import cos, exp, sin
 from ferryid.simulate.noise import generator
 from ferryid.simulate.plant.hull import Force

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi, sqrt
 from typing import NamedTuple
 
-from ferryid.simulate.compiled import borrowing
+from ferryid.compiled import borrowing
 from ferryid.simulate.elementary import atan2
 from ferryid.simulate.plant.hull import Force
 from ferryid.vessel.profile import WindAreas

@@ -10,7 +10,7 @@ from typing import Any
 import numba
 import pytest
 
-from ferryid.simulate.compiled import compiled
+from ferryid.compiled import compiled
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 

@@ -1,7 +1,7 @@
-"""The simulator's inner loops, compiled by numba and kept on disk beside their source.
+"""Inner loops, compiled by numba and kept on disk beside their source.
 
 numba holds a compiled function to be current as long as its own file is; it does not look at the functions that it calls
-in other files. The stamp below makes every one depend on all of the simulator's source.
+in other files. The stamp below makes every one depend on all source of its package, such as the whole simulator.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ R = TypeVar("R")
 
 
 @cache
-def source_stamp() -> str:
-    """Return a hash over the source of the whole simulator."""
-    files = sorted(Path(__file__).parent.rglob("*.py"))
+def source_stamp(package: str) -> str:
+    """Return a hash over the source of a package of ferryid, such as ``"simulate"``."""
+    files = sorted((Path(__file__).parent / package).rglob("*.py"))
     return sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
@@ -51,6 +51,7 @@ class _StampedCache(FunctionCache):  # type: ignore[misc]
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
+        self._package = function.__module__.partition(".")[2].partition(".")[0]
         stamp = self._impl.locator.get_source_stamp()
         self._cache_file = _SealedFile(self._cache_path, self._impl.filename_base, stamp)
 
@@ -69,7 +70,7 @@ class _StampedCache(FunctionCache):  # type: ignore[misc]
             self.disable()
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return (*super()._index_key(sig, codegen), source_stamp())
+        return (*super()._index_key(sig, codegen), source_stamp(self._package))
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
