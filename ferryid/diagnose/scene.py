@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 
 from ferryid.diagnose.hypothesis import HULL_SPREAD
 from ferryid.diagnose.velocity import steadied
-from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, acceleration, hull_of
+from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, hull_of
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.model import Model
-from ferryid.identify.residual import scaled
+from ferryid.identify.pictured import Pictured, bare_picture, bridged, pushes
 from ferryid.signals.align import align
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.smooth import Measured, measure, moving_mean, odd_rows, smooth_measured
 from ferryid.signals.track import Motion, Track
-from ferryid.vessel import actuator_columns, applied_force
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Floats, Profile
 from ferryid.vessel.wind import wind_force
@@ -42,31 +40,6 @@ _POSITION_SHARE = 0.8
 _WATER = 1000.0
 _BLOCK = 0.7
 """Usual part of the box around a hull that it fills."""
-_MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {
-    "X_u": (("u", 0),),
-    "X_|u|u": (("|u|u", 0), ("sgn(u)u^2", 0)),
-    "X_uuu": (("u^3", 0),),
-    "Y_v": (("v", 1),),
-    "Y_|v|v": (("|v|v", 1), ("sgn(v)v^2", 1)),
-    "Y_|r|v": (("|r|v", 1),),
-    "Y_vvv": (("v^3", 1),),
-    "Y_r": (("r", 1),),
-    "Y_|v|r": (("|v|r", 1),),
-    "Y_|r|r": (("|r|r", 1), ("sgn(r)r^2", 1)),
-    "N_v": (("v", 2),),
-    "N_|v|v": (("|v|v", 2), ("sgn(v)v^2", 2)),
-    "N_|r|v": (("|r|v", 2),),
-    "N_r": (("r", 2),),
-    "N_|v|r": (("|v|r", 2),),
-    "N_|r|r": (("|r|r", 2), ("sgn(r)r^2", 2)),
-    "N_rrr": (("r^3", 2),),
-    "m11": (("u_dot", 0),),
-    "m22": (("v_dot", 1),),
-    "m23": (("r_dot", 1),),
-    "m32": (("v_dot", 2),),
-    "m33": (("r_dot", 2),),
-}
-"""The terms of a fitted model, with their axes, that stand for each of the hull's coefficients."""
 
 
 @dataclass(frozen=True)
@@ -160,12 +133,13 @@ def window_lengths(profile: Profile) -> tuple[float, float]:
     return length_s, length_s / STRIDES
 
 
-def plain_picture(scene: Scene, profile: Profile, model: Model | None = None) -> tuple[Picture, Floats]:
-    """Return the picture before any effect, and how far each of its hull's coefficients is believed to be off.
+def plain_picture(
+    scene: Scene, profile: Profile, model: Model | None = None, sha256: str = ""
+) -> tuple[Picture, Floats]:
+    """Return the picture before any suspect, and how far each of its hull's coefficients is believed to be off.
 
-    The air is still where no wind was measured, and the water too. A model's coefficients of acceleration and damping
-    become the hull's; all the rest of it, such as its own Coriolis terms, wind terms and intercept, is an external force, so
-    that the picture's force at the measured motion is the model's.
+    The air is still where no wind was measured, and the water too. A model is imagined as `Pictured` has it, with its vessel's
+    properties and, in a log that it was diagnosed on, that log's conditions.
 
     Parameters
     ----------
@@ -174,12 +148,14 @@ def plain_picture(scene: Scene, profile: Profile, model: Model | None = None) ->
     profile
         The vessel.
     model
-        A fitted model to start from; the profile's hull where None.
+        A model to start from; the profile's hull where None.
+    sha256
+        Hash of the log, by which a model knows its conditions.
 
     Returns
     -------
     Picture
-        Without effects.
+        Without suspects.
     ndarray
         Standard deviations, shape (22,), in the units of the coefficients: `HULL_SPREAD` of each where a hull model is
         known (with the model's own intervals added), and what a vessel of this size may have at most where it is not.
@@ -189,13 +165,9 @@ def plain_picture(scene: Scene, profile: Profile, model: Model | None = None) ->
     FerryIdError
         For a model of another vessel, or one whose inertia couples surge to sway and yaw.
     """
-    load = None
-    if scene.payload is not None:
-        mass, place = scene.payload.T
-        load = np.column_stack([mass, mass * place, mass * place**2])
-    bare = Picture(scene, hull_of(profile), scene.parts, scene.angles, np.zeros((len(scene.t), 3)), scene.current, load)
     if model is not None:
-        return _modelled(bare, profile, model)
+        return _modelled(scene, profile, model, sha256)
+    bare = bare_picture(scene, hull_of(profile))
     air = np.zeros((len(scene.t), 2)) if scene.wind is None else scene.wind
     external = bare.external if profile.wind is None else wind_force(profile.wind, air, scene.psi, scene.nu)
     spread = HULL_SPREAD * np.abs(bare.hull) if profile.hull.has_model else broad_spread(scene, profile)
@@ -248,66 +220,19 @@ def broad_spread(scene: Scene, profile: Profile) -> Floats:
     return np.array([every[name] for name in COEFFICIENTS])
 
 
-def _modelled(bare: Picture, profile: Profile, model: Model) -> tuple[Picture, Floats]:
-    force = estimator(model)
-    _check_model(force, profile, model)
-    hull, spread = _hull_of_model(force, model)
-    if not force.profile.hull.has_model:
-        # What the base does not know, the fit had to learn; terms that it left out may be anything.
-        spread = np.where(hull == 0.0, broad_spread(bare.scene, profile), spread)
-    scene, functions = bare.scene, force.basis
-    still = np.zeros((len(scene.t), 2))
-    wind, current = scene.wind, scene.current
-    if wind is None and functions is not None and functions.needs_wind:
-        wind = still
-    if current is None and functions is not None and functions.needs_current:
-        current = still
-    at_rest = np.zeros_like(scene.nu)
-    needed = force(at_rest, scene.nu, scene.psi, wind, current)
-    # What the picture's own hull needs for the same motion: its acceleration without any force, times its mass.
-    alone = replace(bare, hull=hull, parts=np.zeros_like(bare.parts), load=None)
-    external = -needed - acceleration(alone) @ _mass(hull).T
-    return replace(bare, hull=hull, external=external), spread
-
-
-def _check_model(force: Estimator, profile: Profile, model: Model) -> None:
-    if force.profile.name != profile.name:
+def _modelled(scene: Scene, profile: Profile, model: Model, sha256: str) -> tuple[Picture, Floats]:
+    known = Pictured(model)
+    if known.force.profile.name != profile.name:
         raise FerryIdError(
-            f"{model.name}@{model.version}: a model of {force.profile.name} says nothing about {profile.name}. "
+            f"{model.label}: a model of {known.force.profile.name} says nothing about {profile.name}. "
             "Fix: give a model and logs of one vessel"
         )
-    cross = [
-        (term, axis)
-        for axes in (("u_dot", 1), ("u_dot", 2), ("v_dot", 0), ("r_dot", 0))
-        for term, axis in (axes,)
-        if term in model.terms and model.theta[model.terms.index(term), axis] != 0.0
-    ]
-    if cross:
-        told = ", ".join(f"{term} in {('surge', 'sway', 'yaw')[axis]}" for term, axis in cross)
-        raise FerryIdError(
-            f"{model.name}@{model.version}: a diagnosis needs a mass matrix that keeps surge apart from sway and yaw, found "
-            f"coefficients of {told}. Fix: fit the model with --structure decoupled"
-        )
-
-
-def _hull_of_model(force: Estimator, model: Model) -> tuple[Floats, Floats]:
-    zeta = float(model.scale.get("zeta", 1.0))
-    hull = hull_of(replace(force.profile, hull=scaled(force.profile.hull, model.scale))) / zeta
-    variance = np.zeros_like(hull)
-    for index, name in enumerate(COEFFICIENTS):
-        picked = [(model.terms.index(term), axis) for term, axis in _MAPPED[name] if term in model.terms]
-        if not picked:
-            continue
-        rows, axis = np.array([row for row, _ in picked]), picked[0][1]
-        # Mass takes force to accelerate; a SNAME coefficient gives the force that the water exerts.
-        hull[index] += (1.0 if name.startswith("m") else -1.0) * float(model.theta[rows, axis].sum())
-        variance[index] = float(model.covariance[axis][np.ix_(rows, rows)].sum())
-    return hull, np.sqrt((HULL_SPREAD * hull) ** 2 + np.maximum(variance, 0.0))
-
-
-def _mass(hull: Floats) -> Floats:
-    m11, m22, m23, m32, m33 = hull[:5]
-    return np.array([[m11, 0.0, 0.0], [0.0, m22, m23], [0.0, m32, m33]])
+    picture = known.altered(known.plain(scene), sha256).picture
+    spread = np.sqrt((HULL_SPREAD * picture.hull) ** 2 + known.variance)
+    if not known.force.profile.hull.has_model:
+        # What the base does not know, the fit had to learn; terms that it left out may be anything.
+        spread = np.where(picture.hull == 0.0, broad_spread(scene, profile), spread)
+    return picture, spread
 
 
 def _dimensions(profile: Profile) -> tuple[float, float, float]:
@@ -356,52 +281,26 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         usable &= placed
     else:
         eta = np.column_stack([np.full((len(eta), 2), np.nan), eta[:, 2]])
-    current = None if measured.current is None else _bridged(measured.current, usable)
-    eta = np.column_stack([_bridged(column[:, None], usable) for column in eta.T])
+    current = None if measured.current is None else bridged(measured.current, usable)
+    eta = np.column_stack([bridged(column[:, None], usable) for column in eta.T])
     through_water = (
         measured.nu if measured.current is None else measured.nu - current_in_body(measured.current, eta[:, 2])
     )
-    columns = track.columns
-    chosen, _ = actuator_columns(profile, columns)
-    parts, angles = [], []
-    for actuator in profile.actuators:
-        alone = replace(profile, actuators=(actuator,))
-        parts.append(_bridged(applied_force(alone, columns, through_water)[0], usable))
-        if actuator.kind == "azimuth":
-            angle = columns[chosen[actuator.name, "angle"]]
-            angles.append(_bridged(angle[:, None], usable)[:, 0])
-        else:
-            angles.append(np.full(len(track.t), np.nan))
-    nu_raw = _bridged(measured.nu, usable)
+    parts, angles = pushes(profile, track.columns, through_water, usable)
+    nu_raw = bridged(measured.nu, usable)
     return Scene(
         profile=profile,
         t=measured.t,
         eta=eta,
         nu_raw=nu_raw,
         nu=steadied(_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
-        parts=np.stack(parts, axis=1),
-        angles=np.column_stack(angles),
+        parts=parts,
+        angles=angles,
         usable=usable,
-        wind=None if measured.wind is None else _mean(_bridged(measured.wind, usable), rows),
+        wind=None if measured.wind is None else _mean(bridged(measured.wind, usable), rows),
         current=None if current is None else _mean(current, rows),
-        payload=None if measured.payload is None else _bridged(measured.payload, usable, held=True),
+        payload=None if measured.payload is None else bridged(measured.payload, usable, held=True),
     )
-
-
-def _bridged(values: Floats, usable: Flags, *, held: bool = False) -> Floats:
-    """Return values with NaN replaced by what lies between, or was last, on usable rows; all NaN stays so."""
-    result = values.copy()
-    rows = np.arange(len(values))
-    for column in result.T:
-        missing = ~np.isfinite(column)
-        known = np.flatnonzero(usable & ~missing)
-        if not missing.any() or known.size == 0:
-            continue
-        if held:
-            column[missing] = column[known[np.maximum(np.searchsorted(known, rows[missing]) - 1, 0)]]
-        else:
-            column[missing] = np.interp(rows[missing], known, column[known])
-    return result
 
 
 def _mean(values: Floats, rows: int) -> Floats:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.effects.picture import COEFFICIENTS, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import Basis, basis, relative_flow
-from ferryid.identify.model import Model
-from ferryid.identify.residual import base_force, force_of_motion
+from ferryid.identify.hull_terms import hull_part
+from ferryid.identify.model import NO_BASIS, Model
+from ferryid.identify.residual import base_force, force_of_motion, scaled
 from ferryid.signals.track import Motion
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
@@ -65,24 +67,49 @@ class Estimator:
 
 
 def estimator(model: Model) -> Estimator:
-    """Return the estimator of a stored model.
+    """Return the estimator of a stored model, with the refitted hull where it has one, and without its effects.
 
     Raises
     ------
     FerryIdError
         When the model's terms are not those of its basis: the file was changed by hand, or by another version.
     """
+    profile, scale = parse_profile(model.profile_text, model.name), model.scale
+    if model.hull:
+        profile, scale = with_hull(model, profile, hull_values(model))
+    if not model.terms and model.settings["basis"] == NO_BASIS:
+        return Estimator(profile, scale)
     functions = basis(str(model.settings["basis"]), structure=str(model.settings["structure"]))
     if functions.terms != model.terms:
         raise FerryIdError(
             f"model {model.name}@{model.version}: its terms are not those of the basis {functions.name}. "
             "Fix: fit the model again with this version of ferryid"
         )
-    return Estimator(
-        parse_profile(model.profile_text, model.name), model.scale, functions, model.theta, model.intercept
-    )
+    return Estimator(profile, scale, functions, model.theta, model.intercept)
 
 
 def base_estimator(model: Model) -> Estimator:
     """Return the estimator of the base model that a model was fitted on."""
     return Estimator(parse_profile(model.profile_text, model.name), model.scale)
+
+
+def hull_values(model: Model) -> Floats:
+    """Return the hull's coefficients in the order of `COEFFICIENTS`, a model's terms counted in, shape (22,)."""
+    if model.hull:
+        return np.array([model.hull[name].value for name in COEFFICIENTS])
+    profile = parse_profile(model.profile_text, model.name)
+    base = hull_of(replace(profile, hull=scaled(profile.hull, model.scale)))
+    return base / float(model.scale.get("zeta", 1.0)) + hull_part(model)[0]
+
+
+def with_hull(model: Model, profile: Profile, hull: Floats) -> tuple[Profile, Mapping[str, float]]:
+    """Return profile and factors on it so that with the model's terms the hull has these coefficients, shape (22,)."""
+    zeta = float(model.scale.get("zeta", 1.0))
+    base = zeta * (hull - hull_part(model)[0])
+    m11, m22, m23, m32, m33 = base[:5].tolist()
+    changed = replace(
+        scaled(profile.hull, model.scale),
+        M=np.array([[m11, 0.0, 0.0], [0.0, m22, m23], [0.0, m32, m33]]),
+        D=dict(zip(COEFFICIENTS[5:], base[5:].tolist(), strict=True)),
+    )
+    return replace(profile, hull=changed), {"delta": 1.0, "sigma": 1.0, "zeta": zeta}

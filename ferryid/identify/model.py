@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,24 @@ from numpy.typing import NDArray
 
 from ferryid import __version__
 from ferryid.errors import FerryIdError
+from ferryid.identify.stored_effect import (
+    Conditions,
+    Quantity,
+    StoredEffect,
+    conditions_from,
+    conditions_json,
+    effect_json,
+    effects_from,
+    hull_from,
+    hull_json,
+)
 from ferryid.vessel import parse_profile
 
 Floats = NDArray[np.float64]
 
 SCHEMA = "ferryid.model/1"
+NO_BASIS = "none"
+"""Basis of a model without terms: a diagnosed hull."""
 AXES = ("surge", "sway", "yaw")
 
 
@@ -60,6 +73,13 @@ class Model:
         Validation scores: ``{"base": {...}, "model": {...}, "normalised_mse": ..., "per_axis": {...}}``.
     accepted
         Verdict at the time of the fit.
+    hull
+        The hull's coefficients as a diagnosis refitted them, by the names of `ferryid.effects.picture.COEFFICIENTS`; those
+        of acceleration and damping among `terms` are counted in. Empty in a model that was fitted alone.
+    vessel_effects
+        Properties of hull and thrusters, in the order in which they act.
+    conditions
+        What single logs were recorded in; they act in these alone.
     """
 
     name: str
@@ -82,6 +102,27 @@ class Model:
     training: tuple[Mapping[str, Any], ...]
     scores: Mapping[str, Any]
     accepted: bool
+    hull: Mapping[str, Quantity] = field(default_factory=dict)
+    vessel_effects: tuple[StoredEffect, ...] = ()
+    conditions: tuple[Conditions, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Name and version."""
+        return f"{self.name}@{self.version}"
+
+    @property
+    def diagnosed(self) -> bool:
+        """True where a diagnosis has changed hull or forces."""
+        return bool(self.hull or self.vessel_effects or self.conditions)
+
+    def conditions_of(self, sha256: str) -> tuple[StoredEffect, ...]:
+        """Return what a log was recorded in, by its hash; nothing for a log that was not diagnosed."""
+        return tuple(one for known in self.conditions if known.sha256 == sha256 for one in known.effects)
+
+    def undiagnosed(self) -> Model:
+        """Return the model as it was before any diagnosis."""
+        return replace(self, hull={}, vessel_effects=(), conditions=())
 
 
 def to_json(model: Model) -> dict[str, Any]:
@@ -115,7 +156,17 @@ def to_json(model: Model) -> dict[str, Any]:
         "ranges": {key: list(value) for key, value in model.ranges.items()},
         "training": [dict(log) for log in model.training],
         "scores": dict(model.scores),
+        **_diagnosed(model),
         "profile": model.profile_text,
+    }
+
+
+def _diagnosed(model: Model) -> dict[str, Any]:
+    # What a fit leaves has none of these keys, and stays the same file as ever.
+    return {
+        **({"hull": hull_json(model.hull)} if model.hull else {}),
+        **({"vessel_effects": [effect_json(one) for one in model.vessel_effects]} if model.vessel_effects else {}),
+        **({"conditions": [conditions_json(one) for one in model.conditions]} if model.conditions else {}),
     }
 
 
@@ -176,12 +227,24 @@ def from_json(data: Mapping[str, Any], where: str) -> Model:
             training=tuple(data["training"]),
             scores=dict(data["scores"]),
             accepted=bool(data["accepted"]),
+            **_physics(data, where),
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise FerryIdError(
             f"{where}: a part of the model file is missing or wrong ({type(error).__name__}: {error}). "
             "Fix: fit again, or restore the file from a backup"
         ) from error
+
+
+def _physics(data: Mapping[str, Any], where: str) -> dict[str, Any]:
+    parts: dict[str, Any] = {}
+    if "hull" in data:
+        parts["hull"] = hull_from(data["hull"])
+    if "vessel_effects" in data or "conditions" in data:
+        profile = parse_profile(str(data["profile"]), where)
+        parts["vessel_effects"] = effects_from(data.get("vessel_effects", []), profile, where, vessel=True)
+        parts["conditions"] = conditions_from(data.get("conditions", []), profile, where)
+    return parts
 
 
 def _check_parts(data: Mapping[str, Any]) -> None:
