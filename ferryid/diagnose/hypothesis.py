@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.diagnose.filter import Filter, Sieve, learn, sieve_of
 from ferryid.diagnose.noise import Noise, noise_of
-from ferryid.diagnose.weak import Windows
+from ferryid.diagnose.weak import Windows, steps_of
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
@@ -24,12 +25,13 @@ TRUST = 4.0
 
 @dataclass(frozen=True)
 class Suspect:
-    """An effect in one instance, acting from `onset_s` on (0: all along)."""
+    """An effect in one instance, acting from `onset_s` on (0: all along); `doubt` as in `ferryid.effects.effect.Choice`."""
 
     effect: Effect
     instance: str | None
     parameters: tuple[Parameter, ...]
     onset_s: float = 0.0
+    doubt: float = 0.0
 
     @property
     def key(self) -> tuple[str, str | None]:
@@ -60,8 +62,6 @@ class Fit:
         The hull's coefficients, shape (22,).
     evidence
         Logarithm of the evidence (Laplace) over that of a hypothesis whose parameters are all zero wide.
-    gaps
-        What it leaves of the gaps, shape (J, c).
     """
 
     suspects: tuple[Suspect, ...]
@@ -69,7 +69,6 @@ class Fit:
     spread: Floats
     hull: Floats
     evidence: float
-    gaps: Floats
 
     def errors(self, index: int) -> Floats:
         """Return the standard deviations of one suspect's parameters."""
@@ -79,27 +78,65 @@ class Fit:
 
 @dataclass(frozen=True)
 class Trial:
-    """All that hypotheses about one log share: windows, the picture without effects, and the noise."""
+    """All that hypotheses about one log share.
+
+    Attributes
+    ----------
+    windows
+        For judging and showing what is left over.
+    plain
+        The picture without effects.
+    noise
+        Of the windows.
+    hull_spread
+        Standard deviations of what is believed of the hull's coefficients, shape (22,).
+    filter
+        Of the steps, in which hypotheses are fitted.
+    """
 
     windows: Windows
     plain: Picture
     noise: Noise
     hull_spread: Floats
+    filter: Filter
+
+    @cached_property
+    def steps(self) -> Windows:
+        """The steps of the filter, over the same rows as the windows."""
+        return steps_of(self.windows)
+
+    @cached_property
+    def sieve(self) -> Sieve:
+        """The filter, ready for the steps."""
+        return sieve_of(self.filter, self.steps)
 
     @cached_property
     def by_hull(self) -> Floats:
-        """Whitened derivatives of the gaps by each of the hull's coefficients, in their spreads; shape (w, 22)."""
-        base = self.windows.gap(self.plain)
+        """Derivatives of the prediction errors by each of the hull's coefficients, in their spreads; shape (w, 22)."""
+        base = self.steps.gap(self.plain)
         columns = []
         for k, spread in enumerate(self.hull_spread):
             hull = self.plain.hull.copy()
             hull[k] += 0.1 * spread
-            columns.append((self.windows.gap(replace(self.plain, hull=hull)) - base) / 0.1)
-        return self.noise.white(np.stack(columns, axis=-1), self.windows.runs)
+            columns.append((self.steps.gap(replace(self.plain, hull=hull)) - base) / 0.1)
+        return self.sieve.white(np.stack(columns, axis=-1))
 
-    def with_noise_of(self, gaps: Floats) -> Trial:
-        """Return the trial with the noise that these gaps have."""
-        return Trial(self.windows, self.plain, noise_of(gaps, self.windows.runs), self.hull_spread)
+    def white(self, picture: Picture) -> Floats:
+        """Return the whitened prediction errors of a picture, flat."""
+        return self.sieve.white(self.steps.gap(picture))
+
+    def with_noise_of(self, made: Fit) -> Trial:
+        """Return the trial with the noise that a fit leaves."""
+        picture = imagined(self.plain, made)
+        return replace(
+            self,
+            noise=noise_of(self.windows.gap(picture), self.windows.runs),
+            filter=learn(self.steps, self.steps.gap(picture)),
+        )
+
+    def part(self, windows: Windows) -> Trial:
+        """Return the trial of some of its windows, with the same noise."""
+        return replace(self, windows=windows)
 
 
 def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | None = None, *, steps: int = STEPS) -> Fit:
@@ -127,14 +164,14 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
     cuts = np.cumsum([len(suspect.parameters) for suspect in suspects])[:-1].tolist()
     q, h = len(every), len(trial.hull_spread)
 
-    def gaps(z: Floats) -> Floats:
+    def picture_of(z: Floats) -> Picture:
         picture = replace(trial.plain, hull=trial.plain.hull + trial.hull_spread * z[:h])
         for suspect, p in zip(suspects, np.split(neutral + size * z[h:], cuts), strict=True) if every else ():
             picture = suspect.act(picture, p)
-        return trial.windows.gap(picture)
+        return picture
 
     def white(z: Floats) -> Floats:
-        return trial.noise.white(gaps(z), trial.windows.runs)
+        return trial.white(picture_of(z))
 
     z = np.zeros(h + q)
     if start is not None and every:
@@ -171,10 +208,19 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
         if gained < 1e-3:
             break
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
-    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1])
+    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - sum(suspect.doubt for suspect in suspects)
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
     hull = trial.plain.hull + trial.hull_spread * z[:h]
-    return Fit(tuple(suspects), values, covariance, hull, evidence, gaps(z))
+    return Fit(tuple(suspects), values, covariance, hull, evidence)
+
+
+def settled(trial: Trial, beside: Fit, suspect: Suspect) -> Suspect:
+    """Return a suspect with the parameters that its effect chooses beside a fit; the same one where there is no choice."""
+    if suspect.effect.choose is None:
+        return suspect
+    # The hull is the plain one: what each of its coefficients is believed to be is known of that one alone.
+    made = suspect.effect.choose(imagined(trial.plain, replace(beside, hull=trial.plain.hull)), trial.white)
+    return replace(suspect, parameters=made.parameters, doubt=made.doubt)
 
 
 def imagined(plain: Picture, made: Fit) -> Picture:
@@ -191,9 +237,16 @@ def trial_of(windows: Windows, plain: Picture, hull_spread: Floats) -> Trial:
     What an effect leaves in the gaps is in that noise too, until a hypothesis that holds takes it out: see
     `ferryid.diagnose.search`.
     """
-    trial = Trial(windows, plain, noise_of(windows.gap(plain), windows.runs), hull_spread)
+    first = steps_of(windows)
+    trial = Trial(
+        windows,
+        plain,
+        noise_of(windows.gap(plain), windows.runs),
+        hull_spread,
+        learn(first, first.gap(plain)),
+    )
     for _ in range(2):
-        trial = trial.with_noise_of(fit(trial, ()).gaps)
+        trial = trial.with_noise_of(fit(trial, ()))
     return trial
 
 

@@ -8,7 +8,7 @@ from math import exp, log
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, settled
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
@@ -108,7 +108,7 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         if not good or len(chosen.suspects) == MOST or _void(trial, good[0].fit):
             break
         chosen = good[0].fit
-        trial = trial.with_noise_of(chosen.gaps)
+        trial = trial.with_noise_of(chosen)
         chosen = fit(trial, chosen.suspects, chosen.values)
         suspects = [suspect for suspect in suspects if suspect.key != good[0].suspect.key]
     chosen = _pruned(trial, chosen)
@@ -125,6 +125,7 @@ def _best(trial: Trial, current: Fit, suspect: Suspect) -> Candidate:
         penalty = 0.0 if one.onset_s <= 0.0 else log(len(trial.windows.starts))
         return Candidate(one, made, made.evidence - current.evidence - penalty)
 
+    suspect = settled(trial, current, suspect)
     best = tried(suspect)
     if not suspect.effect.onset:
         return best

@@ -10,6 +10,8 @@ from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats, Profile
 
 Values = Mapping[str, float]
+Residual = Callable[[Picture], Floats]
+"""What a picture leaves of a log, whitened: so that its square is twice what the logarithm of the likelihood loses."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,36 @@ class Parameter:
     low: float
     high: float
     neutral: float = 0.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Parameters that were chosen in view of a log, and the logarithm of how many alternatives they were chosen from."""
+
+    parameters: tuple[Parameter, ...]
+    doubt: float
+
+
+@dataclass(frozen=True)
+class Process:
+    """A disturbance that comes and goes by chance, with covariance ``std² exp(-|t| / time_constant_s) cos(2 pi f t)``.
+
+    Attributes
+    ----------
+    force
+        On the hull by a unit of it [N, N, N·m], shape (n, 3).
+    std
+        Its standard deviation.
+    time_constant_s
+        For how long it remembers itself [s].
+    frequency_hz
+        f; with 0 it is a first-order Gauss-Markov process, such as gusts, and else a narrow band, such as waves.
+    """
+
+    force: Floats
+    std: float
+    time_constant_s: float
+    frequency_hz: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -54,6 +86,11 @@ class Effect:
         What has to stand in a scenario file for the effect to act, from its values by name: nested tables as in TOML.
     vessel
         True for a property of hull or actuators, which carries over to other logs; False for a condition of one log.
+    choose
+        ``choose(picture, residual)`` returns the parameters for a log whose forces are otherwise as in the picture, where
+        there are alternatives to choose from (places, coefficients): a quick scan, in place of ``parameters_of``.
+    least
+        How far the interval of a parameter has to stay from its neutral value for the parameter to be worth a report.
     """
 
     id: str
@@ -66,3 +103,5 @@ class Effect:
     cannot: Callable[[Scene], str] = lambda scene: ""
     onset: bool = False
     vessel: bool = False
+    choose: Callable[[Picture, Residual], Choice] | None = None
+    least: float = 0.0

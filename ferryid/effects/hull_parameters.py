@@ -1,0 +1,132 @@
+"""Hull parameters: masses or damping of the model itself are wrong, far beyond what every hypothesis refits anyway.
+
+A factor on some of the hull's coefficients, one or all of them: which ones is chosen beforehand, by the evidence of a linear
+model in which those chosen are believed to be off by half and the others by no more than usual. What fouling, a payload or
+shallow water explain with fewer parameters is theirs. The scale of all forces is the thrust's.
+
+References
+----------
+Scott and Berger (2010), Bayes and empirical-Bayes multiplicity adjustment in the variable-selection problem: the number of
+subsets of a size is what choosing one of them costs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import lgamma
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
+from ferryid.effects.picture import COEFFICIENTS, MASS, Picture, Scene, hull_of
+from ferryid.vessel.profile import Floats, Profile
+
+TELLING = 0.25
+"""A coefficient that may be within this share of the model's is not worth a name."""
+OFF, USUAL = 0.5, 0.12
+"""Standard deviations of what is believed of the factor of a coefficient that is chosen, and of any other."""
+HELD = 1e-6
+"""The same for the factor of a coefficient that was not chosen, which is refitted anyway."""
+SURGE_ALONE = frozenset({"X_|u|u"})
+"""What one factor of fouling is as well."""
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return a factor for each coefficient that the profile's hull has."""
+    return tuple(_factor(name, OFF) for name in _named(profile))
+
+
+def _named(profile: Profile) -> list[str]:
+    return [name for name, value in zip(COEFFICIENTS, hull_of(profile).tolist(), strict=True) if value != 0.0]
+
+
+def _factor(name: str, size: float) -> Parameter:
+    return Parameter(name, "-", size, 0.05, 10.0, neutral=1.0)
+
+
+def choose(picture: Picture, residual: Residual) -> Choice:
+    """Return factors of which only those of the coefficients that are worth it can move."""
+    names = _named(picture.scene.profile)
+    places = [COEFFICIENTS.index(name) for name in names]
+    e = residual(picture)
+    columns = []
+    for k in places:
+        hull = picture.hull.copy()
+        hull[k] *= 1.0 + 0.1 * USUAL
+        columns.append((residual(replace(picture, hull=hull)) - e) / (0.1 * USUAL))
+    J = np.column_stack(columns)
+    chosen, doubt = _best_subset(J.T @ J, -J.T @ e, names)
+    return Choice(tuple(_factor(name, OFF if name in chosen else HELD) for name in names), doubt)
+
+
+def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str], float]:
+    """Return the coefficients whose evidence is best, going from few to many and from many to few, and what choosing cost."""
+    n = len(names)
+
+    def doubt(chosen: frozenset[str]) -> float:
+        k = len(chosen)
+        return lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1)
+
+    def score(chosen: frozenset[str]) -> float:
+        if not chosen or chosen == SURGE_ALONE:
+            return -np.inf
+        spread = np.array([OFF if name in chosen else USUAL for name in names])
+        A = np.eye(n) + G * np.outer(spread, spread)
+        c = spread * b
+        return 0.5 * float(c @ np.linalg.solve(A, c)) - 0.5 * float(np.linalg.slogdet(A)[1]) - doubt(chosen)
+
+    everything = frozenset(names)
+    best, most = everything, score(everything)
+    for chosen in (frozenset[str](), everything):
+        grows = not chosen
+        while len(chosen) < n if grows else len(chosen) > 1:
+            near = [chosen | {name} for name in everything - chosen] if grows else [chosen - {name} for name in chosen]
+            chosen = max(near, key=lambda one: (score(one), sorted(one)))
+            if score(chosen) > most:
+                best, most = chosen, score(chosen)
+    return best, doubt(best)
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Multiply the coefficients."""
+    factor = np.ones(len(COEFFICIENTS))
+    factor[hull_of(picture.scene.profile) != 0.0] = p
+    return replace(picture, hull=picture.hull * factor)
+
+
+def cannot(scene: Scene) -> str:
+    """Say why the scene cannot show a wrong hull model."""
+    return "" if scene.profile.hull.has_model else "the profile has no hull model that could be wrong"
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence; the values are those of the coefficients that are certainly off."""
+    off = {name: value for name, value in values.items() if abs(value - 1.0) > TELLING}
+    masses = [name for name in off if name in MASS]
+    what = " and ".join(
+        word for word, some in (("masses", masses), ("damping", [name for name in off if name not in MASS])) if some
+    )
+    told = ", ".join(f"{name} is {value:.2f} times the model's" for name, value in off.items())
+    return (
+        f"The hull model's {what or 'coefficients'} are wrong: {told}." if told else "The hull model is somewhat wrong."
+    )
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's true hull."""
+    return {"true_hull": {name: value for name, value in values.items() if value != 1.0}}
+
+
+EFFECT = Effect(
+    "hull_parameters",
+    "Hull model",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    cannot=cannot,
+    vessel=True,
+    choose=choose,
+    least=TELLING,
+)

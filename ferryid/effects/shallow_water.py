@@ -1,0 +1,141 @@
+"""Shallow water: all damping is multiplied in a place.
+
+Where that is, nobody says: a rectangle is chosen from a grid over the visited waters, and its sides are fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import log
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
+from ferryid.effects.picture import COEFFICIENTS, Picture, Scene
+from ferryid.vessel.profile import Floats, Profile
+
+EDGE_M = 2.0
+"""Width over which the factor comes in at a side, outside of it."""
+CELLS = 8
+"""Cells of the grid along north and east each."""
+LEAST, MOST = 0.05, 0.7
+"""Shares of the log that lie in a place. What is nearly everywhere is the hull's own damping, or its fouling."""
+FACTOR = Parameter("factor", "-", 0.4, 0.2, 6.0, neutral=1.0)
+SIDES = ("south", "north", "west", "east")
+USUAL = 0.12
+"""What is believed of the hull's coefficients, as a share of them."""
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return the factor and the sides of the rectangle, that of a place a few lengths wide."""
+    length = profile.hull.length_m if np.isfinite(profile.hull.length_m) else 5.0
+    return (
+        FACTOR,
+        *(_side(name, sign * 2.0 * length, length) for name, sign in zip(SIDES, (-1, 1, -1, 1), strict=True)),
+    )
+
+
+def _side(name: str, at: float, size: float) -> Parameter:
+    return Parameter(name, "m", size, at - 100.0 * size, at + 100.0 * size, neutral=at)
+
+
+def _share(outside: Floats) -> Floats:
+    s = 1.0 - np.clip(outside / EDGE_M, 0.0, 1.0)
+    return np.asarray(s * s * (3.0 - 2.0 * s))
+
+
+def inside(scene: Scene, sides: Floats) -> Floats:
+    """Return how much of the factor acts in every row, 0 to 1, shape (n,)."""
+    x, y = scene.eta[:, 0], scene.eta[:, 1]
+    south, north, west, east = sides.tolist()
+    return _share(south - x) * _share(x - north) * _share(west - y) * _share(y - east)
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Multiply the damping in the place."""
+    return _damped(picture, 1.0 + (float(p[0]) - 1.0) * inside(picture.scene, p[1:]))
+
+
+def _damped(picture: Picture, factor: Floats) -> Picture:
+    before = picture.damping_factor
+    return replace(picture, damping_factor=factor if before is None else before * factor)
+
+
+def choose(picture: Picture, residual: Residual) -> Choice:
+    """Return the place whose damping explains most of what is left, with its neighbours on the grid as the usual error."""
+    scene = picture.scene
+    place = scene.eta[:, :2]
+    low, high = place[scene.usable].min(axis=0), place[scene.usable].max(axis=0)
+    lines = np.linspace(low, high, CELLS + 1)
+    cell = np.clip(((place - low) / np.maximum(high - low, 1e-9) * CELLS).astype(np.int64), 0, CELLS - 1)
+    e = residual(picture)
+    by_cell, share = np.zeros((CELLS, CELLS, len(e))), np.zeros((CELLS, CELLS))
+    for i in range(CELLS):
+        for j in range(CELLS):
+            rows = (cell[:, 0] == i) & (cell[:, 1] == j)
+            share[i, j] = float(np.mean(rows[scene.usable]))
+            if share[i, j] > 0.0:
+                by_cell[i, j] = (residual(_damped(picture, 1.0 + 0.5 * rows)) - e) / 0.5
+    # Columns of rectangles are sums of those of their cells, here as differences of sums from the corner.
+    sums = np.zeros((CELLS + 1, CELLS + 1, len(e)))
+    sums[1:, 1:] = by_cell.cumsum(axis=0).cumsum(axis=1)
+    shares = np.zeros((CELLS + 1, CELLS + 1))
+    shares[1:, 1:] = share.cumsum(axis=0).cumsum(axis=1)
+    a, b = np.triu_indices(CELLS + 1, 1)
+    south, west = np.repeat(a, len(a)), np.tile(a, len(a))
+    north, east = np.repeat(b, len(b)), np.tile(b, len(b))
+    covered = shares[north, east] - shares[south, east] - shares[north, west] + shares[south, west]
+    fits = (covered >= LEAST) & (covered <= MOST)
+    if not fits.any():
+        return Choice(parameters_of(scene.profile), 0.0)
+    south, north, west, east = south[fits], north[fits], west[fits], east[fits]
+    columns = (sums[north, east] - sums[south, east] - sums[north, west] + sums[south, west]).T
+    gains = _gains(picture, residual, e, columns)
+    k = int(np.argmax(gains))
+    sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
+    sizes = np.repeat((high - low) / CELLS, 2)
+    parameters = (_side(name, float(at), float(size)) for name, at, size in zip(SIDES, sides, sizes, strict=True))
+    return Choice((FACTOR, *parameters), log(len(gains)))
+
+
+def _gains(picture: Picture, residual: Residual, e: Floats, columns: Floats) -> Floats:
+    """Return the evidence of a linear model for each of some columns, shape (w, q), beside the hull's coefficients."""
+    by_hull = []
+    for k in range(len(COEFFICIENTS)):
+        if picture.hull[k] != 0.0:
+            hull = picture.hull.copy()
+            hull[k] *= 1.0 + 0.1 * USUAL
+            by_hull.append((residual(replace(picture, hull=hull)) - e) / 0.1)
+    H = np.column_stack(by_hull)
+    rest = np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ np.column_stack([e, columns]))
+    free = np.column_stack([e, columns]) - H @ rest
+    power = np.einsum("wq,wq->q", columns, free[:, 1:])
+    product = columns.T @ free[:, 0]
+    ratio = power * FACTOR.size**2
+    return np.asarray(0.5 * product**2 * FACTOR.size**2 / (1.0 + ratio) - 0.5 * np.log1p(ratio))
+
+
+def cannot(scene: Scene) -> str:
+    """Say why the scene cannot show shallow water."""
+    if not scene.profile.hull.has_model:
+        return "the profile has no damping that could be larger somewhere"
+    return "" if np.isfinite(scene.eta[scene.usable, :2]).all() else "the log has no position"
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    south, north, west, east = (values[name] for name in SIDES)
+    return (
+        f"Damping is {values['factor']:.2f} times as large from {south:.0f} to {north:.0f} m north and {west:.0f} to "
+        f"{east:.0f} m east, as over shallow ground."
+    )
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's shallow rectangle."""
+    sides = {"north_m": [values["south"], values["north"]], "east_m": [values["west"], values["east"]]}
+    return {"environment": {"shallow": {**sides, "damping_factor": values["factor"], "edge_m": EDGE_M}}}
+
+
+EFFECT = Effect("shallow_water", "Shallow water", parameters_of, apply, says, scenario, cannot=cannot, choose=choose)
