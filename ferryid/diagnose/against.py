@@ -8,7 +8,7 @@ the difference. An effect that the simulation has already has the simulation's v
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,11 +44,15 @@ SHOWN_ROWS = 400
 
 @dataclass(frozen=True)
 class Condition:
-    """An effect that the simulation has, with its values and their standard deviations."""
+    """An effect that the simulation has, with its values and their standard deviations.
+
+    `in_hull` where it is one of the hull's coefficients alone, so that it is in `Simulated.hull` already.
+    """
 
     suspect: Suspect
     values: Floats
     errors: Floats
+    in_hull: bool = False
 
 
 @dataclass(frozen=True)
@@ -132,7 +136,7 @@ def learn(
     progress(f"learning what {name} simulates")
     result = search(trial_of(seen, plain, wide), progress)
     made = result.fit
-    left = float(np.mean((made.gaps / _size(seen.measured[:, seen.channels])) ** 2))
+    left = float(np.mean((seen.gap(imagined(plain, made)) / _size(seen.measured[:, seen.channels])) ** 2))
     if left > FOREIGN:
         raise FerryIdError(
             f"{name}: --against needs a simulation of {profile.name}, found a motion of which its hull and the actuators' "
@@ -140,18 +144,30 @@ def learn(
             "signals as the profile maps them"
         )
     conditions = [
-        Condition(suspect, values, made.errors(k))
+        Condition(suspect, values, made.errors(k), _in_hull(suspect, values, plain))
         for k, (suspect, values) in enumerate(zip(made.suspects, made.values, strict=True))
     ]
+    hull = made.hull
+    for one in conditions:
+        if one.in_hull:
+            hull = one.suspect.act(replace(plain, hull=hull), one.values).hull
     posterior = np.sqrt(np.diag(np.linalg.inv(result.trial.by_hull.T @ result.trial.by_hull + np.eye(len(wide)))))
     return Simulated(
         name,
         scene,
-        made.hull,
-        np.hypot(HULL_SPREAD * made.hull, posterior * wide),
+        hull,
+        np.hypot(HULL_SPREAD * hull, posterior * wide),
         (*_measured(scene), *conditions),
         sensors,
     )
+
+
+def _in_hull(suspect: Suspect, values: Floats, plain: Picture) -> bool:
+    after = suspect.act(plain, values)
+    same = all(
+        getattr(after, field.name) is getattr(plain, field.name) for field in fields(plain) if field.name != "hull"
+    )
+    return same and bool((after.hull != plain.hull).any())
 
 
 def _size(measured: Floats) -> Floats:
@@ -198,7 +214,7 @@ def _carried(simulated: Simulated, scene: Scene, shift_s: float) -> list[Conditi
         if one.suspect.onset_s > 0.0
         else one
         for one in simulated.conditions
-        if not one.suspect.effect.cannot(scene)
+        if not one.in_hull and not one.suspect.effect.cannot(scene)
     ]
 
 
@@ -222,7 +238,7 @@ def differing_sensors(
         f"The {one.suspect.effect.id} differs by what was measured, and is no finding: "
         f"{_described(one)} in the simulation; the recording's own is part of its picture."
         for one in simulated.conditions
-        if one.suspect.effect.cannot(scene)
+        if one.suspect.effect.cannot(scene) and not one.in_hull
     ]
     return tuple(one for one in sensors if not _alike(one, own.get(one.effect))), told
 

@@ -32,7 +32,9 @@ def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
     physics = [_inline(title(one.effect, one.instance)) for one in diagnosis.findings if one.effect in effects()]
     sensors = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect not in effects()]
-    parts = [f"the model left out {listed(physics)}"] if physics else []
+    base = "simulation" if diagnosis.against else "model"
+    left_out = "the recording differs from the simulation in" if diagnosis.against else "the model left out"
+    parts = [f"{left_out} {listed(physics)}"] if physics else []
     parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
     names = "; ".join(parts)
     change = changed({axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()})
@@ -45,10 +47,10 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "partly_explained":
         return f"Partly explained: {names}{more}. More is missing, which nothing known here explains."
     if diagnosis.verdict == "unexplained":
-        return "Unexplained: the recording differs from the model, and nothing known here accounts for it."
+        return f"Unexplained: the recording differs from the {base}, and nothing known here accounts for it."
     if diagnosis.verdict == "not_testable":
-        return "Not testable: this log cannot show whether anything is missing from the model."
-    return "Matched: nothing that this log could show is missing from the model."
+        return f"Not testable: this log cannot show whether anything is missing from the {base}."
+    return f"Matched: nothing that this log could show is missing from the {base}."
 
 
 def changed(shares: Mapping[str, float]) -> str:
