@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ferryid.effects import effects
 from ferryid.identify.model import AXES, Model, to_json
 from ferryid.identify.store import stored_models
+from ferryid.identify.stored_effect import StoredEffect
 
 
 def listing(out: Path) -> dict[str, Any]:
@@ -24,10 +26,29 @@ def listing(out: Path) -> dict[str, Any]:
                 "normalised_mse": stored.model.scores.get("normalised_mse"),
                 "logs": [str(log["name"]) for log in stored.model.training],
                 "path": str(stored.path),
+                **_effects_of(stored.model),
             }
             for stored in stored_models(out)
         ],
     }
+
+
+def _effects_of(model: Model) -> dict[str, Any]:
+    if not model.diagnosed:
+        return {}
+    return {
+        "vessel_effects": [_short(one) for one in model.vessel_effects],
+        "conditions": {known.log: [_short(one) for one in known.effects] for known in model.conditions},
+    }
+
+
+def _short(stored: StoredEffect) -> str:
+    """Return an effect as a few words: its name and its values."""
+    title = effects()[stored.effect].title.lower() + (f" ({stored.instance})" if stored.instance else "")
+    values = ", ".join(
+        f"{name} {one.value:.3g}{'' if one.unit == '-' else ' ' + one.unit}" for name, one in stored.parameters.items()
+    )
+    return f"{title}: {values}"
 
 
 def render_listing(result: dict[str, Any], out: Path) -> str:
@@ -43,6 +64,9 @@ def render_listing(result: dict[str, Any], out: Path) -> str:
             f"{'accepted' if model['accepted'] else 'rejected':<12}"
             f"{'-' if score is None else format(score, '9.3f'):>9}  {model['created']:<22}{_some(model['logs'])}"
         )
+        lines += [f"      vessel: {told}" for told in model.get("vessel_effects", ())]
+        for log, shown in model.get("conditions", {}).items():
+            lines += [f"      {_some([log])}: {told}" for told in shown]
     if any(model["current"] for model in result["models"]):
         lines.append("* current")
     return "\n".join(lines)
@@ -76,6 +100,14 @@ def render_model(model: Model) -> str:
             lines.append(
                 f"{term:<14}{axis:<7}{entry['value']:>13.5g}{entry['low']:>13.5g}{entry['high']:>13.5g}  {entry['unit']}"
             )
+    if model.hull:
+        lines += ["", f"{'hull':<14}{'value':>20}{'low':>13}{'high':>13}  unit"]
+        for name, one in model.hull.items():
+            lines.append(f"{name:<14}{one.value:>20.5g}{one.low:>13.5g}{one.high:>13.5g}  {one.unit}")
+    for stored in model.vessel_effects:
+        lines += ["", f"vessel: {stored.says()}", f"  found in {', '.join(one.log for one in stored.sources)}"]
+    for known in model.conditions:
+        lines += ["", f"only in {known.log}:", *(f"  {stored.says()}" for stored in known.effects)]
     return "\n".join(lines)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.estimate import estimator
-from ferryid.identify.free_run import free_run
 from ferryid.identify.model import AXES, Model
+from ferryid.identify.physics_rows import effect_rows, hull_rows, render_effects, render_hull
+from ferryid.identify.predict import predict
 from ferryid.identify.scores import by_axis, free_run_plain, mean_square, r_squared, usable
 from ferryid.identify.settings import check_window
 from ferryid.signals.prepare import prepare
@@ -63,10 +63,10 @@ def compare(
     entries = []
     for path in logs:
         progress(f"comparing on {Path(path).name}")
-        prepared = prepare(path, profile, out, window_s=window_s)
+        prepared = prepare(path, profile, out, window_s=window_s, keep_track=a.diagnosed or b.diagnosed)
         motion = prepared.motion
-        one, other = estimator(a), estimator(b)
-        tau_a, tau_b = one.of(motion), other.of(motion)
+        one, other = (predict(model, prepared, profile, window_s=window_s, smoother="square") for model in (a, b))
+        tau_a, tau_b = one.tau, other.tau
         rows = usable(motion, tau_a, tau_b)
         difference = _paired(motion.tau, tau_a, tau_b, rows, round(BLOCK_S * motion.rate_hz))
         entries.append(
@@ -91,8 +91,8 @@ def compare(
                     for axis, (value, low, high) in zip(AXES, difference, strict=True)
                 },
                 "free_run": {
-                    "a": free_run_plain(free_run(one, [motion], [rows])),
-                    "b": free_run_plain(free_run(other, [motion], [rows])),
+                    "a": free_run_plain(one.free_run(rows)),
+                    "b": free_run_plain(other.free_run(rows)),
                 },
             }
         )
@@ -103,6 +103,7 @@ def compare(
         "b": _entry(b),
         "window_s": window_s,
         "coefficients": _coefficients(a, b),
+        **({"hull": hull_rows(a, b), "effects": effect_rows(a, b)} if a.diagnosed or b.diagnosed else {}),
         "logs": entries,
     }
 
@@ -207,6 +208,7 @@ def render_comparison(result: dict[str, Any]) -> str:
             for who in ("a", "b")
         )
         lines.append(f"  {row['term']:<24}{cells}")
+    lines += render_hull(result.get("hull", ())) + render_effects(result.get("effects", ()))
     return "\n".join(lines)
 
 

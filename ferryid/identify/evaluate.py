@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.estimate import base_estimator, estimator
+from ferryid.identify.estimate import base_estimator
 from ferryid.identify.excitation import RANGE_UNITS, payload_kg, range_columns
-from ferryid.identify.free_run import free_run
 from ferryid.identify.model import AXES, Model
+from ferryid.identify.predict import Prediction, imagine, predict
 from ferryid.identify.scores import force_scores, free_run_plain, outside_ranges, usable
 from ferryid.identify.settings import check_window
 from ferryid.signals.prepare import prepare
@@ -33,6 +33,8 @@ def evaluate(
     progress: Callable[[str], None],
 ) -> dict[str, Any]:
     """Compare a model's and its base model's force with the measured one, and run both free.
+
+    The base of a model that a diagnosis has changed is the model before it.
 
     Parameters
     ----------
@@ -61,7 +63,8 @@ def evaluate(
         )
     check_window(window_s)
     window = float(model.settings["window_s"]) if window_s is None else window_s
-    new, base = estimator(model), base_estimator(model)
+    smoother = str(model.settings.get("smoother", "square"))
+    base = None if model.diagnosed else base_estimator(model)
     entries, parts = [], []
     for path in logs:
         progress(f"evaluating on {Path(path).name}")
@@ -70,11 +73,18 @@ def evaluate(
             profile,
             out,
             window_s=window,
-            smoother=str(model.settings.get("smoother", "square")),
+            smoother=smoother,
             rate_hz=model.settings.get("rate_hz"),
+            keep_track=model.diagnosed,
         )
         motion = prepared.motion
-        tau_base, tau_model = base.of(motion), new.of(motion)
+        new = predict(model, prepared, profile, window_s=window, smoother=smoother)
+        old = (
+            imagine(model.undiagnosed(), prepared, profile, window_s=window, smoother=smoother)
+            if base is None
+            else Prediction(base.of(motion), motion, base)
+        )
+        tau_base, tau_model = old.tau, new.tau
         rows = usable(motion, tau_model)
         parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))
         columns = range_columns(motion.nu[rows], motion.nu_dot[rows], payload_kg(motion, rows))
@@ -87,9 +97,10 @@ def evaluate(
                 "seconds": float(rows.sum() / motion.rate_hz),
                 **force_scores(motion.tau, tau_base, tau_model, rows),
                 "free_run": {
-                    "base": free_run_plain(free_run(base, [motion], [rows])),
-                    "model": free_run_plain(free_run(new, [motion], [rows])),
+                    "base": free_run_plain(old.free_run(rows)),
+                    "model": free_run_plain(new.free_run(rows)),
                 },
+                **({"effects": _applied(new)} if model.diagnosed else {}),
                 "outside": outside,
                 "warnings": _warnings(prepared.recording.sha256, model, outside, motion.payload is not None),
                 "data_quality": prepared.quality,
@@ -99,10 +110,26 @@ def evaluate(
     tau, base_all, model_all = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     return {
         "schema": "ferryid.evaluate/1",
-        "model": {"name": model.name, "version": model.version, "accepted": model.accepted},
+        "model": {
+            "name": model.name,
+            "version": model.version,
+            "accepted": model.accepted,
+            **({"base": "the model before its diagnosis"} if model.diagnosed else {}),
+        },
         "window_s": window,
         "logs": entries,
         "pooled": force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)),
+    }
+
+
+def _applied(found: Prediction) -> dict[str, Any]:
+    """Return the effects that act on a log, and why others do not."""
+    return {
+        "vessel": [{"effect": one.effect, "instance": one.instance, "says": one.says()} for one in found.vessel],
+        "conditions": [
+            {"effect": one.effect, "instance": one.instance, "says": one.says()} for one in found.conditions
+        ],
+        "left_out": list(found.idle),
     }
 
 
@@ -125,7 +152,9 @@ def _warnings(sha256: str, model: Model, outside: dict[str, float], weighed: boo
 def render_evaluation(result: dict[str, Any]) -> str:
     """Return an evaluation as text."""
     head = result["model"]
-    lines = [f"{head['name']}@{head['version']}, test data smoothed with {result['window_s']:g} s", ""]
+    lines = [f"{head['name']}@{head['version']}, test data smoothed with {result['window_s']:g} s"]
+    lines += [f"base: {head['base']}"] if "base" in head else []
+    lines.append("")
     lines.append(f"{'':<34}" + "".join(f"{axis:>11}" for axis in AXES) + f"{'mean':>9}")
     entries = [*result["logs"], {"name": "all logs", **result["pooled"]}] if len(result["logs"]) > 1 else result["logs"]
     for entry in entries:
@@ -141,6 +170,10 @@ def render_evaluation(result: dict[str, Any]) -> str:
         if "free_run" in entry:
             lines.extend(_free_run_lines(entry["free_run"]))
         lines.append(f"  {_verdict(entry)}")
+        applied = entry.get("effects", {"vessel": (), "conditions": (), "left_out": ()})
+        lines.extend(f"  acts, as in every log: {one['says']}" for one in applied["vessel"])
+        lines.extend(f"  acts, as in this log: {one['says']}" for one in applied["conditions"])
+        lines.extend(f"  {told}" for told in applied["left_out"])
         lines.extend(f"  warning: {warning}" for warning in entry.get("warnings", ()))
     return "\n".join(lines)
 

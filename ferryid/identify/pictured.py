@@ -97,20 +97,34 @@ class Pictured:
         alone = required_force(replace(bare, load=None), at_rest)
         return replace(bare, external=alone - needed)
 
-    def altered(self, picture: Picture, sha256: str) -> Acting:
+    def altered(self, picture: Picture, sha256: str, *, righted: bool = False) -> Acting:
         """Return the plain picture of a log with the conditions of that log and the properties of the vessel in it.
 
-        A condition that the log itself measures is not put into it again.
+        A condition that the log itself measures is not put into it again. With `righted`, the picture's scene comes from
+        `righted` already, and errors of the sensors are left out.
         """
         acting, idle = [], []
-        for stored in (*self.model.conditions_of(sha256), *self.model.vessel_effects):
+        for stored in self._effects(sha256):
             reason = effects()[stored.effect].cannot(picture.scene)
             if reason:
                 idle.append((stored, reason))
                 continue
-            picture = stored.act(picture, sha256)
+            after = stored.act(picture, sha256)
+            if not righted or after.scene is picture.scene:
+                picture = after
             acting.append(stored)
         return Acting(picture, tuple(acting), tuple(idle))
+
+    def righted(self, scene: Scene, sha256: str) -> Scene:
+        """Return the scene as sensors without the errors that the model knows would have measured it."""
+        picture = bare_picture(scene, self.hull)
+        for stored in self._effects(sha256):
+            if not effects()[stored.effect].cannot(scene):
+                picture = replace(picture, scene=stored.act(picture, sha256).scene)
+        return picture.scene
+
+    def _effects(self, sha256: str) -> tuple[StoredEffect, ...]:
+        return (*self.model.conditions_of(sha256), *self.model.vessel_effects)
 
     def altered_hull(self) -> Floats:
         """Return the hull's coefficients as the properties of the vessel alter them, shape (22,)."""

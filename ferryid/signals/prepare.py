@@ -11,18 +11,19 @@ from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.smooth import smooth
-from ferryid.signals.track import Motion
+from ferryid.signals.track import Motion, Track
 from ferryid.vessel.profile import Profile
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """One log, ready for regression, with what is known of its quality."""
+    """One log, ready for regression, with what is known of its quality; its aligned signals where they were asked for."""
 
     recording: Recording
     motion: Motion
     quality: Mapping[str, Any]
     doubts: tuple[str, ...] = ()
+    track: Track | None = None
 
 
 def prepare(
@@ -34,6 +35,7 @@ def prepare(
     smoother: str = "square",
     rate_hz: float | None = None,
     verify: bool = False,
+    keep_track: bool = False,
 ) -> Prepared:
     """Ingest, align and smooth one log.
 
@@ -49,6 +51,8 @@ def prepare(
         See `ferryid.signals.smooth` and `ferryid.signals.align`.
     verify
         Check every checksum.
+    keep_track
+        Return the aligned signals as well.
 
     Raises
     ------
@@ -65,4 +69,4 @@ def prepare(
             )
     motion = smooth(track, profile, window_s, smoother)
     doubts = tuple(doubt.says for doubt in track.doubts)
-    return Prepared(recording, motion, data_quality(recording, motion), doubts)
+    return Prepared(recording, motion, data_quality(recording, motion), doubts, track if keep_track else None)
