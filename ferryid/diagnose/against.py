@@ -16,7 +16,7 @@ import numpy as np
 
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
-from ferryid.diagnose.hypothesis import HULL_SPREAD, Suspect, trial_of
+from ferryid.diagnose.hypothesis import HULL_SPREAD, Suspect, imagined, trial_of
 from ferryid.diagnose.result import Estimate
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import search, suspects_of

@@ -36,8 +36,9 @@ def wind(north: float) -> str:
     return f"environment = {{ wind = {{ north_mps = {north}, east_mps = 0.0 }} }}\n"
 
 
-def sailed(folder: Path, name: str, tables: str, seed: int, hull: float = 1.0) -> str:
-    scenario = replace(parse_scenario(BASE + tables, name), true_hull=dict.fromkeys(HULL, hull) if hull != 1.0 else {})
+def sailed(folder: Path, name: str, tables: str, seed: int, hull: float = 1.0, dwell_s: int = 40) -> str:
+    text = BASE.replace("dwell_s = 40", f"dwell_s = {dwell_s}")
+    scenario = replace(parse_scenario(text + tables, name), true_hull=dict.fromkeys(HULL, hull) if hull != 1.0 else {})
     write_log(simulate(scenario, seed), folder / f"{name}.mcap")
     return str(folder / f"{name}.mcap")
 
@@ -112,7 +113,7 @@ def test_a_simulated_hull_of_seven_tenths_hides_no_fault(folder: Path) -> None:
     names = {one.key: values for one, values in zip(result.fit.suspects, result.fit.values, strict=True)}
     assert names["thruster_gain", "thruster1"][0] == pytest.approx(0.8, abs=0.03)
     # The hulls do differ; nothing else does.
-    assert set(names) <= {("thruster_gain", "thruster1"), ("hull_parameters", None)}
+    assert set(names) <= {("thruster_gain", "thruster1"), ("hull_parameters", None), ("fouling", None)}
 
 
 def test_an_effect_that_both_have_is_taken_out_and_put_in_exactly(simulated: Simulated) -> None:
@@ -149,11 +150,12 @@ def test_a_simulation_too_short_to_learn_from_is_refused() -> None:
         learn(str(FIXTURES / "short.mcap"), FERRY, None, progress=quietly)
 
 
-def test_a_simulation_of_another_vessel_is_refused(windy: str) -> None:
+def test_a_simulation_of_another_vessel_is_refused(folder: Path) -> None:
     # The same signals, from a hull that answers its thrusters in another way altogether.
     other = replace(FERRY, actuators=tuple(replace(one, position_m=(0.3, 1.5)) for one in FERRY.actuators))
+    log = sailed(folder, "hasty", "", 7, dwell_s=20)
     with pytest.raises(FerryIdError, match="needs a simulation of milliampere"):
-        learn(windy, other, None, progress=quietly)
+        learn(log, other, None, progress=quietly)
 
 
 def test_model_and_simulation_exclude_each_other(windy: str) -> None:
