@@ -244,7 +244,7 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
 
 
 def _part(trial: Trial, windows: Windows) -> Trial:
-    return Trial(windows, trial.plain, trial.noise, trial.hull_spread)
+    return trial.part(windows)
 
 
 def _gains(trial: Trial, folds: Folds, before: Floats, after: Floats) -> Floats:

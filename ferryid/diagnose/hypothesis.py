@@ -208,7 +208,8 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
         if gained < 1e-3:
             break
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
-    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - sum(suspect.doubt for suspect in suspects)
+    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - trial.sieve.log_scale
+    evidence -= sum(suspect.doubt for suspect in suspects)
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
     hull = trial.plain.hull + trial.hull_spread * z[:h]
     return Fit(tuple(suspects), values, covariance, hull, evidence)

@@ -73,6 +73,9 @@ class Windows:
         return (self.mean(all_six) - self.measured)[:, self.channels]
 
 
+STEPS_A_WINDOW = 20
+FEWEST_STEPS = 10
+"""Steps below which a stretch tells nothing."""
 FORCES_HZ = 5.0
 """Rate at which forces are averaged over windows; they change slowly against it, and hypotheses cost a quarter."""
 
@@ -106,6 +109,39 @@ def windows(scene: Scene, length_s: float, stride_s: float) -> Windows:
         [_means(eta, bend, rows * every, scene.step_s), -_means(nu, slope, rows * every, scene.step_s)]
     )
     return Windows(thin, rows, tuple(runs), _weights(m, thin.step_s)[0], measured, channels)
+
+
+def steps_of(seen: Windows) -> Windows:
+    """Return short windows without overlap in what they measure, over the rows that windows cover: the steps of a filter.
+
+    With a triangle as its weight, ``∫ w p''`` is the second difference of a position; with a box, ``∫ w nu'`` is the first of
+    a velocity. A step is a `STEPS_A_WINDOW`-th of a window.
+    """
+    scene = seen.scene
+    covered = np.zeros(len(scene.t), dtype=np.bool_)
+    for start in seen.starts:
+        covered[start : start + len(seen.weight)] = True
+    m = max(1, round(len(seen.weight) / STEPS_A_WINDOW))
+    placed = bool(seen.channels[0])
+    span = 2 * m if placed else m
+    starts: list[int] = []
+    runs: list[tuple[int, int]] = []
+    for first, end in _stretches(covered):
+        rows = range(first, end - span, m)
+        if len(rows) > FEWEST_STEPS:
+            runs.append((len(starts), len(starts) + len(rows)))
+            starts += rows
+    at = np.array(starts, dtype=np.int64)
+    h = m * scene.step_s
+    if placed:
+        weight = np.concatenate([np.arange(m + 1), np.arange(m)[::-1]]).astype(np.float64)
+        differences = scene.eta[at + 2 * m] - 2.0 * scene.eta[at + m] + scene.eta[at]
+    else:
+        weight = np.concatenate([[0.5], np.ones(m - 1), [0.5]])
+        differences = scene.nu_raw[at + m] - scene.nu_raw[at]
+    differences = np.where(np.isfinite(differences), differences, 0.0) / h ** (2 if placed else 1)
+    measured = np.hstack([differences, differences])
+    return Windows(scene, at, tuple(runs), weight / (weight.sum() * scene.step_s), measured, seen.channels)
 
 
 def _weights(m: int, step_s: float) -> tuple[Floats, Floats, Floats]:

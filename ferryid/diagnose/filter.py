@@ -1,0 +1,268 @@
+"""The noise of what a hypothesis leaves, and the filter that whitens it.
+
+What is left of the accelerations in every step is summed up to what is left of the positions (or velocities): there the error
+of the measurement is plain, and a disturbance is what pushes. A Kalman filter that knows the sizes and time constants of both
+gives prediction errors that are white and depend on nothing but the past. So a controller that answers a disturbance, or the
+error of a measurement, does not bias what is estimated (Ljung 1999, section 13.4); and gusts and waves, which nobody measured,
+are states of the filter instead of being forced into the hull's coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import cos, exp, pi, sin
+
+import numpy as np
+from scipy.optimize import minimize
+
+from ferryid.diagnose.kalman import DIFFUSE, errors, gains
+from ferryid.diagnose.weak import Windows
+from ferryid.effects.effect import Process
+from ferryid.effects.picture import Picture
+from ferryid.vessel.profile import Floats
+
+GROUPS = (0, 0, 1)
+"""Channels that share a noise: north and east (or surge and sway), and the turn."""
+LONGEST = 500.0
+"""Longest time constant, in steps."""
+
+
+@dataclass(frozen=True)
+class Filter:
+    """The noise of the steps of a trial.
+
+    Attributes
+    ----------
+    channels
+        As `ferryid.diagnose.kalman.gains` takes it, shape (c, 5).
+    processes
+        Shared disturbances.
+    picture
+        In which these push.
+    """
+
+    channels: Floats
+    processes: tuple[Process, ...] = ()
+    picture: Picture | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """Channels that are filtered together: which, their noise, shared states, and the gains of every series."""
+
+    channels: tuple[int, ...]
+    noise: Floats
+    blocks: Floats
+    columns: Floats
+    gains: tuple[tuple[Floats, Floats], ...] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Sieve:
+    """A filter with its gains for the steps of one trial; see `sieve_of`."""
+
+    steps: Windows
+    parts: tuple[Part, ...]
+
+    def white(self, gaps: Floats) -> Floats:
+        """Return whitened prediction errors of gaps, shape (J, c) flat, or (J, c, q) with q columns.
+
+        The first steps of every series only tell where it starts, and are zero.
+        """
+        left = np.empty((*gaps.shape[:2], 1 if gaps.ndim == 2 else gaps.shape[2]))
+        integrals, h = integrals_of(self.steps), stride_s(self.steps)
+        for part in self.parts:
+            own = list(part.channels)
+            for (first, end), (K, spread) in zip(self.steps.runs, part.gains, strict=True):
+                series = summed(gaps[first:end][:, own].reshape(end - first, len(own), -1), self.steps)
+                columns = part.columns[first:end]
+                errors_ = errors(K, spread, part.noise, integrals, part.blocks, columns, h, series)
+                errors_[:DIFFUSE] = 0.0
+                left[first:end, own] = errors_
+        return np.ascontiguousarray(left.reshape(-1) if gaps.ndim == 2 else left.reshape(-1, gaps.shape[2]))
+
+    @property
+    def log_scale(self) -> float:
+        """Sum of the logarithms of the standard deviations of all predictions."""
+        return sum(float(np.log(spread[DIFFUSE:]).sum()) for part in self.parts for _, spread in part.gains)
+
+
+def sieve_of(noise: Filter, steps: Windows) -> Sieve:
+    """Return a filter with its gains for some steps. Channels that share no disturbance are filtered by themselves."""
+    h, integrals = stride_s(steps), integrals_of(steps)
+    scale = _scales(steps)
+    if noise.processes and noise.picture is not None:
+        columns = np.concatenate([_pushes(steps, noise.picture, one) for one in noise.processes], axis=2)
+        blocks, drive = _blocks(noise.processes, h)
+        by_run = tuple(
+            gains(scale, noise.channels, integrals, blocks, drive, np.ascontiguousarray(columns[a:b]), h)
+            for a, b in steps.runs
+        )
+        return Sieve(steps, (Part(tuple(range(len(noise.channels))), noise.channels, blocks, columns, by_run),))
+    parts = []
+    for j in range(len(noise.channels)):
+        own = noise.channels[j : j + 1]
+        by_run = tuple(_alone(scale[j : j + 1], own, integrals, b - a, h) for a, b in steps.runs)
+        parts.append(Part((j,), own, np.empty((0, 0)), _no_columns(len(steps.starts)), by_run))
+    return Sieve(steps, tuple(parts))
+
+
+def learn(steps: Windows, gaps: Floats) -> Filter:
+    """Return the noise that gaps have if each channel has its own, by maximum likelihood."""
+    h, integrals = stride_s(steps), integrals_of(steps)
+    scale = _scales(steps)
+    channels = np.empty((gaps.shape[1], 5))
+    for group in sorted(set(GROUPS)):
+        own = [j for j, g in enumerate(GROUPS) if g == group]
+        series = [summed(gaps[a:b][:, own], steps)[:, None, :] for a, b in steps.runs]
+        size = scale[own].mean(keepdims=True)
+
+        def cost(z: Floats, series: list[Floats] = series, size: Floats = size) -> float:
+            total = 0.0
+            for part in series:
+                noise = np.exp(z).reshape(1, 5)
+                K, spread = _alone(size, noise, integrals, len(part), h)
+                nothing = _no_columns(len(part))
+                left = errors(K, spread, noise, integrals, np.empty((0, 0)), nothing, h, part)[DIFFUSE:]
+                total += 0.5 * float(np.sum(left**2)) + part.shape[2] * float(np.log(spread[DIFFUSE:]).sum())
+            return total
+
+        rough = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
+        # The second difference of a position has six times the variance of its errors, the first of a velocity's twice.
+        error = rough * h**integrals / (2.4 if integrals == 2 else 1.4)
+        start = np.log([0.5 * error, error, 4.0 * h, 0.1 * rough, 10.0 * h])
+        channels[own] = np.exp(_least(cost, start, _bounds(start, h)))
+    return Filter(channels)
+
+
+def learn_with(
+    steps: Windows,
+    gaps: Floats,
+    alone: Filter,
+    made: Callable[[Floats], tuple[Process, ...]],
+    start: Floats,
+    picture: Picture,
+) -> tuple[Filter, Floats, Floats, float]:
+    """Return the noise that gaps have if disturbances push beside each channel's own noise.
+
+    Parameters
+    ----------
+    steps, gaps
+        The trial's, and what a hypothesis leaves.
+    alone
+        The noise to begin with; its processes stay as they are.
+    made
+        The further processes, from positive parameters.
+    start
+        These to begin with, shape (k,).
+    picture
+        In which all push.
+
+    Returns
+    -------
+    Filter
+        With the processes.
+    ndarray
+        The parameters, shape (k,).
+    ndarray
+        Standard deviations of their logarithms, shape (k,).
+    float
+        Logarithm of the likelihood.
+    """
+    h = stride_s(steps)
+    first = [GROUPS.index(group) for group in sorted(set(GROUPS))]
+
+    def noise(z: Floats) -> Filter:
+        own, rest = np.exp(z[: 5 * len(first)].reshape(-1, 5)), np.exp(z[5 * len(first) :])
+        return Filter(own[list(GROUPS)], (*alone.processes, *made(rest)), picture)
+
+    def cost(z: Floats) -> float:
+        return -likelihood(noise(z), steps, gaps)
+
+    channels = np.log(alone.channels[first])
+    begin = np.concatenate([channels.ravel(), np.log(start)])
+    bounds = [pair for row in channels for pair in _bounds(row, h)]
+    bounds += [(float(one) - 5.0, float(one) + 4.0) for one in np.log(start)]
+    z = _least(cost, begin, bounds)
+    best = cost(z)
+    width = np.full(len(start), np.inf)
+    for k in range(len(start)):
+        moved = np.zeros(len(z))
+        moved[len(z) - len(start) + k] = 0.05
+        bend = (cost(z + moved) + cost(z - moved) - 2.0 * best) / 0.05**2
+        width[k] = 1.0 / np.sqrt(bend) if bend > 0.0 else np.inf
+    return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
+
+
+def likelihood(noise: Filter, steps: Windows, gaps: Floats) -> float:
+    """Return the logarithm of the likelihood of gaps, but for a constant."""
+    ready = sieve_of(noise, steps)
+    return -0.5 * float(np.sum(ready.white(gaps) ** 2)) - ready.log_scale
+
+
+def integrals_of(steps: Windows) -> int:
+    """Return 2 for steps of positions, 1 for those of velocities."""
+    return 2 if steps.channels[0] else 1
+
+
+def stride_s(steps: Windows) -> float:
+    """Return the time between two steps [s]; a position's weight is two of them long, a velocity's one."""
+    return (len(steps.weight) - 1) // integrals_of(steps) * steps.scene.step_s
+
+
+def summed(gaps: Floats, steps: Windows) -> Floats:
+    """Return the gaps of one series, shape (J, ...), as what they sum up to in position or velocity."""
+    h = stride_s(steps)
+    total = np.cumsum(gaps, axis=0) * h
+    return np.ascontiguousarray(np.cumsum(total, axis=0) * h if integrals_of(steps) == 2 else total)
+
+
+def _least(cost: Callable[[Floats], float], start: Floats, bounds: list[tuple[float, float]]) -> Floats:
+    best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": 1e-4})
+    return np.asarray(best.x, dtype=np.float64)
+
+
+def _bounds(start: Floats, h: float) -> list[tuple[float, float]]:
+    times = (float(np.log(0.5 * h)), float(np.log(LONGEST * h)))
+    return [(one - 12.0, one + 6.0) if k not in (2, 4) else times for k, one in enumerate(start.tolist())]
+
+
+def _scales(steps: Windows) -> Floats:
+    """Return the size of what is measured in every channel, shape (c,)."""
+    measured = steps.measured[:, steps.channels]
+    size = np.sqrt(np.mean(measured**2, axis=0)) * stride_s(steps) ** integrals_of(steps)
+    return np.asarray(np.maximum(size, 1e-9))
+
+
+def _no_columns(n: int) -> Floats:
+    return np.empty((n, 1, 0))
+
+
+def _alone(scale: Floats, noise: Floats, integrals: int, n: int, h: float) -> tuple[Floats, Floats]:
+    return gains(scale, noise, integrals, np.empty((0, 0)), np.empty((2, 0, 0)), _no_columns(n), h)
+
+
+def _pushes(steps: Windows, picture: Picture, process: Process) -> Floats:
+    """Return the acceleration of every channel by a process's states, shape (J, c, states)."""
+    pushed = replace(picture, external=picture.external + process.force)
+    column = (steps.gap(pushed) - steps.gap(picture))[:, :, None]
+    return column if process.frequency_hz == 0.0 else np.concatenate([column, np.zeros_like(column)], axis=2)
+
+
+def _blocks(processes: tuple[Process, ...], h: float) -> tuple[Floats, Floats]:
+    """Return transition, and covariances of what enters and of the start, of all processes' states."""
+    sizes = [1 if one.frequency_hz == 0.0 else 2 for one in processes]
+    F, entering, first = (np.zeros((sum(sizes), sum(sizes))) for _ in range(3))
+    at = 0
+    for one, size in zip(processes, sizes, strict=True):
+        rows = slice(at, at + size)
+        keep, turn = exp(-h / one.time_constant_s), 2.0 * pi * one.frequency_hz * h
+        if size == 1:
+            F[rows, rows] = keep
+        else:
+            F[rows, rows] = keep * np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
+        first[rows, rows] = one.std**2 * np.eye(size)
+        entering[rows, rows] = (1.0 - keep**2) * one.std**2 * np.eye(size)
+        at += size
+    return F, np.stack([entering, first])
