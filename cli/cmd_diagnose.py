@@ -22,20 +22,28 @@ def command(
     withhold: Annotated[
         list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")
     ] = None,
+    name: Annotated[
+        str, typer.Option(help="Name of the model with the findings; the examined model's or the vessel's if left out.")
+    ] = "",
     verify: Verify = False,
     out: Out = OUT,
     json: Json = None,
 ) -> None:
     """Say which physics a model left out of a recording, and what shows it."""
     from ferryid.diagnose.diagnose import diagnose
+    from ferryid.diagnose.remodel import keep
+    from ferryid.identify.store import checked_name
     from ferryid.report.diagnosis_report import patient, report
 
     profile, examined = patient(vessel, model, out)
+    if name:
+        checked_name(name)
     hidden = tuple(withhold or ())
     diagnoses = diagnose(
         logs, profile, out, model=examined, against=against, withhold=hidden, verify=verify, progress=progress
     )
     progress("writing the report")
+    diagnoses = keep(diagnoses, profile, examined, out, name=name)
     outcome = report(diagnoses, out)
     progress("")
     emit(outcome.json, outcome.text, json)

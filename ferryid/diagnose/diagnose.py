@@ -25,6 +25,7 @@ from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.evidence import Evidence, Improvement, evidence, force_errors
 from ferryid.diagnose.free_runs import FreeRuns
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
+from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import TELLS, Location, locate
 from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding, Rival, Withheld
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
@@ -118,7 +119,7 @@ def _one(
         )
         return Diagnosis(name, profile.name, "not_testable", _of_sensors(sensors), {}, {}, tuple(notes))
     if simulated is None:
-        plain, spread = plain_picture(seen.scene, profile, model)
+        plain, spread = plain_picture(seen.scene, profile, model, survey.recording.sha256)
         library = suspects_of(seen.scene)[0]
         compared = {}
     else:
@@ -167,6 +168,7 @@ def _one(
         evidence=_leftover(trial, base, kept),
         withheld=_withheld(survey, scene, findings),
         against=compared,
+        learnt=learnt(trial, kept, findings, survey) if simulated is None else None,
     )
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ferryid.vessel.profile import Floats
+
+if TYPE_CHECKING:
+    from ferryid.diagnose.learnt import Learnt
 
 SCHEMA = "ferryid.diagnosis/1"
 AXES = ("surge", "sway", "yaw")
@@ -142,6 +145,8 @@ class Diagnosis:
         Signals that were hidden from the diagnosis.
     against
         The simulation that a recording was held against, as `ferryid.diagnose.against.plain_against` gives it, or empty.
+    learnt
+        What a model can learn from it; None where it found no force left out, or was held against a simulation.
     """
 
     log: str
@@ -155,6 +160,7 @@ class Diagnosis:
     evidence: Mapping[str, Floats] = field(default_factory=dict)
     withheld: tuple[Withheld, ...] = ()
     against: Mapping[str, Any] = field(default_factory=dict)
+    learnt: Learnt | None = None
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:

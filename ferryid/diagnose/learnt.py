@@ -1,0 +1,161 @@
+"""What one log teaches about a vessel: its hull as it was refitted, and the effects that were believed, with their spread."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
+from ferryid.diagnose.result import Finding
+from ferryid.diagnose.scene import Survey
+from ferryid.effects.picture import COEFFICIENTS
+from ferryid.identify.excitation import ranges
+from ferryid.identify.stored_effect import Quantity, Source, StoredEffect
+from ferryid.vessel.profile import Floats
+
+BELIEVED = 0.5
+"""A finding enters a model where it is more likely than this."""
+IN_THE_HULL = "hull_parameters"
+"""The effect that is nothing but other coefficients of the hull: it becomes these."""
+_STEP = 1e-2
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What one log teaches.
+
+    Attributes
+    ----------
+    training
+        The log, as a model file lists what it was trained on.
+    ranges
+        Ranges of validity.
+    before, spread
+        What was believed of the hull's coefficients before the log, shape (22,) each.
+    hull, covariance
+        What is believed of them now, shapes (22,) and (22, 22).
+    vessel, conditions
+        Properties of the vessel and conditions of the log, in the order in which they act.
+    notes
+        What did not enter and why, as sentences.
+    """
+
+    training: Mapping[str, object]
+    ranges: Mapping[str, tuple[float, float]]
+    before: Floats
+    spread: Floats
+    hull: Floats
+    covariance: Floats
+    vessel: tuple[StoredEffect, ...]
+    conditions: tuple[StoredEffect, ...]
+    notes: tuple[str, ...] = ()
+
+
+def learnt(trial: Trial, kept: Fit, findings: Sequence[Finding], survey: Survey) -> Learnt | None:
+    """Return what a log teaches; None where no force was left out that is more likely than not.
+
+    Parameters
+    ----------
+    trial, kept
+        The log and what was found, hull included.
+    findings
+        The same as it is told; those that are doubtful there do not count, and the hull is refitted without them.
+    survey
+        Of the log.
+    """
+    told = {(one.effect, one.instance): one for one in findings}
+    believed = [i for i, one in enumerate(kept.suspects) if one.key in told and told[one.key].probability > BELIEVED]
+    if not believed:
+        return None
+    notes = [
+        f"{one.effect.title} is too doubtful to enter a model."
+        for i, one in enumerate(kept.suspects)
+        if i not in believed and one.key in told
+    ]
+    if len(believed) < len(kept.suspects):
+        kept = fit(trial, [kept.suspects[i] for i in believed], [kept.values[i] for i in believed])
+    motion, recording = survey.motion, survey.recording
+    before, spread, hull, covariance = _hull(trial, kept)
+    stored = []
+    for i, suspect in enumerate(kept.suspects):
+        if suspect.effect.id != IN_THE_HULL:
+            finding = told[suspect.key]
+            source = Source(
+                motion.log,
+                recording.sha256,
+                finding.probability,
+                suspect.onset_s if suspect.onset_s > 0.0 else None,
+                dict(finding.improvement),
+                finding.unresolved_with,
+            )
+            stored.append((suspect.effect.vessel, _stored(suspect, kept.values[i], kept.errors(i), source)))
+    rows = motion.valid
+    return Learnt(
+        training={
+            "name": motion.log,
+            "files": [str(file).rpartition("/")[2] for file in recording.files],
+            "sha256": recording.sha256,
+            "seconds": float(rows.sum() / motion.rate_hz),
+            "rows": int(rows.sum()),
+        },
+        ranges=ranges(motion.nu[rows], motion.nu_dot[rows]),
+        before=before,
+        spread=spread,
+        hull=hull,
+        covariance=covariance,
+        vessel=tuple(one for vessel, one in stored if vessel),
+        conditions=tuple(one for vessel, one in stored if not vessel),
+        notes=tuple(notes),
+    )
+
+
+def _stored(suspect: Suspect, values: Floats, errors: Floats, source: Source) -> StoredEffect:
+    parameters = {
+        one.name: Quantity(value, max(value - 1.96 * error, one.low), min(value + 1.96 * error, one.high), one.unit)
+        for one, value, error in zip(suspect.parameters, values.tolist(), errors.tolist(), strict=True)
+    }
+    return StoredEffect(suspect.effect.id, suspect.instance, parameters, (source,))
+
+
+def _hull(trial: Trial, kept: Fit) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return the hull's coefficients and their spread before, the same and their covariance after a fit.
+
+    The covariance is that of the linearised posterior, effects included. Factors on single coefficients, where the hull model
+    was found wrong, are multiplied in.
+    """
+    h = len(COEFFICIENTS)
+    parameters = [one for suspect in kept.suspects for one in suspect.parameters]
+    sizes = np.array([one.size for one in parameters])
+    J = np.column_stack([trial.by_hull, _by_effects(trial, kept)])
+    posterior = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))
+    units = np.append(trial.hull_spread, sizes)
+    posterior = posterior * np.outer(units, units)
+    into = np.zeros((h, h + len(parameters)))
+    into[:, :h] = np.eye(h)
+    hull, spread = kept.hull.copy(), trial.hull_spread.copy()
+    column = h
+    for suspect, values in zip(kept.suspects, kept.values, strict=True):
+        for one, factor in zip(suspect.parameters, values.tolist(), strict=True):
+            if suspect.effect.id == IN_THE_HULL:
+                k = COEFFICIENTS.index(one.name)
+                into[k, k], into[k, column] = factor, hull[k]
+                spread[k] = float(np.hypot(spread[k], one.size * trial.plain.hull[k]))
+                hull[k] *= factor
+            column += 1
+    return trial.plain.hull, spread, hull, into @ posterior @ into.T
+
+
+def _by_effects(trial: Trial, kept: Fit) -> Floats:
+    """Return the derivatives of what is left by the effects' parameters, in their sizes, shape (w, q)."""
+    left = trial.white(imagined(trial.plain, kept))
+    columns = []
+    for i, suspect in enumerate(kept.suspects):
+        for k, one in enumerate(suspect.parameters):
+            d = _STEP if kept.values[i][k] + _STEP * one.size <= one.high else -_STEP
+            moved = kept.values[i].copy()
+            moved[k] += d * one.size
+            changed = (*kept.values[:i], moved, *kept.values[i + 1 :])
+            columns.append((trial.white(imagined(trial.plain, replace(kept, values=changed))) - left) / d)
+    return np.column_stack(columns)
