@@ -219,8 +219,8 @@ def settled(trial: Trial, beside: Fit, suspect: Suspect) -> Suspect:
     """Return a suspect with the parameters that its effect chooses beside a fit; the same one where there is no choice."""
     if suspect.effect.choose is None:
         return suspect
-    # The hull is the plain one: what each of its coefficients is believed to be is known of that one alone.
-    made = suspect.effect.choose(imagined(trial.plain, replace(beside, hull=trial.plain.hull)), trial.white)
+    believed = imagined(trial.plain, replace(beside, hull=trial.plain.hull)).hull
+    made = suspect.effect.choose(imagined(trial.plain, beside), believed, trial.white)
     return replace(suspect, parameters=made.parameters, doubt=made.doubt)
 
 

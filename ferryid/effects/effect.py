@@ -87,8 +87,9 @@ class Effect:
     vessel
         True for a property of hull or actuators, which carries over to other logs; False for a condition of one log.
     choose
-        ``choose(picture, residual)`` returns the parameters for a log whose forces are otherwise as in the picture, where
-        there are alternatives to choose from (places, coefficients): a quick scan, in place of ``parameters_of``.
+        ``choose(picture, believed, residual)`` returns the parameters for a log whose forces are otherwise as in the picture,
+        where there are alternatives to choose from (places, coefficients): a quick scan, in place of ``parameters_of``. The
+        picture's hull is the fitted one, `believed` its coefficients as believed before the log, shape (22,).
     least
         How far the interval of a parameter has to stay from its neutral value for the parameter to be worth a report.
     """
@@ -103,5 +104,5 @@ class Effect:
     cannot: Callable[[Scene], str] = lambda scene: ""
     onset: bool = False
     vessel: bool = False
-    choose: Callable[[Picture, Residual], Choice] | None = None
+    choose: Callable[[Picture, Floats, Residual], Choice] | None = None
     least: float = 0.0

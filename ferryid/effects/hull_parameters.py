@@ -24,10 +24,11 @@ from ferryid.vessel.profile import Floats, Profile
 
 TELLING = 0.25
 """A coefficient that may be within this share of the model's is not worth a name."""
-OFF, USUAL = 0.5, 0.12
+OFF, USUAL = 1.0, 0.12
 """Standard deviations of what is believed of the factor of a coefficient that is chosen, and of any other."""
 HELD = 1e-6
 """The same for the factor of a coefficient that was not chosen, which is refitted anyway."""
+TINY = 0.01
 SURGE_ALONE = frozenset({"X_|u|u"})
 """What one factor of fouling is as well."""
 
@@ -45,19 +46,29 @@ def _factor(name: str, size: float) -> Parameter:
     return Parameter(name, "-", size, 0.05, 10.0, neutral=1.0)
 
 
-def choose(picture: Picture, residual: Residual) -> Choice:
+def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
     """Return factors of which only those of the coefficients that are worth it can move."""
     names = _named(picture.scene.profile)
     places = [COEFFICIENTS.index(name) for name in names]
-    e = residual(picture)
-    columns = []
-    for k in places:
-        hull = picture.hull.copy()
-        hull[k] *= 1.0 + 0.1 * USUAL
-        columns.append((residual(replace(picture, hull=hull)) - e) / (0.1 * USUAL))
-    J = np.column_stack(columns)
+    J, e = by_hull(picture, believed, residual, places)
     chosen, doubt = _best_subset(J.T @ J, -J.T @ e, names)
     return Choice(tuple(_factor(name, OFF if name in chosen else HELD) for name in names), doubt)
+
+
+def by_hull(picture: Picture, believed: Floats, residual: Residual, places: list[int]) -> tuple[Floats, Floats]:
+    """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
+
+    The line is drawn at the picture's hull, which is the fitted one, as acceleration is far from linear in mass.
+    """
+    e = residual(picture)
+    columns, away = [], []
+    for k in places:
+        hull = picture.hull.copy()
+        hull[k] += TINY * believed[k]
+        columns.append((residual(replace(picture, hull=hull)) - e) / TINY)
+        away.append(picture.hull[k] / believed[k] - 1.0 if believed[k] != 0.0 else 0.0)
+    J = np.column_stack(columns)
+    return J, e - J @ np.array(away)
 
 
 def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str], float]:

@@ -10,21 +10,24 @@ from math import log
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.picture import COEFFICIENTS, Picture, Scene
+from ferryid.effects.hull_parameters import USUAL, by_hull
+from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats, Profile
+
+Places = NDArray[np.int64]
 
 EDGE_M = 2.0
 """Width over which the factor comes in at a side, outside of it."""
 CELLS = 8
 """Cells of the grid along north and east each."""
-LEAST, MOST = 0.05, 0.7
-"""Shares of the log that lie in a place. What is nearly everywhere is the hull's own damping, or its fouling."""
+LEAST, MOST = 0.05, 0.8
+"""Shares of the log that lie in a place, the latter with all its sides as far out as they may be fitted to: one cell. What
+is nearly everywhere is the hull's own damping, or its fouling."""
 FACTOR = Parameter("factor", "-", 0.4, 0.2, 6.0, neutral=1.0)
 SIDES = ("south", "north", "west", "east")
-USUAL = 0.12
-"""What is believed of the hull's coefficients, as a share of them."""
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -32,12 +35,12 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     length = profile.hull.length_m if np.isfinite(profile.hull.length_m) else 5.0
     return (
         FACTOR,
-        *(_side(name, sign * 2.0 * length, length) for name, sign in zip(SIDES, (-1, 1, -1, 1), strict=True)),
+        *(_side(name, sign * 2.0 * length, length, 100.0) for name, sign in zip(SIDES, (-1, 1, -1, 1), strict=True)),
     )
 
 
-def _side(name: str, at: float, size: float) -> Parameter:
-    return Parameter(name, "m", size, at - 100.0 * size, at + 100.0 * size, neutral=at)
+def _side(name: str, at: float, size: float, reach: float = 1.0) -> Parameter:
+    return Parameter(name, "m", size, at - reach * size, at + reach * size, neutral=at)
 
 
 def _share(outside: Floats) -> Floats:
@@ -62,7 +65,7 @@ def _damped(picture: Picture, factor: Floats) -> Picture:
     return replace(picture, damping_factor=factor if before is None else before * factor)
 
 
-def choose(picture: Picture, residual: Residual) -> Choice:
+def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
     """Return the place whose damping explains most of what is left, with its neighbours on the grid as the usual error."""
     scene = picture.scene
     place = scene.eta[:, :2]
@@ -85,13 +88,21 @@ def choose(picture: Picture, residual: Residual) -> Choice:
     a, b = np.triu_indices(CELLS + 1, 1)
     south, west = np.repeat(a, len(a)), np.tile(a, len(a))
     north, east = np.repeat(b, len(b)), np.tile(b, len(b))
-    covered = shares[north, east] - shares[south, east] - shares[north, west] + shares[south, west]
-    fits = (covered >= LEAST) & (covered <= MOST)
+
+    def covered(south: Places, north: Places, west: Places, east: Places) -> Floats:
+        return np.asarray(shares[north, east] - shares[south, east] - shares[north, west] + shares[south, west])
+
+    lower, upper = (
+        (np.maximum(one - 1, 0) for one in (south, west)),
+        (np.minimum(one + 1, CELLS) for one in (north, east)),
+    )
+    widest = [corner for pair in zip(lower, upper, strict=True) for corner in pair]
+    fits = (covered(south, north, west, east) >= LEAST) & (covered(*widest) <= MOST)
     if not fits.any():
         return Choice(parameters_of(scene.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
     columns = (sums[north, east] - sums[south, east] - sums[north, west] + sums[south, west]).T
-    gains = _gains(picture, residual, e, columns)
+    gains = _gains(*by_hull(picture, believed, residual, list(np.flatnonzero(believed))), columns)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
     sizes = np.repeat((high - low) / CELLS, 2)
@@ -99,17 +110,10 @@ def choose(picture: Picture, residual: Residual) -> Choice:
     return Choice((FACTOR, *parameters), log(len(gains)))
 
 
-def _gains(picture: Picture, residual: Residual, e: Floats, columns: Floats) -> Floats:
+def _gains(J: Floats, e: Floats, columns: Floats) -> Floats:
     """Return the evidence of a linear model for each of some columns, shape (w, q), beside the hull's coefficients."""
-    by_hull = []
-    for k in range(len(COEFFICIENTS)):
-        if picture.hull[k] != 0.0:
-            hull = picture.hull.copy()
-            hull[k] *= 1.0 + 0.1 * USUAL
-            by_hull.append((residual(replace(picture, hull=hull)) - e) / 0.1)
-    H = np.column_stack(by_hull)
-    rest = np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ np.column_stack([e, columns]))
-    free = np.column_stack([e, columns]) - H @ rest
+    H, every = USUAL * J, np.column_stack([e, columns])
+    free = every - H @ np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ every)
     power = np.einsum("wq,wq->q", columns, free[:, 1:])
     product = columns.T @ free[:, 0]
     ratio = power * FACTOR.size**2
