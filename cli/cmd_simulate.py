@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import Json
+from ferryid.cli.options import OUT, Json
 from ferryid.cli.output import emit, progress
 
 
@@ -19,11 +19,22 @@ def command(
     storage: Annotated[str, typer.Option(help="Storage of a ROS2 folder: sqlite3 or mcap.")] = "sqlite3",
     truth: Annotated[Path | None, typer.Option(help="Write the true states to this Parquet file as well.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the noise, instead of the scenario's.")] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            help="A diagnosed model that is the vessel: path, name or name@version. Its effects act, its hull moves."
+        ),
+    ] = None,
+    conditions: Annotated[
+        str, typer.Option(help="With --model: a log that it was diagnosed on, whose wind, payload and so on prevail.")
+    ] = "",
+    models: Annotated[Path, typer.Option(help="Output folder in whose store --model finds names.")] = OUT,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing log.")] = False,
     list_: Annotated[bool, typer.Option("--list", help="List the bundled scenarios.")] = False,
     json: Json = None,
 ) -> None:
     """Simulate a trial and write a log like a recording."""
+    from ferryid.identify.store import load
     from ferryid.simulate import render_scenarios, render_simulation, run_scenario, scenario_listing
 
     if list_:
@@ -38,6 +49,8 @@ def command(
         storage=storage,
         truth=truth,
         seed=seed,
+        model=load(model, models) if model else None,
+        conditions=conditions,
         overwrite=overwrite,
         json=None if json in (None, "-") else Path(json),
         progress=progress,

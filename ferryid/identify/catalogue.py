@@ -37,7 +37,7 @@ def _effects_of(model: Model) -> dict[str, Any]:
     if not model.diagnosed:
         return {}
     return {
-        "vessel_effects": [_short(one) for one in model.vessel_effects],
+        "vessel_effects": [*(["hull refitted"] if model.hull else []), *(_short(one) for one in model.vessel_effects)],
         "conditions": {known.log: [_short(one) for one in known.effects] for known in model.conditions},
     }
 
@@ -61,7 +61,7 @@ def render_listing(result: dict[str, Any], out: Path) -> str:
         score = model["normalised_mse"]
         lines.append(
             f"{mark} {model['name'] + '@' + str(model['version']):<28}"
-            f"{'accepted' if model['accepted'] else 'rejected':<12}"
+            f"{'accepted' if model['accepted'] else 'diagnosed' if 'conditions' in model else 'rejected':<12}"
             f"{'-' if score is None else format(score, '9.3f'):>9}  {model['created']:<22}{_some(model['logs'])}"
         )
         lines += [f"      vessel: {told}" for told in model.get("vessel_effects", ())]
@@ -83,8 +83,10 @@ def render_model(model: Model) -> str:
     data = to_json(model)
     settings = model.settings
     lines = [
-        f"{model.name}@{model.version}  {'accepted' if model.accepted else 'REJECTED'}  {model.created}",
-        f"basis {settings.get('basis')}, {settings.get('structure')}, {settings.get('components')} components, "
+        f"{model.name}@{model.version}  {_verdict(model)}  {model.created}",
+        f"a diagnosis of {settings.get('diagnosed_from')}, without terms of a fit"
+        if model.diagnosed and not model.terms
+        else f"basis {settings.get('basis')}, {settings.get('structure')}, {settings.get('components')} components, "
         f"window {settings.get('window_s')} s",
         f"trained on {', '.join(str(log['name']) for log in model.training)}",
         f"validation force MSE over the base model's: {_number(model.scores.get('normalised_mse'))} ("
@@ -109,6 +111,13 @@ def render_model(model: Model) -> str:
     for known in model.conditions:
         lines += ["", f"only in {known.log}:", *(f"  {stored.says()}" for stored in known.effects)]
     return "\n".join(lines)
+
+
+def _verdict(model: Model) -> str:
+    if model.accepted:
+        return "accepted"
+    # It holds for its own log; whether it does for others is not known.
+    return "diagnosed" if model.diagnosed else "REJECTED"
 
 
 def _number(value: Any) -> str:

@@ -16,7 +16,7 @@ from ferryid.identify.model import NO_BASIS, Model
 from ferryid.identify.residual import base_force, force_of_motion, scaled
 from ferryid.signals.track import Motion
 from ferryid.vessel import parse_profile
-from ferryid.vessel.profile import Profile
+from ferryid.vessel.profile import Hull, Profile
 
 Floats = NDArray[np.float64]
 
@@ -106,10 +106,18 @@ def with_hull(model: Model, profile: Profile, hull: Floats) -> tuple[Profile, Ma
     """Return profile and factors on it so that with the model's terms the hull has these coefficients, shape (22,)."""
     zeta = float(model.scale.get("zeta", 1.0))
     base = zeta * (hull - hull_part(model)[0])
-    m11, m22, m23, m32, m33 = base[:5].tolist()
-    changed = replace(
-        scaled(profile.hull, model.scale),
+    return replace(profile, hull=hull_with(scaled(profile.hull, model.scale), base)), {
+        "delta": 1.0,
+        "sigma": 1.0,
+        "zeta": zeta,
+    }
+
+
+def hull_with(hull: Hull, coefficients: Floats) -> Hull:
+    """Return a hull with other coefficients, in the order of `COEFFICIENTS`, shape (22,)."""
+    m11, m22, m23, m32, m33 = coefficients[:5].tolist()
+    return replace(
+        hull,
         M=np.array([[m11, 0.0, 0.0], [0.0, m22, m23], [0.0, m32, m33]]),
-        D=dict(zip(COEFFICIENTS[5:], base[5:].tolist(), strict=True)),
+        D=dict(zip(COEFFICIENTS[5:], coefficients[5:].tolist(), strict=True)),
     )
-    return replace(profile, hull=changed), {"delta": 1.0, "sigma": 1.0, "zeta": zeta}

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, required_force
 from ferryid.errors import FerryIdError
-from ferryid.identify.estimate import Estimator, estimator, hull_values
+from ferryid.identify.estimate import Estimator, estimator, hull_values, with_hull
 from ferryid.identify.hull_terms import hull_part
 from ferryid.identify.model import Model
 from ferryid.identify.stored_effect import StoredEffect
-from ferryid.vessel import actuator_columns, applied_force
+from ferryid.vessel import actuator_columns, applied_force, parse_profile
 from ferryid.vessel.profile import Floats, Profile
 
 Flags = NDArray[np.bool_]
@@ -145,6 +145,18 @@ class Pictured:
         for stored in self.model.vessel_effects:
             picture = stored.act(picture, "")
         return picture.hull
+
+
+def acting_estimator(model: Model) -> Estimator:
+    """Return the estimator of a model with the hull as the properties of the vessel alter it: the force that it needs.
+
+    What thrusters make of an order is not part of it.
+    """
+    if not model.vessel_effects:
+        return estimator(model)
+    known = Pictured(model)
+    profile, scale = with_hull(model, parse_profile(model.profile_text, model.name), known.altered_hull())
+    return replace(known.force, profile=profile, scale=scale)
 
 
 def bare_picture(scene: Scene, hull: Floats) -> Picture:

@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.errors import FerryIdError
+from ferryid.identify.model import Model
 from ferryid.identify.store import load_file
 from ferryid.simulate.logs import write_log
 from ferryid.simulate.places import check_output
 from ferryid.simulate.scenario import Scenario, check_seed, list_scenarios, load_scenario
 from ferryid.simulate.trial import Simulation, simulate
+from ferryid.simulate.vessel_model import sailed_by
 
 SCHEMA = "ferryid.simulate/1"
 FASTEST_MPS = 15.0
@@ -26,6 +29,8 @@ def run_scenario(
     storage: str = "sqlite3",
     truth: Path | None = None,
     seed: int | None = None,
+    model: Model | None = None,
+    conditions: str = "",
     overwrite: bool = False,
     json: Path | None = None,
     progress: Callable[[str], None],
@@ -40,18 +45,30 @@ def run_scenario(
         As for `ferryid.simulate.write_log`.
     seed
         Takes the place of the scenario's own.
+    model, conditions
+        The vessel in the place of the scenario's, and the log whose conditions prevail; see
+        `ferryid.simulate.vessel_model.sailed_by`.
     json
         Where the caller will write the result; looked at before anything is simulated.
     progress
         Called with the name of each stage.
     """
     asked = load_scenario(scenario)
+    sailing = None
+    if model is not None:
+        sailing = sailed_by(asked, model, conditions)
+        asked = sailing.scenario
+    elif conditions:
+        raise FerryIdError(
+            f"--conditions: {conditions} are conditions of a log that a model was diagnosed on, found no --model. "
+            "Fix: give the model as well"
+        )
     if seed is not None:
         check_seed(seed)
     inputs = asked.inputs if asked.folder is None else (Path(scenario), *asked.inputs)
     check_output(out, truth, storage=storage, overwrite=overwrite, json=json, inputs=inputs)
     progress("simulating (the first run after an installation compiles the simulator, some 20 s)")
-    simulation = simulate(asked, seed)
+    simulation = simulate(asked, seed, vessel=None if sailing is None else sailing.vessel)
     progress("writing the log")
     write_log(simulation, out, truth, storage=storage, overwrite=overwrite)
     progress("")
@@ -73,7 +90,8 @@ def run_scenario(
         },
         "saturated_share": float(np.mean(control.saturated)),
         "undefined_aims": control.undefined_aims,
-        "warnings": [*_rejected(asked), *_warnings(simulation)],
+        "warnings": [*(() if sailing is None else sailing.notes), *_rejected(asked), *_warnings(simulation)],
+        **({} if model is None else {"model": model.label, "conditions": conditions or None}),
     }
 
 
@@ -115,6 +133,9 @@ def render_simulation(result: Mapping[str, Any]) -> str:
         f"{result['title']}",
         f"{result['duration_s']:.0f} s of {result['vessel']}, seed {result['seed']}, written to {result['log']}",
     ]
+    if "model" in result:
+        held = f", in the conditions of {result['conditions']}" if result["conditions"] else ""
+        lines.append(f"the vessel is {result['model']}{held}")
     if result["truth"] is not None:
         lines.append(f"true states: {result['truth']}")
     width = max(len(topic) for topic in result["topics"])

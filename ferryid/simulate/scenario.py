@@ -211,6 +211,21 @@ def parse_scenario(text: str, where: str, folder: Path | None = None) -> Scenari
         raise FerryIdError(f"{where}: not valid TOML, {error}. Fix: correct the line") from error
     if deep:
         raise FerryIdError(f"{where}: {deep}")
+    return scenario_of(data, text, where, folder)
+
+
+def scenario_of(data: dict[str, Any], text: str, where: str, folder: Path | None = None) -> Scenario:
+    """Read a scenario from its tables; see `parse_scenario`.
+
+    Parameters
+    ----------
+    data
+        The tables, which may hold more than the text does.
+    text
+        The TOML source, for the lines of faults.
+    where, folder
+        As in `parse_scenario`.
+    """
     lines = key_lines(text)
     faults = [
         Fault(line_of(lines, place), "the number is too long. Fix: write fewer digits") for place in _long(data, ())

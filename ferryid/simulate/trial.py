@@ -44,7 +44,9 @@ class Simulation:
     streams: tuple[Stream, ...]
 
 
-def simulate(scenario: Scenario, seed: int | None = None, *, model: Model | None = None) -> Simulation:
+def simulate(
+    scenario: Scenario, seed: int | None = None, *, model: Model | None = None, vessel: Profile | None = None
+) -> Simulation:
     """Run a scenario.
 
     Parameters
@@ -55,6 +57,9 @@ def simulate(scenario: Scenario, seed: int | None = None, *, model: Model | None
         Takes the place of the scenario's own.
     model
         Takes the place of the controller's model, profile or file.
+    vessel
+        The vessel that moves, with another hull than the profile's, in which the controller believes; see
+        `ferryid.simulate.vessel_model`.
 
     Raises
     ------
@@ -64,13 +69,16 @@ def simulate(scenario: Scenario, seed: int | None = None, *, model: Model | None
     profile = vessel_of(scenario)
     number = scenario.seed if seed is None else seed
     check_size(scenario, len(profile.actuators))
-    truth, control = sail(scenario, profile, number, model)
+    truth, control = sail(scenario, profile, number, model, vessel)
     return Simulation(scenario, number, profile, truth, control, sense(scenario, profile, number, truth, control))
 
 
-def sail(scenario: Scenario, profile: Profile, seed: int, model: Model | None = None) -> tuple[Truth, Control]:
+def sail(
+    scenario: Scenario, profile: Profile, seed: int, model: Model | None = None, vessel: Profile | None = None
+) -> tuple[Truth, Control]:
     """Run the closed loop without the log's sensors; parameters and errors as for `simulate`."""
-    check_against(scenario, profile)
+    moving = vessel or profile
+    check_against(scenario, moving)
     cycle = 1.0 / scenario.sensors.navigation_rate_hz
     steps = steps_per_cycle(scenario.sensors.navigation_rate_hz)
     h = cycle / steps
@@ -80,7 +88,7 @@ def sail(scenario: Scenario, profile: Profile, seed: int, model: Model | None = 
             f"{scenario.where}:{line_in(scenario, 'duration_s')}: a trial needs at least two control cycles, found "
             f"duration_s = {scenario.duration_s:g}. Fix: make it longer"
         )
-    plant = build(scenario, profile, seed, h, steps * cycles)
+    plant = build(scenario, moving, seed, h, steps * cycles)
     thrusters = resting(plant)
     guidance, way = build_guidance(scenario)
     tuning, reference = build_reference(scenario)

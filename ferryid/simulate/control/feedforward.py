@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import DIMENSIONS
-from ferryid.identify.estimate import Estimator, estimator
+from ferryid.identify.estimate import Estimator
+from ferryid.identify.pictured import acting_estimator
 from ferryid.identify.residual import scaled
 from ferryid.identify.store import load_file
 from ferryid.simulate.elementary import atan2, cos, sin
@@ -91,7 +92,7 @@ def build_feedforward(scenario: Scenario, profile: Profile, model: Model | None)
         model = load_file(scenario.file(control.model))
     if model is None:
         return feedforward_of(Estimator(profile, {"delta": control.delta, "sigma": control.sigma}))
-    estimated = estimator(model)
+    estimated = acting_estimator(model)
     if estimated.profile.name != profile.name:
         raise FerryIdError(
             f"{scenario.where}: the controller's model {model.name}@{model.version} belongs to {estimated.profile.name}, found "

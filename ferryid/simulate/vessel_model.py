@@ -1,0 +1,141 @@
+"""A model as the vessel that is simulated: its hull and its effects in the place of the scenario's."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ferryid.effects import effects
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.estimate import hull_values, hull_with
+from ferryid.identify.hull_terms import other_terms
+from ferryid.identify.model import Model
+from ferryid.identify.stored_effect import Conditions, StoredEffect
+from ferryid.simulate.check_scenario import vessel_of
+from ferryid.simulate.scenario import Scenario, scenario_of
+from ferryid.vessel import parse_profile
+from ferryid.vessel.profile import Profile
+
+VESSEL_KEYS = (
+    ("true_hull",),
+    ("fouling",),
+    ("thrusters", "faults"),
+    ("thrusters", "force_lag_s"),
+    ("thrusters", "inflow_loss_per_mps"),
+    ("thrusters", "interaction_fraction"),
+)
+"""What a scenario says of the vessel itself, which a model takes the place of."""
+
+
+@dataclass(frozen=True)
+class Sailing:
+    """A scenario as a model sails it: what was changed in it, the vessel, and what of the scenario was set aside."""
+
+    scenario: Scenario
+    vessel: Profile
+    notes: tuple[str, ...]
+
+
+def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing:
+    """Return a scenario with a model as its vessel.
+
+    Properties of the vessel act from the start: what began during a log lasts. The controller goes on to believe
+    in what the scenario says.
+
+    Parameters
+    ----------
+    scenario
+        From `load_scenario`.
+    model
+        The vessel.
+    conditions
+        Name of a log that the model was diagnosed on, whose conditions are to prevail; none where empty.
+
+    Raises
+    ------
+    FerryIdError
+        For a model of another vessel, one with terms that no hull has, a log that the model knows no conditions of, and
+        conditions that a scenario cannot have.
+    """
+    expected = vessel_of(scenario)
+    own = parse_profile(model.profile_text, model.name)
+    if own.name != expected.name:
+        raise FerryIdError(
+            f"{scenario.where}: a trial of {expected.name} cannot be sailed by {model.label}, a model of {own.name}. "
+            "Fix: give a model and a scenario of one vessel"
+        )
+    left = other_terms(model)
+    if left:
+        raise FerryIdError(
+            f"{model.label}: the simulated vessel cannot have the model's terms {', '.join(left)}, which no hull has. Fix: "
+            "simulate a model that ferryid diagnose made from the profile, or give this one to the controller "
+            '([controller] model = "FILE")'
+        )
+    chosen = _conditions(model, conditions) if conditions else None
+    data = tomllib.loads(scenario.text)
+    aside = [place for place in VESSEL_KEYS if _taken(data, place)]
+    sha256 = "" if chosen is None else chosen.sha256
+    stored = (*model.vessel_effects, *(() if chosen is None else chosen.effects))
+    for one in stored:
+        data = _merged(data, _tables(one, sha256))
+    try:
+        changed = scenario_of(data, scenario.text, scenario.where, scenario.folder)
+    except FerryIdError as error:
+        raise FerryIdError(f"with {', '.join(_names(stored))} of {model.label}, {error}") from error
+    return Sailing(
+        changed,
+        replace(own, hull=hull_with(own.hull, hull_values(model))),
+        tuple(f"the scenario's [{'.'.join(place)}] is set aside: the vessel is {model.label}" for place in aside),
+    )
+
+
+def _conditions(model: Model, log: str) -> Conditions:
+    known = {one.log: one for one in model.conditions}
+    if log not in known:
+        found = f"those of {', '.join(known)}" if known else "none"
+        raise FerryIdError(
+            f'{model.label}: the conditions of "{log}" are not in the model, found {found}.{did_you_mean(log, known)} '
+            "Fix: name one of the logs that ferryid models lists conditions of"
+        )
+    several = [one.key for one in known[log].effects]
+    twice = [effect for effect, _ in several if sum(effect == other for other, _ in several) > 1]
+    if twice:
+        raise FerryIdError(
+            f"{model.label}: a scenario has one {effects()[twice[0]].title.lower()}, found two of it for {log}, found one "
+            "after the other. Fix: diagnose the log again from the profile"
+        )
+    return known[log]
+
+
+def _tables(stored: StoredEffect, sha256: str) -> dict[str, Any]:
+    values = stored.values
+    if effects()[stored.effect].onset:
+        values["onset"] = stored.onset_in(sha256)
+    return effects()[stored.effect].scenario(values, stored.instance)
+
+
+def _taken(data: dict[str, Any], place: Sequence[str]) -> bool:
+    """Remove a key from nested tables; tell whether it was there."""
+    for name in place[:-1]:
+        data = data.get(name, {})
+    return data.pop(place[-1], None) is not None
+
+
+def _merged(data: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return tables with more in them: arrays of tables grow, everything else gives way."""
+    result = dict(data)
+    for key, value in more.items():
+        old = result.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            result[key] = _merged(old, value)
+        elif isinstance(old, list) and isinstance(value, list) and all(isinstance(one, dict) for one in (*old, *value)):
+            result[key] = [*old, *value]
+        else:
+            result[key] = value
+    return result
+
+
+def _names(stored: Sequence[StoredEffect]) -> list[str]:
+    return [effects()[one.effect].title.lower() for one in stored]
