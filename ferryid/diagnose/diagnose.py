@@ -26,11 +26,13 @@ from ferryid.diagnose.evidence import Evidence, Improvement, evidence, force_err
 from ferryid.diagnose.free_runs import FreeRuns
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
 from ferryid.diagnose.learnt import learnt
-from ferryid.diagnose.locate import TELLS, Location, locate
+from ferryid.diagnose.locate import locate
 from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding, Rival, Withheld
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import NEAR, ODDS, search, suspects_of
 from ferryid.diagnose.separate import manoeuvre
+from ferryid.diagnose.shown import columns_of, regressor_of
+from ferryid.diagnose.unknown import impostors, unknown_of
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.effects.effect import Parameter
 from ferryid.effects.picture import Scene
@@ -138,9 +140,12 @@ def _one(
     if proof is not None:
         kept, proof, dropped = _proved(trial, kept, proof)
         notes += dropped
+    progress("looking for what has no name")
+    kept, proof, told = _without_impostors(trial, kept, proof)
+    notes += told
     base = fit(trial, ())
+    unknown = unknown_of(trial, kept, scene)
     progress("locating")
-    left = locate(trial, kept, kept, scene)
     findings = [*_of_sensors(sensors), *_findings(library, trial, base, kept, proof, scene)]
     unseen = _unseen(trial, kept, library)
     if model is None and not profile.hull.has_model:
@@ -151,11 +156,10 @@ def _one(
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
     if unseen:
         notes.append(f"This log could not have shown, at their usual size: {', '.join(unseen)}.")
-    more = left.profiles[0].statistic >= TELLS if left.profiles else False
-    if more:
-        notes.append(f"Something is left over that nothing in the library explains: it shows most at {left.regime}.")
+    if unknown.unsteady:
         findings = [_doubted(one) for one in findings]
-    verdict = _verdict(bool(findings), more, len(unseen), len(library))
+    verdict = _verdict(bool(findings), bool(unknown.findings), len(unseen), len(library))
+    findings += unknown.findings
     before, after = _scores(trial, base, kept, proof)
     return Diagnosis(
         name,
@@ -166,6 +170,7 @@ def _one(
         after,
         tuple(notes),
         evidence=_leftover(trial, base, kept),
+        located=locate(trial, base, kept, scene) if kept.suspects else unknown.left,
         withheld=_withheld(survey, scene, findings),
         against=compared,
         learnt=learnt(trial, kept, findings, survey) if simulated is None else None,
@@ -237,6 +242,20 @@ def _proved(trial: Trial, kept: Fit, proof: Evidence) -> tuple[Fit, Evidence | N
     return again, evidence(trial, again) if holds else None, told
 
 
+def _without_impostors(
+    trial: Trial, kept: Fit, proof: Evidence | None
+) -> tuple[Fit, Evidence | None, list[str]]:
+    """Drop what an empirical law in its place makes idle: physics without a name here may look a little like an effect."""
+    told = []
+    while idle := impostors(trial, kept):
+        title = kept.suspects[idle[0]].effect.title
+        told.append(f"{title} was suspected, but a law in its place explains more and leaves it nothing: it is no finding.")
+        holds = [suspect for i, suspect in enumerate(kept.suspects) if i != idle[0]]
+        kept = fit(trial, holds, [values for i, values in enumerate(kept.values) if i != idle[0]])
+        proof = evidence(trial, kept) if holds else None
+    return kept, proof, told
+
+
 def _findings(
     library: Sequence[Suspect], trial: Trial, base: Fit, kept: Fit, proof: Evidence | None, scene: Scene
 ) -> list[Finding]:
@@ -272,7 +291,9 @@ def _findings(
                 unresolved_with=unresolved,
                 separating_manoeuvre=manoeuvre(suspect.effect.id, unresolved),
                 says=suspect.effect.says(values, suspect.instance),
-                **_figure(trial, without, kept, place),
+                **columns_of(
+                    trial, place, regressor_of(suspect, imagined(trial.plain, without), kept.values[i], place)
+                ),
             )
         )
     return sorted(made, key=lambda one: -sum(one.improvement.values()))
@@ -329,22 +350,6 @@ def _onset_end(trial: Trial, kept: Fit, index: int, side: float) -> float:
 def _intervals(trial: Trial, suspect: Suspect) -> tuple[tuple[float, float], ...]:
     t = trial.windows.scene.t
     return ((max(suspect.onset_s, float(t[0])), float(t[-1])),)
-
-
-def _figure(trial: Trial, without: Fit, kept: Fit, place: Location) -> dict[str, Any]:
-    """Return the columns of a finding's figure, on the axis that shows it best."""
-    axis = int(np.argmax(place.shares))
-    before, after = place.before[:, axis], place.after[:, axis]
-    columns = {"t": place.middle_s, "before": before, "after": after, "explained": before - after}
-    labels = {
-        "residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'} left over [{'N·m' if axis == 2 else 'N'}]"
-    }
-    windows_ = trial.windows
-    heading = np.degrees(np.mod(windows_.mean(windows_.scene.psi[:, None])[:, 0], 2.0 * np.pi))
-    return {
-        "evidence": {**columns, "regressor": heading},
-        "labels": {**labels, "regressor": "heading [deg]"},
-    }
 
 
 def _unseen(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> list[str]:

@@ -8,6 +8,7 @@ error. Where nothing was found, the two hypotheses are one, and what is told is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,6 @@ from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
-
-__all__ = ["TELLS", "Location", "locate", "whitened"]
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def locate(trial: Trial, before: Fit, after: Fit, scene: Scene | None = None) ->
     unexplained = before is after
     power_before, power_after = np.mean(white**2, axis=0), np.mean(calm**2, axis=0)
     excess = np.maximum(power_before / power_after - 1.0, 0.0)
-    profiles = profiles_of(trial.windows, kept, white, first)
+    profiles = profiles_of(trial.windows, kept, white, calm, first)
     # Without a better hypothesis an axis stands out by how uneven its errors are.
     uneven = profiles[0].by_axis if unexplained and profiles and profiles[0].statistic >= TELLS else np.zeros(3)
     shares = _shared(np.maximum(uneven, 0.0) if unexplained else excess)
@@ -106,6 +105,39 @@ def locate(trial: Trial, before: Fit, after: Fit, scene: Scene | None = None) ->
         bands_of(trial, pictures, scene),
         in_words(profiles, axes),
     )
+
+
+def plain_location(where: Location) -> dict[str, Any]:
+    """Return a location as it stands in JSON; a profile's mean squares are over those of the noise, which are 1."""
+
+    def by_axis(values: Floats) -> dict[str, float]:
+        return dict(zip(("surge", "sway", "yaw"), values.tolist(), strict=True))
+
+    return {
+        "axes": by_axis(where.shares),
+        "intervals": [list(pair) for pair in where.intervals],
+        "onset": where.onset_s,
+        "offset": where.offset_s,
+        "regime": where.regime,
+        "profiles": [
+            {
+                "by": one.name,
+                "unit": one.unit,
+                "low": one.low.tolist(),
+                "high": one.high.tolist(),
+                "windows": one.count.tolist(),
+                "before": [by_axis(row) for row in one.excess + 1.0],
+                "after": [by_axis(row) for row in one.left + 1.0],
+                "noise": one.error.tolist(),
+                "deviations": one.statistic,
+            }
+            for one in where.profiles
+        ],
+        "bands": [
+            {"low_hz": one.low_hz, "high_hz": one.high_hz, "before": by_axis(one.before), "after": by_axis(one.after)}
+            for one in where.bands
+        ],
+    }
 
 
 def _shared(values: Floats) -> Floats:

@@ -36,8 +36,9 @@ class Profiled:
         Edges of the bins, shape (b,).
     count
         Windows in each bin, shape (b,).
-    excess
-        Mean square over that of the noise, less 1, by axis, shape (b, 3); NaN in bins with fewer than `FEWEST` windows.
+    excess, left
+        Mean square over that of the noise, less 1, by axis, before and after, shape (b, 3); NaN in bins with fewer than
+        `FEWEST` windows.
     error
         Its standard error if there were noise alone, shape (b,).
     mean
@@ -52,31 +53,37 @@ class Profiled:
     high: Floats
     count: Ints
     excess: Floats
+    left: Floats
     error: Floats
     mean: Floats
     by_axis: Floats
     statistic: float
 
 
-def profile_of(name: str, unit: str, value: Floats, edges: Floats, white: Floats, errors: Floats) -> Profiled:
+def profile_of(
+    name: str, unit: str, value: Floats, edges: Floats, white: Floats, calm: Floats, errors: Floats
+) -> Profiled:
     """Sort errors into bins.
 
     Parameters
     ----------
     name, unit, value, edges
         What they are sorted by, shape (m,), and edges of the bins, shape (b + 1,).
-    white, errors
-        In units of the noise, and as forces, shape (m, 3).
+    white, calm, errors
+        Before and after in units of the noise, and before as forces, shape (m, 3).
     """
     b = len(edges) - 1
     place = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, b - 1)
     count = np.bincount(place, minlength=b)
     enough = count >= FEWEST
     safe = np.maximum(count, 1)
-    power, mean = np.zeros((b, 3)), np.zeros((b, 3))
-    np.add.at(power, place, white**2)
-    np.add.at(mean, place, errors)
-    power, mean = power / safe[:, None], mean / safe[:, None]
+
+    def by_bin(values: Floats) -> Floats:
+        sums = np.zeros((b, 3))
+        np.add.at(sums, place, values)
+        return sums / safe[:, None]
+
+    power, left, mean = by_bin(white**2), by_bin(calm**2), by_bin(errors)
     # Against an even profile: mean and variance of the logarithm of a mean of n squares of unit noise.
     level = np.log(np.maximum(power, 1e-12)) - (digamma(0.5 * safe) - np.log(0.5 * safe))[:, None]
     weight = np.where(enough, 1.0 / polygamma(1, 0.5 * safe), 0.0)[:, None]
@@ -88,7 +95,17 @@ def profile_of(name: str, unit: str, value: Floats, edges: Floats, white: Floats
     blank = np.where(enough[:, None], 0.0, np.nan)
     error = np.sqrt(2.0 / safe)
     return Profiled(
-        name, unit, edges[:-1], edges[1:], count, power - 1.0 + blank, error, mean + blank, by_axis, statistic
+        name,
+        unit,
+        edges[:-1],
+        edges[1:],
+        count,
+        power - 1.0 + blank,
+        left - 1.0 + blank,
+        error,
+        mean + blank,
+        by_axis,
+        statistic,
     )
 
 
@@ -100,13 +117,13 @@ def _deviations(chi_squared: float, free: int) -> float:
     return float((np.cbrt(chi_squared / free) - (1.0 - spread)) / np.sqrt(spread))
 
 
-def profiles_of(windows_: Windows, kept: Ints, white: Floats, errors: Floats) -> tuple[Profiled, ...]:
+def profiles_of(windows_: Windows, kept: Ints, white: Floats, calm: Floats, errors: Floats) -> tuple[Profiled, ...]:
     scene = windows_.scene
     rows = windows_.starts[kept] + len(windows_.weight) // 2
     chosen = errors[kept]
     turn: Floats = np.linspace(0.0, 360.0, SECTORS + 1)
     heading = np.asarray(np.degrees(scene.psi[rows]) % 360.0, dtype=np.float64)
-    made = [profile_of("heading", "deg", heading, turn, white, chosen)]
+    made = [profile_of("heading", "deg", heading, turn, white, calm, chosen)]
     speed = np.hypot(scene.nu[rows, 0], scene.nu[rows, 1])
     sorted_by: list[tuple[str, str, Floats, int]] = [
         ("speed", "m/s", speed, SPEEDS),
@@ -121,11 +138,11 @@ def profiles_of(windows_: Windows, kept: Ints, white: Floats, errors: Floats) ->
         sorted_by.append((f"{name} force", "N", strength, SPEEDS))
         if np.isfinite(angle).all():
             sector = np.asarray(np.degrees(angle) % 360.0, dtype=np.float64)
-            made.append(profile_of(f"{name} angle", "deg", sector, turn, white, chosen))
+            made.append(profile_of(f"{name} angle", "deg", sector, turn, white, calm, chosen))
     for name, unit, value, bins in sorted_by:
         edges: Floats = np.unique(np.quantile(value, np.linspace(0.0, 1.0, bins + 1)))
         if len(edges) > 2:
-            made.append(profile_of(name, unit, value, edges, white, chosen))
+            made.append(profile_of(name, unit, value, edges, white, calm, chosen))
     return tuple(sorted(made, key=lambda one: -one.statistic))
 
 

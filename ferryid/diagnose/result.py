@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from ferryid.diagnose.locate import Location, plain_location
 from ferryid.vessel.profile import Floats
 
 if TYPE_CHECKING:
@@ -24,6 +25,16 @@ class Estimate:
     low: float
     high: float
     unit: str
+
+
+@dataclass(frozen=True)
+class LawTerm:
+    """One term of an empirical law: what it acts on, what it is in proportion to, its coefficient, and the same in words."""
+
+    on: str
+    quantity: str
+    coefficient: Estimate
+    says: str
 
 
 @dataclass(frozen=True)
@@ -73,6 +84,10 @@ class Finding:
         - ``explained``: what the finding adds, in the same unit; where it holds, `before` follows it and `after` does not;
         - ``regressor``, optional: the quantity that gives it away (heading for a wind, squared speed for fouling);
           `explained` takes its place where there is none.
+    band_hz
+        Frequencies that hold most of it [Hz], where that is told.
+    law
+        Terms of an empirical law, of an effect without a name.
     labels
         Names of the columns of `evidence` for people, with unit: ``residual`` (of `before`, `after` and `explained`) and
         ``regressor``. Such as ``{"residual": "sway force left over [N]", "regressor": "heading [deg]"}``.
@@ -94,6 +109,8 @@ class Finding:
     says: str
     evidence: Mapping[str, Floats] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
+    band_hz: tuple[float, float] | None = None
+    law: tuple[LawTerm, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -147,6 +164,8 @@ class Diagnosis:
         The simulation that a recording was held against, as `ferryid.diagnose.against.plain_against` gives it, or empty.
     learnt
         What a model can learn from it; None where it found no force left out, or was held against a simulation.
+    located
+        Where and when the recording and the model differ.
     """
 
     log: str
@@ -161,6 +180,7 @@ class Diagnosis:
     withheld: tuple[Withheld, ...] = ()
     against: Mapping[str, Any] = field(default_factory=dict)
     learnt: Learnt | None = None
+    located: Location | None = None
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -185,6 +205,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "model": diagnosis.model,
         **({"against": dict(diagnosis.against)} if diagnosis.against else {}),
+        **({} if diagnosis.located is None else {"located": plain_location(diagnosis.located)}),
     }
 
 
@@ -199,6 +220,8 @@ def _finding(one: Finding) -> dict[str, Any]:
             "intervals": [list(pair) for pair in one.intervals],
             "onset": one.onset_s,
             "regime": one.regime,
+            **({} if one.band_hz is None else {"band_hz": list(one.band_hz)}),
+            **({"law": [{**vars(term), "coefficient": vars(term.coefficient)} for term in one.law]} if one.law else {}),
         },
         "improvement": dict(one.improvement),
         "held_out": one.held_out,

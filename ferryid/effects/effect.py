@@ -92,6 +92,12 @@ class Effect:
         picture's hull is the fitted one, `believed` its coefficients as believed before the log, shape (22,).
     least
         How far the interval of a parameter has to stay from its neutral value for the parameter to be worth a report.
+    unsteady
+        ``unsteady(picture, p)`` returns what comes and goes by chance, from positive parameters; none where the picture has
+        nothing for it to act on. Such an effect changes no picture: it is a state of the filter.
+    regressor
+        ``regressor(picture, p, instance, axis)`` returns label with unit and values, shape (n,), of the quantity on which the
+        force that is left over on that axis gives the effect away: the figure that would convince a sceptic.
     """
 
     id: str
@@ -106,3 +112,5 @@ class Effect:
     vessel: bool = False
     choose: Callable[[Picture, Floats, Residual], Choice] | None = None
     least: float = 0.0
+    unsteady: Callable[[Picture, Floats], tuple[Process, ...]] | None = None
+    regressor: Callable[[Picture, Floats, str | None, str], tuple[str, Floats]] | None = None

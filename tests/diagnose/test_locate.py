@@ -60,7 +60,7 @@ def pushed(shape: Floats) -> Suspect:
 def told_of(shape: Floats) -> tuple[Trial, Fit]:
     trial = trial_on(shape)
     found = fit(trial, [pushed(shape)])
-    trial = trial.with_noise_of(found.gaps)
+    trial = trial.with_noise_of(found)
     return trial, fit(trial, [pushed(shape)])
 
 
@@ -160,7 +160,7 @@ def test_a_profile_of_noise_is_even_and_counts_every_window() -> None:
     statistics = []
     for _ in range(200):
         white = rng.standard_normal((360, 3))
-        one = profile_of("heading", "deg", rng.uniform(0.0, 360.0, 360), np.linspace(0.0, 360.0, 13), white, white)
+        one = profile_of("heading", "deg", rng.uniform(0.0, 360.0, 360), np.linspace(0.0, 360.0, 13), white, white, white)
         assert one.count.sum() == 360
         statistics.append(one.statistic)
     assert abs(np.mean(statistics)) < 0.4
@@ -170,7 +170,7 @@ def test_a_profile_of_noise_is_even_and_counts_every_window() -> None:
 def test_bins_with_too_few_windows_are_not_judged() -> None:
     value = np.concatenate([np.full(50, 0.5), np.full(FEWEST - 1, 1.5), np.full(50, 2.5)])
     white = np.random.default_rng(0).standard_normal((len(value), 3))
-    one = profile_of("speed", "m/s", value, np.array([0.0, 1.0, 2.0, 3.0]), white, white)
+    one = profile_of("speed", "m/s", value, np.array([0.0, 1.0, 2.0, 3.0]), white, white, white)
     assert np.isnan(one.excess[1]).all()
     assert np.isfinite(one.excess[[0, 2]]).all()
 
@@ -191,5 +191,5 @@ def test_a_regime_across_north_is_one_range() -> None:
     heading = np.arange(0.5, 360.0)
     loud = np.where((heading > 330.0) | (heading < 60.0), 3.0, 1.0)
     white = np.random.default_rng(6).standard_normal((360, 3)) * loud[:, None]
-    one = profile_of("heading", "deg", heading, np.linspace(0.0, 360.0, 13), white, white)
+    one = profile_of("heading", "deg", heading, np.linspace(0.0, 360.0, 13), white, white, white)
     assert in_words([one], np.full(3, 1.0 / 3.0)) == "headings 330 to 60 deg"

@@ -1,0 +1,203 @@
+"""What is left when everything with a name has been tried: described, not named.
+
+Either a law of the motion holds for it on data that it was not fitted to, or it is unsteady: then it is told on which axes,
+when, where, and how fast it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import exp
+
+import numpy as np
+
+from ferryid.diagnose.bands import Band
+from ferryid.diagnose.folds import Folds, folds_of
+from ferryid.diagnose.hypothesis import Fit, Trial, fit, imagined
+from ferryid.diagnose.law import Law, law_of
+from ferryid.diagnose.locate import Location, locate
+from ferryid.diagnose.profiles import TELLS
+from ferryid.diagnose.result import AXES, Estimate, Finding, LawTerm
+from ferryid.diagnose.search import ODDS
+from ferryid.diagnose.shown import columns_of
+from ferryid.diagnose.terms import Term
+from ferryid.effects.picture import Picture, Scene
+from ferryid.vessel.profile import Floats
+
+USUAL = 0.9
+"""Quantile of a quantity's size at which its force is told."""
+BAND_SHARE = 0.5
+"""A band is told that holds this share of the power."""
+BURSTS = 5
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """Findings without a name; what the errors that remain beside all findings look like; whether they come and go."""
+
+    findings: tuple[Finding, ...]
+    left: Location
+    unsteady: bool
+
+
+def unknown_of(trial: Trial, kept: Fit, scene: Scene) -> Unknown:
+    """Return what is left of a log beside what was named.
+
+    Parameters
+    ----------
+    trial
+        With the noise that the named effects leave.
+    kept
+        Hull and named effects.
+    scene
+        The log's scene at its full rate.
+    """
+    findings = []
+    folds = folds_of(trial.windows)
+    law = None if folds is None else law_of(trial, kept, folds)
+    after, seen = (kept, trial) if law is None else (law.fit, law.trial)
+    if law is not None:
+        findings.append(_lawful(law, kept, scene))
+    left = locate(seen, after, after, scene)
+    # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
+    known = any(suspect.effect.unsteady is not None for suspect in kept.suspects)
+    uneven = bool(left.profiles) and left.profiles[0].statistic >= TELLS
+    if uneven and not known:
+        findings.append(_unsteady(seen, left))
+    return Unknown(tuple(findings), left, uneven)
+
+
+def impostors(trial: Trial, kept: Fit) -> tuple[int, ...]:
+    """Return which of the named effects a law of fewer means makes idle.
+
+    Physics outside the library may look a little like an effect. If a law that is fitted in the effect's place explains more
+    than the effect, and leaves it nothing to explain, then the effect was named by mistake.
+    """
+    folds = folds_of(trial.windows)
+    if folds is None:
+        return ()
+    return tuple(i for i in range(len(kept.suspects)) if _displaced(trial, kept, i, folds))
+
+
+def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
+    others = [k for k in range(len(kept.suspects)) if k != index]
+    rest, start = [kept.suspects[k] for k in others], [kept.values[k] for k in others]
+    without = fit(trial, rest, start)
+    law = law_of(trial.with_noise_of(without), without, folds)
+    if law is None:
+        return False
+    told, coefficients = law.fit.suspects[-1], law.fit.values[-1]
+    suspect, values = kept.suspects[index], kept.values[index]
+    neutral = np.array([parameter.neutral for parameter in suspect.parameters])
+    both = fit(trial, [*rest, told, suspect], [*start, coefficients, neutral])
+    fair = trial.with_noise_of(both)
+    with_law = fit(fair, [*rest, told], [*start, coefficients]).evidence
+    with_effect = fit(fair, [*rest, suspect], [*start, values]).evidence
+    with_both = fit(fair, [*rest, told, suspect], both.values).evidence
+    return with_law - with_effect > ODDS and with_both - with_law < ODDS
+
+
+def _lawful(law: Law, kept: Fit, scene: Scene) -> Finding:
+    trial = law.trial
+    before = fit(trial, kept.suspects, kept.values)
+    place = locate(trial, before, law.fit, scene)
+    picture = imagined(trial.plain, before)
+    terms = [
+        _told(term, picture, trial, float(value), float(error))
+        for term, value, error in zip(law.terms, law.fit.values[-1], law.fit.errors(len(kept.suspects)), strict=True)
+    ]
+    first = law.terms[0]
+    size = "" if first.name == "1" else f"{first.name} [{first.unit}]" if first.unit else first.name
+    regressor = (size, first.value(picture)) if size else None
+    parts = [one.says for one in terms]
+    told = "; ".join(parts)
+    return Finding(
+        effect="unknown",
+        instance=None,
+        probability=1.0 - exp(-min(law.gain - max(law.chance, 0.0), 700.0)),
+        parameters={},
+        axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
+        intervals=((float(trial.windows.scene.t[0]), float(trial.windows.scene.t[-1])),),
+        onset_s=None,
+        regime=place.regime,
+        improvement=dict(zip(AXES, law.held_out.removed.tolist(), strict=True)),
+        held_out=True,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says=f"A force acts that has no name here, but a law: {told}.",
+        band_hz=_band(place.bands, place.shares, [band.before - band.after for band in place.bands]),
+        law=tuple(terms),
+        **columns_of(trial, place, regressor),
+    )
+
+
+def _told(term: Term, picture: Picture, trial: Trial, value: float, error: float) -> LawTerm:
+    """Return a term as people read it: its force where its quantity is as large as it usually gets."""
+    quantity = term.value(picture)[trial.windows.scene.usable]
+    at = 1.0 if term.name == "1" else float(f"{np.quantile(np.abs(quantity), USUAL):.1g}")
+    low, high = value - 1.96 * error, value + 1.96 * error
+    share = not term.force_unit
+    scale, unit = (100.0 * at, "%") if share else (at, term.force_unit)
+    ends = sorted((low * scale, high * scale))
+    size = f"{value * scale:+.3g} {unit} ({ends[0]:.3g} to {ends[1]:.3g})"
+    place = "" if term.name == "1" else f" where {term.name} is {at:g} {term.unit}".rstrip()
+    if term.name.startswith(("cos", "sin")):
+        place = f" times {term.name}"
+    grows = "" if term.name == "1" or term.name.startswith(("cos", "sin")) else ", in proportion to it"
+    constant = ", constant" if term.name == "1" and not share else ""
+    says = f"{_subject(term)} {size}{constant}{place}{grows}"
+    return LawTerm(term.on, term.name, Estimate(value, low, high, term.coefficient_unit), says)
+
+
+def _subject(term: Term) -> str:
+    if term.on in AXES:
+        return f"in {term.on}"
+    return f"towards {term.on}" if term.on in ("north", "east") else f"on the {term.on}"
+
+
+def _unsteady(trial: Trial, left: Location) -> Finding:
+    band = _band(left.bands, left.shares, [one.before for one in left.bands])
+    spans = [f"{first:.0f}-{last:.0f} s" for first, last in left.intervals[:BURSTS]]
+    whole = len(left.intervals) == 1 and left.onset_s is None and left.offset_s is None
+    more = " and later" if len(left.intervals) > BURSTS else ""
+    when = "" if whole or not spans else f", strongest at {', '.join(spans)}{more}"
+    where = "" if left.regime.startswith("time") or not left.regime else f", most of it at {left.regime}"
+    fast = f", mostly at {band[0]:g} to {band[1]:g} Hz" if band else ""
+    axis = AXES[int(np.argmax(left.shares))]
+    # As rare as the strongest profile is by chance, of all that were looked at.
+    z = left.profiles[0].statistic
+    chance = len(left.profiles) * 0.5 * exp(-0.5 * z * z)
+    return Finding(
+        effect="unknown",
+        instance=None,
+        probability=max(0.0, 1.0 - chance),
+        parameters={},
+        axes=dict(zip(AXES, left.shares.tolist(), strict=True)),
+        intervals=left.intervals,
+        onset_s=left.onset_s,
+        regime=left.regime,
+        improvement={},
+        held_out=False,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says=f"Something unsteady moves the vessel, most in {axis}{fast}{when}{where}; no law of its motion explains it.",
+        band_hz=band,
+        **columns_of(trial, replace(left, after=np.zeros_like(left.after)), None, alone=True),
+    )
+
+
+def _band(bands: Sequence[Band], shares: Floats, powers: Sequence[Floats]) -> tuple[float, float] | None:
+    """Return the fewest neighbouring bands that hold most of the power, each axis in its own unit."""
+    if not bands:
+        return None
+    total = np.maximum(np.sum(np.maximum(powers, 0.0), axis=0), 1e-12)
+    level = np.array([float(np.maximum(power, 0.0) / total @ shares) for power in powers])
+    for count in range(1, len(bands) + 1):
+        sums = [float(level[k : k + count].sum()) for k in range(len(bands) - count + 1)]
+        best = int(np.argmax(sums))
+        if sums[best] >= BAND_SHARE * level.sum():
+            return bands[best].low_hz, bands[best + count - 1].high_hz
+    return None
