@@ -168,6 +168,12 @@ def check_together(models: Sequence[Model]) -> None:
     FerryIdError
         Which two do not belong together, and why.
     """
+    for model in models:
+        if model.diagnosed:
+            raise FerryIdError(
+                f"model {model.label}: a diagnosis has changed its hull or forces, which cannot be averaged. "
+                "Fix: average the models that were fitted"
+            )
     first, *others = models
     vessel = parse_profile(first.profile_text, first.name)
     for other in others:

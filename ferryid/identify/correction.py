@@ -104,15 +104,15 @@ def task_of(
 
 def _check_base(base: Model, profile: Profile, settings: FitSettings) -> None:
     where, name = f"{base.name}@{base.version}", str(base.settings["basis"])
-    if settings.basis not in (name, name.partition("+")[0]):
-        raise FerryIdError(
-            f"model {where}: as a base its basis {name} must be that of the fit, which is {settings.basis}. "
-            f"Fix: set the basis to {name}"
-        )
     if base.diagnosed:
         raise FerryIdError(
             f"model {where}: a diagnosis has changed its hull or forces, and a correction would be fitted to what these "
             "explain. Fix: take the model that was diagnosed as the base"
+        )
+    if settings.basis not in (name, name.partition("+")[0]):
+        raise FerryIdError(
+            f"model {where}: as a base its basis {name} must be that of the fit, which is {settings.basis}. "
+            f"Fix: set the basis to {name}"
         )
     estimator(base)  # refuses a model whose terms were changed
     if base.profile_text != profile.text:

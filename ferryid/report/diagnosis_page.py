@@ -68,7 +68,7 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
         hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
         remarks = [*hidden, *(f"note: {note}" for note in one.notes)]
         lines += ["", *remarks] if remarks else []
-        lines += ["", f"model   {one.model}"] if one.model else [""]
+        lines += ["", f"The model with the findings is {diagnosis_words.new_model(one)}"] if one.model else [""]
         blocks.append("\n".join(_folded(line) for line in lines))
     return "\n\n".join(blocks)
 
@@ -133,7 +133,7 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool) -> dict[str, Any]:
             for one in diagnosis.withheld
         ],
         "notes": diagnosis.notes,
-        "model": diagnosis.model,
+        "model": diagnosis_words.new_model(diagnosis),
     }
 
 

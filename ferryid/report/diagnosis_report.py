@@ -98,7 +98,8 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         "after": {"mse": _pooled(diagnoses, "after"), "free_run": {}},
         "notes": [],
         "withheld": [],
-        "model": None,
+        # What several logs teach is one model.
+        "model": next((one.model for one in diagnoses if one.model), None),
         "logs": [{key: value for key, value in one.items() if key != "schema"} for one in logs],
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import exp, isfinite, log
+from pathlib import PurePath
 from typing import Any
 
 from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding
@@ -144,6 +145,15 @@ def rivals(finding: Finding) -> list[str]:
         manoeuvre = finding.separating_manoeuvre.rstrip(".")
         lines.append(f"To tell them apart, record this: {manoeuvre}.")
     return lines
+
+
+def new_model(diagnosis: Diagnosis) -> str:
+    """Return where the model with the findings lies and how to use it; empty where there is none."""
+    if diagnosis.model is None:
+        return ""
+    path = PurePath(diagnosis.model)
+    label = f"{path.parent.name}@{path.stem}"
+    return f"{label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG"
 
 
 def overall(diagnoses: Sequence[Diagnosis]) -> str:

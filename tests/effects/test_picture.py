@@ -1,0 +1,102 @@
+"""The picture of the forces: its two directions undo each other, and an onset leaves what was before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.effects import effects
+from ferryid.effects.picture import (
+    COEFFICIENTS,
+    UNITS,
+    Picture,
+    Scene,
+    acceleration,
+    from_onset,
+    hull_of,
+    required_force,
+)
+from ferryid.vessel import load_profile
+from ferryid.vessel.hull import inverse_dynamics
+
+FERRY = load_profile("milliampere")
+RNG = np.random.default_rng(4)
+N = 40
+
+
+def picture(*, flow: bool, load: bool, damped: bool) -> Picture:
+    nu = RNG.normal(size=(N, 3)) * [1.0, 0.5, 0.2]
+    scene = Scene(
+        profile=FERRY,
+        t=0.2 * np.arange(N),
+        eta=RNG.normal(size=(N, 3)) * 3.0,
+        nu_raw=nu,
+        nu=nu,
+        parts=RNG.normal(size=(N, 2, 3)) * 200.0,
+        angles=np.zeros((N, 2)),
+        usable=np.ones(N, dtype=bool),
+    )
+    x = RNG.normal(size=N)
+    mass = 100.0 + 50.0 * RNG.random(N)
+    return Picture(
+        scene,
+        hull_of(FERRY),
+        scene.parts,
+        scene.angles,
+        RNG.normal(size=(N, 3)) * 50.0,
+        RNG.normal(size=(N, 2)) * 0.3 if flow else None,
+        np.column_stack([mass, mass * x, mass * x**2]) if load else None,
+        1.0 + RNG.random(N) if damped else None,
+    )
+
+
+@pytest.mark.parametrize("flow", [False, True])
+@pytest.mark.parametrize("load", [False, True])
+@pytest.mark.parametrize("damped", [False, True])
+def test_the_force_for_an_acceleration_gives_that_acceleration(flow: bool, load: bool, damped: bool) -> None:
+    one = picture(flow=flow, load=load, damped=damped)
+    nu_dot = RNG.normal(size=(N, 3))
+    needed = required_force(one, nu_dot)
+    pushed = replace(one, parts=np.stack([0.3 * needed, 0.7 * needed], axis=1))
+    np.testing.assert_allclose(acceleration(pushed), nu_dot, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(required_force(one, acceleration(one)), one.parts.sum(axis=1), rtol=1e-9, atol=1e-9)
+
+
+def test_the_force_is_that_of_inverse_dynamics() -> None:
+    one = replace(picture(flow=False, load=False, damped=False), external=np.zeros((N, 3)))
+    nu_dot = RNG.normal(size=(N, 3))
+    np.testing.assert_allclose(
+        required_force(one, nu_dot), inverse_dynamics(FERRY.hull, nu_dot, one.scene.nu), rtol=1e-9
+    )
+
+
+def test_what_begins_later_changes_nothing_before() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    after = effects()["payload"].apply(one, np.array([300.0, 0.5]), None)
+    late = from_onset(one, after, 4.0)
+    rows = one.scene.t >= 4.0
+    assert 0 < rows.sum() < N
+    np.testing.assert_array_equal(acceleration(late)[~rows], acceleration(one)[~rows])
+    np.testing.assert_array_equal(acceleration(late)[rows], acceleration(after)[rows])
+
+
+@pytest.mark.parametrize("name", COEFFICIENTS)
+def test_the_unit_of_a_coefficient_follows_from_its_name(name: str) -> None:
+    # Every coefficient gives a force [kg m/s²] or, on yaw, a moment [kg m²/s²] from the product that its index names.
+    if name.startswith("m"):
+        row, column = int(name[1]), int(name[2])
+        metres, seconds = (row == 3) + (column == 3), 0
+    else:
+        index = name.partition("_")[2].replace("|", "")
+        metres = (2 if name[0] == "N" else 1) - sum(letter in "uv" for letter in index)
+        seconds = -2 + len(index)
+    parts = ["kg"]
+    over = []
+    for unit, power in (("m", metres), ("s", seconds)):
+        text = unit + {1: "", 2: "²", 3: "³"}.get(abs(power), "")
+        if power:
+            (parts if power > 0 else over).append(text)
+    told = "·".join(parts) + "".join(f"/{one}" for one in over)
+    assert dict(zip(COEFFICIENTS, UNITS, strict=True))[name] == told

@@ -1,0 +1,164 @@
+"""Effects in model files: they come back as they were, what a fit writes has none, and damage is told in one line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from ferryid.effects import effects
+from ferryid.effects.picture import COEFFICIENTS, UNITS, hull_of
+from ferryid.errors import FerryIdError
+from ferryid.files import dump_json
+from ferryid.identify.estimate import estimator, hull_values
+from ferryid.identify.hull_terms import other_terms
+from ferryid.identify.model import Model, to_json
+from ferryid.identify.pictured import Pictured, acting_estimator
+from ferryid.identify.store import load_file, save
+from ferryid.identify.stored_effect import Conditions, Quantity, Source, StoredEffect
+from ferryid.vessel import load_profile
+from tests.identify.test_store import made
+
+FERRY = load_profile("milliampere")
+HERE = "ab" * 32
+VESSEL = {
+    "azimuth_offset",
+    "azimuth_resolution",
+    "fouling",
+    "heading_bias",
+    "hull_parameters",
+    "lever_arm",
+    "thrust_inflow_loss",
+    "thruster_gain",
+    "thruster_interaction",
+    "thruster_lag",
+    "yaw_rate_scale",
+}
+CONDITIONS = {"current", "gusts", "mooring", "payload", "shallow_water", "time_delay", "waves", "wind"}
+
+
+def stored(effect: str, instance: str | None = None, *, onset_s: float | None = None, **values: float) -> StoredEffect:
+    parameters = {
+        one.name: Quantity(values[one.name], values[one.name] - 0.1, values[one.name] + 0.1, one.unit)
+        for one in effects()[effect].parameters_of(FERRY)
+    }
+    source = Source("trial", HERE, 0.97, onset_s, {"surge": 0.2, "sway": 0.1, "yaw": 0.0}, ("payload",))
+    return StoredEffect(effect, instance, parameters, (source,))
+
+
+FOULED = stored("fouling", surge=1.8, sway=1.3, yaw=1.3)
+BROKEN = stored("thruster_gain", "thruster2", onset_s=720.0, factor=0.6)
+WINDY = stored("wind", north=-4.0, east=3.0)
+
+
+def diagnosed(model: Model | None = None, *, factor: float = 1.1) -> Model:
+    model = model or made()
+    values = factor * hull_values(model)
+    hull = {
+        name: Quantity(value, value - 1.0, value + 1.0, unit)
+        for name, value, unit in zip(COEFFICIENTS, values.tolist(), UNITS, strict=True)
+    }
+    return replace(model, hull=hull, vessel_effects=(FOULED, BROKEN), conditions=(Conditions("trial", HERE, (WINDY,)),))
+
+
+def test_every_effect_is_known_to_be_of_the_vessel_or_of_a_log() -> None:
+    for name, effect in effects().items():
+        assert name in (VESSEL if effect.vessel else CONDITIONS), name
+
+
+def test_a_diagnosed_model_comes_back_and_keeps_to_its_schema(tmp_path: Path) -> None:
+    path = save(diagnosed(), tmp_path).path
+    again = load_file(path)
+    assert again.hull == diagnosed().hull
+    assert again.vessel_effects == (FOULED, BROKEN)
+    assert again.conditions == diagnosed().conditions
+    schema = json.loads(files("ferryid.schemas").joinpath("model.json").read_text(encoding="utf-8"))
+    data = json.loads(path.read_text(encoding="utf-8"))
+    data["scores"] = {}
+    del schema["properties"]["scores"]
+    jsonschema.validate(data, schema)
+    data["vessel_effects"][0]["parameters"]["surge"].pop("unit")
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(data, schema)
+
+
+def test_a_model_of_a_fit_has_no_key_more() -> None:
+    text = dump_json(to_json(made()))
+    assert dump_json(to_json(diagnosed().undiagnosed())) == text
+    assert not {"hull", "vessel_effects", "conditions"} & json.loads(text).keys()
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda data: data["vessel_effects"][0].update(effect="fowling"), '"fowling".*Did you mean "fouling"'),
+        (lambda data: data["vessel_effects"][0].update(effect="wind", instance=None), "wind is no property"),
+        (lambda data: data["vessel_effects"][1].update(instance="thruster9"), "no instance 'thruster9'"),
+        (lambda data: data["vessel_effects"][1]["parameters"]["factor"].update(value=None), "thruster_gain.factor"),
+        (lambda data: data["vessel_effects"][1]["parameters"].pop("factor"), "takes the parameters factor"),
+        (lambda data: data["vessel_effects"][1].update(found_in=[]), "found in no log"),
+        (lambda data: data["vessel_effects"][1]["found_in"][0].update(onset_s="late"), "onset_s is no number"),
+        (lambda data: data["conditions"][0]["effects"][0]["parameters"]["north"].update(unit="kn"), "wind takes"),
+        (lambda data: data["conditions"][0].pop("sha256"), "sha256"),
+        (lambda data: data.update(conditions={}), "no list"),
+        (lambda data: data["hull"].pop("N_rrr"), "22 coefficients"),
+        (lambda data: data["hull"]["m11"].update(value=-3.0), "no positive mass"),
+        (lambda data: data["hull"]["X_u"].update(unit="N"), "hull.X_u is in"),
+        (lambda data: data["hull"]["X_u"].update(value=float("inf")), "hull.X_u is not finite"),
+    ],
+)
+def test_damaged_physics_is_told(tmp_path: Path, change, told: str) -> None:
+    path = save(diagnosed(), tmp_path).path
+    data = json.loads(path.read_text(encoding="utf-8"))
+    change(data)
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(FerryIdError, match=told) as caught:
+        load_file(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_refitted_hull_counts_the_terms_in() -> None:
+    model = replace(made(), settings={**made().settings, "structure": "decoupled"})
+    rng = np.random.default_rng(2)
+    nu_dot, nu = rng.normal(size=(2, 50, 3))
+    psi = rng.normal(size=50)
+    same = estimator(diagnosed(model, factor=1.0))(nu_dot, nu, psi, None, None)
+    np.testing.assert_allclose(same, estimator(model)(nu_dot, nu, psi, None, None), rtol=1e-9)
+    # A mass more takes its weight times the acceleration more.
+    heavy = diagnosed(model, factor=1.0)
+    more = {**heavy.hull, "m11": replace(heavy.hull["m11"], value=heavy.hull["m11"].value + 100.0)}
+    at_rest = np.zeros((1, 3))
+    pull = estimator(replace(heavy, hull=more))(np.array([[0.5, 0.0, 0.0]]), at_rest, np.zeros(1), None, None)
+    before = estimator(heavy)(np.array([[0.5, 0.0, 0.0]]), at_rest, np.zeros(1), None, None)
+    np.testing.assert_allclose(pull - before, [[50.0, 0.0, 0.0]], atol=1e-9)
+
+
+def test_what_no_hull_has_is_named() -> None:
+    left = other_terms(made())
+    assert "uv" in left
+    assert "the constant" in left
+    assert other_terms(replace(made(), theta=0.0 * made().theta, intercept=np.zeros(3))) == ()
+
+
+def test_the_vessels_own_effects_alter_the_hull_that_a_controller_needs() -> None:
+    bare = replace(made(), scale={}, theta=0.0 * made().theta, intercept=np.zeros(3))
+    model = diagnosed(bare, factor=1.0)
+    k = COEFFICIENTS.index("X_|u|u")
+    assert Pictured(model).altered_hull()[k] == pytest.approx(1.8 * hull_of(FERRY)[k])
+    nu = np.array([[1.0, 0.0, 0.0]])
+    force = acting_estimator(model)(0.0 * nu, nu, np.zeros(1), None, None)
+    clean = estimator(model)(0.0 * nu, nu, np.zeros(1), None, None)
+    assert force[0, 0] - clean[0, 0] == pytest.approx(-0.8 * hull_of(FERRY)[k])
+
+
+def test_what_began_in_one_log_lasts_in_the_others() -> None:
+    assert BROKEN.onset_in(HERE) == 720.0
+    assert BROKEN.onset_in("cd" * 32) == 0.0
+    assert diagnosed().conditions_of(HERE) == (WINDY,)
+    assert diagnosed().conditions_of("cd" * 32) == ()
