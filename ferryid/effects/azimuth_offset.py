@@ -47,6 +47,23 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"faults": [{"thruster": instance, "offset_deg": values["angle"]}]}}
 
 
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return the thruster's own force turned by a right angle."""
+    k = picture.scene.names.index(str(instance))
+    x, y = picture.scene.profile.actuators[k].position_m
+    X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
+    turned = {"surge": -Y, "sway": X, "yaw": x * X + y * Y}[axis]
+    return f"{instance}'s force turned by 90° {'[N·m]' if axis == 'yaw' else '[N]'}", turned
+
+
 EFFECT = Effect(
-    "azimuth_offset", "Azimuth offset", parameters_of, apply, says, scenario, instances=instances, vessel=True
+    "azimuth_offset",
+    "Azimuth offset",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    instances=instances,
+    vessel=True,
+    regressor=regressor,
 )

@@ -41,4 +41,9 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"current": {"north_mps": values["north"], "east_mps": values["east"]}}}
 
 
-EFFECT = Effect("current", "Current", parameters_of, apply, says, scenario, cannot=cannot)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return the heading: what is constant over ground turns with it."""
+    return "heading [deg]", np.asarray(np.degrees(picture.scene.psi) % 360.0)
+
+
+EFFECT = Effect("current", "Current", parameters_of, apply, says, scenario, cannot=cannot, regressor=regressor)

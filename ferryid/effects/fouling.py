@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene
 from ferryid.vessel.profile import Floats, Profile
@@ -46,4 +48,13 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"fouling": {axis: values[axis] for axis in ("surge", "sway", "yaw")}}
 
 
-EFFECT = Effect("fouling", "Fouling", parameters_of, apply, says, scenario, cannot=cannot, vessel=True)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return the squared speed along the axis, with its sign."""
+    k = ("surge", "sway", "yaw").index(axis)
+    speed = picture.scene.nu[:, k]
+    return f"{axis} speed squared, signed [{'rad²/s²' if axis == 'yaw' else 'm²/s²'}]", np.abs(speed) * speed
+
+
+EFFECT = Effect(
+    "fouling", "Fouling", parameters_of, apply, says, scenario, cannot=cannot, vessel=True, regressor=regressor
+)

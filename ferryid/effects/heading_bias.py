@@ -52,4 +52,10 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"heading_bias_deg": values["angle"]}}}
 
 
-EFFECT = Effect("heading_bias", "Heading bias", parameters_of, apply, says, scenario, vessel=True)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return the thrust along the other axis, some of which seems to act along this one."""
+    j, other = (1, "sway") if axis == "surge" else (0, "surge")
+    return f"thrusters' {other} force [N]", picture.parts[:, :, j].sum(axis=1)
+
+
+EFFECT = Effect("heading_bias", "Heading bias", parameters_of, apply, says, scenario, vessel=True, regressor=regressor)

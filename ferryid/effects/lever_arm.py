@@ -61,4 +61,11 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"antenna_m": [values["x"], values["y"]]}}}
 
 
-EFFECT = Effect("lever_arm", "Antenna off the body origin", parameters_of, apply, says, scenario, vessel=True)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return the yaw rate, with which the antenna swings."""
+    return "yaw rate [deg/s]", np.degrees(picture.scene.nu[:, 2])
+
+
+EFFECT = Effect(
+    "lever_arm", "Antenna off the body origin", parameters_of, apply, says, scenario, vessel=True, regressor=regressor
+)

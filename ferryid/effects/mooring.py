@@ -56,4 +56,13 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"mooring": spring}}
 
 
-EFFECT = Effect("mooring", "Mooring", parameters_of, apply, says, scenario, cannot=cannot)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return how far the vessel is from the point, along the axis."""
+    eta = picture.scene.eta
+    ahead, aside = to_body(eta[:, 0] - p[2], eta[:, 1] - p[3], eta[:, 2])
+    if axis == "sway":
+        return "place from the mooring, to starboard [m]", aside
+    return "place from the mooring, ahead [m]", ahead
+
+
+EFFECT = Effect("mooring", "Mooring", parameters_of, apply, says, scenario, cannot=cannot, regressor=regressor)

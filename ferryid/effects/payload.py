@@ -46,4 +46,15 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"payload": [{"mass_kg": values["mass"], "x_m": values["x"], "from_s": values.get("onset", 0.0)}]}
 
 
-EFFECT = Effect("payload", "Payload", parameters_of, apply, says, scenario, cannot=cannot, onset=True)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return the acceleration along the axis, that of turning included."""
+    scene = picture.scene
+    u, v, r = scene.nu.T
+    u_dot, v_dot, r_dot = np.gradient(scene.nu, scene.step_s, axis=0).T
+    values = {"surge": u_dot - v * r, "sway": v_dot + u * r, "yaw": r_dot}[axis]
+    return f"{axis} acceleration [{'rad/s²' if axis == 'yaw' else 'm/s²'}]", values
+
+
+EFFECT = Effect(
+    "payload", "Payload", parameters_of, apply, says, scenario, cannot=cannot, onset=True, regressor=regressor
+)

@@ -42,4 +42,17 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"inflow_loss_per_mps": values["per_mps"]}}
 
 
-EFFECT = Effect("thrust_inflow_loss", "Inflow loss", parameters_of, apply, says, scenario, vessel=True)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return force times inflow, of all thrusters together."""
+    j = ("surge", "sway", "yaw").index(axis)
+    # A hundredth of the loss, so that nothing is clipped.
+    lost = picture.parts.sum(axis=1) - apply(picture, np.array([0.01]), instance).parts.sum(axis=1)
+    unit = "N·m·m/s" if axis == "yaw" else "N·m/s"
+    return f"inflow speed times {axis} {'moment' if axis == 'yaw' else 'force'} of the thrusters [{unit}]", lost[
+        :, j
+    ] / 0.01
+
+
+EFFECT = Effect(
+    "thrust_inflow_loss", "Inflow loss", parameters_of, apply, says, scenario, vessel=True, regressor=regressor
+)

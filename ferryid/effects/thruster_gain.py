@@ -39,6 +39,13 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"faults": [fault]}}
 
 
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return the thruster's own force."""
+    k = picture.scene.names.index(str(instance))
+    j = ("surge", "sway", "yaw").index(axis)
+    return f"{instance}'s own {axis} {'moment [N·m]' if axis == 'yaw' else 'force [N]'}", picture.parts[:, k, j]
+
+
 EFFECT = Effect(
     "thruster_gain",
     "Thruster force",
@@ -49,4 +56,5 @@ EFFECT = Effect(
     instances=instances,
     onset=True,
     vessel=True,
+    regressor=regressor,
 )

@@ -57,4 +57,11 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"force_lag_s": values["time_constant"]}}
 
 
-EFFECT = Effect("thruster_lag", "Thruster lag", parameters_of, apply, says, scenario, vessel=True)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return how fast the thrust changes."""
+    j = ("surge", "sway", "yaw").index(axis)
+    rate = np.gradient(picture.parts[:, :, j].sum(axis=1), picture.scene.step_s)
+    return f"change of the thrusters' {axis} {'moment [N·m/s]' if axis == 'yaw' else 'force [N/s]'}", rate
+
+
+EFFECT = Effect("thruster_lag", "Thruster lag", parameters_of, apply, says, scenario, vessel=True, regressor=regressor)

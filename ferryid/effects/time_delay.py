@@ -40,4 +40,11 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"delay_s": values["seconds"]}}}
 
 
-EFFECT = Effect("time_delay", "Time delay", parameters_of, apply, says, scenario)
+def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+    """Return how fast the thrust changes."""
+    j = ("surge", "sway", "yaw").index(axis)
+    rate = np.gradient(picture.parts[:, :, j].sum(axis=1), picture.scene.step_s)
+    return f"change of the thrusters' {axis} {'moment [N·m/s]' if axis == 'yaw' else 'force [N/s]'}", rate
+
+
+EFFECT = Effect("time_delay", "Time delay", parameters_of, apply, says, scenario, regressor=regressor)
