@@ -31,7 +31,7 @@ from ferryid.vessel.profile import Floats, Profile
 FREER = 2.5
 """A simulator's hull may be this much further from the profile's than a vessel's."""
 FEWEST_WINDOWS = 60
-FOREIGN = 0.5
+FOREIGN = 0.35
 """A log is of another vessel if this share of its mean square acceleration follows neither from hull, force nor any effect."""
 RATE_HZ = 2.0
 MOST_SHIFT_S = 60.0
@@ -140,8 +140,8 @@ def learn(
     if left > FOREIGN:
         raise FerryIdError(
             f"{name}: --against needs a simulation of {profile.name}, found a motion of which its hull and the actuators' "
-            f"force explain no more than {100.0 * max(0.0, 1.0 - left):.0f} %. Fix: give a simulation of this vessel, with "
-            "signals as the profile maps them"
+            f"force explain no more than {100.0 * max(0.0, 1.0 - left):.0f} %. Fix: give a simulation of this vessel that "
+            "moves, with signals as the profile maps them"
         )
     conditions = [
         Condition(suspect, values, made.errors(k), _in_hull(suspect, values, plain))
@@ -291,36 +291,23 @@ def _told(value: float, unit: str) -> str:
 
 def _changed(picture: Picture, old: Picture, new: Picture) -> Picture:
     """Return a picture changed as `old` becomes `new`: hull and factors by the ratio, all else by the difference."""
-
-    def more(own: Floats | None, before: Floats | None, after: Floats | None) -> Floats | None:
-        if before is None and after is None:
-            return own
-        change = (0.0 if after is None else after) - (0.0 if before is None else before)
-        return np.asarray(change if own is None else own + change)
-
-    known = old.hull != 0.0
-    ratio = np.where(known, new.hull, 1.0) / np.where(known, old.hull, 1.0)
     scene = picture.scene
     if new.scene is not old.scene:
         scene = replace(scene, eta=scene.eta + new.scene.eta - old.scene.eta, nu=scene.nu + new.scene.nu - old.scene.nu)
-    factor = picture.damping_factor
-    if new.damping_factor is not None or old.damping_factor is not None:
-        one = np.ones(len(scene.t))
-        over = (one if new.damping_factor is None else new.damping_factor) / (
-            one if old.damping_factor is None else old.damping_factor
-        )
-        factor = over if factor is None else factor * over
-    return replace(
-        picture,
-        scene=scene,
-        hull=picture.hull * ratio,
-        parts=picture.parts + new.parts - old.parts,
-        angles=picture.angles + new.angles - old.angles,
-        external=picture.external + new.external - old.external,
-        flow=more(picture.flow, old.flow, new.flow),
-        load=more(picture.load, old.load, new.load),
-        damping_factor=factor,
-    )
+    changed: dict[str, Any] = {"scene": scene}
+    for field in fields(picture):
+        own, before, after = (getattr(one, field.name) for one in (picture, old, new))
+        if field.name == "scene" or before is after:
+            continue
+        if field.name in ("hull", "damping_factor"):
+            upper, lower = (np.ones(1) if one is None else one for one in (after, before))
+            # What was zero stays so, whatever it is multiplied by.
+            ratio = np.divide(upper, lower, out=np.ones(np.broadcast(upper, lower).shape), where=lower != 0.0)
+            changed[field.name] = ratio if own is None else own * ratio
+        else:
+            change = (0.0 if after is None else after) - (0.0 if before is None else before)
+            changed[field.name] = change if own is None else own + change
+    return replace(picture, **changed)
 
 
 def paths(simulated: Scene, recorded: Scene) -> Paths | str:

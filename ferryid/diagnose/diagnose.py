@@ -32,9 +32,9 @@ from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengt
 from ferryid.diagnose.search import NEAR, ODDS, search, suspects_of
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shown import columns_of, regressor_of
+from ferryid.diagnose.testable import advice, powers, testable, unexcited
 from ferryid.diagnose.unknown import impostors, unknown_of
 from ferryid.diagnose.weak import Windows, windows
-from ferryid.effects.effect import Parameter
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
@@ -42,8 +42,6 @@ from ferryid.vessel.profile import Profile
 
 FEWEST_WINDOWS = 60
 """Windows below which nothing is tested."""
-UNSEEN = 0.5
-"""An effect whose parameters a log leaves as uncertain as this share of their usual size cannot be seen in it."""
 SHOWN_RIVALS = 3
 OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
@@ -147,18 +145,17 @@ def _one(
     unknown = unknown_of(trial, kept, scene)
     progress("locating")
     findings = [*_of_sensors(sensors), *_findings(library, trial, base, kept, proof, scene)]
-    unseen = _unseen(trial, kept, library)
+    chances, still = powers(trial, kept, library), unexcited(trial)
     if model is None and not profile.hull.has_model:
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
             "stand in for what a hull model would explain. Take them as hints."
         )
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
-    if unseen:
-        notes.append(f"This log could not have shown, at their usual size: {', '.join(unseen)}.")
+    notes += advice(chances, still)
     if unknown.unsteady:
         findings = [_doubted(one) for one in findings]
-    verdict = _verdict(bool(findings), bool(unknown.findings), len(unseen), len(library))
+    verdict = _verdict(bool(findings), bool(unknown.findings), testable(chances, still))
     findings += unknown.findings
     before, after = _scores(trial, base, kept, proof)
     return Diagnosis(
@@ -192,10 +189,10 @@ def _doubted(finding: Finding) -> Finding:
     )
 
 
-def _verdict(found: bool, more: bool, unseen: int, tested: int) -> str:
+def _verdict(found: bool, more: bool, telling: bool) -> str:
     if found:
         return "partly_explained" if more else "explained"
-    if 2 * unseen > tested:
+    if not telling:
         return "not_testable"
     return "unexplained" if more else "matched"
 
@@ -350,26 +347,6 @@ def _onset_end(trial: Trial, kept: Fit, index: int, side: float) -> float:
 def _intervals(trial: Trial, suspect: Suspect) -> tuple[tuple[float, float], ...]:
     t = trial.windows.scene.t
     return ((max(suspect.onset_s, float(t[0])), float(t[-1])),)
-
-
-def _unseen(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> list[str]:
-    """Return the effects that would have stayed as uncertain as they were before the log, at their usual size."""
-    taken = {one.key for one in kept.suspects}
-    names = []
-    for suspect in library:
-        if suspect.key in taken:
-            continue
-        usual = np.array([_usual(parameter) for parameter in suspect.parameters])
-        start = [*kept.values, usual]
-        made = fit(trial, [*kept.suspects, suspect], start, steps=0)
-        size = np.array([parameter.size for parameter in suspect.parameters])
-        if (made.errors(len(kept.suspects))[:1] > UNSEEN * size[:1]).any():
-            names.append(suspect.effect.title.lower() + (f" ({suspect.instance})" if suspect.instance else ""))
-    return names
-
-
-def _usual(parameter: Parameter) -> float:
-    return float(np.clip(parameter.neutral + parameter.size, parameter.low, parameter.high))
 
 
 def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -1,0 +1,182 @@
+"""What a log could have shown: the chance of finding each effect at its usual size, the axes that moved, what to record next.
+
+An effect of usual size adds a known change to the prediction errors. The hull and all that was found may imitate it as far as
+their own uncertainty goes; what then is left of it, in units of the noise, is what the evidence for it would be made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import erf, sqrt
+
+import numpy as np
+
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
+from ferryid.diagnose.search import ODDS
+from ferryid.effects.picture import MASS, SURGE, SWAY, YAW
+from ferryid.vessel.profile import Floats
+
+SEEN = 0.5
+"""An effect of usual size that a log would show with less than this chance counts as one that it could not show."""
+LEARNT = 0.5
+"""An axis is excited if some combination of its coefficients is known to this share of what was known before the log."""
+MOVED = 1e-2
+"""Step of derivatives, in sizes of a parameter."""
+
+_M11, _M22, _M23, _M32, _M33 = range(len(MASS))
+_FIRST = len(MASS)
+AXES = {
+    "surge": (_M11, *range(_FIRST, _FIRST + len(SURGE))),
+    "sway": (_M22, _M23, *range(_FIRST + len(SURGE), _FIRST + len(SURGE) + len(SWAY))),
+    "yaw": (_M32, _M33, *range(_FIRST + len(SURGE) + len(SWAY), _FIRST + len(SURGE) + len(SWAY) + len(YAW))),
+}
+"""Places of each axis's coefficients in the hull's."""
+EXCITES = {
+    "surge": "accelerations from rest to full speed and back, ahead and astern",
+    "sway": "moves sideways to both sides, from rest and back to rest",
+    "yaw": "turns on the spot both ways, at several rates",
+}
+TURNING = "a slow turn on the spot through all headings"
+ALONE = "each thruster alone, at several speeds and angles, ahead and astern"
+STEPS = "steps of the thrusters' speed and angle from rest"
+SPEEDS = "straight runs at several constant speeds up to full speed, both ways, and turns at speed"
+SHOWS = {
+    "wind": TURNING,
+    "current": f"{TURNING}, and straight runs both ways",
+    "waves": "station keeping in that sea, at several headings",
+    "gusts": TURNING,
+    "payload": "hard accelerations and turns from rest",
+    "fouling": SPEEDS,
+    "hull_parameters": "accelerations and turns on every axis, at several speeds",
+    "thruster_gain": ALONE,
+    "azimuth_offset": ALONE,
+    "azimuth_resolution": ALONE,
+    "thruster_lag": STEPS,
+    "time_delay": STEPS,
+    "thrust_inflow_loss": "the same thrust at rest and at several speeds",
+    "thruster_interaction": "thrust with each thruster's wake on the other one, and beside it",
+    "mooring": "station keeping at places far apart",
+    "shallow_water": "the same runs in deep and in shallow water",
+    "lever_arm": "turns on the spot both ways, at several rates",
+    "heading_bias": "straight runs ahead and astern at several headings",
+}
+"""What a log has to hold to show an effect."""
+OTHERWISE = "a calibration run that excites every axis at many headings, such as the 12-corner path"
+
+
+@dataclass(frozen=True)
+class Power:
+    """The chance, 0 to 1, that a suspect of usual size would have been found in a log."""
+
+    suspect: Suspect
+    chance: float
+
+
+def powers(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> tuple[Power, ...]:
+    """Return the chance of finding each suspect, beside what was found.
+
+    With d the change of the whitened prediction errors that the effect makes at its usual size, less what hull and findings
+    can imitate, and S the information on its parameters, the logarithm of the evidence is normal about ``½ d'd - ½ z'z - ½ log
+    det(1 + S)`` with a variance of ``d'd``; z are the parameters in their sizes. It has to exceed `ODDS`. Of effects that may
+    go either way the less visible one counts.
+
+    Parameters
+    ----------
+    trial, kept
+        The log, and what was found in it.
+    library
+        The suspects; those that were found are left out.
+    """
+    picture = imagined(trial.plain, kept)
+    before = trial.white(picture)
+    nuisance = np.column_stack([trial.by_hull, *_derivatives(trial, kept, before)])
+    inner = nuisance.T @ nuisance + np.eye(nuisance.shape[1])
+
+    def apart(columns: Floats) -> Floats:
+        return np.asarray(columns - nuisance @ np.linalg.solve(inner, nuisance.T @ columns))
+
+    taken = {one.key for one in kept.suspects}
+    made = []
+    for suspect in library:
+        if suspect.key in taken:
+            continue
+        size = np.array([one.size for one in suspect.parameters])
+        chance = 1.0
+        for usual in _usual(suspect):
+            there = trial.white(suspect.act(picture, usual))
+            change = apart(there - before)
+            if not change.any():
+                # Of what comes and goes by chance a picture holds no force: it is found in the noise, and not here.
+                break
+            columns = [
+                (trial.white(suspect.act(picture, usual + MOVED * step)) - there) / MOVED for step in np.diag(size)
+            ]
+            information = np.column_stack(columns).T @ apart(np.column_stack(columns))
+            strength = float(change @ change)
+            occam = float(np.linalg.slogdet(np.eye(len(size)) + information)[1])
+            evidence = 0.5 * (strength - len(size) - occam)
+            chance = min(chance, 0.5 * (1.0 + erf((evidence - ODDS) / sqrt(2.0 * max(strength, 1.0)))))
+        else:
+            made.append(Power(suspect, chance))
+    return tuple(made)
+
+
+def _usual(suspect: Suspect) -> list[Floats]:
+    """Return parameters of usual size: all larger than neutral, and every other one smaller where that is possible."""
+    neutral = np.array([one.neutral for one in suspect.parameters])
+    size = np.array([one.size for one in suspect.parameters])
+    low, high = (np.array([getattr(one, end) for one in suspect.parameters]) for end in ("low", "high"))
+    signs = [np.ones(len(size)), np.where(np.arange(len(size)) % 2 == 0, -1.0, 1.0)]
+    return [np.clip(neutral + sign * size, low, high) for sign in signs]
+
+
+def _derivatives(trial: Trial, kept: Fit, before: Floats) -> list[Floats]:
+    columns = []
+    for k, suspect in enumerate(kept.suspects):
+        for i, parameter in enumerate(suspect.parameters):
+            values = [one.copy() for one in kept.values]
+            values[k][i] += MOVED * parameter.size
+            columns.append((trial.white(imagined(trial.plain, replace(kept, values=tuple(values)))) - before) / MOVED)
+    return columns
+
+
+def unexcited(trial: Trial) -> tuple[str, ...]:
+    """Return the axes of whose hull coefficients the log tells next to nothing."""
+    information = trial.by_hull.T @ trial.by_hull
+    found = []
+    for axis, places in AXES.items():
+        most = float(np.linalg.eigvalsh(information[np.ix_(places, places)])[-1])
+        if 1.0 / sqrt(1.0 + max(most, 0.0)) > LEARNT:
+            found.append(axis)
+    return tuple(found)
+
+
+def testable(every: Sequence[Power], axes: Sequence[str]) -> bool:
+    """Tell whether a log in which nothing was found can be said to match: more than half of the effects would have shown."""
+    return 2 * sum(one.chance >= SEEN for one in every) > len(every) and len(axes) < len(AXES)
+
+
+def advice(every: Sequence[Power], axes: Sequence[str]) -> list[str]:
+    """Return what the log could not show, and what to record next, in sentences."""
+    told = []
+    if axes:
+        what = " and ".join(axes)
+        told.append(
+            f"The vessel was hardly moved in {what}: the log tells nothing of its hull there. "
+            f"To excite {'it' if len(axes) == 1 else 'them'}, record {'; '.join(EXCITES[axis] for axis in axes)}."
+        )
+    by_manoeuvre: dict[str, list[str]] = {}
+    for one in every:
+        if one.chance < SEEN:
+            name = one.suspect.effect.title.lower() + (f" ({one.suspect.instance})" if one.suspect.instance else "")
+            by_manoeuvre.setdefault(SHOWS.get(one.suspect.effect.id, OTHERWISE), []).append(name)
+    if by_manoeuvre:
+        names = ", ".join(name for names in by_manoeuvre.values() for name in names)
+        told.append(f"This log could not have shown, at their usual size: {names}.")
+        told.append(
+            "To show them, record "
+            + "; ".join(f"{manoeuvre} ({', '.join(names)})" for manoeuvre, names in by_manoeuvre.items())
+            + "."
+        )
+    return told
