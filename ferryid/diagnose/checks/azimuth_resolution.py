@@ -1,0 +1,102 @@
+"""Azimuth resolution: measured angles are rounded to a coarse step, and thrust acts along the true ones.
+
+That angles lie on a grid is plain to see in them; no force is needed to tell. Rounding errs to either side alike, and averages
+out over the seconds in which forces act: a step is worth a finding only where it is coarse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.result import Estimate
+from ferryid.effects.picture import Scene
+from ferryid.vessel.profile import Floats
+
+LEAST = 0.04
+"""Error across the thrust, as a share of it, from which on a step matters: that of steps of eight degrees."""
+HELD = 0.1
+"""Share of the rows in which a rounded angle stays as it is from row to row at least; one that is not rounded never does."""
+ON_GRID = 0.95
+"""Share of these that have to be multiples of the step."""
+SLEW_DEGPS = 30.0
+"""Speed at which azimuth thrusters turn where they do: a reading that lasts longer than a step then takes is the angle."""
+
+
+def step_of(angle: Floats) -> float:
+    """Return the step that an angle [rad] is rounded to [deg], 0 for none."""
+    if not np.isfinite(angle).all():
+        return 0.0
+    still = np.abs(np.diff(angle)) < 1e-9
+    held = np.flatnonzero(still[1:] & still[:-1])
+    if held.size < HELD * len(angle):
+        return 0.0
+    readings = np.degrees(angle[held])
+    readings = readings - 360.0 * np.round(readings / 360.0)
+    apart = np.diff(np.unique(np.round(readings, 6)))
+    apart = apart[apart > 1e-4]
+    if apart.size < 2:
+        return 0.0
+    step = float(np.median(apart[apart < 1.5 * apart.min()]))
+    off = np.abs(readings - step * np.round(readings / step))
+    return step if float(np.mean(off < 0.01 * step)) >= ON_GRID else 0.0
+
+
+def restored(angle: Floats, step_deg: float, step_s: float) -> Floats:
+    """Return the angle [rad] that a rounded one most likely stands for, shape (n,).
+
+    Where the reading changes, the true angle is halfway. From one such moment to the next it is taken to go straight, and back
+    to the reading where that lasts.
+    """
+    step = np.radians(step_deg)
+    level = step * np.round(angle / step)
+    change = np.flatnonzero(np.diff(level))
+    if change.size < 2:
+        return angle
+    row = np.arange(len(angle), dtype=np.float64)
+    at = change + 0.5
+    straight = np.interp(row, at, 0.5 * (level[change] + level[change + 1]))
+    k = np.searchsorted(at, row)
+    since = np.where(k > 0, row - at[np.maximum(k - 1, 0)], np.inf)
+    until = np.where(k < len(at), at[np.minimum(k, len(at) - 1)] - row, np.inf)
+    back = np.clip(np.minimum(since, until) * step_s * SLEW_DEGPS / step_deg, 0.0, 1.0)
+    return np.asarray((1.0 - back) * straight + back * level)
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return the step of the coarsest azimuth angle, where it matters to the direction of the force."""
+    steps = [step_of(angle) for angle in scene.angles.T]
+    step = max(steps, default=0.0)
+    # Uniform within the step, the angle's error has this standard deviation.
+    error = np.radians(step) / np.sqrt(12.0)
+    if error < LEAST:
+        return None
+    k = int(np.argmax(steps))
+
+    def correct(seen: Scene) -> Scene:
+        parts, angles = seen.parts.copy(), seen.angles.copy()
+        for i, (one, actuator) in enumerate(zip(steps, seen.profile.actuators, strict=True)):
+            if one == 0.0:
+                continue
+            angles[:, i] = restored(seen.angles[:, i], one, seen.step_s)
+            turn = angles[:, i] - seen.angles[:, i]
+            c, s = np.cos(turn), np.sin(turn)
+            X, Y = seen.parts[:, i, 0], seen.parts[:, i, 1]
+            x, y = actuator.position_m
+            parts[:, i, 0], parts[:, i, 1] = c * X - s * Y, s * X + c * Y
+            parts[:, i, 2] = x * parts[:, i, 1] - y * parts[:, i, 0]
+        return replace(seen, parts=parts, angles=angles)
+
+    return SensorFinding(
+        "azimuth_resolution",
+        {"step": Estimate(step, step, step, "deg")},
+        f"The azimuth angles are read in steps of {step:g} deg: at any moment the force points {100.0 * error:.0f} % of itself "
+        "to one side or the other.",
+        correct,
+        {"time_s": scene.t, "angle_deg": np.degrees(scene.angles[:, k])},
+    )
+
+
+CHECK = Check("azimuth_resolution", "Steps of the azimuth angles", find, place=70)
