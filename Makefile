@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test demo picture bench real thesis fixtures wheel-check lint clean
+.PHONY: test demo picture bench real thesis reach fixtures wheel-check lint clean
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .
@@ -31,6 +31,10 @@ real: $(VENV)/installed
 # The thesis's trials, flown again: writes reports/thesis.md and its figures.
 thesis: $(VENV)/installed
 	$(BIN)/ferryid reproduce thesis --out reports --json reports/thesis.json
+
+# Conceals physics in simulated logs and counts how often it is named: writes reports/diagnosis.md. Half an hour on two cores.
+reach: $(VENV)/installed
+	$(BIN)/python -m tests.reach
 
 fixtures: $(VENV)/installed
 	$(BIN)/python -m fixtures
