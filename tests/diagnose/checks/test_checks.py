@@ -96,12 +96,14 @@ def interpolated_heading(scene: Scene, every: int) -> Scene:
 def test_every_check_is_registered_once_and_in_order() -> None:
     assert [check.id for check in checks()] == [
         "held_samples",
+        "unrecorded_force",
         "heading_wrap",
         "yaw_rate_scale",
         "clock_offset",
         "velocity_scale",
         "heading_bias",
         "lever_arm",
+        "azimuth_resolution",
     ]
 
 
