@@ -1,0 +1,83 @@
+"""Unrecorded force: the vessel speeds up along its bow while every recorded actuator pushes nothing.
+
+Somebody steered by hand, or the orders took another way than the one that was recorded. Wind moves an idle vessel too, but
+slowly: it drifts with a few per cent of the wind's speed. So only a gain in speed counts that no wind gives, with a force that
+comes near the largest recorded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.result import Estimate
+from ferryid.effects.picture import Scene
+from ferryid.signals.smooth import moving_mean, odd_rows
+
+SHORTEST_S = 3.0
+STEADY_S = 1.0
+"""The surge velocity is averaged over this before its slope is taken over as long."""
+LEAST_GAIN_MPS = 0.5
+"""Gain in speed along the bow: an idle vessel in a gale drifts as fast."""
+LEAST_SHARE = 0.25
+"""Force of the acceleration over the largest force recorded."""
+IDLE = 1e-3
+"""An actuator is idle below this share of the largest force."""
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return for how long the vessel was driven by what was not recorded, and how hard."""
+    size = np.abs(scene.parts).sum(axis=1)[:, :2].max(axis=1)
+    ahead = np.abs(scene.parts.sum(axis=1)[:, 0])
+    if not scene.usable.any():
+        return None
+    largest = float(np.quantile(ahead[scene.usable], 0.95))
+    if largest <= 0.0:
+        return None
+    idle = scene.usable & (size < IDLE * float(size[scene.usable].max()))
+    rows = np.zeros(len(scene.t), dtype=np.bool_)
+    hardest = 0.0
+    for first, end in _stretches(idle):
+        slope, gain = _speeding(scene, first, end)
+        force = scene.profile.hull.mass_kg * slope
+        if gain > LEAST_GAIN_MPS and force > LEAST_SHARE * largest:
+            rows[first:end] = True
+            hardest = max(hardest, force)
+    if not rows.any():
+        return None
+    seconds = float(rows.sum()) * scene.step_s
+    share = 100.0 * hardest / largest
+
+    def correct(seen: Scene) -> Scene:
+        return replace(seen, usable=seen.usable & ~rows)
+
+    return SensorFinding(
+        "unrecorded_force",
+        {"duration": Estimate(seconds, seconds, seconds, "s"), "force": Estimate(hardest, hardest, hardest, "N")},
+        f"For {seconds:.0f} s every recorded actuator was idle, yet the vessel speeded up as with {hardest:.0f} N, {share:.0f} "
+        "% of the most that was recorded: it was driven by something that was not recorded.",
+        correct,
+        {"time_s": scene.t, "surge_mps": scene.nu[:, 0], "recorded_N": scene.parts.sum(axis=1)[:, 0]},
+    )
+
+
+def _stretches(idle: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], idle, [False]]).astype(np.int8))).reshape(-1, 2)
+    return [(int(first), int(end)) for first, end in edges]
+
+
+def _speeding(scene: Scene, first: int, end: int) -> tuple[float, float]:
+    """Return how fast the bow's speed grows at most [m/s²], astern or ahead, and by how much in all [m/s]."""
+    width = odd_rows(STEADY_S, 1.0 / scene.step_s)
+    if (end - first) * scene.step_s < SHORTEST_S or end - first < 3 * width:
+        return 0.0, 0.0
+    speed = moving_mean(np.abs(scene.nu_raw[first:end, :1]), width)[:, 0]
+    speed = speed[np.isfinite(speed)]
+    slope = (speed[width:] - speed[:-width]) / (width * scene.step_s)
+    return float(slope.max()), float((speed - np.minimum.accumulate(speed)).max())
+
+
+CHECK = Check("unrecorded_force", "Motion while every actuator is idle", find, place=8)

@@ -1,0 +1,95 @@
+"""Defects of recording that real logs showed: positions of a coarse grid, interpolated tables, orders that went another way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.checks.held_samples import find as held
+from ferryid.diagnose.checks.unrecorded_force import find as unrecorded
+from ferryid.effects.picture import Scene
+from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Floats
+from tests.diagnose.checks.test_checks import sailed
+
+FERRY = load_profile("milliampere")
+
+
+def straight(surge: Floats, pushed: Floats, step_s: float = 0.1) -> Scene:
+    """Return a scene in which the vessel goes north with a surge velocity, shape (n,), under a force ahead [N], shape (n,)."""
+    n = len(surge)
+    zero = np.zeros(n)
+    nu = np.column_stack([surge, zero, zero])
+    parts = np.zeros((n, 2, 3))
+    parts[:, :, 0] = 0.5 * pushed[:, None]
+    return Scene(
+        profile=FERRY,
+        t=step_s * np.arange(n),
+        eta=np.column_stack([np.cumsum(surge) * step_s, zero, zero]),
+        nu_raw=nu,
+        nu=nu,
+        parts=parts,
+        angles=np.zeros((n, 2)),
+        usable=np.ones(n, dtype=np.bool_),
+    )
+
+
+def run(idle: Floats) -> Scene:
+    """Return a minute under 400 N at 1 m/s, and half a minute without force in which the surge velocity is as given."""
+    driven = np.full(600, 1.0)
+    return straight(np.concatenate([driven, idle]), np.concatenate([np.full(600, 400.0), np.zeros(len(idle))]))
+
+
+def test_a_vessel_that_speeds_up_with_idle_actuators_was_driven_by_something_else() -> None:
+    ramp = np.interp(0.1 * np.arange(300), [0.0, 10.0, 15.0, 30.0], [0.0, 0.0, 1.5, 1.5])
+    finding = unrecorded(run(ramp))
+    assert finding is not None
+    assert finding.effect == "unrecorded_force"
+    assert finding.parameters["duration"].value == pytest.approx(30.0)
+    assert finding.parameters["force"].value == pytest.approx(FERRY.hull.mass_kg * 0.3, rel=0.02)
+    assert not finding.correct(run(ramp)).usable[600:].any()
+    assert finding.correct(run(ramp)).usable[:600].all()
+
+
+def test_a_vessel_that_stops_or_drifts_with_idle_actuators_is_left_alone() -> None:
+    seconds = 0.1 * np.arange(300)
+    assert unrecorded(run(np.exp(-seconds / 8.0))) is None
+    assert unrecorded(run(0.4 * (1.0 - np.exp(-seconds / 3.0)))) is None
+
+
+def test_an_actuator_that_pushes_explains_its_own_motion() -> None:
+    ramp = np.interp(0.1 * np.arange(300), [0.0, 10.0, 15.0, 30.0], [0.0, 0.0, 1.5, 1.5])
+    scene = run(ramp)
+    parts = scene.parts.copy()
+    parts[600:, 0, 0] = 300.0
+    assert unrecorded(replace(scene, parts=parts)) is None
+
+
+def test_positions_on_a_coarse_grid_are_not_held() -> None:
+    scene = sailed(3, 300.0)
+    turn = np.array([[np.cos(0.03), -np.sin(0.03)], [np.sin(0.03), np.cos(0.03)]])
+    grid = np.array([0.22, 0.06])
+    # The grid of a receiver that gives degrees in single precision, not quite along north and east.
+    coarse = np.round(scene.eta[:, :2] @ turn / grid) * grid @ turn.T
+    assert held(replace(scene, eta=np.column_stack([coarse, scene.psi]))) is None
+
+
+def test_equal_readings_in_an_interpolated_table_are_not_held() -> None:
+    scene = sailed(4, 300.0)
+    rows = np.arange(len(scene.t))
+    some = rows[::15]
+    slow = np.column_stack([np.interp(rows, some, np.round(column[some], 2)) for column in scene.nu_raw.T])
+    assert held(replace(scene, nu_raw=slow)) is None
+
+
+def test_a_position_that_stands_still_while_the_vessel_moves_is_held() -> None:
+    scene = sailed(5, 300.0)
+    eta = scene.eta.copy()
+    fast = int(np.argmax(np.abs(scene.nu[200:-200, 0]))) + 200
+    eta[fast - 60 : fast + 60, :2] = eta[fast - 60, :2]
+    finding = held(replace(scene, eta=eta))
+    assert finding is not None
+    assert "north, east" in finding.says
+    assert "heading" not in finding.says
