@@ -19,6 +19,10 @@ def command(
     against: Annotated[
         str | None, typer.Option(help="A simulated log of the trial to hold the recording against, instead of a model.")
     ] = None,
+    together: Annotated[
+        bool,
+        typer.Option("--together", help="Fit one hull to all logs, and diagnose each with what the others say of it."),
+    ] = False,
     withhold: Annotated[
         list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")
     ] = None,
@@ -40,7 +44,15 @@ def command(
         checked_name(name)
     hidden = tuple(withhold or ())
     diagnoses = diagnose(
-        logs, profile, out, model=examined, against=against, withhold=hidden, verify=verify, progress=progress
+        logs,
+        profile,
+        out,
+        model=examined,
+        against=against,
+        shared=together,
+        withhold=hidden,
+        verify=verify,
+        progress=progress,
     )
     progress("writing the report")
     diagnoses = keep(diagnoses, profile, examined, out, name=name)

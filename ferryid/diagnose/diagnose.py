@@ -31,6 +31,7 @@ from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding, Rival, W
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import NEAR, ODDS, search, suspects_of
 from ferryid.diagnose.separate import manoeuvre
+from ferryid.diagnose.shared_hull import Together, together
 from ferryid.diagnose.shown import columns_of, regressor_of
 from ferryid.diagnose.testable import advice, powers, testable, unexcited
 from ferryid.diagnose.unknown import impostors, unknown_of
@@ -57,6 +58,7 @@ def diagnose(
     *,
     model: Model | None = None,
     against: str | None = None,
+    shared: bool = False,
     withhold: Sequence[str] = (),
     verify: bool = False,
     progress: Callable[[str], None],
@@ -75,6 +77,8 @@ def diagnose(
         A fitted model to examine; the profile's hull where None.
     against
         Path of a simulated log of the trial: what is found is the difference to that simulation.
+    shared
+        Fit one hull to all logs first, and diagnose each with what the others say of it.
     withhold
         Signals to hide from the diagnosis.
     verify
@@ -92,8 +96,14 @@ def diagnose(
             "diagnose: a recording is held against one thing at a time, found both --model and --against. "
             "Fix: leave out one of the two"
         )
+    if shared and (against is not None or model is not None):
+        raise FerryIdError(
+            "diagnose: --together finds the hull in the logs, found --model or --against as well, which bring their own. "
+            "Fix: leave out one of the two"
+        )
+    common = together(logs, profile, out, withhold=withhold, verify=verify, progress=progress) if shared else None
     simulated = None if against is None else learn(against, profile, out, verify=verify, progress=progress)
-    return tuple(_one(path, profile, out, model, simulated, withhold, verify, progress) for path in logs)
+    return tuple(_one(path, profile, out, model, simulated, common, withhold, verify, progress) for path in logs)
 
 
 def _one(
@@ -102,6 +112,7 @@ def _one(
     out: Path | None,
     model: Model | None,
     simulated: Simulated | None,
+    common: Together | None,
     withhold: Sequence[str],
     verify: bool,
     progress: Callable[[str], None],
@@ -122,6 +133,9 @@ def _one(
         plain, spread = plain_picture(seen.scene, profile, model, survey.recording.sha256)
         library = suspects_of(seen.scene)[0]
         compared = {}
+        if common is not None:
+            plain, spread = common.picture(path, plain)
+            notes.append(common.says(path))
     else:
         path_errors = paths(simulated.scene, scene)
         shift_s = path_errors.shift_s if isinstance(path_errors, Paths) else 0.0
@@ -146,7 +160,7 @@ def _one(
     progress("locating")
     findings = [*_of_sensors(sensors), *_findings(library, trial, base, kept, proof, scene)]
     chances, still = powers(trial, kept, library), unexcited(trial)
-    if model is None and not profile.hull.has_model:
+    if model is None and common is None and not profile.hull.has_model:
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
             "stand in for what a hull model would explain. Take them as hints."
@@ -239,14 +253,14 @@ def _proved(trial: Trial, kept: Fit, proof: Evidence) -> tuple[Fit, Evidence | N
     return again, evidence(trial, again) if holds else None, told
 
 
-def _without_impostors(
-    trial: Trial, kept: Fit, proof: Evidence | None
-) -> tuple[Fit, Evidence | None, list[str]]:
+def _without_impostors(trial: Trial, kept: Fit, proof: Evidence | None) -> tuple[Fit, Evidence | None, list[str]]:
     """Drop what an empirical law in its place makes idle: physics without a name here may look a little like an effect."""
     told = []
     while idle := impostors(trial, kept):
         title = kept.suspects[idle[0]].effect.title
-        told.append(f"{title} was suspected, but a law in its place explains more and leaves it nothing: it is no finding.")
+        told.append(
+            f"{title} was suspected, but a law in its place explains more and leaves it nothing: it is no finding."
+        )
         holds = [suspect for i, suspect in enumerate(kept.suspects) if i != idle[0]]
         kept = fit(trial, holds, [values for i, values in enumerate(kept.values) if i != idle[0]])
         proof = evidence(trial, kept) if holds else None

@@ -129,7 +129,7 @@ def scene_of(
 
 def window_lengths(profile: Profile) -> tuple[float, float]:
     """Return length and stride [s] of the weak form's windows for a vessel."""
-    length_s = WINDOW_S * sqrt(_dimensions(profile)[0] / WINDOW_LENGTH_M)
+    length_s = WINDOW_S * sqrt(dimensions(profile)[0] / WINDOW_LENGTH_M)
     return length_s, length_s / STRIDES
 
 
@@ -180,7 +180,7 @@ def broad_spread(scene: Scene, profile: Profile) -> Floats:
     Added mass of a half-immersed cylinder of the hull's draught, cross-flow drag with a coefficient of 1 along the hull, lift
     and friction in proportion to the usual speed; Faltinsen (1990), chapters 3 and 6; Fossen (2021), chapter 6.
     """
-    length, beam, draught = _dimensions(profile)
+    length, beam, draught = dimensions(profile)
     hull = profile.hull
     speed = float(np.quantile(np.hypot(scene.nu[scene.usable, 0], scene.nu[scene.usable, 1]), 0.9))
     usual = max(speed, 0.1 * sqrt(9.81 * length) * 0.5)
@@ -235,7 +235,7 @@ def _modelled(scene: Scene, profile: Profile, model: Model, sha256: str) -> tupl
     return picture, spread
 
 
-def _dimensions(profile: Profile) -> tuple[float, float, float]:
+def dimensions(profile: Profile) -> tuple[float, float, float]:
     """Return length, beam and draught [m], from mass and inertia where the profile does not state them."""
     hull = profile.hull
     # The radius of gyration is about a quarter of the length.

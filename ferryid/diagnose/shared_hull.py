@@ -17,25 +17,34 @@ chapter 5, for parameters that groups of data share.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from ferryid.diagnose.checks import examine
 from ferryid.diagnose.hypothesis import Suspect
-from ferryid.diagnose.noise import Noise, noise_of
-from ferryid.diagnose.weak import Windows
+from ferryid.diagnose.noise import ORDER, Noise, noise_of
+from ferryid.diagnose.scene import dimensions, plain_picture, scene_of, window_lengths
+from ferryid.diagnose.weak import Windows, windows
+from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import COEFFICIENTS, Picture
-from ferryid.vessel.profile import Floats
+from ferryid.errors import FerryIdError
+from ferryid.vessel.profile import Floats, Profile
 
 LIFT = ("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_vv")
 ROUNDS, STEPS = 3, 5
 """Rounds, each with the noise that the one before left, and Gauss-Newton steps in a round."""
 TRUST = 2.0
 TINY = 0.02
+FEWEST_WINDOWS = 4 * ORDER
+"""Windows below which a log has no say."""
+OWN = "wind"
+"""What every log has its own of, where it can be told: the commonest of what a hull would otherwise take upon itself."""
 START = 0.4
 """Where a search begins besides at the neutral values, in sizes: a load that grows with speed squared has no slope at rest."""
 
@@ -104,6 +113,11 @@ class SharedHull:
         without
             The log that has no part in it; None for what all logs say.
         """
+        z, covariance = self._believed(without)
+        return self.before + self.spread * z, covariance * np.outer(self.spread, self.spread)
+
+    def _believed(self, without: int | None) -> tuple[Floats, Floats]:
+        """Return mean and covariance in spreads."""
         A = np.eye(len(self.step)) + self.normal.sum(axis=0)
         z = self.step
         if without is not None:
@@ -111,9 +125,8 @@ class SharedHull:
             A = A - self.normal[without]
             z = z + np.linalg.solve(A, self.gradient[without])
         # Logs that differ by more than noise know less of the hull than their noise says, but never less than before.
-        A = np.eye(len(A)) + (A - np.eye(len(A))) / max(1.0, self.disagreement)
-        covariance = np.linalg.inv(A)
-        return self.before + self.spread * z, covariance * np.outer(self.spread, self.spread)
+        known = np.eye(len(A)) + (A - np.eye(len(A))) / max(1.0, self.disagreement)
+        return z, np.asarray(np.linalg.inv(known))
 
     def picture(self, plain: Picture, without: int | None = None) -> tuple[Picture, Floats]:
         """Return a log's picture with the hull that is believed in, and the standard deviations of `COEFFICIENTS`.
@@ -131,8 +144,8 @@ class SharedHull:
 
         Its parameters are independent and of unit variance; a trial that holds it needs no spread of its own.
         """
-        mean, covariance = self.belief(without)
-        root = np.linalg.cholesky(covariance)
+        z, covariance = self._believed(without)
+        mean, root = self.before + self.spread * z, self.spread[:, None] * np.linalg.cholesky(covariance)
         h = len(COEFFICIENTS)
 
         def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
@@ -142,6 +155,77 @@ class SharedHull:
         parameters = tuple(Parameter(name, "-", 1.0, -np.inf, np.inf) for name in self.names)
         effect = Effect("hull", "Hull", lambda profile: parameters, apply, _says, lambda values, instance: {})
         return Suspect(effect, None, parameters)
+
+
+@dataclass(frozen=True)
+class Together:
+    """Logs of one vessel and their common hull; `place` gives each path's place in it, for logs that have a say."""
+
+    members: tuple[Member, ...]
+    hull: SharedHull
+    place: Mapping[str, int]
+
+    def picture(self, path: str, plain: Picture) -> tuple[Picture, Floats]:
+        """Return a log's picture with the hull that the other logs speak for, as `SharedHull.picture` does."""
+        return self.hull.picture(plain, self.place.get(path))
+
+    def says(self, path: str) -> str:
+        """Return a sentence on where the hull comes from that a log is diagnosed with."""
+        others = len(self.members) - (path in self.place)
+        return (
+            f"The hull is that of {others} other log{'s' if others > 1 else ''} of the vessel, lift included; they differ "
+            f"about it by {self.hull.disagreement:.1f} times the variance of their noise."
+        )
+
+
+def together(
+    logs: Sequence[str],
+    profile: Profile,
+    out: Path | None,
+    *,
+    withhold: Sequence[str] = (),
+    verify: bool = False,
+    progress: Callable[[str], None],
+) -> Together:
+    """Read logs of one vessel and fit one hull to all of them, with a steady wind of its own to each that did not measure it.
+
+    Parameters
+    ----------
+    logs, profile, out, withhold, verify, progress
+        As in `ferryid.diagnose.diagnose.diagnose`.
+
+    Raises
+    ------
+    FerryIdError
+        For logs that cannot be used, and for fewer than two with enough in them.
+    """
+    members: list[Member] = []
+    spreads: list[Floats] = []
+    place: dict[str, int] = {}
+    for path in logs:
+        scene, _ = scene_of(path, profile, out, withhold=withhold, verify=verify, progress=progress)
+        seen = windows(examine(scene)[1], *window_lengths(profile))
+        if len(seen.starts) < FEWEST_WINDOWS or path in place:
+            continue
+        plain, spread = plain_picture(seen.scene, profile)
+        place[path] = len(members)
+        members.append(Member(seen, plain, own_of(seen, profile)))
+        spreads.append(spread)
+    if len(members) < 2:
+        raise FerryIdError(
+            f"--together: a common hull needs two logs of {profile.name} with a minute or more of motion each, found "
+            f"{len(members)} of {len(logs)}. Fix: give more logs, or leave out --together"
+        )
+    progress(f"fitting one hull to {len(members)} logs")
+    length, _, draught = dimensions(profile)
+    lift_size = np.zeros(len(LIFT)) if profile.hull.has_model else lift_spread(length, draught)
+    return Together(tuple(members), fit_together(members, np.max(spreads, axis=0), lift_size), place)
+
+
+def own_of(seen: Windows, profile: Profile) -> tuple[Suspect, ...]:
+    """Return what a log is given of its own while the hull is fitted to all."""
+    effect = effects()[OWN]
+    return () if effect.cannot(seen.scene) else (Suspect(effect, None, effect.parameters_of(profile)),)
 
 
 def _says(values: Values, instance: str | None) -> str:
