@@ -24,7 +24,7 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.evidence import Evidence, Improvement, evidence, force_errors
 from ferryid.diagnose.free_runs import FreeRuns
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, settled, trial_of
 from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import locate
 from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding, Rival, Withheld
@@ -282,7 +282,12 @@ def _findings(
             )
         )
         place = locate(trial, without, kept, scene)
-        values = dict(zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True))
+        estimates = _estimates(trial, suspect, kept, i)
+        if not estimates:
+            # Every one of its parameters may be too near the neutral value to be worth a name: the hull's, for one.
+            continue
+        named = zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True)
+        values = {name: value for name, value in named if name in estimates}
         if suspect.effect.onset:
             values["onset"] = suspect.onset_s
         improved = None if proof is None else proof.proofs[i].improvement
@@ -291,7 +296,7 @@ def _findings(
                 effect=suspect.effect.id,
                 instance=suspect.instance,
                 probability=probability,
-                parameters=_estimates(trial, suspect, kept, i),
+                parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
                 intervals=_intervals(trial, suspect),
                 onset_s=suspect.onset_s if suspect.onset_s > 0.0 else None,
@@ -319,10 +324,9 @@ def _rivals(
     for other in library:
         if other.key in taken:
             continue
-        neutral = np.array([parameter.neutral for parameter in other.parameters])
-        stand_in = Suspect(
-            other.effect, other.instance, other.parameters, suspect.onset_s if other.effect.onset else 0.0
-        )
+        begins = replace(other, onset_s=suspect.onset_s if other.effect.onset else 0.0)
+        stand_in = settled(trial, without, begins)
+        neutral = np.array([parameter.neutral for parameter in stand_in.parameters])
         made = fit(trial, [*rest, stand_in], [*without.values, neutral])
         rivals.append(Rival(other.effect.id, other.instance, made.evidence - kept.evidence))
     rivals.sort(key=lambda one: -one.delta_score)
@@ -336,6 +340,9 @@ def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[st
     estimates = {}
     for parameter, value, spread in zip(suspect.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
         low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
+        least = suspect.effect.least
+        if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
+            continue
         estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
     if suspect.onset_s > 0.0:
         early, late = (_onset_end(trial, kept, index, side) for side in (-1.0, 1.0))
