@@ -1,0 +1,110 @@
+"""A model as the simulated vessel: its hull moves, its effects act, and what cannot be is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.effects.picture import COEFFICIENTS, UNITS, hull_of
+from ferryid.errors import FerryIdError
+from ferryid.identify.model import Model
+from ferryid.identify.stored_effect import Conditions, Quantity
+from ferryid.simulate import load_scenario, parse_scenario, simulate
+from ferryid.simulate.vessel_model import sailed_by
+from ferryid.vessel import load_profile
+from tests.identify.test_store import made
+from tests.identify.test_stored_effect import BROKEN, FERRY, FOULED, HERE, WINDY, diagnosed, stored
+
+TRIAL = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+duration_s = 60
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+path = { kind = "four-corner", dwell_s = 15 }
+"""
+
+
+def hull_alone(**changes: object) -> Model:
+    """A diagnosed model without terms, whose hull is the profile's but for one coefficient."""
+    nothing = np.zeros((0, 3))
+    hull = {
+        name: Quantity(value, value, value, unit)
+        for name, value, unit in zip(COEFFICIENTS, hull_of(FERRY).tolist(), UNITS, strict=True)
+    }
+    model = replace(
+        made(),
+        scale={"delta": 1.0, "sigma": 1.0, "zeta": 1.0},
+        settings={"basis": "none", "structure": "decoupled", "components": 0, "window_s": 1.0},
+        terms=(),
+        units=(),
+        theta=nothing,
+        low=nothing,
+        high=nothing,
+        intercept=np.zeros(3),
+        covariance=np.zeros((3, 1, 1)),
+        hull=hull,
+    )
+    return replace(model, **changes)
+
+
+def test_a_hull_like_the_profiles_sails_alike() -> None:
+    scenario = parse_scenario(TRIAL, "t")
+    sailing = sailed_by(scenario, hull_alone())
+    plain, same = simulate(scenario, 3), simulate(sailing.scenario, 3, vessel=sailing.vessel)
+    np.testing.assert_array_equal(plain.truth.eta, same.truth.eta)
+    assert sailing.notes == ()
+
+
+def test_the_model_is_the_scenario_that_has_its_effects() -> None:
+    by_hand = TRIAL + (
+        "fouling = { surge = 1.8, sway = 1.3, yaw = 1.3 }\n"
+        '[[thrusters.faults]]\nthruster = "thruster2"\nfactor = 0.6\n[true_hull]\nm11 = 1.25\n'
+    )
+    k = hull_alone().hull["m11"]
+    model = hull_alone(
+        vessel_effects=(FOULED, BROKEN),
+        hull={**hull_alone().hull, "m11": replace(k, value=1.25 * k.value)},
+        conditions=(Conditions("trial", HERE, (WINDY,)),),
+    )
+    sailing = sailed_by(parse_scenario(TRIAL, "t"), model)
+    ours = simulate(sailing.scenario, 3, vessel=sailing.vessel)
+    theirs = simulate(parse_scenario(by_hand, "t"), 3)
+    np.testing.assert_allclose(ours.truth.eta, theirs.truth.eta, rtol=1e-9, atol=1e-12)
+    # Neither the wind of the log nor the time at which the fault began there.
+    assert (sailing.scenario.wind.north_mps, sailing.scenario.thrusters.faults[0].from_s) == (0.0, 0.0)
+
+
+def test_the_conditions_of_a_log_prevail_when_asked_for() -> None:
+    late = replace(BROKEN, sources=(replace(BROKEN.sources[0], onset_s=30.0),))
+    aboard = stored("payload", mass=200.0, x=0.5, onset_s=20.0)
+    model = hull_alone(vessel_effects=(late,), conditions=(Conditions("trial", HERE, (WINDY, aboard)),))
+    held = sailed_by(parse_scenario(TRIAL, "t"), model, "trial").scenario
+    assert (held.wind.north_mps, held.wind.east_mps) == (-4.0, 3.0)
+    assert (held.payload[0].mass_kg, held.payload[0].from_s) == (200.0, 20.0)
+    assert held.thrusters.faults[0].from_s == 30.0
+    with pytest.raises(FerryIdError, match=r'conditions of "trail" are not in the model.*Did you mean "trial"'):
+        sailed_by(parse_scenario(TRIAL, "t"), model, "trail")
+    twice = replace(model, conditions=(Conditions("trial", HERE, (WINDY, WINDY)),))
+    with pytest.raises(FerryIdError, match="one steady wind, found two"):
+        sailed_by(parse_scenario(TRIAL, "t"), twice, "trial")
+
+
+def test_what_the_scenario_says_of_the_vessel_is_set_aside() -> None:
+    sailing = sailed_by(load_scenario("thruster-fault"), hull_alone(vessel_effects=(FOULED,)))
+    assert sailing.scenario.thrusters.faults == ()
+    assert sailing.scenario.fouling.surge == 1.8
+    assert sailing.scenario.wind == load_scenario("thruster-fault").wind
+    assert sailing.notes == ("the scenario's [thrusters.faults] is set aside: the vessel is boat@0",)
+
+
+def test_what_cannot_be_sailed_is_told() -> None:
+    scenario = parse_scenario(TRIAL, "t")
+    with pytest.raises(FerryIdError, match=r"boat@0: the simulated vessel cannot have .* uv, .*the constant"):
+        sailed_by(scenario, diagnosed())
+    with pytest.raises(FerryIdError, match="a trial of milliampere cannot be sailed by boat@0, a model of revolt"):
+        sailed_by(scenario, hull_alone(profile_text=load_profile("revolt").text))
+    light = hull_alone(conditions=(Conditions("trial", HERE, (stored("payload", mass=-200.0, x=0.5),)),))
+    with pytest.raises(FerryIdError, match=r'with payload of boat@0, t[.]toml:.*"mass_kg" must be'):
+        sailed_by(scenario, light, "trial")
