@@ -7,6 +7,9 @@ from collections.abc import Collection
 TURN = "a slow turn on the spot through all headings, then straight runs at several speeds both ways"
 STEPS = "steps of the thrusters' speed from rest, straight ahead and astern"
 SINGLE = "each thruster alone, ahead and astern, at several speeds"
+COAST = "coasting to a stop from full speed with the thrusters off, ahead and sideways"
+ELSEWHERE = "the same manoeuvres in deep water, or over the whole of the place and far from it"
+STRAIGHT = "long straight runs at constant speed on opposite courses"
 ACCELERATE = "hard acceleration and turning at low speed, and long straight runs at constant speed"
 
 PAIRS: tuple[tuple[frozenset[str], str], ...] = (
@@ -17,6 +20,50 @@ PAIRS: tuple[tuple[frozenset[str], str], ...] = (
     (frozenset({"payload", "thruster_gain"}), ACCELERATE),
     (frozenset({"payload", "fouling"}), ACCELERATE),
     (frozenset({"fouling", "thrust_inflow_loss"}), "coasting to a stop from full speed with the thrusters off"),
+    (frozenset({"shallow_water", "fouling"}), ELSEWHERE),
+    (frozenset({"shallow_water", "hull_parameters"}), ELSEWHERE),
+    (frozenset({"shallow_water", "mooring"}), "drifting through the place with the thrusters off, from all sides"),
+    (frozenset({"shallow_water", "current"}), "runs through the place both ways at several speeds"),
+    (frozenset({"shallow_water", "wind"}), "runs through the place both ways at several speeds"),
+    (frozenset({"shallow_water", "thruster_gain"}), COAST),
+    (frozenset({"shallow_water", "thrust_inflow_loss"}), COAST),
+    (frozenset({"shallow_water", "payload"}), ACCELERATE),
+    (
+        frozenset({"hull_parameters", "fouling"}),
+        "straight runs at many speeds from slow to full, ahead and sideways, and turns at many rates",
+    ),
+    (
+        frozenset({"hull_parameters", "payload"}),
+        "the same manoeuvres with the vessel empty, or with a weighed mass aboard",
+    ),
+    (frozenset({"hull_parameters", "thruster_gain"}), "pulling at a quay with a load cell, each thruster alone"),
+    (frozenset({"hull_parameters", "thrust_inflow_loss"}), COAST),
+    (frozenset({"hull_parameters", "thruster_interaction"}), SINGLE),
+    (frozenset({"hull_parameters", "thruster_lag"}), STEPS),
+    (frozenset({"hull_parameters", "time_delay"}), STEPS),
+    (frozenset({"hull_parameters", "lever_arm"}), "turns on the spot at many rates, without way on"),
+    (frozenset({"hull_parameters", "current"}), TURN),
+    (frozenset({"fouling", "thruster_gain"}), COAST),
+    (frozenset({"fouling", "current"}), STRAIGHT),
+    (frozenset({"payload", "thruster_lag"}), STEPS),
+    (frozenset({"payload", "lever_arm"}), "turns on the spot at many rates, without way on"),
+    (
+        frozenset({"thrust_inflow_loss", "thruster_gain"}),
+        "steps of each thruster's speed from rest, and again at full speed ahead",
+    ),
+    (frozenset({"thrust_inflow_loss", "current"}), STRAIGHT),
+    (frozenset({"thrust_inflow_loss", "thruster_interaction"}), SINGLE),
+    (frozenset({"azimuth_offset", "heading_bias"}), SINGLE),
+    (frozenset({"azimuth_offset", "wind"}), TURN),
+    (frozenset({"azimuth_offset", "current"}), TURN),
+    (frozenset({"heading_bias", "current"}), STRAIGHT),
+    (frozenset({"heading_bias", "wind"}), TURN),
+    (frozenset({"heading_bias", "lever_arm"}), STRAIGHT),
+    (frozenset({"gusts", "waves"}), "the same manoeuvres in shelter, with a wind sensor aboard"),
+    (frozenset({"gusts", "time_delay"}), "the same manoeuvres in calm air"),
+    (frozenset({"gusts", "thruster_lag"}), "the same manoeuvres in calm air"),
+    (frozenset({"waves", "time_delay"}), "the same manoeuvres in still water"),
+    (frozenset({"waves", "thruster_lag"}), "the same manoeuvres in still water"),
     (frozenset({"thruster_gain", "azimuth_offset"}), SINGLE),
     (frozenset({"thruster_gain", "thruster_interaction"}), SINGLE),
     (frozenset({"thruster_gain"}), SINGLE),
