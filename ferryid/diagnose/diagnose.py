@@ -184,7 +184,8 @@ def _one(
         located=locate(trial, base, kept, scene) if kept.suspects else unknown.left,
         withheld=_withheld(survey, scene, findings),
         against=compared,
-        learnt=learnt(trial, kept, findings, survey) if simulated is None else None,
+        # A simulation's hull is not the vessel's, and the lift of a common one is in no model file.
+        learnt=learnt(trial, kept, findings, survey) if simulated is None and common is None else None,
     )
 
 

@@ -163,7 +163,8 @@ class Diagnosis:
     against
         The simulation that a recording was held against, as `ferryid.diagnose.against.plain_against` gives it, or empty.
     learnt
-        What a model can learn from it; None where it found no force left out, or was held against a simulation.
+        What a model can learn from it; None where it found no force left out, was held against a simulation, or shares
+        the hull of other logs.
     located
         Where and when the recording and the model differ.
     """
