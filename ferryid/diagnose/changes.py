@@ -14,6 +14,8 @@ FEWEST = 4
 BREAK = 2.3
 """Kuiper's statistic of changes of the mean, as of which they are believed: one in a thousand without any."""
 MOST_BREAKS = 6
+FLOOR = 0.05
+"""Strengths below this share of their mean are as good as none."""
 ACTS = 0.25
 """An interval acts whose mean excess is more than this part of the strongest one's."""
 
@@ -39,7 +41,13 @@ def acting(
     Kuiper (1960) for the statistic, Vostrikova (1981) for the segmentation. The standard deviation of the mean is that of
     blocks, since neighbours are correlated.
     """
-    edges = [0, *sorted(_breaks(strength, 0, len(strength), MOST_BREAKS)), len(strength)]
+    if steady:
+        # Noise and more noise differ by a factor, and bursts are heavy.
+        judged = np.log(np.maximum(strength, FLOOR * float(np.mean(strength))))
+    else:
+        # Large squares are rare and heavy: their roots vary less.
+        judged = np.sign(strength) * np.sqrt(np.abs(strength))
+    edges = [0, *sorted(_breaks(judged, 0, len(strength), MOST_BREAKS)), len(strength)]
     means = [float(strength[a:b].mean()) for a, b in pairwise(edges)]
     calm = min(means) if steady and len(means) > 1 else 0.0
     top = max(means)
@@ -58,13 +66,11 @@ def acting(
     return tuple(found)
 
 
-def _breaks(strength: Floats, first: int, end: int, most: int) -> list[int]:
+def _breaks(values: Floats, first: int, end: int, most: int) -> list[int]:
     n = end - first
     if n < 4 * FEWEST or most <= 0:
         return []
-    part = strength[first:end]
-    # Large squares are rare and heavy: their roots vary less.
-    part = np.sign(part) * np.sqrt(np.abs(part))
+    part = values[first:end]
     away = np.concatenate([[0.0], np.cumsum(part - part.mean())])
     # From its lowest to its highest point the sum gains most: one of the two ends of what differs, or both.
     cuts = sorted({int(np.argmin(away)), int(np.argmax(away))})
@@ -74,7 +80,7 @@ def _breaks(strength: Floats, first: int, end: int, most: int) -> list[int]:
     if not cuts or away.max() - away.min() <= BREAK * deviation * sqrt(n):
         return []
     ends = [first, *(first + k for k in cuts), end]
-    further = [k for a, b in pairwise(ends) for k in _breaks(strength, a, b, most // 2)]
+    further = [k for a, b in pairwise(ends) for k in _breaks(values, a, b, most // 2)]
     return [*ends[1:-1], *further]
 
 

@@ -156,11 +156,26 @@ def in_words(profiles: Sequence[Profiled], shares: Floats) -> str:
     level = np.where(np.isfinite(one.excess).all(axis=1), np.nan_to_num(one.excess) @ shares, -np.inf)
     strong = level >= HALF * level.max()
     pieces = [
-        f"{_number(one.low[a])} to {_number(one.high[b - 1])} {one.unit}"
+        f"{_number(one.low[a])} to {_number(one.high[b - 1])}"
         for a, b in _stretches(strong, round_trip=one.unit == "deg" and len(one.low) == SECTORS)
     ]
-    what = {"heading": "headings", "speed": "speeds", "yaw rate": "yaw rates"}.get(one.name, one.name)
-    return f"{what} {' and '.join(pieces)}"
+    return _phrase(one, " and ".join([", ".join(pieces[:-1]), pieces[-1]] if len(pieces) > 1 else pieces))
+
+
+def _phrase(one: Profiled, ranges: str) -> str:
+    """Return a regime so that "at" can stand before it."""
+    known = {
+        "heading": f"headings {ranges} deg",
+        "speed": f"speeds of {ranges} m/s",
+        "yaw rate": f"yaw rates of {ranges} deg/s",
+        "time": f"times {ranges} s",
+        "north": f"places {ranges} m north",
+        "east": f"places {ranges} m east",
+    }
+    actuator, _, what = one.name.rpartition(" ")
+    if what == "angle":
+        return f"angles of {actuator} of {ranges} deg"
+    return known.get(one.name, f"forces of {actuator} of {ranges} {one.unit}")
 
 
 def _stretches(flags: Flags, *, round_trip: bool) -> list[tuple[int, int]]:

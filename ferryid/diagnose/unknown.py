@@ -12,7 +12,7 @@ from math import exp
 
 import numpy as np
 
-from ferryid.diagnose.bands import Band
+from ferryid.diagnose.bands import BURST_HZ, Band, Burst, bursts_of
 from ferryid.diagnose.folds import Folds, folds_of
 from ferryid.diagnose.hypothesis import Fit, Trial, fit, imagined
 from ferryid.diagnose.law import Law, law_of
@@ -21,7 +21,7 @@ from ferryid.diagnose.profiles import TELLS
 from ferryid.diagnose.result import AXES, Estimate, Finding, LawTerm
 from ferryid.diagnose.search import ODDS
 from ferryid.diagnose.shown import columns_of
-from ferryid.diagnose.terms import Term
+from ferryid.diagnose.terms import FORCE, Term
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats
 
@@ -29,7 +29,10 @@ USUAL = 0.9
 """Quantile of a quantity's size at which its force is told."""
 BAND_SHARE = 0.5
 """A band is told that holds this share of the power."""
-BURSTS = 5
+SPANS = 5
+"""Intervals that are told."""
+BURSTS = 5.0
+"""Standard deviations from even as of which bursts are told."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,11 @@ def unknown_of(trial: Trial, kept: Fit, scene: Scene) -> Unknown:
     # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
     known = any(suspect.effect.unsteady is not None for suspect in kept.suspects)
     uneven = bool(left.profiles) and left.profiles[0].statistic >= TELLS
-    if uneven and not known:
+    burst = bursts_of(seen, imagined(seen.plain, after), scene)
+    if burst is not None and burst.deviations >= BURSTS:
+        uneven = True
+        findings += [] if known else [_in_bursts(burst)]
+    elif uneven and not known:
         findings.append(_unsteady(seen, left))
     return Unknown(tuple(findings), left, uneven)
 
@@ -103,6 +110,12 @@ def _lawful(law: Law, kept: Fit, scene: Scene) -> Finding:
     before = fit(trial, kept.suspects, kept.values)
     place = locate(trial, before, law.fit, scene)
     picture = imagined(trial.plain, before)
+    # Without the law the hull bends to it on all axes; its own force tells where it acts.
+    force = np.zeros((len(trial.windows.scene.t), 3))
+    for term, value in zip(law.terms, law.fit.values[-1].tolist(), strict=True):
+        force += value * term.force(picture)
+    own = np.mean(trial.windows.mean(force) ** 2, axis=0) / np.mean(place.after**2, axis=0)
+    place = replace(place, shares=own / own.sum())
     terms = [
         _told(term, picture, trial, float(value), float(error))
         for term, value, error in zip(law.terms, law.fit.values[-1], law.fit.errors(len(kept.suspects)), strict=True)
@@ -157,22 +170,56 @@ def _subject(term: Term) -> str:
     return f"towards {term.on}" if term.on in ("north", "east") else f"on the {term.on}"
 
 
+def _in_bursts(burst: Burst) -> Finding:
+    axis = int(np.argmax(burst.shares))
+    band = f"{burst.low_hz:g} to {burst.high_hz:g} Hz"
+    spans = [f"{first:.0f}-{last:.0f} s" for first, last in burst.intervals[:SPANS]]
+    more = " and later" if len(burst.intervals) > SPANS else ""
+    when = f", strongest at {', '.join(spans)}{more}" if spans else ""
+    unit = FORCE[axis]
+    inside = [(burst.t >= first) & (burst.t <= last) for first, last in burst.intervals]
+    loud = burst.force[np.any(inside, axis=0), axis] if inside else burst.force[:, axis]
+    size = float(np.sqrt(np.mean(loud**2)))
+    return Finding(
+        effect="unknown",
+        instance=None,
+        probability=_no_chance(burst.deviations, len(BURST_HZ) - 1),
+        parameters={},
+        axes=dict(zip(AXES, burst.shares.tolist(), strict=True)),
+        intervals=burst.intervals,
+        onset_s=None,
+        regime="",
+        improvement={},
+        held_out=False,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says=f"Something unsteady moves the vessel in bursts of {band}, most in {AXES[axis]} ({size:.2g} {unit} in the root "
+        f"mean square){when}; no law of its motion explains it.",
+        evidence={"t": burst.t, "before": burst.force[:, axis]},
+        labels={"residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'}, {band} [{unit}]"},
+        band_hz=(burst.low_hz, burst.high_hz),
+    )
+
+
+def _no_chance(deviations: float, looked_at: int) -> float:
+    """Return one less the bound on how often the strongest of so many is as strong by chance."""
+    return max(0.0, 1.0 - looked_at * 0.5 * exp(-0.5 * deviations * deviations))
+
+
 def _unsteady(trial: Trial, left: Location) -> Finding:
     band = _band(left.bands, left.shares, [one.before for one in left.bands])
-    spans = [f"{first:.0f}-{last:.0f} s" for first, last in left.intervals[:BURSTS]]
+    spans = [f"{first:.0f}-{last:.0f} s" for first, last in left.intervals[:SPANS]]
     whole = len(left.intervals) == 1 and left.onset_s is None and left.offset_s is None
-    more = " and later" if len(left.intervals) > BURSTS else ""
+    more = " and later" if len(left.intervals) > SPANS else ""
     when = "" if whole or not spans else f", strongest at {', '.join(spans)}{more}"
     where = "" if left.regime.startswith("time") or not left.regime else f", most of it at {left.regime}"
     fast = f", mostly at {band[0]:g} to {band[1]:g} Hz" if band else ""
     axis = AXES[int(np.argmax(left.shares))]
-    # As rare as the strongest profile is by chance, of all that were looked at.
-    z = left.profiles[0].statistic
-    chance = len(left.profiles) * 0.5 * exp(-0.5 * z * z)
     return Finding(
         effect="unknown",
         instance=None,
-        probability=max(0.0, 1.0 - chance),
+        probability=_no_chance(left.profiles[0].statistic, len(left.profiles)),
         parameters={},
         axes=dict(zip(AXES, left.shares.tolist(), strict=True)),
         intervals=left.intervals,

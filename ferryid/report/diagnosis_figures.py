@@ -20,19 +20,29 @@ from ferryid.report.figures import (
     UNITS,
     Floats,
     canvas,
+    grid_of,
     legend_above,
+    plain_log,
     svg_text,
 )
 from ferryid.report.structure import envelope
 
+PROFILES = 4
+"""Profiles that are drawn, the most telling ones; all are in the JSON."""
+OUTER = 0.01
 BINS = 10
-"""Bins of a profile; each holds about the same number of windows."""
+"""Bins of a profile, of equal width between all but the outermost values."""
 WITHOUT, WITH, FOUND = "without the finding", "with it", "what it adds"
 
 
 def drawable(finding: Finding) -> bool:
     """Return whether a finding carries evidence that can be drawn."""
-    return all(len(finding.evidence.get(name, ())) > 1 for name in ("t", "before", "after"))
+    return all(len(finding.evidence.get(name, ())) > 1 for name in ("t", "before"))
+
+
+def compared(finding: Finding) -> bool:
+    """Return whether it can be drawn what a finding adds, and not only what is left over."""
+    return drawable(finding) and len(finding.evidence.get("after", ())) > 1
 
 
 def in_time(finding: Finding) -> str:
@@ -45,8 +55,9 @@ def in_time(finding: Finding) -> str:
             ax.axvspan(first, last, color=SHADE, linewidth=0)
         if finding.onset_s is not None:
             ax.axvline(finding.onset_s, color=MEASURED, linewidth=0.9, linestyle="--", label="onset")
-        ax.plot(*envelope(t, evidence["before"]), color=BASE, label=WITHOUT)
-        ax.plot(*envelope(t, evidence["after"]), color=NEW, label=WITH)
+        ax.plot(*envelope(t, evidence["before"]), color=BASE, label=WITHOUT if "after" in evidence else "left over")
+        if "after" in evidence:
+            ax.plot(*envelope(t, evidence["after"]), color=NEW, label=WITH)
         if "explained" in evidence:
             ax.plot(*envelope(t, evidence["explained"]), color=MEASURED, linewidth=1.5, label=FOUND)
         ax.set_xlabel("time [s]")
@@ -114,7 +125,7 @@ def by_regime(diagnosis: Diagnosis, column: str, label: str) -> str:
 
 
 def binned(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return middle, mean, and half the 95 % interval of the mean of `y` in bins of `x` that hold as many values each.
+    """Return middle, mean, and half the 95 % interval of the mean of `y` in bins of `x` of equal width.
 
     Neighbouring windows overlap and are no independent evidence: the interval comes from the scatter of the means of the
     separate visits to a bin, and is NaN where there was but one.
@@ -123,7 +134,7 @@ def binned(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     x, y = x[good], y[good]
     if not x.size:
         return np.empty(0), np.empty(0), np.empty(0)
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+    edges = np.unique(np.linspace(*np.quantile(x, [OUTER, 1.0 - OUTER]), BINS + 1))
     index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
     visit = np.cumsum(np.concatenate([[0], np.diff(index) != 0]))
     rows: list[tuple[float, float, float]] = []
@@ -149,6 +160,56 @@ def _profile(ax: Axes, x: Floats, y: Floats, colour: str, label: str) -> None:
     ax.plot(places, means, "o-", color=colour, markersize=3.5, label=label)
 
 
+def in_regimes(diagnosis: Diagnosis) -> str:
+    """Draw mean squares over that of the noise by where the vessel was and what it did: the most telling profiles."""
+    assert diagnosis.located is not None
+    chosen = diagnosis.located.profiles[:PROFILES]
+    with mpl.rc_context(STYLE):
+        figure, grid = grid_of(len(chosen), 3, 1.55 * len(chosen) + 0.6)
+        for row, one in zip(grid, chosen, strict=True):
+            edges = np.append(one.low, one.high[-1])
+            for j, ax in enumerate(row):
+                noise = np.append(one.error, one.error[-1])
+                ax.fill_between(
+                    edges, 1.0 / (1.0 + 2.0 * noise), 1.0 + 2.0 * noise, step="post", color=SHADE, linewidth=0
+                )
+                for values, colour, label in ((one.excess, BASE, "before"), (one.left, NEW, "after")):
+                    if label == "before" or diagnosis.findings:
+                        ax.stairs(values[:, j] + 1.0, edges, baseline=None, color=colour, linewidth=1.4, label=label)
+                ax.set_yscale("log")
+                ax.set_xlabel(f"{one.name} [{one.unit}]", labelpad=1.0)
+                plain_log(ax, x=False, y=True)
+        for j, ax in enumerate(grid[0]):
+            ax.set_title(AXES[j], fontsize=10)
+        if diagnosis.findings:
+            legend_above(figure, grid[0][0], 2)
+        return svg_text(figure)
+
+
+def in_bands(diagnosis: Diagnosis) -> str:
+    """Draw the power of the force that was left over in frequency bands, axis by axis."""
+    assert diagnosis.located is not None
+    bands = diagnosis.located.bands
+    edges = np.array([bands[0].low_hz, *(band.high_hz for band in bands)])
+    # A logarithmic axis has no place for zero.
+    edges[0] = 0.5 * edges[1] if edges[0] == 0.0 else edges[0]
+    with mpl.rc_context(STYLE):
+        figure, grid = grid_of(1, 3, 2.4)
+        for j, ax in enumerate(grid[0]):
+            for label, colour in (("before", BASE), ("after", NEW)):
+                if label == "before" or diagnosis.findings:
+                    power = np.sqrt([getattr(band, label)[j] for band in bands])
+                    ax.stairs(power, edges, baseline=None, color=colour, linewidth=1.4, label=label)
+            ax.set_xscale("log")
+            ax.set_yscale("log")
+            ax.set_title(f"{AXES[j]} [{UNITS[j]}]", fontsize=10)
+            ax.set_xlabel("frequency [Hz]", labelpad=1.0)
+            plain_log(ax, x=True, y=True)
+        if diagnosis.findings:
+            legend_above(figure, grid[0][0], 2)
+        return svg_text(figure)
+
+
 def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
     """Return name, drawing and caption of every figure of the whole log that its evidence allows."""
     evidence = diagnosis.evidence
@@ -156,8 +217,20 @@ def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
         return ()
     both = " Orange: before; blue: with the findings." if diagnosis.findings else ""
     shown = [("left-over", left_over(diagnosis), f"Force that the model leaves unexplained, over the whole log.{both}")]
-    for column, label in (("heading", "heading [deg]"), ("speed", "speed [m/s]")):
-        if column in evidence:
-            caption = f"Mean of the same force against {column}, with 95 % intervals from separate visits.{both}"
-            shown.append((f"by-{column}", by_regime(diagnosis, column, label), caption))
+    located = diagnosis.located
+    if located is None:
+        for column, label in (("heading", "heading [deg]"), ("speed", "speed [m/s]")):
+            if column in evidence:
+                caption = f"Mean of the same force against {column}, with 95 % intervals from separate visits.{both}"
+                shown.append((f"by-{column}", by_regime(diagnosis, column, label), caption))
+        return shown
+    if located.profiles:
+        caption = (
+            "Its mean square over that of the noise that remains, where the vessel was and by what it did; shaded: what "
+            f"noise alone would give.{both}"
+        )
+        shown.append(("regimes", in_regimes(diagnosis), caption))
+    if located.bands:
+        caption = f"Its root mean square in bands of frequency, by windows short enough to show them.{both}"
+        shown.append(("bands", in_bands(diagnosis), caption))
     return shown

@@ -139,23 +139,22 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool) -> dict[str, Any]:
 
 def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
     shown = []
-    if drawn and diagnosis_figures.drawable(finding):
+    if drawn and diagnosis_figures.compared(finding):
         what = finding.labels.get("regressor", "") if "regressor" in finding.evidence else ""
         against = what.partition(" [")[0] or "what the finding adds"
-        shown = [
+        shown.append(
             {
                 "file": f"{file}-evidence",
                 "svg": diagnosis_figures.on_regressor(finding),
                 "caption": f"What is left over, against {against}. Points: windows of the recording; marks: their means with "
-                "95 % intervals. "
-                "Where the finding holds, orange follows the black line, and blue is flat.",
-            },
-            {
-                "file": f"{file}-time",
-                "svg": diagnosis_figures.in_time(finding),
-                "caption": "The same over time; shaded: when it acts.",
-            },
-        ]
+                "95 % intervals. Where the finding holds, orange follows the black line, and blue is flat.",
+            }
+        )
+    if drawn and diagnosis_figures.drawable(finding):
+        caption = (
+            "The same over time; shaded: when it acts." if shown else "What is left over; shaded: when it acts most."
+        )
+        shown.append({"file": f"{file}-time", "svg": diagnosis_figures.in_time(finding), "caption": caption})
     return {
         "title": diagnosis_words.title(finding.effect, finding.instance),
         "says": finding.says,

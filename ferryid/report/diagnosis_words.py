@@ -10,10 +10,18 @@ from typing import Any
 from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding
 from ferryid.effects import effects
 
-RIVALS = 4
+EVERYWHERE = "all along"
+SPANS = 4
+"""Intervals that are told."""
+RIVALS = 3
 """Rivals that are told; the others are in the JSON."""
 SMALL = 0.02
 """A smaller change of the squared error is not told."""
+UNKNOWN = "unknown"
+FAR = 1e6
+"""Rivals that are less likely by more than this are told in one word."""
+ENDS_S = 10.0
+"""What begins and ends this near to the ends of the log acts throughout."""
 FREE_RUN = (
     ("position_m", "position", "m", 1.0),
     ("heading_rad", "heading", "deg", 57.29577951308232),
@@ -24,6 +32,8 @@ FREE_RUN = (
 
 def title(effect: str, instance: str | None = None) -> str:
     """Return the name of an effect for people."""
+    if effect == UNKNOWN:
+        return "Something without a name"
     known = effects().get(effect)
     name = known.title if known else effect.replace("_", " ").capitalize()
     return f"{name} ({instance})" if instance else name
@@ -31,17 +41,16 @@ def title(effect: str, instance: str | None = None) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
-    physics = [_inline(title(one.effect, one.instance)) for one in diagnosis.findings if one.effect in effects()]
-    sensors = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect not in effects()]
+    named = [one for one in diagnosis.findings if one.effect != UNKNOWN]
+    physics = [_inline(title(one.effect, one.instance)) for one in named if one.effect in effects()]
+    sensors = [_inline(title(one.effect)) for one in named if one.effect not in effects()]
     base = "simulation" if diagnosis.against else "model"
     left_out = "the recording differs from the simulation in" if diagnosis.against else "the model left out"
     parts = [f"{left_out} {listed(physics)}"] if physics else []
     parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
     names = "; ".join(parts)
     change = changed({axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()})
-    told = (
-        f"; with {'them' if len(diagnosis.findings) > 1 else 'it'}, the squared force error on held-out data {change}"
-    )
+    told = f"; with {'them' if len(physics) > 1 else 'it'}, the squared force error on held-out data {change}"
     more = told if change and physics else ""
     if diagnosis.verdict == "explained":
         return f"Explained: {names}{more}."
@@ -98,27 +107,37 @@ def estimate(one: Estimate) -> str:
 
 def where(finding: Finding) -> str:
     """Return since when a finding acts, and where it shows."""
-    if finding.onset_s is not None:
+    if finding.onset_s is not None and len(finding.intervals) < 2:
         told = f"It began at {finding.onset_s:.0f} s"
     elif len(finding.intervals) > 1:
-        spans = [f"{first:.0f}–{last:.0f} s" for first, last in finding.intervals[:4]]
-        more = " and later" if len(finding.intervals) > 4 else ""
-        told = f"It acts in {listed(spans)}{more}"
-    elif finding.intervals:
+        spans = [f"{first:.0f} to {last:.0f} s" for first, last in finding.intervals[:SPANS]]
+        more = " and later" if len(finding.intervals) > SPANS else ""
+        told = f"It acts from {listed(spans)}{more}"
+    elif finding.intervals and not _throughout(finding):
         first, last = finding.intervals[0]
         told = f"It acts from {first:.0f} s to {last:.0f} s"
     else:
-        told = "It acts all along"
+        told = "It acts throughout"
     shares = sorted(finding.axes.items(), key=lambda pair: -pair[1])
     shown = [f"{axis} ({_percent(share)})" for axis, share in shares if share >= 0.05]
     if shown:
         told += f", and shows in {listed(shown)}"
-    return f"{told}; clearest at {finding.regime}." if finding.regime else f"{told}."
+    if finding.band_hz is not None:
+        told += f", mostly between {finding.band_hz[0]:g} and {finding.band_hz[1]:g} Hz"
+    regime = "" if finding.regime == EVERYWHERE else finding.regime
+    return f"{told}; clearest at {regime}." if regime else f"{told}."
+
+
+def _throughout(finding: Finding) -> bool:
+    t = finding.evidence.get("t")
+    first, last = finding.intervals[0]
+    return t is not None and len(t) > 0 and bool(first <= t[0] + ENDS_S and last >= t[-1] - ENDS_S)
 
 
 def trust(finding: Finding) -> str:
     """Return the probability, and what the finding removes of the squared force error."""
-    told = f"Probability {probability(finding.probability)}."
+    no_name = finding.effect == UNKNOWN
+    told = f"Probability {probability(finding.probability)}{' that it is no chance' if no_name else ''}."
     change = changed(finding.improvement)
     if not change:
         return told
@@ -138,9 +157,14 @@ def rivals(finding: Finding) -> list[str]:
         names = listed([_inline(title(name)) for name in finding.unresolved_with], "or")
         lines.append(f"This log cannot tell it from {names}.")
     shown = sorted(finding.rivals, key=lambda rival: -rival.delta_score)[:RIVALS]
-    if shown:
-        parts = [f"{_inline(title(one.effect, one.instance))} {_odds(one.delta_score)}" for one in shown]
-        lines.append(f"In its place, by the evidence of this log: {'; '.join(parts)}.")
+    near = [one for one in shown if one.delta_score > -log(FAR)]
+    far = [_inline(title(one.effect, one.instance)) for one in shown if one not in near]
+    if near:
+        parts = [f"{_inline(title(one.effect, one.instance))} {_odds(one.delta_score)}" for one in near]
+        lines.append(f"In its place {'; '.join(parts)}.")
+    if far:
+        other = "Anything else" if near else "Anything in its place"
+        lines.append(f"{other} is less likely by a factor of more than a million: {listed(far, 'or')} would be next.")
     if finding.separating_manoeuvre:
         manoeuvre = finding.separating_manoeuvre.rstrip(".")
         lines.append(f"To tell them apart, record this: {manoeuvre}.")
@@ -235,10 +259,7 @@ def _bare(value: float) -> Estimate:
 def _odds(delta: float) -> str:
     if delta > -0.7:
         return "is as likely"
-    if delta > -log(1000.0):
-        return f"is {exp(-delta):.2g} times less likely"
-    power = str(round(-delta / log(10.0))).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"is less likely by a factor of 10{power}"
+    return f"is {float(f'{exp(-delta):.2g}'):,.0f} times less likely".replace(",", " ")
 
 
 def _inline(name: str) -> str:

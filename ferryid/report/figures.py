@@ -68,13 +68,23 @@ def canvas(rows: int, height: float, *, top: float = 0.35) -> tuple[Figure, list
     return figure, list(axes[:, 0])
 
 
+def grid_of(rows: int, columns: int, height: float) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure of small panels with axes of their own, and space for a title and a legend above them."""
+    figure = _figure(height, top=0.5, left=0.5, between=(0.28, 0.55))
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for ax in grid.flat:
+        ax.tick_params(labelsize=8)
+        ax.xaxis.label.set_size(9)
+    return figure, [list(row) for row in grid]
+
+
 def legend_above(figure: Figure, ax: Axes, columns: int, title: str = "") -> None:
     """Put one legend for the whole figure along its upper edge."""
     handles, labels = ax.get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper center", ncols=columns, title=title, borderaxespad=0.1)
 
 
-def _plain_log(ax: Axes, *, x: bool, y: bool) -> None:
+def plain_log(ax: Axes, *, x: bool, y: bool) -> None:
     """Label logarithmic axes as 1e-3, 1e0: typeset exponents take longer than all else on the page."""
     for wanted, axis in ((x, ax.xaxis), (y, ax.yaxis)):
         if wanted:
@@ -146,7 +156,7 @@ def residual_spectrum(logs: Sequence[LogFit]) -> str:
                             frequency[1:], density[1:], color=colour, alpha=0.8, label=label if i == 0 else "_nolegend_"
                         )
             ax.set_ylabel(f"{AXES[j]} [({UNITS[j]})²/Hz]")
-            _plain_log(ax, x=True, y=True)
+            plain_log(ax, x=True, y=True)
         axes[-1].set_xlabel("frequency [Hz]")
         legend_above(figure, axes[0], 2)
         return svg_text(figure)
@@ -228,7 +238,7 @@ def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
         values = result.singular_values
         values = values / values[0] if values.size and values[0] > 0 else values
         grid[0, 0].semilogy(np.arange(1, len(values) + 1), np.maximum(values, 1e-17), "o-", color=NEW, markersize=3)
-        _plain_log(grid[0, 0], x=False, y=True)
+        plain_log(grid[0, 0], x=False, y=True)
         grid[0, 0].set_xlabel("index")
         grid[0, 0].set_ylabel("singular value over largest [-]")
         pairs = ((0, 1, "u [m/s]", "v [m/s]"), (0, 2, "u [m/s]", "r [deg/s]"), (1, 2, "v [m/s]", "r [deg/s]"))

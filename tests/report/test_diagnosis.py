@@ -15,7 +15,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, Rival, Withheld
+from ferryid.diagnose.bands import Band
+from ferryid.diagnose.locate import Location
+from ferryid.diagnose.profiles import profile_of
+from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, LawTerm, Rival, Withheld
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.report.diagnosis_figures import binned
@@ -230,7 +233,7 @@ def test_a_verdict_is_told_with_what_changed() -> None:
 def test_a_finding_is_told_in_numbers() -> None:
     assert numbers(wind()) == "North -3.02 m/s (-3.21 to -2.83); east 2.96 m/s (2.81 to 3.11) (95 % intervals)."
     assert where(wind()) == (
-        "It acts from 0 s to 720 s, and shows in sway (60 %), yaw (30 %) and surge (10 %); clearest at headings 150-210 deg."
+        "It acts throughout, and shows in sway (60 %), yaw (30 %) and surge (10 %); clearest at headings 150-210 deg."
     )
     assert where(gain()) == "It began at 312 s, and shows in surge (70 %) and yaw (26 %)."
     assert trust(wind()) == (
@@ -246,10 +249,51 @@ def test_a_finding_is_told_in_numbers() -> None:
 def test_rivals_are_told_by_how_much_less_likely_they_are() -> None:
     told = rivals(wind())
     assert told[0] == "This log cannot tell it from current."
-    # exp(310) is 10 to the 134.6; exp(4) is 54.6. The nearest comes first.
-    assert "heading bias is 55 times less likely; current is less likely by a factor of 10¹³⁵" in told[1]
-    assert told[2] == "To tell them apart, record this: a slow turn on the spot through all headings."
+    # exp(4) is 54.6; exp(310) is 10 to the 134.6, which nobody needs to know.
+    assert told[1] == "In its place heading bias is 55 times less likely."
+    assert told[2] == "Anything else is less likely by a factor of more than a million: current would be next."
+    assert told[3] == "To tell them apart, record this: a slow turn on the spot through all headings."
     assert rivals(gain()) == []
+
+
+def test_where_is_told_by_what_is_known_of_it() -> None:
+    some = replace(wind(), intervals=((100.0, 180.0), (400.0, 460.0)), regime="all along", axes={"yaw": 1.0})
+    assert where(some) == "It acts from 100 to 180 s and 400 to 460 s, and shows in yaw (100 %)."
+    assert where(replace(some, intervals=((0.0, 500.0),))) == "It acts from 0 s to 500 s, and shows in yaw (100 %)."
+    fast = replace(some, intervals=((0.0, 720.0),), band_hz=(0.1, 0.2), regime="speeds of 1 to 2 m/s")
+    assert where(fast).endswith("in yaw (100 %), mostly between 0.1 and 0.2 Hz; clearest at speeds of 1 to 2 m/s.")
+
+
+def nameless() -> Finding:
+    """Return something unsteady, which nothing explains: there is no after."""
+    burst = np.where((T > 200.0) & (T < 260.0), 50.0, 5.0) * np.random.default_rng(4).standard_normal(T.size)
+    return replace(
+        wind(),
+        effect="unknown",
+        parameters={},
+        intervals=((200.0, 260.0),),
+        improvement={},
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says="Something unsteady moves the vessel.",
+        evidence={"t": T, "before": burst},
+        labels={"residual": "yaw moment left over [N·m]"},
+        band_hz=(0.1, 0.2),
+    )
+
+
+def test_what_has_no_name_is_no_fault_of_the_sensors() -> None:
+    one = replace(diagnosis("partly_explained"), findings=(wind(), nameless()))
+    assert headline(one).startswith("Partly explained: the model left out steady wind; with it,")
+    assert "sensors" not in headline(one)
+    page, drawings = render((one,), "trial")
+    assert "2. Something without a name" in page
+    # Nothing explains it, so that there is no figure of what it adds.
+    assert {name for name in drawings if name.startswith("finding-2")} == {"finding-2-time"}
+    assert "that it is no chance" in trust(nameless())
+    alone = replace(one, verdict="unexplained", findings=(nameless(),))
+    assert headline(alone).startswith("Unexplained:")
 
 
 @pytest.mark.parametrize(
@@ -356,3 +400,61 @@ def test_whose_log_it_is_must_be_known(tmp_path: Path) -> None:
     with pytest.raises(FerryIdError, match=r"--vessel.*Fix:"):
         patient(None, None, tmp_path)
     assert patient("milliampere", None, tmp_path)[0].name == "milliampere"
+
+
+def location() -> Location:
+    """Return a location made by hand: headings from 0 to 90 deg and the band from 0.1 to 0.2 Hz stand out before."""
+    rng = np.random.default_rng(7)
+    calm = rng.standard_normal((T.size, 3))
+    heading = (T * 1.3) % 360.0
+    loud = calm * np.where(heading < 90.0, 5.0, 1.0)[:, None]
+    errors = 20.0 * loud
+    profile = profile_of("heading", "deg", heading, np.linspace(0.0, 360.0, 13), loud, calm, errors)
+    power = np.array([400.0, 900.0, 25.0])
+    bands = (Band(0.0, 0.1, power, power), Band(0.1, 0.2, 9.0 * power, power))
+    shares = np.array([0.5, 0.3, 0.2])
+    return Location(
+        shares, shares, T, errors, errors, ((10.0, 500.0),), 10.0, None, (profile,), bands, "headings 0 to 90 deg"
+    )
+
+
+def test_where_the_whole_log_differs_is_drawn_and_in_the_json(tmp_path: Path) -> None:
+    one = replace(diagnosis("explained"), located=location(), findings=(replace(wind(), band_hz=(0.1, 0.2)), gain()))
+    outcome = report((one,), tmp_path)
+    conforms(outcome.json)
+    located = outcome.json["located"]
+    assert located["onset"] == 10.0
+    profile = located["profiles"][0]
+    assert profile["by"] == "heading"
+    # Five times the noise is 25 times its square; afterwards there is the noise alone.
+    assert profile["before"][1]["sway"] == pytest.approx(25.0, rel=0.5)
+    assert profile["after"][1]["sway"] == pytest.approx(1.0, rel=0.5)
+    assert profile["before"][6]["sway"] == profile["after"][6]["sway"]
+    assert located["bands"][1] == {
+        "low_hz": 0.1,
+        "high_hz": 0.2,
+        "before": {"surge": 3600.0, "sway": 8100.0, "yaw": 225.0},
+        "after": {"surge": 400.0, "sway": 900.0, "yaw": 25.0},
+    }
+    assert outcome.json["findings"][0]["where"]["band_hz"] == [0.1, 0.2]
+    drawings = render((one,), "trial")[1]
+    assert {"left-over", "regimes", "bands"} <= set(drawings)
+    assert "heading [deg]" in drawings["regimes"]
+    assert "frequency [Hz]" in drawings["bands"]
+    assert "by-heading" not in drawings
+
+
+def test_a_law_is_in_the_json(tmp_path: Path) -> None:
+    term = LawTerm("sway", "r|r|", Estimate(-34.0, -38.0, -30.0, "N/(rad/s)²"), "in sway -34 N")
+    one = replace(diagnosis("unexplained"), findings=(replace(nameless(), law=(term,)),))
+    outcome = report((one,), tmp_path)
+    conforms(outcome.json)
+    told = outcome.json["findings"][0]["where"]["law"]
+    assert told == [
+        {
+            "on": "sway",
+            "quantity": "r|r|",
+            "coefficient": {"value": -34.0, "low": -38.0, "high": -30.0, "unit": "N/(rad/s)²"},
+            "says": "in sway -34 N",
+        }
+    ]
