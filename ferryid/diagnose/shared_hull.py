@@ -276,6 +276,24 @@ def fit_together(members: Sequence[Member], spread: Floats, lift_size: Floats) -
     return joint.result(z, own, noise)
 
 
+def left_over(member: Member, hull: SharedHull, place: int) -> Floats:
+    """Return the gaps that are left in some windows of a log, shape (J, c), with its hull and effects fitted elsewhere.
+
+    Parameters
+    ----------
+    member
+        With the windows to judge.
+    hull, place
+        The fit, and the log's place in it.
+    """
+    h = len(COEFFICIENTS)
+    mean = hull.before + hull.spread * hull.step
+    picture = lift(replace(member.plain, hull=mean[:h]), mean[h:])
+    for suspect, values in zip(member.suspects, hull.values[place], strict=True):
+        picture = suspect.act(picture, values)
+    return member.windows.gap(picture)
+
+
 @dataclass(frozen=True)
 class _Joint:
     """All logs with the belief about their hull; z is the hull in spreads, own[i] the effects of log i in sizes."""
