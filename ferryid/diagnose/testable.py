@@ -48,7 +48,6 @@ SHOWS = {
     "gusts": TURNING,
     "payload": "hard accelerations and turns from rest",
     "fouling": SPEEDS,
-    "hull_parameters": "accelerations and turns on every axis, at several speeds",
     "thruster_gain": ALONE,
     "azimuth_offset": ALONE,
     "azimuth_resolution": ALONE,
@@ -62,6 +61,8 @@ SHOWS = {
     "heading_bias": "straight runs ahead and astern at several headings",
 }
 """What a log has to hold to show an effect."""
+HULL = "hull_parameters"
+"""What a log tells of the hull's coefficients is told by axis."""
 OTHERWISE = "a calibration run that excites every axis at many headings, such as the 12-corner path"
 
 
@@ -99,7 +100,7 @@ def powers(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> tuple[Power, 
     taken = {one.key for one in kept.suspects}
     made = []
     for suspect in library:
-        if suspect.key in taken:
+        if suspect.key in taken or suspect.effect.id == HULL:
             continue
         size = np.array([one.size for one in suspect.parameters])
         chance = 1.0

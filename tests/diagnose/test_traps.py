@@ -1,0 +1,168 @@
+"""The traps that a first trial of naming missing physics fell into, one test each: it fails for whoever walks into it again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ferryid.diagnose.search as search_module
+from ferryid.diagnose.evidence import HEADING, evidence
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
+from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
+from ferryid.diagnose.search import search, suspects_of
+from ferryid.diagnose.weak import windows
+from ferryid.effects.picture import COEFFICIENTS, Scene
+from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+
+FERRY = load_profile("milliampere")
+BASE = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "twelve-corner", dwell_s = 40 }
+controller = { delta = 0.7, sigma = 0.7 }
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+"""
+OFF = {
+    "m11": 0.9,
+    "m22": 1.1,
+    "m33": 0.9,
+    "X_u": 1.1,
+    "Y_v": 0.9,
+    "Y_|r|v": 1.1,
+    "N_r": 1.1,
+    "N_|r|r": 0.9,
+    "N_|r|v": 1.1,
+}
+"""What the true hull is off the profile's."""
+
+
+def sailed(folder: Path, name: str, tables: str, seed: int) -> Scene:
+    scenario = replace(parse_scenario(BASE + tables, name), true_hull=OFF)
+    log = folder / f"{name}.mcap"
+    write_log(simulate(scenario, seed), log)
+    return scene_of(str(log), FERRY, None)[0]
+
+
+def trial_on(scene: Scene) -> Trial:
+    seen = windows(scene, *window_lengths(FERRY))
+    return trial_of(seen, *plain_picture(seen.scene, FERRY))
+
+
+def suspect(trial: Trial, name: str, instance: str | None = None) -> Suspect:
+    return next(one for one in suspects_of(trial.plain.scene)[0] if one.key == (name, instance))
+
+
+def gain(trial: Trial, made: Fit) -> float:
+    return made.evidence - fit(trial, ()).evidence
+
+
+@pytest.fixture(scope="module")
+def raw(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """A closed-loop trial with coloured navigation noise, in which nothing acts but a hull that is ten per cent off."""
+    return sailed(tmp_path_factory.mktemp("clean"), "clean", "", 3)
+
+
+@pytest.fixture(scope="module")
+def clean(raw: Scene) -> Trial:
+    """The same, ready for hypotheses."""
+    return trial_on(raw)
+
+
+@pytest.fixture(scope="module")
+def inflow(tmp_path_factory: pytest.TempPathFactory) -> Trial:
+    """The same with thrusters that lose force to their inflow, which damping resembles."""
+    return trial_on(
+        sailed(tmp_path_factory.mktemp("inflow"), "inflow", "thrusters = { inflow_loss_per_mps = 0.3 }\n", 4)
+    )
+
+
+def test_trap_1_noise_in_the_acceleration_is_not_less_mass(clean: Trial, raw: Scene) -> None:
+    # The trap: force on the differentiated velocity by least squares.
+    u_dot = np.gradient(raw.nu_raw[:, 0], raw.step_s)
+    u, v, r = raw.nu.T
+    columns = np.column_stack([u_dot, u, np.abs(u) * u, v * r, r * r])
+    naive = float(np.linalg.lstsq(columns, raw.parts.sum(axis=1)[:, 0], rcond=None)[0][0])
+    true = OFF["m11"] * FERRY.hull.M[0, 0]
+    assert naive < 0.8 * true
+    # Masses that may be anything are still found.
+    spread = clean.hull_spread.copy()
+    spread[:5] = 0.5 * np.abs(clean.plain.hull[:5])
+    free = replace(clean, hull_spread=spread)
+    hull = dict(zip(COEFFICIENTS, fit(free, ()).hull.tolist(), strict=True))
+    assert hull["m11"] == pytest.approx(true, rel=0.05)
+    assert hull["m22"] == pytest.approx(OFF["m22"] * FERRY.hull.M[1, 1], rel=0.08)
+    assert hull["m33"] == pytest.approx(OFF["m33"] * FERRY.hull.M[2, 2], rel=0.08)
+
+
+@pytest.mark.parametrize("name", ["thruster_lag", "time_delay"])
+def test_trap_2_a_controller_that_answers_noise_is_no_lag(clean: Trial, name: str) -> None:
+    made = fit(clean, [suspect(clean, name)])
+    assert gain(clean, made) < 0.0
+    assert abs(made.values[0][0]) < 0.05
+
+
+def test_trap_3_what_hides_in_a_product_is_found_and_sized(inflow: Trial) -> None:
+    # Every effect among all the others: tests/effects/test_every_effect.py.
+    made = fit(inflow, [suspect(inflow, "thrust_inflow_loss")])
+    assert made.values[0][0] == pytest.approx(0.3, abs=0.05)
+    assert gain(inflow, made) > 5.0 * search_module.ODDS
+
+
+def test_trap_4_gains_and_hull_free_at_once_do_not_shrink(clean: Trial) -> None:
+    both = [suspect(clean, "thruster_gain", name) for name in clean.plain.scene.names]
+    made = fit(clean, both)
+    np.testing.assert_allclose(np.concatenate(made.values), 1.0, atol=0.06)
+    assert gain(clean, made) < 0.0
+
+
+def test_trap_4_a_mass_that_would_cancel_the_acceleration_explains_nothing(clean: Trial) -> None:
+    one = suspect(clean, "payload")
+    assert gain(clean, fit(clean, [one])) < search_module.ODDS
+    # The more mass, the less acceleration does the picture have; what was measured stays.
+    left = [float(np.sum(clean.white(one.act(clean.plain, np.array([mass, 0.0]))) ** 2)) for mass in (0.0, 2e3, 2e4)]
+    assert left[0] < left[1] < left[2]
+
+
+def test_trap_5_a_hull_that_is_off_is_refitted_beside_every_candidate(inflow: Trial) -> None:
+    one = suspect(inflow, "thrust_inflow_loss")
+    # The trap: regress what an old fit of the hull left on the candidate; the hull has swallowed the effect by then.
+    old = imagined(inflow.plain, fit(inflow, ()))
+    left = inflow.white(old)
+    slope = (inflow.white(one.act(old, np.array([0.05]))) - left) / 0.05
+    assert abs(float(slope @ left) / float(slope @ slope)) < 0.4 * 0.3
+    assert fit(inflow, [one]).values[0][0] == pytest.approx(0.3, abs=0.05)
+
+
+def test_trap_6_what_is_certain_but_void_is_no_finding(clean: Trial, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A force of the size of an integrator's error, in a log calm enough to make it significant.
+    wind = suspect(clean, "wind")
+    little = wind.act(clean.plain, np.array([-0.24, 0.16]))
+    calm = replace(clean, plain=replace(clean.plain, external=2.0 * clean.plain.external - little.external))
+    result = search(calm, lambda stage: None, known=[wind])
+    assert result.rounds[0].candidates[0].gain > search_module.ODDS
+    assert result.fit.suspects == ()
+    monkeypatch.setattr(search_module, "VOID", 0.0)
+    assert [one.key for one in search(calm, lambda stage: None, known=[wind]).fit.suspects] == [wind.key]
+
+
+def test_trap_7_a_gain_that_a_reversed_heading_matches_names_nothing(clean: Trial) -> None:
+    # Half a wind on the vessel as it turned, half one on a vessel that turned the other way: either explains as much.
+    wind, plain = suspect(clean, "wind"), clean.plain
+    scene = plain.scene
+    turned = replace(plain, scene=replace(scene, eta=scene.eta * [1.0, 1.0, -1.0]))
+    blown = [wind.act(one, np.array([-2.0, 1.4])).external - one.external for one in (plain, turned)]
+    pushed = replace(clean, plain=replace(plain, external=plain.external + sum(blown)))
+    made = fit(pushed, [wind])
+    pushed = pushed.with_noise_of(made)
+    told = evidence(pushed, fit(pushed, [wind]))
+    assert told is not None
+    (proof,) = told.proofs
+    assert proof.improvement.score_low > 0.0
+    late = [value for name, value in proof.placebos.items() if name != HEADING]
+    assert max(late) < 0.1 * proof.improvement.score
+    assert proof.placebos[HEADING] > 0.8 * proof.improvement.score
+    assert not proof.holds
