@@ -33,7 +33,7 @@ from ferryid.diagnose.search import NEAR, ODDS, search, suspects_of
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shared_hull import Together, together
 from ferryid.diagnose.shown import columns_of, regressor_of
-from ferryid.diagnose.testable import advice, powers, testable, unexcited
+from ferryid.diagnose.testable import advice, powers, tells, unexcited
 from ferryid.diagnose.unknown import impostors, unknown_of
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.effects.picture import Scene
@@ -169,7 +169,7 @@ def _one(
     notes += advice(chances, still)
     if unknown.unsteady:
         findings = [_doubted(one) for one in findings]
-    verdict = _verdict(bool(findings), bool(unknown.findings), testable(chances, still))
+    verdict = _verdict(bool(findings), bool(unknown.findings), tells(chances, still))
     findings += unknown.findings
     before, after = _scores(trial, base, kept, proof)
     return Diagnosis(

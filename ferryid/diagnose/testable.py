@@ -153,7 +153,7 @@ def unexcited(trial: Trial) -> tuple[str, ...]:
     return tuple(found)
 
 
-def testable(every: Sequence[Power], axes: Sequence[str]) -> bool:
+def tells(every: Sequence[Power], axes: Sequence[str]) -> bool:
     """Tell whether a log in which nothing was found can be said to match: more than half of the effects would have shown."""
     return 2 * sum(one.chance >= SEEN for one in every) > len(every) and len(axes) < len(AXES)
 

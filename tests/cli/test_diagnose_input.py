@@ -1,0 +1,69 @@
+"""What ``ferryid diagnose`` says to input that cannot be used, or cannot tell anything."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+
+def refused(run, *parts: str) -> None:
+    """Check for one line that says `parts`, with a remedy, and exit code 2."""
+    assert run.code == 2, run.out + run.err
+    (line,) = run.err.strip().splitlines()
+    assert line.startswith("ferryid: ")
+    assert "Fix:" in line
+    for part in parts:
+        assert part in line, line
+
+
+@pytest.mark.parametrize(
+    ("options", "parts"),
+    [
+        (("--vessel", "revolt"), ("stern_port.speed", "found no topic")),
+        (("--vessel", "milliampere", "--withhold", "current"), ("current cannot be withheld",)),
+        (("--vessel", "milliampere", "--withhold", "wimd"), ('Did you mean "wind"',)),
+        (("--vessel", "milliampere", "--against", "absent.mcap"), ("absent.mcap", "no such file")),
+    ],
+)
+def test_what_does_not_belong_together(
+    ferryid, fixtures: Path, tmp_path: Path, options: tuple[str, ...], parts: tuple[str, ...]
+) -> None:
+    refused(ferryid("diagnose", fixtures / "short.mcap", "--out", tmp_path, *options), *parts)
+    assert not (tmp_path / "reports").exists()
+
+
+def test_a_simulation_too_short_to_learn_from(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    log = fixtures / "short.mcap"
+    run = ferryid("diagnose", log, "--vessel", "milliampere", "--against", log, "--out", tmp_path)
+    refused(run, "--against", "simulate and record the whole trial")
+
+
+def test_one_bad_log_among_two_is_named(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    empty = tmp_path / "empty.mcap"
+    empty.write_bytes(b"")
+    run = ferryid("diagnose", fixtures / "short.mcap", empty, "--vessel", "milliampere", "--out", tmp_path / "out")
+    refused(run, "empty.mcap")
+    assert not (tmp_path / "out" / "reports").exists()
+
+
+def test_a_log_of_two_minutes_cannot_tell(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    run = ferryid("diagnose", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path, "--json", "-")
+    assert run.code == 0
+    told = json.loads(run.out)
+    assert told["verdict"] == "not_testable"
+    assert told["findings"] == []
+    assert any("Record at least ten minutes" in note for note in told["notes"])
+
+
+def test_thrust_of_the_wrong_sign_is_told_by_the_profile(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    from ferryid.vessel import load_profile
+
+    text = load_profile("milliampere").text
+    old = "coefficients = [2.39675290e-2,"
+    assert old in text
+    profile = tmp_path / "boat.toml"
+    profile.write_text(text.replace(old, "coefficients = [-2.39675290e-2,"), encoding="utf-8")
+    run = ferryid("diagnose", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")
+    refused(run, "boat.toml")
