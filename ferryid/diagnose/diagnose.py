@@ -282,7 +282,9 @@ def _findings(
                 rival.effect for rival in rivals if rival.delta_score > -NEAR and rival.effect != suspect.effect.id
             )
         )
-        place = locate(trial, without, kept, scene)
+        # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
+        bare = replace(kept, suspects=tuple(rest), values=tuple(kept.values[j] for j in others))
+        place = locate(trial, bare, kept, scene)
         estimates = _estimates(trial, suspect, kept, i)
         if not estimates:
             # Every one of its parameters may be too near the neutral value to be worth a name: the hull's, for one.
@@ -309,7 +311,7 @@ def _findings(
                 separating_manoeuvre=manoeuvre(suspect.effect.id, unresolved),
                 says=suspect.effect.says(values, suspect.instance),
                 **columns_of(
-                    trial, place, regressor_of(suspect, imagined(trial.plain, without), kept.values[i], place)
+                    trial, place, regressor_of(suspect, imagined(trial.plain, bare), kept.values[i], place)
                 ),
             )
         )

@@ -107,15 +107,10 @@ def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
 
 def _lawful(law: Law, kept: Fit, scene: Scene) -> Finding:
     trial = law.trial
-    before = fit(trial, kept.suspects, kept.values)
+    # The hull stays as it is with the law: refitted without, it would bend to it on axes where it does not act.
+    before = replace(law.fit, suspects=law.fit.suspects[:-1], values=law.fit.values[:-1])
     place = locate(trial, before, law.fit, scene)
     picture = imagined(trial.plain, before)
-    # Without the law the hull bends to it on all axes; its own force tells where it acts.
-    force = np.zeros((len(trial.windows.scene.t), 3))
-    for term, value in zip(law.terms, law.fit.values[-1].tolist(), strict=True):
-        force += value * term.force(picture)
-    own = np.mean(trial.windows.mean(force) ** 2, axis=0) / np.mean(place.after**2, axis=0)
-    place = replace(place, shares=own / own.sum())
     terms = [
         _told(term, picture, trial, float(value), float(error))
         for term, value, error in zip(law.terms, law.fit.values[-1], law.fit.errors(len(kept.suspects)), strict=True)
@@ -232,7 +227,7 @@ def _unsteady(trial: Trial, left: Location) -> Finding:
         separating_manoeuvre=None,
         says=f"Something unsteady moves the vessel, most in {axis}{fast}{when}{where}; no law of its motion explains it.",
         band_hz=band,
-        **columns_of(trial, replace(left, after=np.zeros_like(left.after)), None, alone=True),
+        **columns_of(trial, left, None, alone=True),
     )
 
 

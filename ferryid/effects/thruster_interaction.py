@@ -56,18 +56,13 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
 
 
 def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
-    """Return the angle between a wake and the direction to another thruster: the least of all pairs."""
-    actuators = picture.scene.profile.actuators
-    least = np.full(len(picture.scene.t), 180.0)
-    for i, hit in enumerate(actuators):
-        for j, source in enumerate(actuators):
-            dx, dy = hit.position_m[0] - source.position_m[0], hit.position_m[1] - source.position_m[1]
-            push = picture.parts[:, j]
-            size = np.hypot(push[:, 0], push[:, 1])
-            if i != j and hypot(dx, dy) > 0.0:
-                towards = -(push[:, 0] * dx + push[:, 1] * dy) / (np.maximum(size, 1e-9) * hypot(dx, dy))
-                least = np.minimum(least, np.degrees(np.arccos(np.clip(towards, -1.0, 1.0))))
-    return "angle between a wake and the other thruster [deg]", least
+    """Return the force of a thruster by how much of a full wake it lies in: the angle alone leaves its direction open."""
+    j = ("surge", "sway", "yaw").index(axis)
+    lost = picture.parts.sum(axis=1) - apply(picture, np.array([1.0]), instance).parts.sum(axis=1)
+    return (
+        f"{axis} {'moment' if axis == 'yaw' else 'force'} of the thruster in the wake [{'N·m' if axis == 'yaw' else 'N'}]",
+        lost[:, j],
+    )
 
 
 EFFECT = Effect(

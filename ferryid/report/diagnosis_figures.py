@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from scipy.special import stdtrit
 
 from ferryid.diagnose.result import AXES, Diagnosis, Finding
@@ -30,6 +31,9 @@ from ferryid.report.structure import envelope
 PROFILES = 4
 """Profiles that are drawn, the most telling ones; all are in the JSON."""
 OUTER = 0.01
+OFTEN = 0.1
+VISITS = 3
+"""Visits to a bin that an interval of its mean takes."""
 BINS = 10
 """Bins of a profile, of equal width between all but the outermost values."""
 WITHOUT, WITH, FOUND = "without the finding", "with it", "what it adds"
@@ -72,14 +76,18 @@ def on_regressor(finding: Finding) -> str:
     residual = finding.labels.get("residual", "left over")
     own = "regressor" not in evidence
     x = evidence.get("explained", evidence["t"]) if own else evidence["regressor"]
+    # What has not begun cannot give itself away.
+    since = np.ones(len(x), dtype=bool) if finding.onset_s is None else evidence["t"] >= finding.onset_s
+    x, seen = x[since], {name: values[since] for name, values in evidence.items()}
     with mpl.rc_context(STYLE):
         figure, (ax,) = canvas(1, 3.2)
         for name, colour, label in (("before", BASE, WITHOUT), ("after", NEW, WITH)):
-            ax.plot(x, evidence[name], ".", color=colour, markersize=2.0, alpha=0.25, rasterized=True)
-            _profile(ax, x, evidence[name], colour, label)
-        if "explained" in evidence:
-            places, means, _ = binned(x, evidence["explained"])
+            ax.plot(x, seen[name], ".", color=colour, markersize=2.0, alpha=0.25, rasterized=True)
+            _profile(ax, x, seen[name], colour, label)
+        if "explained" in seen:
+            places, means, _ = binned(x, seen["explained"])
             ax.plot(places, means, color=MEASURED, linewidth=1.5, label=FOUND)
+        ax.set_ylim(*_reach(x, seen))
         unit = "".join(residual.partition("[")[1:])
         ax.set_xlabel(f"{FOUND} {unit}" if own else finding.labels.get("regressor", "regressor"))
         ax.set_ylabel(residual)
@@ -124,17 +132,31 @@ def by_regime(diagnosis: Diagnosis, column: str, label: str) -> str:
         return svg_text(figure)
 
 
+def _reach(x: Floats, seen: Mapping[str, Floats]) -> tuple[float, float]:
+    """Return limits within which means, their intervals and most points lie: single points are not what convinces."""
+    ends = [np.quantile(seen[name], [OFTEN, 1.0 - OFTEN]) for name in ("before", "after")]
+    for name in ("before", "after", "explained"):
+        if name in seen:
+            _, means, halves = binned(x, seen[name])
+            known = np.nan_to_num(halves)
+            ends.append(np.array([np.min(means - known), np.max(means + known)]))
+    low, high = float(np.min(ends)), float(np.max(ends))
+    room = 0.1 * max(high - low, 1e-9)
+    return low - room, high + room
+
+
 def binned(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     """Return middle, mean, and half the 95 % interval of the mean of `y` in bins of `x` of equal width.
 
     Neighbouring windows overlap and are no independent evidence: the interval comes from the scatter of the means of the
-    separate visits to a bin, and is NaN where there was but one.
+    separate visits to a bin, and is NaN where there were fewer than `VISITS`.
     """
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
     if not x.size:
         return np.empty(0), np.empty(0), np.empty(0)
-    edges = np.unique(np.linspace(*np.quantile(x, [OUTER, 1.0 - OUTER]), BINS + 1))
+    first, last = np.quantile(x, [OUTER, 1.0 - OUTER]).tolist()
+    edges = np.unique(np.linspace(first, last, BINS + 1))
     index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
     visit = np.cumsum(np.concatenate([[0], np.diff(index) != 0]))
     rows: list[tuple[float, float, float]] = []
@@ -145,7 +167,7 @@ def binned(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         means = np.bincount(which, weights=y[inside]) / counts
         mean, n = float(y[inside].mean()), len(means)
         half = float("nan")
-        if n > 1:
+        if n >= VISITS:
             weight = counts / counts.sum()
             half = float(stdtrit(n - 1, 0.975) * np.sqrt(np.sum(weight**2 * (means - mean) ** 2) * n / (n - 1)))
         rows.append((float(np.median(x[inside])), mean, half))
@@ -178,7 +200,7 @@ def in_regimes(diagnosis: Diagnosis) -> str:
                         ax.stairs(values[:, j] + 1.0, edges, baseline=None, color=colour, linewidth=1.4, label=label)
                 ax.set_yscale("log")
                 ax.set_xlabel(f"{one.name} [{one.unit}]", labelpad=1.0)
-                plain_log(ax, x=False, y=True)
+                _few_labels(ax)
         for j, ax in enumerate(grid[0]):
             ax.set_title(AXES[j], fontsize=10)
         if diagnosis.findings:
@@ -204,10 +226,18 @@ def in_bands(diagnosis: Diagnosis) -> str:
             ax.set_yscale("log")
             ax.set_title(f"{AXES[j]} [{UNITS[j]}]", fontsize=10)
             ax.set_xlabel("frequency [Hz]", labelpad=1.0)
-            plain_log(ax, x=True, y=True)
+            plain_log(ax, x=True, y=False)
+            _few_labels(ax)
         if diagnosis.findings:
             legend_above(figure, grid[0][0], 2)
         return svg_text(figure)
+
+
+def _few_labels(ax: Axes) -> None:
+    """Label a logarithmic axis that may span less than a decade."""
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=5))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_locator(NullLocator())
 
 
 def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:

@@ -142,12 +142,13 @@ def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
     if drawn and diagnosis_figures.compared(finding):
         what = finding.labels.get("regressor", "") if "regressor" in finding.evidence else ""
         against = what.partition(" [")[0] or "what the finding adds"
+        since = "" if finding.onset_s is None else " from its onset on"
         shown.append(
             {
                 "file": f"{file}-evidence",
                 "svg": diagnosis_figures.on_regressor(finding),
-                "caption": f"What is left over, against {against}. Points: windows of the recording; marks: their means with "
-                "95 % intervals. Where the finding holds, orange follows the black line, and blue is flat.",
+                "caption": f"What is left over{since}, against {against}. Points: windows of the recording; marks: their means "
+                "with 95 % intervals. Where the finding holds, orange follows the black line, and blue is flat.",
             }
         )
     if drawn and diagnosis_figures.drawable(finding):
