@@ -24,6 +24,9 @@ from ferryid.vessel.profile import Floats
 
 GROUPS = (0, 0, 1)
 """Channels that share a noise: north and east (or surge and sway), and the turn."""
+STARTS = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5))
+"""Where the search for a channel's noise begins: white error, as a share of all; time constant of the coloured, in steps; and
+disturbance, as a share of the acceleration left over."""
 LONGEST = 500.0
 """Longest time constant, in steps."""
 
@@ -131,8 +134,13 @@ def learn(steps: Windows, gaps: Floats) -> Filter:
         rough = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
         # The second difference of a position has six times the variance of its errors, the first of a velocity's twice.
         error = rough * h**integrals / (2.4 if integrals == 2 else 1.4)
-        start = np.log([0.5 * error, error, 4.0 * h, 0.1 * rough, 10.0 * h])
-        channels[own] = np.exp(_least(cost, start, _bounds(start, h)))
+        # The likelihood has several tops: the same roughness may be of short errors, of long ones or of pushes.
+        found = []
+        for white, error_s, pushed in STARTS:
+            start = np.log([white * error, error, error_s * h, pushed * rough, 10.0 * h])
+            z = _least(cost, start, _bounds(start, h))
+            found.append((cost(z), z))
+        channels[own] = np.exp(min(found, key=lambda one: one[0])[1])
     return Filter(channels)
 
 

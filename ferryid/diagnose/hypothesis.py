@@ -112,27 +112,34 @@ class Trial:
 
     @cached_property
     def by_hull(self) -> Floats:
-        """Derivatives of the prediction errors by each of the hull's coefficients, in their spreads; shape (w, 22)."""
-        base = self.steps.gap(self.plain)
-        columns = []
-        for k, spread in enumerate(self.hull_spread):
-            hull = self.plain.hull.copy()
-            hull[k] += 0.1 * spread
-            columns.append((self.steps.gap(replace(self.plain, hull=hull)) - base) / 0.1)
-        return self.sieve.white(np.stack(columns, axis=-1))
+        """`hull_slopes` of the plain picture."""
+        return self.hull_slopes(self.plain)
+
+    def hull_slopes(self, picture: Picture) -> Floats:
+        """Return derivatives of the prediction errors by the hull's coefficients, in their spreads, shape (w, 22).
+
+        Coefficients that cannot move have none.
+        """
+        base = self.steps.gap(picture)
+        free = np.flatnonzero(self.hull_spread)
+        columns = np.zeros((*base.shape, len(free)))
+        for column, k in enumerate(free):
+            hull = picture.hull.copy()
+            hull[k] += 0.1 * self.hull_spread[k]
+            columns[:, :, column] = (self.steps.gap(replace(picture, hull=hull)) - base) / 0.1
+        every = np.zeros((base.size, len(self.hull_spread)))
+        every[:, free] = self.sieve.white(columns)
+        return every
 
     def white(self, picture: Picture) -> Floats:
         """Return the whitened prediction errors of a picture, flat."""
         return self.sieve.white(self.steps.gap(picture))
 
     def with_noise_of(self, made: Fit) -> Trial:
-        """Return the trial with the noise that a fit leaves."""
+        """Return the trial with the noise that a fit leaves; a filter that has shared disturbances stays as it is."""
         picture = imagined(self.plain, made)
-        return replace(
-            self,
-            noise=noise_of(self.windows.gap(picture), self.windows.runs),
-            filter=learn(self.steps, self.steps.gap(picture)),
-        )
+        own = self.filter if self.filter.processes else learn(self.steps, self.steps.gap(picture))
+        return replace(self, noise=noise_of(self.windows.gap(picture), self.windows.runs), filter=own)
 
     def part(self, windows: Windows) -> Trial:
         """Return the trial of some of its windows, with the same noise."""
@@ -163,6 +170,8 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
     high = (np.array([parameter.high for parameter in every]) - neutral) / size if every else np.empty(0)
     cuts = np.cumsum([len(suspect.parameters) for suspect in suspects])[:-1].tolist()
     q, h = len(every), len(trial.hull_spread)
+    # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
+    bends = any(suspect.effect.bends_hull for suspect in suspects)
 
     def picture_of(z: Floats) -> Picture:
         picture = replace(trial.plain, hull=trial.plain.hull + trial.hull_spread * z[:h])
@@ -181,7 +190,7 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
     A = np.eye(h + q)
     for count in range(max(steps, 1)):
         J = np.empty((len(w), h + q))
-        J[:, :h] = trial.by_hull
+        J[:, :h] = trial.by_hull if count == 0 or not bends else trial.hull_slopes(picture_of(z))
         for k in range(q):
             moved = z.copy()
             d = 1e-2 if z[h + k] + 1e-2 <= high[k] else -1e-2

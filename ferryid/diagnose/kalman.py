@@ -1,7 +1,7 @@
 """A Kalman filter of what a hypothesis leaves of the motion: its whitened prediction errors, compiled.
 
-The states of each channel are what disturbances have made of the position and the velocity, the error of the measurement, and
-a disturbance of the channel's own; then come shared disturbances, each a block of states whose last one pushes on all channels.
+The states of each channel are what disturbances have made of the position and the velocity, the error of the measurement with
+its rate, and a disturbance of the channel's own; then come shared disturbances, whose states push on all channels.
 Gains depend on the noise alone and are computed once; every column of a linear problem then passes through the same filter.
 """
 
@@ -12,12 +12,66 @@ import numpy as np
 from ferryid.compiled import compiled
 from ferryid.vessel.profile import Floats
 
-OWN = 4
-"""States of a channel: position, velocity, measurement error, disturbance."""
+OWN = 5
+"""States of a channel: position, velocity, measurement error, its rate, disturbance."""
 SETTLED = 1e-9
 """Change of gains, as a share of the largest, below which they stay as they are."""
 DIFFUSE = 2
 """Steps after which position and velocity are known."""
+
+
+@compiled
+def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, step_s: float) -> None:
+    """Move states, shape (S, q), on by a step, in place.
+
+    Parameters
+    ----------
+    x
+        States of all channels, then the shared ones.
+    keep
+        Of each channel: what moves the error and its rate on, row by row, and what is kept of the disturbance, shape (c, 5).
+    blocks
+        Transition of the shared states, shape (s, s).
+    columns
+        Acceleration of every channel by each of these, shape (c, s).
+    step_s
+        Step [s].
+    """
+    c, s = columns.shape
+    h = step_s
+    shared = np.empty(s)
+    for m in range(x.shape[1]):
+        for b in range(s):
+            shared[b] = x[OWN * c + b, m]
+        for j in range(c):
+            i = OWN * j
+            push = x[i + 4, m]
+            for b in range(s):
+                push += columns[j, b] * shared[b]
+            x[i, m] += h * x[i + 1, m] + 0.5 * h * h * push
+            x[i + 1, m] += h * push
+            wrong, rate = x[i + 2, m], x[i + 3, m]
+            x[i + 2, m] = keep[j, 0] * wrong + keep[j, 1] * rate
+            x[i + 3, m] = keep[j, 2] * wrong + keep[j, 3] * rate
+            x[i + 4, m] *= keep[j, 4]
+        for i in range(s):
+            total = 0.0
+            for b in range(s):
+                total += blocks[i, b] * shared[b]
+            x[OWN * c + i, m] = total
+
+
+@compiled
+def kept(noise: Floats, step_s: float) -> Floats:
+    """Return what each channel keeps over a step; see `advance`. The error is critically damped, as a filter's is."""
+    keep = np.empty((noise.shape[0], 5))
+    for j in range(noise.shape[0]):
+        x = step_s / noise[j, 2]
+        fade = np.exp(-x)
+        keep[j, 0], keep[j, 1] = fade * (1.0 + x), fade * step_s
+        keep[j, 2], keep[j, 3] = -fade * x / noise[j, 2], fade * (1.0 - x)
+        keep[j, 4] = np.exp(-step_s / noise[j, 4])
+    return keep
 
 
 @compiled
@@ -47,50 +101,49 @@ def gains(
     Returns
     -------
     ndarray
-        Gains, shape (n, c, S), S = 4 c + s.
+        Gains, shape (n, c, S), S = 5 c + s.
     ndarray
         Standard deviation of every prediction, shape (n, c).
     """
     n, c, s = columns.shape
     S = OWN * c + s
-    F, Q, P = np.zeros((S, S)), np.zeros((S, S)), np.zeros((S, S))
     h = step_s
     known = 0 if integrals == 2 else 1
+    keep = kept(noise, h)
+    P, Q = np.zeros((S, S)), np.zeros((S, S))
     for j in range(c):
         i = OWN * j
-        coloured, coloured_s, pushed, pushed_s = noise[j, 1], noise[j, 2], noise[j, 3], noise[j, 4]
-        F[i, i], F[i, i + 1], F[i, i + 3] = 1.0, h, 0.5 * h * h
-        F[i + 1, i + 1], F[i + 1, i + 3] = 1.0, h
-        erring, pushing = np.exp(-h / coloured_s), np.exp(-h / pushed_s)
-        F[i + 2, i + 2], F[i + 3, i + 3] = erring, pushing
-        P[i + 2, i + 2], P[i + 3, i + 3] = coloured * coloured, pushed * pushed
-        Q[i + 2, i + 2] = (1.0 - erring * erring) * coloured * coloured
-        Q[i + 3, i + 3] = (1.0 - pushing * pushing) * pushed * pushed
-        vague = 1e3 * scale[j]
-        P[i + known, i + known] = vague * vague
+        vague = (1e3 * scale[j]) ** 2
+        P[i + known, i + known] = vague
         if integrals == 2:
-            P[i + 1, i + 1] = vague * vague / (h * h)
-    F[OWN * c :, OWN * c :] = blocks
-    Q[OWN * c :, OWN * c :] = drive[0]
+            P[i + 1, i + 1] = vague / (h * h)
+        wrong, rate = noise[j, 1] ** 2, (noise[j, 1] / noise[j, 2]) ** 2
+        pushed = noise[j, 3] ** 2
+        P[i + 2, i + 2], P[i + 3, i + 3], P[i + 4, i + 4] = wrong, rate, pushed
+        a, b, d, e, f = keep[j]
+        Q[i + 2, i + 2] = wrong - a * a * wrong - b * b * rate
+        Q[i + 3, i + 3] = rate - d * d * wrong - e * e * rate
+        Q[i + 2, i + 3] = Q[i + 3, i + 2] = -a * d * wrong - b * e * rate
+        Q[i + 4, i + 4] = (1.0 - f * f) * pushed
     P[OWN * c :, OWN * c :] = drive[1]
+    Q[OWN * c :, OWN * c :] = drive[0]
     K, spread = np.zeros((n, c, S)), np.empty((n, c))
     for k in range(n):
         for j in range(c):
-            i = OWN * j
-            at, wrong = i + known, i + 2
-            variance = P[at, at] + 2.0 * P[at, wrong] + P[wrong, wrong] + noise[j, 0] * noise[j, 0]
+            at, wrong_ = OWN * j + known, OWN * j + 2
+            variance = P[at, at] + 2.0 * P[at, wrong_] + P[wrong_, wrong_] + noise[j, 0] * noise[j, 0]
             spread[k, j] = np.sqrt(variance)
-            for a in range(S):
-                K[k, j, a] = (P[a, at] + P[a, wrong]) / variance
-            for a in range(S):
-                for b in range(a, S):
-                    P[a, b] -= K[k, j, a] * K[k, j, b] * variance
-                    P[b, a] = P[a, b]
-        for j in range(c):
-            for b in range(s):
-                F[OWN * j, OWN * c + b] = 0.5 * h * h * columns[k, j, b]
-                F[OWN * j + 1, OWN * c + b] = h * columns[k, j, b]
-        P = F @ P @ F.T + Q
+            for i in range(S):
+                K[k, j, i] = (P[i, at] + P[i, wrong_]) / variance
+            for i in range(S):
+                for m in range(S):
+                    P[i, m] -= K[k, j, i] * K[k, j, m] * variance
+        advance(P, keep, blocks, columns[k], h)
+        advance(P.T, keep, blocks, columns[k], h)
+        P += Q
+        for i in range(S):
+            for m in range(i):
+                P[i, m] = P[m, i] = 0.5 * (P[i, m] + P[m, i])
         if s == 0 and k > 0 and np.abs(K[k] - K[k - 1]).max() < SETTLED * np.abs(K[k]).max():
             for rest in range(k + 1, n):
                 K[rest], spread[rest] = K[k], spread[k]
@@ -126,12 +179,10 @@ def errors(
         Shape (n, c, q).
     """
     n, c, q = series.shape
-    s = blocks.shape[0]
-    S = OWN * c + s
-    h = step_s
+    S = OWN * c + blocks.shape[0]
     known = 0 if integrals == 2 else 1
-    keep = np.exp(-h / noise)
-    x, shared = np.zeros((S, q)), np.zeros(s)
+    keep = kept(noise, step_s)
+    x = np.zeros((S, q))
     out = np.empty((n, c, q))
     for k in range(n):
         for j in range(c):
@@ -141,21 +192,5 @@ def errors(
                 out[k, j, m] = error / spread[k, j]
                 for i in range(S):
                     x[i, m] += K[k, j, i] * error
-        for m in range(q):
-            for i in range(s):
-                shared[i] = x[OWN * c + i, m]
-            for j in range(c):
-                i = OWN * j
-                push = x[i + 3, m]
-                for b in range(s):
-                    push += columns[k, j, b] * shared[b]
-                x[i, m] += h * x[i + 1, m] + 0.5 * h * h * push
-                x[i + 1, m] += h * push
-                x[i + 2, m] *= keep[j, 2]
-                x[i + 3, m] *= keep[j, 4]
-            for i in range(s):
-                total = 0.0
-                for b in range(s):
-                    total += blocks[i, b] * shared[b]
-                x[OWN * c + i, m] = total
+        advance(x, keep, blocks, columns[k], step_s)
     return out

@@ -9,6 +9,7 @@ from math import exp, log
 import numpy as np
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, settled
+from ferryid.diagnose.unsteady import State, disturbed
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
@@ -17,6 +18,8 @@ ODDS = 8.0
 """Logarithm of the evidence that an effect must show over none before it is as likely as none."""
 NEAR = 3.0
 """Rivals whose evidence is less than this behind are not told apart."""
+REJUDGED = 5
+"""Candidates whose evidence is weighed under the noise that each leaves itself."""
 MOST = 4
 """Effects looked for at once."""
 ONSETS = 12
@@ -57,6 +60,8 @@ class Search:
         One per selected effect, and the last, in which none was good enough.
     untested
         Effect (and instance) to why it could not be tested.
+    states
+        Disturbances that came and went by chance.
     """
 
     trial: Trial
@@ -64,6 +69,7 @@ class Search:
     fit: Fit
     rounds: tuple[Round, ...]
     untested: dict[str, str]
+    states: tuple[State, ...] = ()
 
 
 def suspects_of(scene: Scene) -> tuple[list[Suspect], dict[str, str]]:
@@ -94,25 +100,54 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
     suspects, untested = suspects_of(trial.plain.scene)
     if known is not None:
         suspects = list(known)
-    chosen = base = fit(trial, ())
-    rounds: list[Round] = []
+    steady = [suspect for suspect in suspects if suspect.effect.unsteady is None]
+    shaken = [suspect for suspect in suspects if suspect.effect.unsteady is not None]
+    base = fit(trial, ())
+    trial, chosen, rounds = _selected(trial, base, steady, progress)
+    chosen = _pruned(trial, chosen)
+    states: tuple[State, ...] = ()
+    if shaken:
+        progress("looking for gusts and waves")
+        trial, states = disturbed(trial, chosen, shaken)
+    if states:
+        # What stood in for them falls, and what they hid may show.
+        chosen = _pruned(trial, fit(trial, chosen.suspects, chosen.values))
+        trial, chosen, more = _selected(trial, chosen, steady, progress)
+        rounds += more
+        trial, states = disturbed(trial, chosen, shaken)
+        chosen = _pruned(trial, fit(trial, chosen.suspects, chosen.values))
+    return Search(trial, fit(trial, ()), chosen, tuple(rounds), untested, states)
+
+
+def rejudged(trial: Trial, made: Fit) -> Fit:
+    """Return a fit with the evidence that it has under the noise that it leaves itself: with that two are fairly compared."""
+    return fit(trial.with_noise_of(made), made.suspects, made.values)
+
+
+def _selected(
+    trial: Trial, chosen: Fit, suspects: Sequence[Suspect], progress: Callable[[str], None]
+) -> tuple[Trial, Fit, list[Round]]:
+    """Select effects one after the other beside those chosen already."""
+    rounds = []
     while True:
-        progress(f"weighing {len(suspects)} hypotheses beside {len(chosen.suspects) or 'none'} found")
+        taken = {suspect.key for suspect in chosen.suspects}
+        left = [suspect for suspect in suspects if suspect.key not in taken]
+        progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
         current = fit(trial, chosen.suspects, chosen.values)
-        tried = [_best(trial, current, suspect) for suspect in suspects]
-        found = sorted(tried, key=lambda candidate: -candidate.gain)
+        found = sorted((_best(trial, current, suspect) for suspect in left), key=lambda one: -one.gain)
+        fair = [_fairly(trial, current, one) for one in found[:REJUDGED]]
+        found = sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
         done = _round(found)
         rounds.append(done)
-        taken = {suspect.key for suspect in chosen.suspects}
-        good = [one for one in found[:1] if done.none < 0.5 and one.suspect.key not in taken]
-        if not good or len(chosen.suspects) == MOST or _void(trial, good[0].fit):
-            break
-        chosen = good[0].fit
-        trial = trial.with_noise_of(chosen)
-        chosen = fit(trial, chosen.suspects, chosen.values)
-        suspects = [suspect for suspect in suspects if suspect.key != good[0].suspect.key]
-    chosen = _pruned(trial, chosen)
-    return Search(trial, fit(trial, ()) if chosen.suspects else base, chosen, tuple(rounds), untested)
+        if not found or done.none >= 0.5 or len(taken) == MOST or _void(trial, found[0].fit):
+            return trial, chosen, rounds
+        trial = trial.with_noise_of(found[0].fit)
+        chosen = fit(trial, found[0].fit.suspects, found[0].fit.values)
+
+
+def _fairly(trial: Trial, current: Fit, one: Candidate) -> Candidate:
+    made = rejudged(trial, one.fit)
+    return replace(one, fit=made, gain=max(one.gain, one.gain + made.evidence - one.fit.evidence))
 
 
 def _best(trial: Trial, current: Fit, suspect: Suspect) -> Candidate:
@@ -167,13 +202,13 @@ def _void(trial: Trial, made: Fit) -> bool:
 
 def _pruned(trial: Trial, chosen: Fit) -> Fit:
     """Drop one by one what the others explain as well without it."""
-    while len(chosen.suspects) > 1:
+    while chosen.suspects:
         without = []
         for i in range(len(chosen.suspects)):
             rest = [j for j in range(len(chosen.suspects)) if j != i]
             start = [chosen.values[j] for j in rest]
             without.append(fit(trial, [chosen.suspects[j] for j in rest], start))
-        best = max(without, key=lambda one: one.evidence)
+        best = max((rejudged(trial, one) for one in without), key=lambda one: one.evidence)
         if chosen.evidence - best.evidence >= ODDS:
             break
         chosen = best

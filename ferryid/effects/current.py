@@ -46,4 +46,6 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
     return "heading [deg]", np.asarray(np.degrees(picture.scene.psi) % 360.0)
 
 
-EFFECT = Effect("current", "Current", parameters_of, apply, says, scenario, cannot=cannot, regressor=regressor)
+EFFECT = Effect(
+    "current", "Current", parameters_of, apply, says, scenario, cannot=cannot, regressor=regressor, bends_hull=True
+)

@@ -92,6 +92,8 @@ class Effect:
         picture's hull is the fitted one, `believed` its coefficients as believed before the log, shape (22,).
     least
         How far the interval of a parameter has to stay from its neutral value for the parameter to be worth a report.
+    bends_hull
+        True where the effect changes how the hull's coefficients act: masses, damping, the flow.
     unsteady
         ``unsteady(picture, p)`` returns what comes and goes by chance, from positive parameters; none where the picture has
         nothing for it to act on. Such an effect changes no picture: it is a state of the filter.
@@ -112,5 +114,6 @@ class Effect:
     vessel: bool = False
     choose: Callable[[Picture, Floats, Residual], Choice] | None = None
     least: float = 0.0
+    bends_hull: bool = False
     unsteady: Callable[[Picture, Floats], tuple[Process, ...]] | None = None
     regressor: Callable[[Picture, Floats, str | None, str], tuple[str, Floats]] | None = None

@@ -56,5 +56,14 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
 
 
 EFFECT = Effect(
-    "fouling", "Fouling", parameters_of, apply, says, scenario, cannot=cannot, vessel=True, regressor=regressor
+    "fouling",
+    "Fouling",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    cannot=cannot,
+    vessel=True,
+    regressor=regressor,
+    bends_hull=True,
 )

@@ -140,4 +140,5 @@ EFFECT = Effect(
     vessel=True,
     choose=choose,
     least=TELLING,
+    bends_hull=True,
 )

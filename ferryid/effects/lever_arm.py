@@ -67,5 +67,13 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
 
 
 EFFECT = Effect(
-    "lever_arm", "Antenna off the body origin", parameters_of, apply, says, scenario, vessel=True, regressor=regressor
+    "lever_arm",
+    "Antenna off the body origin",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    vessel=True,
+    regressor=regressor,
+    bends_hull=True,
 )

@@ -56,5 +56,14 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
 
 
 EFFECT = Effect(
-    "payload", "Payload", parameters_of, apply, says, scenario, cannot=cannot, onset=True, regressor=regressor
+    "payload",
+    "Payload",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    cannot=cannot,
+    onset=True,
+    regressor=regressor,
+    bends_hull=True,
 )

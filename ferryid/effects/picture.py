@@ -110,6 +110,9 @@ class Picture:
         Mass aboard and its first and second moment about the body origin [kg, kg·m, kg·m²], shape (n, 3), or None.
     damping_factor
         Factor on all damping, shape (n,), or None.
+    air
+        Where an air flow goes to that is imagined and not measured, north and east [m/s], shape (2,), or None; its load is
+        among the external forces.
     """
 
     scene: Scene
@@ -120,6 +123,7 @@ class Picture:
     flow: Floats | None = None
     load: Floats | None = None
     damping_factor: Floats | None = None
+    air: Floats | None = None
 
 
 def damping_regressors(nu: Floats) -> tuple[Floats, Floats, Floats]:

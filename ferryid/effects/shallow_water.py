@@ -142,4 +142,14 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"shallow": {**sides, "damping_factor": values["factor"], "edge_m": EDGE_M}}}
 
 
-EFFECT = Effect("shallow_water", "Shallow water", parameters_of, apply, says, scenario, cannot=cannot, choose=choose)
+EFFECT = Effect(
+    "shallow_water",
+    "Shallow water",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    cannot=cannot,
+    choose=choose,
+    bends_hull=True,
+)

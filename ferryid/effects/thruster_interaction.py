@@ -11,6 +11,7 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.thrusters import thrust
 
 SHARPNESS = 16
 """Power of the cosine of the angle beside the wake: half of the loss is left at 17 degrees."""
@@ -26,7 +27,6 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     actuators = picture.scene.profile.actuators
     parts = picture.parts.copy()
     size = np.hypot(picture.parts[:, :, 0], picture.parts[:, :, 1])
-    full = np.maximum(size.max(axis=0), 1e-9)
     for i, hit in enumerate(actuators):
         for j, source in enumerate(actuators):
             dx, dy = hit.position_m[0] - source.position_m[0], hit.position_m[1] - source.position_m[1]
@@ -35,9 +35,23 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
                 continue
             push = picture.parts[:, j]
             towards = -(push[:, 0] * dx + push[:, 1] * dy) / (np.maximum(size[:, j], 1e-9) * apart)
-            loss = np.maximum(towards, 0.0) ** SHARPNESS * np.sqrt(size[:, j] / full[j])
+            share = np.minimum(size[:, j] / _full(picture, j, size[:, j]), 1.0)
+            loss = np.maximum(towards, 0.0) ** SHARPNESS * np.sqrt(share)
             parts[:, i] *= (1.0 - p[0] * loss)[:, None]
     return replace(picture, parts=parts)
+
+
+def _full(picture: Picture, j: int, size: Floats) -> Floats:
+    """Return the most that a thruster can push, ahead or astern as it does [N], shape (n,); the log's most without a curve."""
+    actuator = picture.scene.profile.actuators[j]
+    most = np.full(len(size), max(float(size.max()), 1e-9))
+    if actuator.thrust is None or actuator.thrust.kind == "open_water":
+        return most
+    angle = picture.angles[:, j] if actuator.kind == "azimuth" else np.full(len(size), actuator.angle_rad)
+    along = picture.parts[:, j, 0] * np.cos(angle) + picture.parts[:, j, 1] * np.sin(angle)
+    factor = 60.0 if actuator.thrust.input_unit == "rps" else 1.0
+    astern, ahead = thrust(actuator.thrust, factor * np.array(actuator.thrust.valid))[0] * actuator.count
+    return np.asarray(np.maximum(np.abs(np.where(along < 0.0, astern, ahead)), 1e-9))
 
 
 def cannot(scene: Scene) -> str:

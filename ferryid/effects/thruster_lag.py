@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from math import exp
 from typing import Any
 
@@ -23,27 +24,28 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     """Let the strength of each thruster lag; its direction is as measured."""
     if p[0] < 1e-3:
         return picture
-    keep = exp(-picture.scene.step_s / float(p[0]))
+    late = partial(_late, time_constant_s=float(p[0]), step_s=picture.scene.step_s)
     parts = picture.parts.copy()
     for k in range(parts.shape[1]):
         angle = picture.angles[:, k]
         if np.isfinite(angle).all():
             c, s = np.cos(angle), np.sin(angle)
             along = parts[:, k, 0] * c + parts[:, k, 1] * s
-            late = _late(along, keep)
+            felt = late(along)
             x, y = picture.scene.profile.actuators[k].position_m
-            parts[:, k, 0], parts[:, k, 1] = late * c, late * s
+            parts[:, k, 0], parts[:, k, 1] = felt * c, felt * s
             parts[:, k, 2] = x * parts[:, k, 1] - y * parts[:, k, 0]
         else:
-            parts[:, k] = _late(parts[:, k], keep)
+            parts[:, k] = late(parts[:, k])
     return replace(picture, parts=parts)
 
 
-def _late(values: Floats, keep: float) -> Floats:
-    # The input is linear between rows, as a sampled force is, not held.
-    mean = 0.5 * (values[1:] + values[:-1])
-    fed = np.concatenate([values[:1], mean])
-    late, _ = lfilter([1.0 - keep], [1.0, -keep], fed, axis=0, zi=keep * values[:1])
+def _late(values: Floats, time_constant_s: float, step_s: float) -> Floats:
+    """Return the answer to values that are linear between rows, shape (n, ...): exact, so that no lag is no delay either."""
+    x = step_s / time_constant_s
+    keep = exp(-x)
+    new, old = 1.0 - (1.0 - keep) / x, (1.0 - keep) / x - keep
+    late, _ = lfilter([new, old], [1.0, -keep], values, axis=0, zi=(1.0 - new) * values[:1])
     return np.asarray(late)
 
 

@@ -26,7 +26,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
         return picture
     air = np.broadcast_to(p, (len(scene.t), 2))
     more = wind_force(areas, air, scene.psi, scene.nu) - wind_force(areas, np.zeros_like(air), scene.psi, scene.nu)
-    return replace(picture, external=picture.external + more)
+    return replace(picture, external=picture.external + more, air=np.asarray(p, dtype=np.float64))
 
 
 def cannot(scene: Scene) -> str:

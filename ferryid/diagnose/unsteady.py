@@ -1,0 +1,103 @@
+"""Disturbances that nobody measured and that come and go by chance: gusts and waves, as states of the filter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+
+from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
+from ferryid.effects.effect import Process
+from ferryid.effects.picture import Picture
+from ferryid.vessel.profile import Floats
+
+WORTH = 8.0
+"""Logarithm of the evidence that a disturbance must show before its states are as likely as none."""
+PROMISING = 2.0
+"""The same at the best of a few parameters, from which on it is worth a search."""
+STRENGTHS, BANDS = (0.03, 0.1, 0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
+"""What these few are, as shares of the usual ones."""
+VAGUE = 0.5
+"""A disturbance whose parameters are known no better than within this factor (as a logarithm) was not seen."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A disturbance with its parameters, the standard deviations of their logarithms, and the evidence for it."""
+
+    suspect: Suspect
+    values: Floats
+    widths: Floats
+    gain: float
+
+
+def disturbed(trial: Trial, made: Fit, suspects: Sequence[Suspect]) -> tuple[Trial, tuple[State, ...]]:
+    """Return the trial with the disturbances in its filter that what a fit leaves speaks for, and these.
+
+    Each is weighed by its likelihood, at its most likely parameters and noise, less Schwarz's penalty for its parameters.
+
+    Parameters
+    ----------
+    trial
+        Its filter is learnt anew.
+    made
+        What has been found.
+    suspects
+        Disturbances that the scene can show.
+    """
+    picture = imagined(trial.plain, made)
+    gaps = trial.steps.gap(picture)
+    noise = learn(trial.steps, gaps)
+    best = likelihood(noise, trial.steps, gaps)
+    states: list[State] = []
+    left = list(suspects)
+    while left:
+        tried = []
+        for suspect in left:
+            effect = suspect.effect
+            if effect.unsteady is None or not effect.unsteady(picture, _sizes(suspect)):
+                continue
+
+            def processes(p: Floats, suspect: Suspect = suspect) -> tuple[Process, ...]:
+                assert suspect.effect.unsteady is not None
+                return suspect.effect.unsteady(picture, p)
+
+            begin, first = max(
+                ((one, _glance(trial, gaps, noise, processes(one), picture)) for one in _starts(suspect)),
+                key=lambda one: one[1],
+            )
+            if first < best + PROMISING:
+                continue
+            told, values, widths, after = learn_with(trial.steps, gaps, noise, processes, begin, picture)
+            gain = after - best - 0.5 * len(values) * log(len(trial.steps.starts))
+            if (widths < VAGUE).all():
+                tried.append((gain, told, State(suspect, values, widths, gain), after))
+        if not tried:
+            break
+        gain, told, state, after = max(tried, key=lambda one: one[0])
+        if gain < WORTH:
+            break
+        noise, best = told, after
+        states.append(state)
+        left.remove(state.suspect)
+    return replace(trial.with_noise_of(made), filter=noise), tuple(states)
+
+
+def _glance(trial: Trial, gaps: Floats, noise: Filter, processes: tuple[Process, ...], picture: Picture) -> float:
+    return likelihood(Filter(noise.channels, (*noise.processes, *processes), picture), trial.steps, gaps)
+
+
+def _starts(suspect: Suspect) -> list[Floats]:
+    """Return parameters to begin with: strengths, and frequencies where there is one, about the usual ones."""
+    usual = _sizes(suspect)
+    strength = np.array([parameter.name.endswith("std") for parameter in suspect.parameters])
+    band = np.array([parameter.unit == "Hz" for parameter in suspect.parameters])
+    bands = BANDS if band.any() else (1.0,)
+    return [usual * np.where(strength, a, np.where(band, b, 1.0)) for a in STRENGTHS for b in bands]
+
+
+def _sizes(suspect: Suspect) -> Floats:
+    return np.array([parameter.size for parameter in suspect.parameters])

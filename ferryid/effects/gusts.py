@@ -1,0 +1,62 @@
+"""Gusts: a wind that was found blows now more and now less, on both components alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Process, Values
+from ferryid.effects.picture import Picture, Scene
+from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.wind import wind_force
+
+STEP = 0.1
+"""Change of the wind by which its load is differentiated [m/s]."""
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return strength and memory."""
+    return (Parameter("std", "m/s", 1.0, 0.0, 15.0), Parameter("time_constant", "s", 8.0, 0.1, 300.0))
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Change nothing: on average gusts are no wind."""
+    return picture
+
+
+def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:
+    """Return the load of a gust to the north and to the east; none in still air, whose load is of second order."""
+    scene, areas = picture.scene, picture.scene.profile.wind
+    if areas is None or picture.air is None:
+        return ()
+    loads = []
+    for towards in np.eye(2):
+        ends = [
+            wind_force(
+                areas, np.broadcast_to(picture.air + side * STEP * towards, (len(scene.t), 2)), scene.psi, scene.nu
+            )
+            for side in (1.0, -1.0)
+        ]
+        loads.append((ends[0] - ends[1]) / (2.0 * STEP))
+    return tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
+
+
+def cannot(scene: Scene) -> str:
+    """Say why the scene cannot show gusts."""
+    if scene.wind is not None:
+        return "the wind was measured, gusts included"
+    return "the profile has no wind areas" if scene.profile.wind is None else ""
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    return f"The wind was gusty: {values['std']:.1f} m/s about its mean, a gust lasting some {values['time_constant']:.0f} s."
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's gusts."""
+    return {"environment": {"wind": {"gust_std_mps": values["std"], "gust_time_s": values["time_constant"]}}}
+
+
+EFFECT = Effect("gusts", "Gusts", parameters_of, apply, says, scenario, cannot=cannot, unsteady=unsteady)

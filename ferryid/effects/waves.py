@@ -1,0 +1,78 @@
+"""Waves: forces in a narrow band of frequencies, along, across and about the vessel, that nothing measured explains.
+
+A narrow-band Gauss-Markov process on each axis stands for the shaping filter ``K s / (s² + 2 lambda omega_0 s + omega_0²)`` of
+Fossen (2021), section 10.2, driven by white noise.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.effect import Effect, Parameter, Process, Values
+from ferryid.effects.picture import Picture
+from ferryid.vessel.profile import Floats, Profile
+
+USUAL_HZ = 0.35
+"""Usual frequency of the waves that a vessel of `USUAL_M` feels most; longer ones feel longer waves."""
+USUAL_M = 5.0
+
+
+def _length(profile: Profile) -> float:
+    hull = profile.hull
+    return hull.length_m if np.isfinite(hull.length_m) else 4.0 * sqrt(hull.inertia_z / hull.mass_kg)
+
+
+def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
+    """Return frequency, strength on surge and sway, strength in yaw, and memory."""
+    length = _length(profile)
+    frequency = USUAL_HZ * sqrt(USUAL_M / length)
+    force = 0.03 * profile.hull.mass_kg
+    return (
+        Parameter("peak_frequency", "Hz", frequency, 0.02, 3.0),
+        Parameter("force_std", "N", force, 0.0, 100.0 * force),
+        Parameter("moment_std", "N·m", 0.2 * force * length, 0.0, 20.0 * force * length),
+        Parameter("time_constant", "s", 2.0 / frequency, 0.1, 300.0),
+    )
+
+
+def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    """Change nothing: what waves push on average is not theirs alone."""
+    return picture
+
+
+def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:
+    """Return a process on each axis."""
+    frequency, force, moment, memory = (float(value) for value in p)
+    made = []
+    for axis, std in enumerate((force, force, moment)):
+        load = np.zeros((len(picture.scene.t), 3))
+        load[:, axis] = 1.0
+        made.append(Process(load, std, memory, frequency))
+    return tuple(made)
+
+
+def says(values: Values, instance: str | None) -> str:
+    """Return the finding as a sentence."""
+    return (
+        f"Waves of {1.0 / values['peak_frequency']:.1f} s pushed the vessel with {values['force_std']:.0f} N and "
+        f"{values['moment_std']:.0f} N·m (standard deviations), which nothing measured explains."
+    )
+
+
+def scenario(values: Values, instance: str | None) -> dict[str, Any]:
+    """Return the scenario's waves; how high they are for a force is the hull's affair, a hand's breadth here."""
+    return {
+        "environment": {
+            "waves": {
+                "significant_height_m": 0.15,
+                "peak_period_s": 1.0 / values["peak_frequency"],
+                "direction_deg": 225.0,
+            }
+        }
+    }
+
+
+EFFECT = Effect("waves", "Waves", parameters_of, apply, says, scenario, unsteady=unsteady)
