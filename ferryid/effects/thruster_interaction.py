@@ -73,10 +73,8 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
     """Return the force of a thruster by how much of a full wake it lies in: the angle alone leaves its direction open."""
     j = ("surge", "sway", "yaw").index(axis)
     lost = picture.parts.sum(axis=1) - apply(picture, np.array([1.0]), instance).parts.sum(axis=1)
-    return (
-        f"{axis} {'moment' if axis == 'yaw' else 'force'} of the thruster in the wake [{'N·m' if axis == 'yaw' else 'N'}]",
-        lost[:, j],
-    )
+    what, unit = ("moment", "N·m") if axis == "yaw" else ("force", "N")
+    return f"{axis} {what} of the thruster in the wake [{unit}]", lost[:, j]
 
 
 EFFECT = Effect(
