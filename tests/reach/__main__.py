@@ -48,7 +48,7 @@ def main() -> int:
             left = (time.perf_counter() - start) / len(lines) * (len(work) - len(lines))
             print(f"\r{len(lines)} of {len(work)} runs, {left / 60.0:.0f} min left ", end="", file=sys.stderr)
     lines.sort(key=lambda line: [line["draw"][key] for key in ("place", "cell", "number")])
-    settings = {"runs": options.runs, "seed": options.seed, "version": of}
+    settings = {"runs": options.runs, "seed": options.seed, "version": of, "only": options.only}
     told = results(lines, every, settings)
     folder = options.out / "diagnosis"
     folder.mkdir(parents=True, exist_ok=True)

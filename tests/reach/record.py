@@ -73,7 +73,10 @@ def run_all(draws: Sequence[Draw], of: str, path: Path, processes: int) -> Itera
     if not left:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
+    # A line that broke off must not swallow the next one.
+    cut = path.exists() and path.read_bytes()[-1:] not in (b"", b"\n")
     with path.open("a", encoding="utf-8") as file:
+        file.write("\n" if cut else "")
         for line in _results(left, processes):
             file.write(json.dumps(line) + "\n")
             file.flush()

@@ -74,6 +74,8 @@ class Score:
         Parameters whose 95 % interval holds the truth.
     onsets_s
         Errors of onsets [s], infinite where none was found.
+    onset_held
+        Onsets whose 95 % interval holds the truth.
     seconds
         Time of each diagnosis.
     """
@@ -88,6 +90,7 @@ class Score:
     half_widths: Sequence[float] = field(default_factory=tuple)
     covered: Share = Share(0, 0)
     onsets_s: Sequence[float] = field(default_factory=tuple)
+    onset_held: Share = Share(0, 0)
     seconds: Sequence[float] = field(default_factory=tuple)
 
     @property
@@ -129,6 +132,7 @@ def score(lines: Iterable[Line]) -> Score:
     widths: list[float] = []
     covered: list[bool] = []
     onsets: list[float] = []
+    onset_held: list[bool] = []
     for line in lines:
         truths = line["draw"]["truths"]
         there = {(truth["effect"], truth["instance"]) for truth in truths}
@@ -151,6 +155,8 @@ def score(lines: Iterable[Line]) -> Score:
             covered += held
             if truth["onset_s"] is not None:
                 onsets.append(abs(told["onset"] - truth["onset_s"]) if told["onset"] is not None else float("inf"))
+                interval = told["parameters"].get("onset")
+                onset_held.append(interval is not None and interval["low"] <= truth["onset_s"] <= interval["high"])
     n = len(lines)
     return Score(
         n,
@@ -163,6 +169,7 @@ def score(lines: Iterable[Line]) -> Score:
         widths,
         Share(sum(covered), len(covered)),
         onsets,
+        Share(sum(onset_held), len(onset_held)),
         [line["seconds"] for line in lines],
     )
 

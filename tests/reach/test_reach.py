@@ -106,7 +106,7 @@ def test_scores_of_runs_worked_by_hand() -> None:
     assert one.errors == pytest.approx([0.1, 0.05])
     assert one.half_widths == pytest.approx([0.35 * 2**0.5 / 5.0, 0.1])
     assert one.covered == Share(2, 3)
-    assert one.onsets_s == [4.0]
+    assert (one.onsets_s, one.onset_held) == ([4.0], Share(0, 1))
     assert [first_name(each) for each in lines] == ["wind", "current", OTHER, "thruster_gain", NONE, NONE]
     rows, columns, counts = confusion(lines)
     assert rows == ["wind", "thruster_gain later", "clean"]
@@ -147,7 +147,10 @@ def test_the_study_runs_and_goes_on_where_it_stopped(tmp_path: Path, monkeypatch
     assert (tmp_path / "diagnosis" / "confusion.svg").read_text("utf-8").startswith("<?xml")
     # A line that broke off is run again, and nothing else is.
     lines = first.splitlines(keepends=True)
-    cache.write_text("".join(lines[:-1]) + lines[-1][:20] + "\n", encoding="utf-8")
+    broken = "".join(lines[:-1]) + lines[-1][:20]
+    cache.write_text(broken, encoding="utf-8")
     assert main() == 0
     assert set(done_before(cache)) == {json.loads(text)["key"] for text in lines}
-    assert cache.read_text("utf-8").startswith("".join(lines[:-1]))
+    again = cache.read_text("utf-8")
+    assert again.startswith(broken + "\n")
+    assert len(again.splitlines()) == len(lines) + 1
