@@ -17,34 +17,25 @@ chapter 5, for parameters that groups of data share.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ferryid.diagnose.checks import examine
 from ferryid.diagnose.hypothesis import Suspect
-from ferryid.diagnose.noise import ORDER, Noise, noise_of
-from ferryid.diagnose.scene import dimensions, plain_picture, scene_of, window_lengths
-from ferryid.diagnose.weak import Windows, windows
-from ferryid.effects import effects
+from ferryid.diagnose.noise import Noise, noise_of
+from ferryid.diagnose.weak import Windows
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import COEFFICIENTS, Picture
-from ferryid.errors import FerryIdError
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Floats
 
 LIFT = ("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_vv")
 ROUNDS, STEPS = 3, 5
 """Rounds, each with the noise that the one before left, and Gauss-Newton steps in a round."""
 TRUST = 2.0
 TINY = 0.02
-FEWEST_WINDOWS = 4 * ORDER
-"""Windows below which a log has no say."""
-OWN = "wind"
-"""What every log has its own of, where it can be told: the commonest of what a hull would otherwise take upon itself."""
 START = 0.4
 """Where a search begins besides at the neutral values, in sizes: a load that grows with speed squared has no slope at rest."""
 
@@ -157,77 +148,6 @@ class SharedHull:
         return Suspect(effect, None, parameters)
 
 
-@dataclass(frozen=True)
-class Together:
-    """Logs of one vessel and their common hull; `place` gives each path's place in it, for logs that have a say."""
-
-    members: tuple[Member, ...]
-    hull: SharedHull
-    place: Mapping[str, int]
-
-    def picture(self, path: str, plain: Picture) -> tuple[Picture, Floats]:
-        """Return a log's picture with the hull that the other logs speak for, as `SharedHull.picture` does."""
-        return self.hull.picture(plain, self.place.get(path))
-
-    def says(self, path: str) -> str:
-        """Return a sentence on where the hull comes from that a log is diagnosed with."""
-        others = len(self.members) - (path in self.place)
-        return (
-            f"The hull is that of {others} other log{'s' if others > 1 else ''} of the vessel, lift included; they differ "
-            f"about it by {self.hull.disagreement:.1f} times the variance of their noise."
-        )
-
-
-def together(
-    logs: Sequence[str],
-    profile: Profile,
-    out: Path | None,
-    *,
-    withhold: Sequence[str] = (),
-    verify: bool = False,
-    progress: Callable[[str], None],
-) -> Together:
-    """Read logs of one vessel and fit one hull to all of them, with a steady wind of its own to each that did not measure it.
-
-    Parameters
-    ----------
-    logs, profile, out, withhold, verify, progress
-        As in `ferryid.diagnose.diagnose.diagnose`.
-
-    Raises
-    ------
-    FerryIdError
-        For logs that cannot be used, and for fewer than two with enough in them.
-    """
-    members: list[Member] = []
-    spreads: list[Floats] = []
-    place: dict[str, int] = {}
-    for path in logs:
-        scene, _ = scene_of(path, profile, out, withhold=withhold, verify=verify, progress=progress)
-        seen = windows(examine(scene)[1], *window_lengths(profile))
-        if len(seen.starts) < FEWEST_WINDOWS or path in place:
-            continue
-        plain, spread = plain_picture(seen.scene, profile)
-        place[path] = len(members)
-        members.append(Member(seen, plain, own_of(seen, profile)))
-        spreads.append(spread)
-    if len(members) < 2:
-        raise FerryIdError(
-            f"--together: a common hull needs two logs of {profile.name} with a minute or more of motion each, found "
-            f"{len(members)} of {len(logs)}. Fix: give more logs, or leave out --together"
-        )
-    progress(f"fitting one hull to {len(members)} logs")
-    length, _, draught = dimensions(profile)
-    lift_size = np.zeros(len(LIFT)) if profile.hull.has_model else lift_spread(length, draught)
-    return Together(tuple(members), fit_together(members, np.max(spreads, axis=0), lift_size), place)
-
-
-def own_of(seen: Windows, profile: Profile) -> tuple[Suspect, ...]:
-    """Return what a log is given of its own while the hull is fitted to all."""
-    effect = effects()[OWN]
-    return () if effect.cannot(seen.scene) else (Suspect(effect, None, effect.parameters_of(profile)),)
-
-
 def _says(values: Values, instance: str | None) -> str:
     return "The hull is that of the vessel's other logs."
 
@@ -332,7 +252,7 @@ class _Joint:
         q = sum(len(suspect.parameters) for suspect in self.members[i].suspects)
         around = product((-1.0, 0.0, 1.0), repeat=q) if q <= 3 else [*np.eye(q).tolist(), *(-np.eye(q)).tolist()]
         tried = [START * np.array(one) for one in around]
-        J = self.slopes(i, z, tried[0], noise)[1][:, : len(z)]
+        J = self.by_hull(i, z, tried[0], noise)
         factor = cho_factor(J.T @ J + np.eye(len(z)))
         cost = []
         for own in tried:
@@ -344,22 +264,34 @@ class _Joint:
     def white(self, i: int, z: Floats, own: Floats, noise: Noise) -> Floats:
         return noise.white(self.gap(i, z, own), self.members[i].windows.runs)
 
-    def slopes(self, i: int, z: Floats, own: Floats, noise: Noise) -> tuple[Floats, Floats]:
-        """Return the whitened gaps of a log and their derivatives by hull and own effects."""
+    def by_hull(self, i: int, z: Floats, own: Floats, noise: Noise) -> Floats:
+        """Return the derivatives of the whitened gaps of a log by the hull, shape (w, 28)."""
         w = self.white(i, z, own, noise)
-        J = np.empty((len(w), len(z) + len(own)))
-        for k in range(J.shape[1]):
-            a, b = z.copy(), own.copy()
-            (a if k < len(z) else b)[k if k < len(z) else k - len(z)] += TINY
-            J[:, k] = (self.white(i, a, b, noise) - w) / TINY
+        J = np.zeros((len(w), len(z)))
+        for k in np.flatnonzero(self.spread > 0.0):
+            moved = z.copy()
+            moved[k] += TINY
+            J[:, k] = (self.white(i, moved, own, noise) - w) / TINY
+        return J
+
+    def by_own(self, i: int, z: Floats, own: Floats, noise: Noise) -> tuple[Floats, Floats]:
+        """Return the whitened gaps of a log and their derivatives by its own effects, shapes (w,) and (w, q)."""
+        w = self.white(i, z, own, noise)
+        J = np.empty((len(w), len(own)))
+        for k in range(len(own)):
+            moved = own.copy()
+            moved[k] += TINY
+            J[:, k] = (self.white(i, z, moved, noise) - w) / TINY
         return w, J
 
     def solve(self, z: Floats, own: Sequence[Floats], noise: Noise) -> tuple[Floats, list[Floats]]:
         """Return better values by Gauss-Newton steps."""
         now = list(own)
         cost = self._cost(z, now, noise)
+        # The gaps are all but linear in the hull: one derivative will do for all steps.
+        by_hull = [self.by_hull(i, z, mine, noise) for i, mine in enumerate(now)]
         for _ in range(STEPS):
-            parts = [self._part(i, z, now[i], noise) for i in range(len(self.members))]
+            parts = [self._part(i, z, now[i], noise, by_hull[i]) for i in range(len(self.members))]
             A = np.eye(len(z)) + np.sum([part.normal for part in parts], axis=0)
             step = -np.linalg.solve(A, z + np.sum([part.gradient for part in parts], axis=0))
             moves = [part.own_step(step) for part in parts]
@@ -381,19 +313,17 @@ class _Joint:
         logs = (float(np.sum(self.white(i, z, mine, noise) ** 2) + mine @ mine) for i, mine in enumerate(own))
         return float(z @ z) + sum(logs)
 
-    def _part(self, i: int, z: Floats, own: Floats, noise: Noise) -> _Part:
-        w, J = self.slopes(i, z, own, noise)
-        h = len(z)
-        Jh, Jq = J[:, :h], J[:, h:]
+    def _part(self, i: int, z: Floats, own: Floats, noise: Noise, Jh: Floats) -> _Part:
+        w, Jq = self.by_own(i, z, own, noise)
         H, g = Jh.T @ Jh, Jh.T @ w
         if len(own) == 0:
-            return _Part(H, g, np.zeros((0, 0)), np.zeros((0, h)), np.zeros(0))
+            return _Part(H, g, np.zeros((0, 0)), np.zeros((0, len(z))), np.zeros(0))
         Q, cross, gq = Jq.T @ Jq + np.eye(len(own)), Jq.T @ Jh, Jq.T @ w + own
         factor = cho_factor(Q)
         return _Part(H - cross.T @ cho_solve(factor, cross), g - cross.T @ cho_solve(factor, gq), Q, cross, gq)
 
     def result(self, z: Floats, own: Sequence[Floats], noise: Noise) -> SharedHull:
-        parts = [self._part(i, z, own[i], noise) for i in range(len(self.members))]
+        parts = [self._part(i, z, mine, noise, self.by_hull(i, z, mine, noise)) for i, mine in enumerate(own)]
         normal = np.stack([part.normal for part in parts])
         A = np.eye(len(z)) + normal.sum(axis=0)
         errors = []

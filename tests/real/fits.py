@@ -1,12 +1,7 @@
-"""Fit the recordings of real vessels and write reports/real.md with its figures; ``make real`` calls it.
-
-The recordings themselves are not part of the project. Where they are absent nothing is written.
-"""
+"""Fits on the recordings of real vessels: reports/real.md and its figures."""
 
 from __future__ import annotations
 
-import shutil
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,9 +15,7 @@ from ferryid.report import figures
 from ferryid.report.page import headline
 from ferryid.report.structure import worst_and_best_minute
 from ferryid.vessel import load_profile
-
-ROOT = Path(__file__).resolve().parents[1]
-DATA = ROOT.parent / "shared" / "data"
+from tests.real.places import DATA, FOLDER, REPORTS
 
 
 @dataclass(frozen=True)
@@ -76,13 +69,8 @@ CASES = (
 )
 
 
-def main() -> None:
+def write() -> None:
     """Fit every case and write the page."""
-    if not DATA.is_dir():
-        sys.exit(f"{DATA}: no recordings here. Fix: lay them beside the project, or leave reports/real.md as it is")
-    folder = ROOT / "reports" / "real"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
     sections = [HEAD]
     with tempfile.TemporaryDirectory() as out:
         for case in CASES:
@@ -93,11 +81,13 @@ def main() -> None:
                 FitSettings(split=case.split),
                 Path(out),
             )
-            sections.append(section(case, result, folder))
-    (ROOT / "reports" / "real.md").write_text("\n".join(sections), encoding="utf-8")
+            sections.append(section(case, result, FOLDER))
+    (REPORTS / "real.md").write_text("\n".join(sections), encoding="utf-8")
 
 
 HEAD = """# Fits on recordings of real vessels
+
+What `ferryid diagnose` says of the same recordings stands in [real/diagnosis.md](real/diagnosis.md).
 
 Made by `make real` with the recordings at hand (they are not part of the project) and the default settings. *Base* is
 the model in the bundled profile: where a vessel has no hull model, that is rigid-body mass alone, which is easily improved
@@ -151,7 +141,3 @@ def section(case: Case, result: FitResult, folder: Path) -> str:
         (folder / f"{case.name}-free-run.svg").write_text(figures.free_run_example(base, new), encoding="utf-8")
         lines += ["", f"![A free run of {case.name}](real/{case.name}-free-run.svg)"]
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,29 @@
+"""``make real``: fits and diagnoses of the recordings, written to reports/real.md and reports/real.
+
+``python -m tests.real fits`` or ``diagnoses`` makes one of the two. Where the recordings are absent nothing is written.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from tests.real import diagnoses, fits
+from tests.real.places import DATA, FOLDER
+
+PARTS = {"fits": fits.write, "diagnoses": diagnoses.write}
+
+
+def main(chosen: list[str]) -> None:
+    """Write the parts that were asked for, or all."""
+    if not DATA.is_dir():
+        sys.exit(f"{DATA}: no recordings here. Fix: lay them beside the project, or leave reports/real as it is")
+    unknown = [name for name in chosen if name not in PARTS]
+    if unknown:
+        sys.exit(f"{unknown[0]}: no part of the report. Fix: choose of {', '.join(PARTS)}")
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name in chosen or PARTS:
+        PARTS[name]()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,98 @@
+"""Figures of the diagnoses of real recordings, as SVG text."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ferryid.effects.picture import Scene
+from ferryid.report.figures import STYLE
+from tests.real.esso import FOUND, Course, Study, bearing
+from tests.real.witnesses import Lag
+
+Floats = NDArray[np.float64]
+
+BLUE, ORANGE, GREY = "#0072b2", "#d55e00", "#888888"
+
+
+def winds(studies: Sequence[Study]) -> str:
+    """Draw the bearing and the strength that were found against the hidden ones, run by run."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        for one, colour, label in zip(studies, (BLUE, ORANGE), ("random runs", "zigzags"), strict=False):
+            found = one.winds[FOUND].values
+            left.plot(bearing(one.measured), bearing(found), "o", color=colour, label=label)
+            right.plot(np.hypot(*one.measured.T), np.hypot(*found.T), "o", color=colour)
+        for axes, ends, name in (
+            (left, (0.0, 360.0), "wind goes towards [deg]"),
+            (right, (0.0, 2.5), "strength [m/s]"),
+        ):
+            axes.plot(ends, ends, color=GREY, linewidth=0.8)
+            axes.set(xlim=ends, ylim=ends, xlabel=f"{name}, hidden channel", ylabel=f"{name}, found")
+        left.legend()
+        return _svg(figure)
+
+
+def course(told: Sequence[Course], names: Sequence[str], shown: Sequence[int]) -> str:
+    """Draw the wind in the course of time, found and hidden, of some runs."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 1.9 * len(shown)), layout="constrained")
+        for row, index in enumerate(shown):
+            one = told[index]
+            for k, way in enumerate(("north", "east")):
+                axes = figure.add_subplot(len(shown), 2, 2 * row + k + 1)
+                axes.plot(one.t, one.hidden[:, k], color=GREY, label="hidden channel, 15 s mean")
+                axes.plot(one.t, one.found[:, k], color=BLUE, label="found from the motion")
+                axes.set_ylabel(f"wind {way} [m/s]")
+                axes.set_title(names[index].removeprefix("random_"), fontsize=8)
+                if row == 0 and k == 0:
+                    axes.legend(fontsize=7)
+        return _svg(figure)
+
+
+def lag(found: Sequence[Lag], names: Sequence[str]) -> str:
+    """Draw the correlation of velocity and slope of position against the shift between them."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 3.0), layout="constrained")
+        axes = figure.add_subplot()
+        for one, name in zip(found, names, strict=True):
+            axes.plot(one.lags_s, 1.0 - one.correlations, label=name)
+        axes.set(yscale="log", xlabel="velocity later than position [s]", ylabel="1 - correlation")
+        axes.legend(fontsize=6, ncol=2)
+        return _svg(figure)
+
+
+def driven(scene: Scene) -> str:
+    """Draw recorded force and surge velocity."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+        above, below = figure.subplots(2, 1, sharex=True)
+        above.plot(scene.t, scene.parts.sum(axis=1)[:, 0], color=BLUE)
+        below.plot(scene.t, scene.nu_raw[:, 0], color=ORANGE)
+        above.set_ylabel("force ordered [N]")
+        below.set(ylabel="surge velocity [m/s]", xlabel="time [s]")
+        return _svg(figure)
+
+
+def raw(t: Floats, columns: dict[str, Floats]) -> str:
+    """Draw raw rows, every row marked."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 1.7 * len(columns)), layout="constrained")
+        panels = figure.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (name, values) in zip(panels, columns.items(), strict=True):
+            axes.plot(t, values, ".-", color=BLUE, markersize=3, linewidth=0.6)
+            axes.set_ylabel(name)
+        panels[-1].set_xlabel("time [s]")
+        return _svg(figure)
+
+
+def _svg(figure: Figure) -> str:
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"

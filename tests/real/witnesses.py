@@ -1,0 +1,153 @@
+"""Witnesses that know nothing of the diagnosis: raw rows, correlations and regressions on the recordings themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.signal import csd, savgol_filter, welch
+from scipy.spatial.transform import Rotation
+
+from ferryid.effects.picture import Scene
+
+Floats = NDArray[np.float64]
+
+SLOPE_S = 2.0
+DEGREE_M = 111_412.0
+
+
+@dataclass(frozen=True)
+class Lag:
+    """How much later velocities are than the slope of positions [s], at the highest correlation, which is given too."""
+
+    seconds: float
+    correlation: float
+    lags_s: Floats
+    correlations: Floats
+
+
+def velocity_lag(scene: Scene, reach_s: float = 2.0) -> Lag:
+    """Correlate the slope of positions with velocities turned north and east, shifted row by row."""
+    rate = 1.0 / scene.step_s
+    rows = 2 * round(0.5 * SLOPE_S * rate) + 1
+    slope = savgol_filter(scene.eta[:, :2], rows, 1, deriv=1, delta=scene.step_s, axis=0)
+    c, s = np.cos(scene.psi), np.sin(scene.psi)
+    u, v = savgol_filter(scene.nu_raw[:, :2], rows, 1, axis=0).T
+    ground = np.column_stack([c * u - s * v, s * u + c * v])
+    reach = round(reach_s * rate)
+    inner = slice(rows + reach, len(c) - rows - reach)
+    known = scene.usable[inner]
+    shifts = np.arange(-reach, reach + 1)
+    # A velocity that is late by k rows belongs to the slope k rows earlier.
+    found = [
+        np.corrcoef(slope[inner][known].ravel(), np.roll(ground, -int(k), axis=0)[inner][known].ravel())[0, 1]
+        for k in shifts
+    ]
+    best = int(np.argmax(found))
+    return Lag(float(shifts[best] * scene.step_s), float(found[best]), shifts * scene.step_s, np.array(found))
+
+
+def slow_gain(scene: Scene, below_hz: float = 0.06) -> Floats:
+    """Return velocity over slope of position where both are slow, north and east: there the position is exact."""
+    c, s = np.cos(scene.psi), np.sin(scene.psi)
+    u, v = scene.nu_raw[:, :2].T
+    gains = []
+    for place, velocity in ((scene.eta[:, 0], c * u - s * v), (scene.eta[:, 1], s * u + c * v)):
+        slope = np.gradient(place, scene.step_s)
+        rows = round(40.0 / scene.step_s)
+        frequency, both = csd(slope, velocity, 1.0 / scene.step_s, nperseg=rows)
+        alone = welch(slope, 1.0 / scene.step_s, nperseg=rows)[1]
+        slow = (frequency > 0.0) & (frequency <= below_hz)
+        gains.append(float(np.sum(np.abs(both[slow])) / np.sum(alone[slow])))
+    return np.array(gains)
+
+
+def antenna(folder: Path) -> Floats:
+    """Return where milliAmpère's receiver stands, seen from the origin of the ferry's own navigation [m], x and y."""
+    fix, pose = (_stamped(folder / name) for name in ("vectorVS330/fix.csv", "navigation/pose.csv"))
+    heading = _stamped(folder / "vectorVS330" / "heading.csv")
+    turns = heading[[f"quaternion_{axis}" for axis in "xyzw"]].to_numpy()
+    psi = np.unwrap(Rotation.from_quat(turns).as_euler("ZYX")[:, 0])
+    north = (fix.latitude - fix.latitude[0]).to_numpy() * DEGREE_M
+    east = (fix.longitude - fix.longitude[0]).to_numpy() * DEGREE_M * np.cos(np.radians(fix.latitude[0]))
+    when = pose.stamp.to_numpy()
+    inside = (when > fix.stamp.iloc[0]) & (when < fix.stamp.iloc[-1])
+    when, seen = when[inside], pose[inside]
+    at = [np.interp(when, fix.stamp, column) for column in (north, east)]
+    turned = np.interp(when, heading.stamp, psi)
+    c, s, one, none = np.cos(turned), np.sin(turned), np.ones(len(when)), np.zeros(len(when))
+    rows = np.vstack([np.column_stack([one, none, c, -s]), np.column_stack([none, one, s, c])])
+    apart = np.concatenate([at[0] - seen.pose_position_x, at[1] - seen.pose_position_y])
+    return np.linalg.lstsq(rows, apart, rcond=None)[0][2:]
+
+
+def _stamped(path: Path) -> pd.DataFrame:
+    table = pd.read_csv(path)
+    table["stamp"] = table.header_stamp_secs - 1_744_000_000 + 1e-9 * table.header_stamp_nsecs
+    return table
+
+
+def encoder_offsets(folder: Path) -> Floats:
+    """Return the median of measured less ordered angle of milliAmpère's four thrusters [deg]."""
+    found = []
+    for number in range(1, 5):
+        order = pd.read_csv(folder / f"actuator_ref_{number}.csv")
+        angle = pd.read_csv(folder / "actuators" / f"actuator_{number}" / "azimuth_angle.csv")
+        when, ordered = (pd.to_datetime(table.time).astype("int64") * 1e-9 for table in (angle, order))
+        apart = angle.data - np.interp(when, ordered, order.angle_reference)
+        found.append(float(np.median((apart + 180.0) % 360.0 - 180.0)))
+    return np.array(found)
+
+
+def sectors(scene: Scene) -> Floats:
+    """Return the range of angles that each azimuth thruster used while it pushed [deg], shape (k, 2)."""
+    used = []
+    for k in range(scene.parts.shape[1]):
+        size = np.hypot(scene.parts[:, k, 0], scene.parts[:, k, 1])
+        pushing = scene.usable & (size > 0.2 * np.quantile(size, 0.95))
+        used.append(np.degrees(np.quantile(scene.angles[pushing, k], [0.025, 0.975])))
+    return np.array(used)
+
+
+def straight_share(values: Floats) -> float:
+    """Return the share of rows that lie on the line of their neighbours to a part in a thousand: interpolated ones."""
+    slope = np.diff(values)
+    moving = (slope[1:] != 0.0) & (slope[:-1] != 0.0)
+    return float(np.mean(np.abs(np.diff(slope))[moving] <= 1e-3 * np.abs(slope[1:][moving])))
+
+
+def position_pace(table: pd.DataFrame, rows: int) -> Floats:
+    """Return the way of Gunnerus's positions in some rows over that of the logged speed.
+
+    It is the 5, 25, 50, 75 and 95 % quantiles.
+    """
+    step = np.hypot(np.diff(table.N), np.diff(table.E))
+    logged = np.hypot(table.u, table.v).to_numpy()[1:] * np.diff(table.tvec)
+    ways = [np.convolve(one, np.ones(rows), mode="valid") for one in (step, logged)]
+    return np.quantile(ways[0] / ways[1], [0.05, 0.25, 0.5, 0.75, 0.95])
+
+
+def idle(scene: Scene, least_s: float = 3.0) -> tuple[float, float, float] | None:
+    """Return the longest time without any recorded force [s], and the surge speeds at its slowest and fastest after [m/s]."""
+    still = np.abs(scene.parts).sum(axis=(1, 2)) == 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8))).reshape(-1, 2)
+    best = None
+    for first, end in edges.tolist():
+        seconds = (end - first) * scene.step_s
+        surge = np.abs(scene.nu_raw[first:end, 0])
+        slowest = int(np.argmin(surge))
+        fastest = float(surge[slowest:].max())
+        if seconds >= least_s and (best is None or fastest - surge[slowest] > best[2] - best[1]):
+            best = (seconds, float(surge[slowest]), fastest)
+    return best
+
+
+def position_steps(pose: Floats) -> Floats:
+    """Return the commonest lengths of a position's steps [m], the commonest first, with the share of all steps: (k, 2)."""
+    step = np.hypot(*np.diff(pose, axis=0).T)
+    lengths, counts = np.unique(np.round(step[step > 1e-3], 2), return_counts=True)
+    first = np.argsort(-counts)[:4]
+    return np.column_stack([lengths[first], counts[first] / counts.sum()])
