@@ -24,7 +24,7 @@ picture: demo
 bench: $(VENV)/installed $(VENV)/bench-installed
 	$(BIN)/python -m tests.bench
 
-# Fits on the real recordings, where they lie in ../shared/data; writes reports/real.
+# Fits and diagnoses of the real recordings, where they lie in ../shared/data; writes reports/real.md and reports/real.
 real: $(VENV)/installed
 	$(BIN)/python -m tests.real
 
