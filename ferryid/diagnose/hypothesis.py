@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ferryid.diagnose.filter import Filter, Sieve, learn, sieve_of
 from ferryid.diagnose.noise import Noise, noise_of
 from ferryid.diagnose.weak import Windows, steps_of
-from ferryid.effects.effect import Effect, Parameter
+from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
 
@@ -189,9 +189,9 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
     cost = float(w @ w + z @ z)
     A = np.eye(h + q)
     for count in range(max(steps, 1)):
-        J = np.empty((len(w), h + q))
+        J = np.zeros((len(w), h + q))
         J[:, :h] = trial.by_hull if count == 0 or not bends else trial.hull_slopes(picture_of(z))
-        for k in range(q):
+        for k in np.flatnonzero(size > HELD).tolist():
             moved = z.copy()
             d = 1e-2 if z[h + k] + 1e-2 <= high[k] else -1e-2
             moved[h + k] += d

@@ -13,6 +13,9 @@ Values = Mapping[str, float]
 Residual = Callable[[Picture], Floats]
 """What a picture leaves of a log, whitened: so that its square is twice what the logarithm of the likelihood loses."""
 
+HELD = 1e-6
+"""Size of a parameter that is not to move: one of several alternatives that was not chosen."""
+
 
 @dataclass(frozen=True)
 class Parameter:

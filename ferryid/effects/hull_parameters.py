@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
+from ferryid.effects.effect import HELD, Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.picture import COEFFICIENTS, MASS, Picture, Scene, hull_of
 from ferryid.vessel.profile import Floats, Profile
 
@@ -26,8 +26,6 @@ TELLING = 0.25
 """A coefficient that may be within this share of the model's is not worth a name."""
 OFF, USUAL = 1.0, 0.12
 """Standard deviations of what is believed of the factor of a coefficient that is chosen, and of any other."""
-HELD = 1e-6
-"""The same for the factor of a coefficient that was not chosen, which is refitted anyway."""
 TINY = 0.01
 SURGE_ALONE = frozenset({"X_|u|u"})
 """What one factor of fouling is as well."""
