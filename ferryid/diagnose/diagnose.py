@@ -35,6 +35,7 @@ from ferryid.diagnose.shown import columns_of, regressor_of
 from ferryid.diagnose.testable import advice, powers, tells, unexcited
 from ferryid.diagnose.together import Together, together
 from ferryid.diagnose.unknown import impostors, unknown_of
+from ferryid.diagnose.unsteady import findings_of
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
@@ -158,8 +159,10 @@ def _one(
     base = fit(trial, ())
     unknown = unknown_of(trial, kept, scene)
     progress("locating")
-    findings = [*_of_sensors(sensors), *_findings(library, trial, base, kept, proof, scene)]
-    chances, still = powers(trial, kept, library), unexcited(trial)
+    steady = [suspect for suspect in library if suspect.effect.unsteady is None]
+    named = [*_findings(steady, trial, base, kept, proof, scene), *findings_of(trial, found.states)]
+    findings = [*_of_sensors(sensors), *named]
+    chances, still = powers(trial, kept, steady), unexcited(trial)
     if model is None and common is None and not profile.hull.has_model:
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
@@ -167,7 +170,7 @@ def _one(
         )
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
     notes += advice(chances, still)
-    if unknown.unsteady:
+    if unknown.unsteady or found.states:
         findings = [_doubted(one) for one in findings]
     verdict = _verdict(bool(findings), bool(unknown.findings), tells(chances, still))
     findings += unknown.findings
@@ -310,9 +313,7 @@ def _findings(
                 unresolved_with=unresolved,
                 separating_manoeuvre=manoeuvre(suspect.effect.id, unresolved),
                 says=suspect.effect.says(values, suspect.instance),
-                **columns_of(
-                    trial, place, regressor_of(suspect, imagined(trial.plain, bare), kept.values[i], place)
-                ),
+                **columns_of(trial, place, regressor_of(suspect, imagined(trial.plain, bare), kept.values[i], place)),
             )
         )
     return sorted(made, key=lambda one: -sum(one.improvement.values()))

@@ -64,7 +64,7 @@ def unknown_of(trial: Trial, kept: Fit, scene: Scene) -> Unknown:
         findings.append(_lawful(law, kept, scene))
     left = locate(seen, after, after, scene)
     # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
-    known = any(suspect.effect.unsteady is not None for suspect in kept.suspects)
+    known = bool(trial.filter.processes)
     uneven = bool(left.profiles) and left.profiles[0].statistic >= TELLS
     burst = bursts_of(seen, imagined(seen.plain, after), scene)
     if burst is not None and burst.deviations >= BURSTS:

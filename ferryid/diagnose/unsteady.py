@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log
+from math import exp, log
 
 import numpy as np
 
 from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
+from ferryid.diagnose.result import AXES, Estimate, Finding
 from ferryid.effects.effect import Process
-from ferryid.effects.picture import Picture
+from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats
 
 WORTH = 8.0
@@ -101,3 +102,40 @@ def _starts(suspect: Suspect) -> list[Floats]:
 
 def _sizes(suspect: Suspect) -> Floats:
     return np.array([parameter.size for parameter in suspect.parameters])
+
+
+def findings_of(trial: Trial, states: Sequence[State]) -> tuple[Finding, ...]:
+    """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over."""
+    seen = trial.windows.scene
+    return tuple(_finding(seen, trial, state) for state in states)
+
+
+def _finding(scene: Scene, trial: Trial, state: State) -> Finding:
+    suspect = state.suspect
+    assert suspect.effect.unsteady is not None
+    parameters = {
+        one.name: Estimate(value, value * exp(-1.96 * width), value * exp(1.96 * width), one.unit)
+        for one, value, width in zip(suspect.parameters, state.values.tolist(), state.widths.tolist(), strict=True)
+    }
+    picture = trial.filter.picture or trial.plain
+    pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in suspect.effect.unsteady(picture, state.values)]
+    # Newtons and newton metres compare as what they do to the vessel.
+    arm = np.array([1.0, 1.0, np.sqrt(picture.hull[0] / picture.hull[4])])
+    power = np.sum(pushed, axis=0) * arm**2
+    values = {name: one.value for name, one in parameters.items()}
+    return Finding(
+        effect=suspect.effect.id,
+        instance=None,
+        probability=1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0))),
+        parameters=parameters,
+        axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
+        intervals=((float(scene.t[0]), float(scene.t[-1])),),
+        onset_s=None,
+        regime="",
+        improvement={},
+        held_out=False,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says=suspect.effect.says(values, None),
+    )
