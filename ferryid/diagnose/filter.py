@@ -111,8 +111,16 @@ def sieve_of(noise: Filter, steps: Windows) -> Sieve:
     return Sieve(steps, tuple(parts))
 
 
-def learn(steps: Windows, gaps: Floats) -> Filter:
-    """Return the noise that gaps have if each channel has its own, by maximum likelihood."""
+def learn(steps: Windows, gaps: Floats, near: Filter | None = None) -> Filter:
+    """Return the noise that gaps have if each channel has its own, by maximum likelihood.
+
+    Parameters
+    ----------
+    steps, gaps
+        The trial's, and what a hypothesis leaves.
+    near
+        A filter to begin with; else the search begins at several places.
+    """
     h, integrals = stride_s(steps), integrals_of(steps)
     scale = _scales(steps)
     channels = np.empty((gaps.shape[1], 5))
@@ -136,8 +144,12 @@ def learn(steps: Windows, gaps: Floats) -> Filter:
         error = rough * h**integrals / (2.4 if integrals == 2 else 1.4)
         # The likelihood has several tops: the same roughness may be of short errors, of long ones or of pushes.
         found = []
-        for white, error_s, pushed in STARTS:
-            start = np.log([white * error, error, error_s * h, pushed * rough, 10.0 * h])
+        begin = [
+            np.log([white * error, error, error_s * h, pushed * rough, 10.0 * h])
+            for white, error_s, pushed in STARTS[: 1 if near else None]
+        ]
+        begin += [np.log(near.channels[own[0]])] if near else []
+        for start in begin:
             z = _least(cost, start, _bounds(start, h))
             found.append((cost(z), z))
         channels[own] = np.exp(min(found, key=lambda one: one[0])[1])
@@ -227,7 +239,7 @@ def summed(gaps: Floats, steps: Windows) -> Floats:
 
 
 def _least(cost: Callable[[Floats], float], start: Floats, bounds: list[tuple[float, float]]) -> Floats:
-    best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": 1e-4})
+    best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": 1e-4, "ftol": 1e-7})
     return np.asarray(best.x, dtype=np.float64)
 
 

@@ -138,7 +138,7 @@ class Trial:
     def with_noise_of(self, made: Fit) -> Trial:
         """Return the trial with the noise that a fit leaves; a filter that has shared disturbances stays as it is."""
         picture = imagined(self.plain, made)
-        own = self.filter if self.filter.processes else learn(self.steps, self.steps.gap(picture))
+        own = self.filter if self.filter.processes else learn(self.steps, self.steps.gap(picture), self.filter)
         return replace(self, noise=noise_of(self.windows.gap(picture), self.windows.runs), filter=own)
 
     def part(self, windows: Windows) -> Trial:

@@ -21,7 +21,7 @@ DIFFUSE = 2
 
 
 @compiled
-def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, step_s: float) -> None:
+def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, step_s: float) -> None:
     """Move states, shape (S, q), on by a step, in place.
 
     Parameters
@@ -33,11 +33,13 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, step_s: fl
     blocks
         Transition of the shared states, shape (s, s).
     columns
-        Acceleration of every channel by each of these, shape (c, s).
+        Acceleration of every channel by each of these, shape (n, c, s).
+    k
+        Which of the n.
     step_s
         Step [s].
     """
-    c, s = columns.shape
+    c, s = columns.shape[1], columns.shape[2]
     h = step_s
     shared = np.empty(s)
     for m in range(x.shape[1]):
@@ -47,7 +49,7 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, step_s: fl
             i = OWN * j
             push = x[i + 4, m]
             for b in range(s):
-                push += columns[j, b] * shared[b]
+                push += columns[k, j, b] * shared[b]
             x[i, m] += h * x[i + 1, m] + 0.5 * h * h * push
             x[i + 1, m] += h * push
             wrong, rate = x[i + 2, m], x[i + 3, m]
@@ -110,7 +112,7 @@ def gains(
     h = step_s
     known = 0 if integrals == 2 else 1
     keep = kept(noise, h)
-    P, Q = np.zeros((S, S)), np.zeros((S, S))
+    P, Q, turned = np.zeros((S, S)), np.zeros((S, S)), np.empty((S, S))
     for j in range(c):
         i = OWN * j
         vague = (1e3 * scale[j]) ** 2
@@ -120,13 +122,14 @@ def gains(
         wrong, rate = noise[j, 1] ** 2, (noise[j, 1] / noise[j, 2]) ** 2
         pushed = noise[j, 3] ** 2
         P[i + 2, i + 2], P[i + 3, i + 3], P[i + 4, i + 4] = wrong, rate, pushed
-        a, b, d, e, f = keep[j]
+        a, b, d, e, f = keep[j, 0], keep[j, 1], keep[j, 2], keep[j, 3], keep[j, 4]
         Q[i + 2, i + 2] = wrong - a * a * wrong - b * b * rate
         Q[i + 3, i + 3] = rate - d * d * wrong - e * e * rate
         Q[i + 2, i + 3] = Q[i + 3, i + 2] = -a * d * wrong - b * e * rate
         Q[i + 4, i + 4] = (1.0 - f * f) * pushed
-    P[OWN * c :, OWN * c :] = drive[1]
-    Q[OWN * c :, OWN * c :] = drive[0]
+    for i in range(s):
+        for m in range(s):
+            P[OWN * c + i, OWN * c + m], Q[OWN * c + i, OWN * c + m] = drive[1, i, m], drive[0, i, m]
     K, spread = np.zeros((n, c, S)), np.empty((n, c))
     for k in range(n):
         for j in range(c):
@@ -138,16 +141,28 @@ def gains(
             for i in range(S):
                 for m in range(S):
                     P[i, m] -= K[k, j, i] * K[k, j, m] * variance
-        advance(P, keep, blocks, columns[k], h)
-        advance(P.T, keep, blocks, columns[k], h)
-        P += Q
+        # F P F' by moving the columns, then the rows: P is symmetric.
+        advance(P, keep, blocks, columns, k, h)
         for i in range(S):
-            for m in range(i):
-                P[i, m] = P[m, i] = 0.5 * (P[i, m] + P[m, i])
-        if s == 0 and k > 0 and np.abs(K[k] - K[k - 1]).max() < SETTLED * np.abs(K[k]).max():
-            for rest in range(k + 1, n):
-                K[rest], spread[rest] = K[k], spread[k]
-            break
+            for m in range(S):
+                turned[m, i] = P[i, m]
+        advance(turned, keep, blocks, columns, k, h)
+        for i in range(S):
+            for m in range(S):
+                P[i, m] = 0.5 * (turned[i, m] + turned[m, i]) + Q[i, m]
+        if s == 0 and k > 0:
+            change, largest = 0.0, 0.0
+            for j in range(c):
+                for i in range(S):
+                    change = max(change, abs(K[k, j, i] - K[k - 1, j, i]))
+                    largest = max(largest, abs(K[k, j, i]))
+            if change < SETTLED * largest:
+                for rest in range(k + 1, n):
+                    for j in range(c):
+                        spread[rest, j] = spread[k, j]
+                        for i in range(S):
+                            K[rest, j, i] = K[k, j, i]
+                break
     return K, spread
 
 
@@ -192,5 +207,5 @@ def errors(
                 out[k, j, m] = error / spread[k, j]
                 for i in range(S):
                     x[i, m] += K[k, j, i] * error
-        advance(x, keep, blocks, columns[k], step_s)
+        advance(x, keep, blocks, columns, k, step_s)
     return out

@@ -85,6 +85,11 @@ class Scene:
         return self.eta[:, 2]
 
     @cached_property
+    def pointing(self) -> tuple[Floats, Floats]:
+        """Cosine and sine of the heading, shape (n,) each."""
+        return np.cos(self.psi), np.sin(self.psi)
+
+    @cached_property
     def regressors(self) -> tuple[Floats, Floats, Floats]:
         """Damping regressors over ground; see `damping_regressors`."""
         return damping_regressors(self.nu)
