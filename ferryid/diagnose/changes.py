@@ -14,8 +14,6 @@ FEWEST = 4
 BREAK = 2.3
 """Kuiper's statistic of changes of the mean, as of which they are believed: one in a thousand without any."""
 MOST_BREAKS = 6
-FLOOR = 0.05
-"""Strengths below this share of their mean are as good as none."""
 ACTS = 0.25
 """An interval acts whose mean excess is more than this part of the strongest one's."""
 
@@ -41,12 +39,8 @@ def acting(
     Kuiper (1960) for the statistic, Vostrikova (1981) for the segmentation. The standard deviation of the mean is that of
     blocks, since neighbours are correlated.
     """
-    if steady:
-        # Noise and more noise differ by a factor, and bursts are heavy.
-        judged = np.log(np.maximum(strength, FLOOR * float(np.mean(strength))))
-    else:
-        # Large squares are rare and heavy: their roots vary less.
-        judged = np.sign(strength) * np.sqrt(np.abs(strength))
+    # Large squares are rare and heavy: their roots vary less, and of bursts above noise the roots of these.
+    judged = np.sign(strength) * np.abs(strength) ** (0.25 if steady else 0.5)
     edges = [0, *sorted(_breaks(judged, 0, len(strength), MOST_BREAKS)), len(strength)]
     means = [float(strength[a:b].mean()) for a, b in pairwise(edges)]
     calm = min(means) if steady and len(means) > 1 else 0.0
