@@ -214,7 +214,7 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
             break
         gained = cost - new_cost
         z, w, cost = new, w_new, new_cost
-        if gained < 1e-3:
+        if gained < 1e-2:
             break
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - trial.sieve.log_scale

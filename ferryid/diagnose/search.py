@@ -18,6 +18,8 @@ ODDS = 8.0
 """Logarithm of the evidence that an effect must show over none before it is as likely as none."""
 NEAR = 3.0
 """Rivals whose evidence is less than this behind are not told apart."""
+GLANCE = 3
+"""Steps of a fit by which candidates are sorted; the best are then fitted to the end."""
 REJUDGED = 5
 """Candidates whose evidence is weighed under the noise that each leaves itself."""
 MOST = 4
@@ -139,10 +141,11 @@ def _selected(
         found = sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
         done = _round(found)
         rounds.append(done)
-        if not found or done.none >= 0.5 or len(taken) == MOST or _void(trial, found[0].fit):
+        good = [one for one in found if one.gain > ODDS and not _void(trial, one.fit)]
+        if not good or len(taken) == MOST:
             return trial, chosen, rounds
-        trial = trial.with_noise_of(found[0].fit)
-        chosen = fit(trial, found[0].fit.suspects, found[0].fit.values)
+        trial = trial.with_noise_of(good[0].fit)
+        chosen = fit(trial, good[0].fit.suspects, good[0].fit.values)
 
 
 def _fairly(trial: Trial, current: Fit, one: Candidate) -> Candidate:
@@ -156,7 +159,7 @@ def _best(trial: Trial, current: Fit, suspect: Suspect) -> Candidate:
     def tried(one: Suspect, values: Floats | None = None) -> Candidate:
         neutral = np.array([parameter.neutral for parameter in one.parameters])
         start = (*current.values, neutral if values is None else values)
-        made = fit(trial, (*current.suspects, one), start)
+        made = fit(trial, (*current.suspects, one), start, steps=GLANCE)
         penalty = 0.0 if one.onset_s <= 0.0 else log(len(trial.windows.starts))
         return Candidate(one, made, made.evidence - current.evidence - penalty)
 
