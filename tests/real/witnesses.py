@@ -46,8 +46,11 @@ def velocity_lag(scene: Scene, reach_s: float = 2.0) -> Lag:
         np.corrcoef(slope[inner][known].ravel(), np.roll(ground, -int(k), axis=0)[inner][known].ravel())[0, 1]
         for k in shifts
     ]
-    best = int(np.argmax(found))
-    return Lag(float(shifts[best] * scene.step_s), float(found[best]), shifts * scene.step_s, np.array(found))
+    best = int(np.clip(np.argmax(found), 1, len(found) - 2))
+    # The top of the parabola through the highest three.
+    before, top, after = found[best - 1 : best + 2]
+    between = 0.5 * (before - after) / (before - 2.0 * top + after)
+    return Lag(float((shifts[best] + between) * scene.step_s), float(top), shifts * scene.step_s, np.array(found))
 
 
 def slow_gain(scene: Scene, below_hz: float = 0.06) -> Floats:
