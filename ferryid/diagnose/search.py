@@ -137,7 +137,7 @@ def _selected(
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
         current = fit(trial, chosen.suspects, chosen.values)
         found = sorted((_best(trial, current, suspect) for suspect in left), key=lambda one: -one.gain)
-        fair = [_fairly(trial, current, one) for one in found[:REJUDGED]]
+        fair = [_fairly(trial, one) for one in found[:REJUDGED]]
         found = sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
         done = _round(found)
         rounds.append(done)
@@ -148,8 +148,8 @@ def _selected(
         chosen = fit(trial, good[0].fit.suspects, good[0].fit.values)
 
 
-def _fairly(trial: Trial, current: Fit, one: Candidate) -> Candidate:
-    made = rejudged(trial, one.fit)
+def _fairly(trial: Trial, one: Candidate) -> Candidate:
+    made = rejudged(trial, fit(trial, one.fit.suspects, one.fit.values))
     return replace(one, fit=made, gain=max(one.gain, one.gain + made.evidence - one.fit.evidence))
 
 
