@@ -7,26 +7,28 @@ shallow water explain with fewer parameters is theirs. The scale of all forces i
 References
 ----------
 Scott and Berger (2010), Bayes and empirical-Bayes multiplicity adjustment in the variable-selection problem: the number of
-subsets of a size is what choosing one of them costs.
+subsets of a size, times that of sizes, is what choosing one of them costs.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import lgamma
+from math import lgamma, log
 from typing import Any
 
 import numpy as np
 
 from ferryid.effects.effect import HELD, Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.picture import COEFFICIENTS, MASS, Picture, Scene, hull_of
+from ferryid.effects.scan import USUAL, by_hull
 from ferryid.vessel.profile import Floats, Profile
 
 TELLING = 0.25
 """A coefficient that may be within this share of the model's is not worth a name."""
-OFF, USUAL = 1.0, 0.12
-"""Standard deviations of what is believed of the factor of a coefficient that is chosen, and of any other."""
-TINY = 0.01
+OFF = 1.0
+"""Standard deviation of what is believed of the factor of a coefficient that is chosen."""
+ARMS = ("m23", "m32")
+"""How far ahead the mass lies; that a few hundred kilograms lie elsewhere is a payload's to say."""
 SURGE_ALONE = frozenset({"X_|u|u"})
 """What one factor of fouling is as well."""
 
@@ -47,26 +49,11 @@ def _factor(name: str, size: float) -> Parameter:
 def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
     """Return factors of which only those of the coefficients that are worth it can move."""
     names = _named(picture.scene.profile)
-    places = [COEFFICIENTS.index(name) for name in names]
+    able = [name for name in names if name not in ARMS]
+    places = [COEFFICIENTS.index(name) for name in able]
     J, e = by_hull(picture, believed, residual, places)
-    chosen, doubt = _best_subset(J.T @ J, -J.T @ e, names)
+    chosen, doubt = _best_subset(J.T @ J, -J.T @ e, able)
     return Choice(tuple(_factor(name, OFF if name in chosen else HELD) for name in names), doubt)
-
-
-def by_hull(picture: Picture, believed: Floats, residual: Residual, places: list[int]) -> tuple[Floats, Floats]:
-    """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
-
-    The line is drawn at the picture's hull, which is the fitted one, as acceleration is far from linear in mass.
-    """
-    e = residual(picture)
-    columns, away = [], []
-    for k in places:
-        hull = picture.hull.copy()
-        hull[k] += TINY * believed[k]
-        columns.append((residual(replace(picture, hull=hull)) - e) / TINY)
-        away.append(picture.hull[k] / believed[k] - 1.0 if believed[k] != 0.0 else 0.0)
-    J = np.column_stack(columns)
-    return J, e - J @ np.array(away)
 
 
 def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str], float]:
@@ -75,7 +62,7 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
 
     def doubt(chosen: frozenset[str]) -> float:
         k = len(chosen)
-        return lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1)
+        return log(n) + lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1)
 
     def score(chosen: frozenset[str]) -> float:
         if not chosen or chosen == SURGE_ALONE:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.hull_parameters import USUAL, by_hull
 from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.scan import by_hull, linear_gains
 from ferryid.vessel.profile import Floats, Profile
 
 Places = NDArray[np.int64]
@@ -102,22 +102,12 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
         return Choice(parameters_of(scene.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
     columns = (sums[north, east] - sums[south, east] - sums[north, west] + sums[south, west]).T
-    gains = _gains(*by_hull(picture, believed, residual, list(np.flatnonzero(believed))), columns)
+    gains = linear_gains(*by_hull(picture, believed, residual, np.flatnonzero(believed).tolist()), columns, FACTOR.size)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
     sizes = np.repeat((high - low) / CELLS, 2)
     parameters = (_side(name, float(at), float(size)) for name, at, size in zip(SIDES, sides, sizes, strict=True))
     return Choice((FACTOR, *parameters), log(len(gains)))
-
-
-def _gains(J: Floats, e: Floats, columns: Floats) -> Floats:
-    """Return the evidence of a linear model for each of some columns, shape (w, q), beside the hull's coefficients."""
-    H, every = USUAL * J, np.column_stack([e, columns])
-    free = every - H @ np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ every)
-    power = np.einsum("wq,wq->q", columns, free[:, 1:])
-    product = columns.T @ free[:, 0]
-    ratio = power * FACTOR.size**2
-    return np.asarray(0.5 * product**2 * FACTOR.size**2 / (1.0 + ratio) - 0.5 * np.log1p(ratio))
 
 
 def cannot(scene: Scene) -> str:
