@@ -113,10 +113,12 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         trial, states = disturbed(trial, chosen, shaken)
     if states:
         # What stood in for them falls, and what they hid may show.
+        stood = [one.key for one in chosen.suspects]
         chosen = _pruned(trial, fit(trial, chosen.suspects, chosen.values))
         trial, chosen, more = _selected(trial, chosen, steady, progress)
         rounds += more
-        trial, states = disturbed(trial, chosen, shaken)
+        if [one.key for one in chosen.suspects] != stood:
+            trial, states = disturbed(trial, chosen, shaken, states)
         chosen = _pruned(trial, fit(trial, chosen.suspects, chosen.values))
     return Search(trial, fit(trial, ()), chosen, tuple(rounds), untested, states)
 

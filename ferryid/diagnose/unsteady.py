@@ -35,7 +35,9 @@ class State:
     gain: float
 
 
-def disturbed(trial: Trial, made: Fit, suspects: Sequence[Suspect]) -> tuple[Trial, tuple[State, ...]]:
+def disturbed(
+    trial: Trial, made: Fit, suspects: Sequence[Suspect], near: Sequence[State] = ()
+) -> tuple[Trial, tuple[State, ...]]:
     """Return the trial with the disturbances in its filter that what a fit leaves speaks for, and these.
 
     Each is weighed by its likelihood, at its most likely parameters and noise, less Schwarz's penalty for its parameters.
@@ -48,10 +50,13 @@ def disturbed(trial: Trial, made: Fit, suspects: Sequence[Suspect]) -> tuple[Tri
         What has been found.
     suspects
         Disturbances that the scene can show.
+    near
+        What they were beside another fit: where the search begins.
     """
     picture = imagined(trial.plain, made)
     gaps = trial.steps.gap(picture)
-    noise = learn(trial.steps, gaps)
+    noise = learn(trial.steps, gaps, trial.filter)
+    before = {state.suspect.key: [state.values] for state in near}
     best = likelihood(noise, trial.steps, gaps)
     states: list[State] = []
     left = list(suspects)
@@ -67,7 +72,10 @@ def disturbed(trial: Trial, made: Fit, suspects: Sequence[Suspect]) -> tuple[Tri
                 return suspect.effect.unsteady(picture, p)
 
             begin, first = max(
-                ((one, _glance(trial, gaps, noise, processes(one), picture)) for one in _starts(suspect)),
+                (
+                    (one, _glance(trial, gaps, noise, processes(one), picture))
+                    for one in before.get(suspect.key, _starts(suspect))
+                ),
                 key=lambda one: one[1],
             )
             if first < best + PROMISING:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.wind import wind_force
 
 MASS = ("m11", "m22", "m23", "m32", "m33")
 SURGE = ("X_u", "X_|u|u", "X_uuu")
@@ -90,6 +91,16 @@ class Scene:
         return np.cos(self.psi), np.sin(self.psi)
 
     @cached_property
+    def still_air(self) -> Floats:
+        """Load of air that does not move [N, N, N·m], shape (n, 3)."""
+        areas = self.profile.wind
+        return (
+            np.zeros((len(self.t), 3))
+            if areas is None
+            else wind_force(areas, np.zeros((len(self.t), 2)), self.psi, self.nu)
+        )
+
+    @cached_property
     def regressors(self) -> tuple[Floats, Floats, Floats]:
         """Damping regressors over ground; see `damping_regressors`."""
         return damping_regressors(self.nu)
@@ -155,6 +166,14 @@ def named(hull: Floats) -> Mapping[str, float]:
     return dict(zip(COEFFICIENTS, hull.tolist(), strict=True))
 
 
+def total(parts: Floats) -> Floats:
+    """Return the sum over actuators, shape (n, 3), of forces of shape (n, k, 3); NumPy's own is slow along a short axis."""
+    force = parts[:, 0].copy()
+    for k in range(1, parts.shape[1]):
+        force += parts[:, k]
+    return force
+
+
 def body_current(picture: Picture) -> tuple[Floats, Floats]:
     """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n,) each."""
     flow, scene = picture.flow, picture.scene
@@ -171,7 +190,7 @@ def acceleration(picture: Picture) -> Floats:
     frame turns through; Fossen (2021), section 10.3.
     """
     (m11, m22, m23, m32, m33), rest, turning = _balance(picture)
-    X, Y, N = (picture.parts.sum(axis=1) + rest).T
+    X, Y, N = (total(picture.parts) + rest).T
     det = m22 * m33 - m23 * m32
     rates = np.column_stack([X / m11, (m33 * Y - m23 * N) / det, (m22 * N - m32 * Y) / det])
     return rates if turning is None else rates + turning

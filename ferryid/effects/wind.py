@@ -25,7 +25,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     if areas is None:
         return picture
     air = np.broadcast_to(p, (len(scene.t), 2))
-    more = wind_force(areas, air, scene.psi, scene.nu) - wind_force(areas, np.zeros_like(air), scene.psi, scene.nu)
+    more = wind_force(areas, air, scene.psi, scene.nu) - scene.still_air
     return replace(picture, external=picture.external + more, air=np.asarray(p, dtype=np.float64))
 
 

@@ -21,8 +21,11 @@ def diagnosed(name: str, folder: Path) -> Diagnosis:
 def test_a_thruster_that_gives_up_half_way_and_a_breeze(tmp_path: Path) -> None:
     result = diagnosed("thruster-fault", tmp_path)
     assert result.verdict == "explained"
-    fault, wind = result.findings
+    fault, wind, gusts = result.findings
     assert (fault.effect, fault.instance, wind.effect) == ("thruster_gain", "thruster2", "wind")
+    true = load_scenario("thruster-fault").wind
+    assert gusts.effect == "gusts"
+    assert gusts.parameters["std"].value == pytest.approx(true.gust_std_mps, rel=0.25)
     assert fault.parameters["factor"].value == pytest.approx(0.6, abs=0.02)
     onset = fault.parameters["onset"]
     assert onset.low - 1.0 <= 720.0 <= onset.high + 1.0
