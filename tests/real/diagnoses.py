@@ -33,6 +33,9 @@ JUDGED_2025 = {
         "Doubtful: every thruster used one quadrant only, so that a turned thruster, a weaker one and a wrong thrust curve "
         "differ little; the encoder itself follows its order."
     ),
+    "payload": (
+        "Doubtful: the mass of this configuration is an assumption in the profile, and most of it again is no load."
+    ),
     "time_delay": "Doubtful in open air: a controller that answers gusts looks the same.",
 }
 ENVIRONMENT = ("wind", "current", "gusts", "waves", "mooring", "shallow_water")
@@ -169,8 +172,8 @@ def osaka() -> str:
             f"In the random runs the direction is found, and a share of {strength:.2f} of the strength; in the zigzags, two "
             "minutes on few headings, it is not. A steady wind predicts held-out stretches of the random runs no better than "
             f"its controls do, and diagnosing them the tool names it in {named} of {len(made)}. The row of the measured mean "
-            "says why: the true mean of the hidden channel would recover only that share of what the channel itself does. The rest "
-            "is in how the wind changes.",
+            "says why: the true mean of the hidden channel would recover only that share of what the channel itself does. The "
+            "rest is in how the wind changes.",
             "",
             f"Let change in the course of time (nodes every {esso.NODES_S:.0f} s, fitted to all runs together), "
             f"the wind that "
@@ -341,7 +344,11 @@ def tank() -> str:
             return "Doubtful: nothing says where the carriage measured, but lift that the hull lacks looks the same."
         return UNJUDGED
 
-    alone, (one_hull, shared) = told("kvlcc2-model", logs, judge), told("kvlcc2-model", logs, judge, together=True)
+    def judge_together(one: Diagnosis, finding: Finding) -> str:
+        return UNJUDGED if finding.effect == "unknown" else judge(one, finding)
+
+    alone = told("kvlcc2-model", logs, judge)
+    one_hull, shared = told("kvlcc2-model", logs, judge_together, together=True)
     environment = sum(finding.effect in ENVIRONMENT for one in shared for finding in one.findings)
     arms = [
         sum(any(finding.effect == "lever_arm" for finding in one.findings) for one in made)
