@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import exp
 from pathlib import Path
@@ -47,8 +47,10 @@ FEWEST_WINDOWS = 60
 SHOWN_RIVALS = 3
 OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
-ONSET_DROP = 2.0
-"""Fall of the logarithm of the evidence at the ends of an onset's interval."""
+ONSET_DROP = 50.0
+"""Fall of the logarithm of the evidence as of which no onset farther away comes into question; smaller dips may lie between."""
+ONSET_STEP, ONSET_FIT = 0.125, 2
+"""Step between onsets that are weighed, in lengths of a window, and steps of the fit for each."""
 WITHHELD_EFFECTS = {"wind": "wind", "current": "current", "payload": "payload"}
 
 
@@ -295,7 +297,7 @@ def _findings(
         named = zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True)
         values = {name: value for name, value in named if name in estimates}
         if suspect.effect.onset:
-            values["onset"] = suspect.onset_s
+            values["onset"] = estimates["onset"].value if "onset" in estimates else suspect.onset_s
         improved = None if proof is None else proof.proofs[i].improvement
         made.append(
             Finding(
@@ -304,8 +306,8 @@ def _findings(
                 probability=probability,
                 parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
-                intervals=_intervals(trial, suspect),
-                onset_s=suspect.onset_s if suspect.onset_s > 0.0 else None,
+                intervals=_intervals(trial, estimates),
+                onset_s=estimates["onset"].value if "onset" in estimates else None,
                 regime=place.regime,
                 improvement={} if improved is None else dict(zip(AXES, improved.removed.tolist(), strict=True)),
                 held_out=improved is not None,
@@ -349,29 +351,41 @@ def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[st
             continue
         estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
     if suspect.onset_s > 0.0:
-        early, late = (_onset_end(trial, kept, index, side) for side in (-1.0, 1.0))
-        estimates["onset"] = Estimate(suspect.onset_s, early, late, "s")
+        estimates["onset"] = _onset(trial, kept, index)
     return estimates
 
 
-def _onset_end(trial: Trial, kept: Fit, index: int, side: float) -> float:
-    """Return how far an onset can be moved to one side before the evidence falls: an idle thruster hides its fault."""
+def _onset(trial: Trial, kept: Fit, index: int) -> Estimate:
+    """Return when an effect began, as the median of its posterior with the interval: an idle thruster hides its fault."""
     suspect = kept.suspects[index]
     times = trial.windows.middle_s
-    onset = suspect.onset_s
-    step = 0.25 * len(trial.windows.weight) * trial.windows.scene.step_s
-    while True:
-        onset += side * step
-        if not times[0] < onset < times[-1]:
-            return float(np.clip(onset, times[0], times[-1]))
+    step = ONSET_STEP * len(trial.windows.weight) * trial.windows.scene.step_s
+
+    def evidence_at(onset: float) -> float:
         moved = [replace(one, onset_s=onset) if i == index else one for i, one in enumerate(kept.suspects)]
-        if fit(trial, moved, kept.values).evidence < kept.evidence - ONSET_DROP:
-            return onset
+        return fit(trial, moved, kept.values, steps=ONSET_FIT).evidence
+
+    tried = {suspect.onset_s: evidence_at(suspect.onset_s)}
+    for side in (-1.0, 1.0):
+        onset = suspect.onset_s + side * step
+        while times[0] < onset < times[-1]:
+            tried[onset] = evidence_at(onset)
+            if tried[onset] < max(tried.values()) - ONSET_DROP:
+                break
+            onset += side * step
+    onsets = np.array(sorted(tried))
+    weights = np.exp(np.array([tried[onset] for onset in onsets.tolist()]) - max(tried.values()))
+    # Each onset stands for the step about it.
+    shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
+    edges = np.concatenate([onsets - 0.5 * step, onsets[-1:] + 0.5 * step])
+    low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
+    return Estimate(middle, max(low, 0.0), high, "s")
 
 
-def _intervals(trial: Trial, suspect: Suspect) -> tuple[tuple[float, float], ...]:
+def _intervals(trial: Trial, estimates: Mapping[str, Estimate]) -> tuple[tuple[float, float], ...]:
     t = trial.windows.scene.t
-    return ((max(suspect.onset_s, float(t[0])), float(t[-1])),)
+    begun = estimates["onset"].value if "onset" in estimates else 0.0
+    return ((max(begun, float(t[0])), float(t[-1])),)
 
 
 def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple[dict[str, Any], dict[str, Any]]:
