@@ -128,7 +128,8 @@ class Trial:
             hull[k] += 0.1 * self.hull_spread[k]
             columns[:, :, column] = (self.steps.gap(replace(picture, hull=hull)) - base) / 0.1
         every = np.zeros((base.size, len(self.hull_spread)))
-        every[:, free] = self.sieve.white(columns)
+        if free.size:
+            every[:, free] = self.sieve.white(columns)
         return every
 
     def white(self, picture: Picture) -> Floats:

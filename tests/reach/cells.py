@@ -24,6 +24,8 @@ ELSEWHERE = 0.35
 """The same, in another place than the usual one; singles, onsets and clean runs only."""
 UNSTEADY = ("gusts", "waves")
 """Effects that pairs leave out: they are what is laid over a concealed effect."""
+NEEDS = {"gusts": ("wind",)}
+"""What has to be there for an effect to act on: gusts about a calm push with the square of their speed only."""
 NOT_BOTH = (frozenset({"time_delay", "thruster_lag"}),)
 """Pairs that no log of these paths can tell apart."""
 
@@ -81,7 +83,13 @@ def _of_place(place: Place) -> list[Cell]:
         clean.append(Cell("noisy", "clean", place.name, "nothing; twice the noise", partial(_noisy, place)))
         clean.append(Cell("gaps", "clean", place.name, "nothing; navigation with gaps", partial(_gaps, place)))
     singles = [
-        Cell(name, "single", place.name, effect.title, partial(_effects, place, name, "single", [name], 0))
+        Cell(
+            name,
+            "single",
+            place.name,
+            effect.title,
+            partial(_effects, place, name, "single", [*NEEDS.get(name, ()), name], 0),
+        )
         for name, effect in effects().items()
     ]
     onsets = [
