@@ -73,7 +73,7 @@ def suspect(name: str, instance: str | None = None) -> Suspect:
 @pytest.fixture(scope="module")
 def windy() -> Trial:
     trial = trial_on(sailed(480.0, WIND))
-    return trial.with_noise_of(fit(trial, [suspect("wind")]).gaps)
+    return trial.with_noise_of(fit(trial, [suspect("wind")]))
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +176,7 @@ def test_a_constant_push_is_matched_by_its_placebo(calm: Trial) -> None:
         tuple(replace(parameter, size=50.0, low=-500.0, high=500.0) for parameter in base.parameters_of(FERRY)),
     )
     found = fit(pushed, [push])
-    told = evidence(pushed.with_noise_of(found.gaps), found)
+    told = evidence(pushed.with_noise_of(found), found)
     assert told is not None
     assert told.proofs[0].improvement.score_low > 0.0
     assert told.proofs[0].beaten <= 1e-6

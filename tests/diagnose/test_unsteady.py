@@ -1,0 +1,70 @@
+"""Gusts and waves of simulated trials become states of the filter; where there are none, none are seen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ferryid.diagnose.hypothesis import trial_of
+from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
+from ferryid.diagnose.search import Search, search, suspects_of
+from ferryid.diagnose.unsteady import State
+from ferryid.diagnose.weak import windows
+from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+
+FERRY = load_profile("milliampere")
+BASE = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "twelve-corner" }
+controller = { delta = 0.7, sigma = 0.7 }
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+"""
+WIND = "north_mps = -3.2, east_mps = 2.4"
+TRUE_GUST, TRUE_HZ = 0.8, 1.0 / 2.4
+IMITATORS = ("wind", "gusts", "waves", "time_delay", "thruster_lag")
+"""What chance disturbances are easily taken for in a closed loop; the whole library takes ten times as long."""
+
+
+def found_in(environment: str, seed: int, folder: Path) -> Search:
+    log = folder / "trial.mcap"
+    write_log(simulate(parse_scenario(BASE + environment, "unsteady"), seed), log)
+    scene, _ = scene_of(str(log), FERRY, None)
+    seen = windows(scene, *window_lengths(FERRY))
+    plain, spread = plain_picture(seen.scene, FERRY)
+    suspects, _ = suspects_of(seen.scene)
+    known = [one for one in suspects if one.effect.id in IMITATORS]
+    assert {one.effect.id for one in known} == set(IMITATORS)
+    return search(trial_of(seen, plain, spread), lambda stage: None, known=known)
+
+
+def values_of(state: State) -> dict[str, float]:
+    return dict(zip([one.name for one in state.suspect.parameters], state.values.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_gusts_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
+    gusts = f"environment = {{ wind = {{ {WIND}, gust_std_mps = {TRUE_GUST}, gust_time_s = 8.0 }} }}\n"
+    result = found_in(gusts, seed, tmp_path)
+    assert [one.suspect.effect.id for one in result.states] == ["gusts"]
+    assert abs(values_of(result.states[0])["std"] / TRUE_GUST - 1.0) < 0.25
+    assert [one.effect.id for one in result.fit.suspects] == ["wind"]
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_waves_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
+    waves = "waves = { significant_height_m = 0.12, peak_period_s = 2.4, direction_deg = 225.0 }"
+    result = found_in(f"environment = {{ {waves} }}\n", seed, tmp_path)
+    assert [one.suspect.effect.id for one in result.states] == ["waves"]
+    assert abs(values_of(result.states[0])["peak_frequency"] / TRUE_HZ - 1.0) < 0.3
+    assert not {one.effect.id for one in result.fit.suspects} & {"time_delay", "thruster_lag"}
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+@pytest.mark.parametrize("wind", ["", f"environment = {{ wind = {{ {WIND} }} }}\n"], ids=["calm", "steady wind"])
+def test_where_nothing_comes_and_goes_there_are_no_states(wind: str, seed: int, tmp_path: Path) -> None:
+    result = found_in(wind, seed, tmp_path)
+    assert result.states == ()
+    assert [one.effect.id for one in result.fit.suspects] == (["wind"] if wind else [])
