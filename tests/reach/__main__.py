@@ -6,12 +6,14 @@ import argparse
 import json
 import os
 import sys
+import tempfile
 import time
 from pathlib import Path
 
 # Before numpy is imported, here and in the processes: each run keeps to one core.
 os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
 
+from tests.reach import wavy
 from tests.reach.cells import KINDS, cells, draws
 from tests.reach.figures import errors, matrix
 from tests.reach.page import page, results
@@ -34,7 +36,7 @@ def main() -> int:
     options = parser.parse_args()
     chosen = {name.strip() for name in options.only.split(",") if name.strip()}
     every = [cell for cell in cells() if not chosen or chosen & {cell.name, cell.kind, cell.place, cell.key}]
-    if not every:
+    if not every and "wavy" not in chosen:
         parser.error(
             f"--only: no cell of this name. Kinds are {', '.join(KINDS)}; cells {', '.join(c.name for c in cells())}"
         )
@@ -50,10 +52,15 @@ def main() -> int:
     lines.sort(key=lambda line: [line["draw"][key] for key in ("place", "cell", "number")])
     settings = {"runs": options.runs, "seed": options.seed, "version": of, "only": options.only}
     told = results(lines, every, settings)
+    section: list[str] = []
+    if not chosen or "wavy" in chosen:
+        with tempfile.TemporaryDirectory() as scratch:
+            told["wavy"] = wavy.wavy(Path(scratch))
+        section = wavy.lines(told["wavy"])
     folder = options.out / "diagnosis"
     folder.mkdir(parents=True, exist_ok=True)
     (options.out / "diagnosis.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    (options.out / "diagnosis.md").write_text(page(lines, every, settings, "diagnosis"), encoding="utf-8")
+    (options.out / "diagnosis.md").write_text(page(lines, every, settings, "diagnosis", section), encoding="utf-8")
     (folder / "confusion.svg").write_text(matrix(*told["confusion"].values()), encoding="utf-8")
     by_cell = {
         cell.key: score(

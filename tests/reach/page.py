@@ -24,8 +24,6 @@ HEADS: Mapping[str, str] = {
     "outside": "Outside the library",
 }
 REASONS: Mapping[str, str] = {
-    "fouling": "the hull refitted alone fits held-out stretches as well as damping that has grown, so that the proof may fail",
-    "thruster_interaction": "the effect takes the largest force in the log for full thrust, the simulator that of the curve",
     "revolt": "the velocity's noise times ReVolt's sway damping is a tenth of its thrust; m22 refitted grows to hide it, and "
     "names rest on that hull",
 }
@@ -120,7 +118,13 @@ def _in_order(lines: Sequence[Line]) -> list[Line]:
     return sorted(lines, key=lambda line: KINDS.index(line["draw"]["kind"]))
 
 
-def page(lines: Sequence[Line], cells: Sequence[Cell], settings: Mapping[str, Any], figures: str) -> str:
+def page(
+    lines: Sequence[Line],
+    cells: Sequence[Cell],
+    settings: Mapping[str, Any],
+    figures: str,
+    more: Sequence[str] = (),
+) -> str:
     """Return the report in Markdown.
 
     Parameters
@@ -133,6 +137,8 @@ def page(lines: Sequence[Line], cells: Sequence[Cell], settings: Mapping[str, An
         ``runs``, ``seed``, ``version`` of the sources, and ``only`` what of the study was run, empty for all.
     figures
         Folder of the figures, from where the page lies.
+    more
+        Lines of further sections.
     """
     seconds = [line["seconds"] for line in lines]
     text = [
@@ -187,6 +193,7 @@ def page(lines: Sequence[Line], cells: Sequence[Cell], settings: Mapping[str, An
         "",
         f"![Relative errors of parameters]({figures}/errors.svg)",
         "",
+        *more,
     ]
     return "\n".join(text).rstrip() + "\n"
 

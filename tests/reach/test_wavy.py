@@ -1,0 +1,19 @@
+"""Waves that nobody measured do not spoil the hull that a diagnosis learns among them, where they spoil a regression."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.reach.wavy import AXES, lines, wavy
+
+
+def test_a_hull_learnt_in_waves_serves_in_calm_water(tmp_path: Path) -> None:
+    told = wavy(tmp_path, rounds=1)
+    corrected, diagnosed = told["fit"], told["diagnose"]
+    assert corrected["mse"]["sway"] > 1.1
+    assert corrected["position_m"] > corrected["base_position_m"]
+    assert sum(diagnosed["mse"][axis] for axis in AXES) < 0.8 * sum(corrected["mse"][axis] for axis in AXES)
+    assert diagnosed["mse"]["yaw"] < 0.5
+    assert diagnosed["position_m"] < 0.8 * diagnosed["base_position_m"]
+    assert diagnosed["heading_deg"] < 0.8 * diagnosed["base_heading_deg"]
+    assert any("`diagnose`" in line for line in lines(told))
