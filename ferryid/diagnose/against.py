@@ -66,7 +66,7 @@ class Simulated:
     scene
         What it holds, at its full rate.
     hull, spread
-        Coefficients of its hull, shape (22,), and how far off they may be.
+        Coefficients of its hull, shape (26,), and how far off they may be.
     conditions
         Effects that it has, in the order in which they act.
     sensors

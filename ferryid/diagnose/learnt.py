@@ -33,9 +33,9 @@ class Learnt:
     ranges
         Ranges of validity.
     before, spread
-        What was believed of the hull's coefficients before the log, shape (22,) each.
+        What was believed of the hull's coefficients before the log, shape (26,) each.
     hull, covariance
-        What is believed of them now, shapes (22,) and (22, 22).
+        What is believed of them now, shapes (26,) and (26, 26).
     vessel, conditions
         Properties of the vessel and conditions of the log, in the order in which they act.
     notes

@@ -157,7 +157,7 @@ def plain_picture(
     Picture
         Without suspects.
     ndarray
-        Standard deviations, shape (22,), in the units of the coefficients: `HULL_SPREAD` of each where a hull model is
+        Standard deviations, shape (26,), in the units of the coefficients: `HULL_SPREAD` of each where a hull model is
         known (with the model's own intervals added), and what a vessel of this size may have at most where it is not.
 
     Raises
@@ -175,10 +175,12 @@ def plain_picture(
 
 
 def broad_spread(scene: Scene, profile: Profile) -> Floats:
-    """Return how large the hull's coefficients may be for a vessel of this size and speed, shape (22,).
+    """Return how large the hull's coefficients may be for a vessel of this size and speed, shape (26,).
 
     Added mass of a half-immersed cylinder of the hull's draught, cross-flow drag with a coefficient of 1 along the hull, lift
-    and friction in proportion to the usual speed; Faltinsen (1990), chapters 3 and 6; Fossen (2021), chapter 6.
+    and friction in proportion to the usual speed; Faltinsen (1990), chapters 3 and 6; Fossen (2021), chapter 6. Lift as of a
+    plate of the hull's length and draught by slender-body theory, times what the hull's thickness adds; Clarke, Gedling and
+    Hine (1983), The application of manoeuvring criteria in hull design using linear theory.
     """
     length, beam, draught = dimensions(profile)
     hull = profile.hull
@@ -203,6 +205,13 @@ def broad_spread(scene: Scene, profile: Profile) -> Floats:
         "N_|v|r": plate * length**2 / 12.0,
         "N_|r|r": plate * length**3 / 32.0,
     }
+    slender = 0.5 * np.pi * _WATER * draught**2 * (1.0 + 0.4 * _BLOCK * beam / draught)
+    ahead = {
+        "Y_uv": slender,
+        "Y_ur": slender * length / 2.0,
+        "N_uv": slender * length / 2.0,
+        "N_ur": slender * length**2 / 4.0,
+    }
     lift = 0.4 * plate * usual
     first = {
         "X_u": hull.mass_kg / time_s,
@@ -216,7 +225,7 @@ def broad_spread(scene: Scene, profile: Profile) -> Floats:
         "Y_vvv": second["Y_|v|v"] / usual,
         "N_rrr": second["N_|r|r"] / turning,
     }
-    every = {"m11": m11, "m22": m22, "m23": m23, "m32": m23, "m33": m33, **first, **second, **third}
+    every = {"m11": m11, "m22": m22, "m23": m23, "m32": m23, "m33": m33, **first, **second, **third, **ahead}
     return np.array([every[name] for name in COEFFICIENTS])
 
 

@@ -46,7 +46,7 @@ class Gains:
 
 
 def held_out_gains(
-    variants: Mapping[str, Sequence[Member]], none: Sequence[Member], spread: Floats, lift_size: Floats
+    variants: Mapping[str, Sequence[Member]], none: Sequence[Member], spread: Floats, induced_size: Floats
 ) -> dict[str, Gains]:
     """Return the gain of each variant of the members over those without effects.
 
@@ -56,7 +56,7 @@ def held_out_gains(
         The same logs with other effects or pictures, by name.
     none
         The logs without effects.
-    spread, lift_size
+    spread, induced_size
         As in `ferryid.diagnose.shared_hull.fit_together`.
 
     Raises
@@ -68,13 +68,13 @@ def held_out_gains(
     if not cut:
         raise FerryIdError("the logs: each is too short to hold stretches out. Fix: give logs of some minutes")
     kept = [i for i, _ in cut]
-    weigh = fit_together([next(iter(variants.values()))[i] for i in kept], spread, lift_size).noise
+    weigh = fit_together([next(iter(variants.values()))[i] for i in kept], spread, induced_size).noise
 
     def left(members: Sequence[Member]) -> list[Floats]:
         squares = [np.zeros(len(members[i].windows.starts)) for i in kept]
         for k in range(FOLDS):
             training = [replace(members[i], windows=folds.training[k]) for i, folds in cut]
-            made = fit_together(training, spread, lift_size)
+            made = fit_together(training, spread, induced_size)
             for place, (i, folds) in enumerate(cut):
                 own = folds.fold == k
                 gaps = left_over(replace(members[i], windows=subset(members[i].windows, own)), made, place)

@@ -6,12 +6,12 @@ wind, current and payload are not. So the hull is fitted to all logs at once, ea
 steps; the normal matrix of each log, its own effects partialled out, is what this log knows of the hull. Their sum without one
 log is what the others know, which makes a belief for diagnosing that log that it had no part in.
 
-Beside the coefficients of `ferryid.effects.picture` the hull has lift here: forces with u v and u r, which a slender hull that
-moves ahead has and a polynomial in moduli does not.
+Beside the coefficients of `ferryid.effects.picture` the hull has the drag of drift and turning here: surge forces with v r and
+v v, which a hull that lifts pays for it.
 
 References
 ----------
-Fossen (2021), section 6.5, for cross-flow drag and low-aspect-ratio lift; Gelman et al. (2013), Bayesian Data Analysis,
+Fossen (2021), section 6.5, for cross-flow drag and lift; Gelman et al. (2013), Bayesian Data Analysis,
 chapter 5, for parameters that groups of data share.
 """
 
@@ -31,7 +31,7 @@ from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import COEFFICIENTS, Picture
 from ferryid.vessel.profile import Floats
 
-LIFT = ("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_vv")
+INDUCED = ("X_vr", "X_vv")
 ROUNDS, STEPS = 3, 5
 """Rounds, each with the noise that the one before left, and Gauss-Newton steps in a round."""
 TRUST = 2.0
@@ -56,13 +56,13 @@ class SharedHull:
     Attributes
     ----------
     names
-        `COEFFICIENTS` and `LIFT`.
+        `COEFFICIENTS` and `INDUCED`, h in all.
     before, spread
-        What was believed before any log: mean and standard deviations, shape (28,).
+        What was believed before any log: mean and standard deviations, shape (h,).
     step
-        Fitted values in spreads from `before`, shape (28,).
+        Fitted values in spreads from `before`, shape (h,).
     normal, gradient
-        Of each log, its own effects partialled out, in spreads; shapes (logs, 28, 28) and (logs, 28).
+        Of each log, its own effects partialled out, in spreads; shapes (logs, h, h) and (logs, h).
     values, errors
         Parameters of each log's own effects, and their standard deviations, one array per effect.
     noise
@@ -97,7 +97,7 @@ class SharedHull:
         return apart / max(expected * (1.0 - 1.0 / logs), 1e-12) if logs > 1 else 1.0
 
     def belief(self, without: int | None = None) -> tuple[Floats, Floats]:
-        """Return mean, shape (28,), and covariance, shape (28, 28), of the hull in the units of its coefficients.
+        """Return mean, shape (h,), and covariance, shape (h, h), of the hull in the units of its coefficients.
 
         Parameters
         ----------
@@ -122,13 +122,13 @@ class SharedHull:
     def picture(self, plain: Picture, without: int | None = None) -> tuple[Picture, Floats]:
         """Return a log's picture with the hull that is believed in, and the standard deviations of `COEFFICIENTS`.
 
-        The lift is an external force at the measured motion. Standard deviations alone say less than the covariance does:
-        `suspect` keeps all of it.
+        The induced drag is an external force at the measured motion. Standard deviations alone say less than the covariance
+        does: `suspect` keeps all of it.
         """
         mean, covariance = self.belief(without)
         h = len(COEFFICIENTS)
-        lifted = lift(replace(plain, hull=mean[:h]), mean[h:])
-        return lifted, np.sqrt(np.diag(covariance))[:h]
+        pictured = induced(replace(plain, hull=mean[:h]), mean[h:])
+        return pictured, np.sqrt(np.diag(covariance))[:h]
 
     def suspect(self, without: int | None = None) -> Suspect:
         """Return the hull as a suspect with the whole covariance, for `ferryid.diagnose.hypothesis.fit`.
@@ -141,7 +141,7 @@ class SharedHull:
 
         def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
             now = mean + root @ p
-            return lift(replace(picture, hull=now[:h]), now[h:])
+            return induced(replace(picture, hull=now[:h]), now[h:])
 
         parameters = tuple(Parameter(name, "-", 1.0, -np.inf, np.inf) for name in self.names)
         effect = Effect("hull", "Hull", lambda profile: parameters, apply, _says, lambda values, instance: {})
@@ -152,22 +152,22 @@ def _says(values: Values, instance: str | None) -> str:
     return "The hull is that of the vessel's other logs."
 
 
-def lift(picture: Picture, coefficients: Floats) -> Picture:
-    """Return the picture with lift in it, from coefficients in the order of `LIFT`; in still water."""
-    u, v, r = picture.scene.nu.T
-    Y_uv, Y_ur, N_uv, N_ur, X_vr, X_vv = coefficients
-    force = np.column_stack([(X_vr * r + X_vv * v) * v, u * (Y_uv * v + Y_ur * r), u * (N_uv * v + N_ur * r)])
+def induced(picture: Picture, coefficients: Floats) -> Picture:
+    """Return the picture with induced drag in it, from coefficients in the order of `INDUCED`; in still water."""
+    _, v, r = picture.scene.nu.T
+    X_vr, X_vv = coefficients
+    still = np.zeros_like(v)
+    force = np.column_stack([(X_vr * r + X_vv * v) * v, still, still])
     return replace(picture, external=picture.external + force)
 
 
-def lift_spread(length_m: float, draught_m: float, water_density: float = 1000.0) -> Floats:
-    """Return how large the coefficients of `LIFT` may be, shape (6,): a flat plate's lift, and the moments of its halves."""
+def induced_spread(length_m: float, draught_m: float, water_density: float = 1000.0) -> Floats:
+    """Return how large the coefficients of `INDUCED` may be, shape (2,): a flat plate's."""
     plate = 0.5 * water_density * length_m * draught_m
-    L = length_m
-    return np.array([plate, plate * L / 2.0, plate * L / 2.0, plate * L**2 / 4.0, plate * L / 2.0, plate / 2.0])
+    return np.array([plate * length_m / 2.0, plate / 2.0])
 
 
-def fit_together(members: Sequence[Member], spread: Floats, lift_size: Floats) -> SharedHull:
+def fit_together(members: Sequence[Member], spread: Floats, induced_size: Floats) -> SharedHull:
     """Fit one hull to all logs, and to each the effects of its own.
 
     Parameters
@@ -175,11 +175,13 @@ def fit_together(members: Sequence[Member], spread: Floats, lift_size: Floats) -
     members
         The logs, all of one vessel.
     spread
-        Standard deviations of what is believed of `COEFFICIENTS`, about those of the first log's picture, shape (22,).
-    lift_size
-        Those of `LIFT`, about zero, shape (6,).
+        Standard deviations of what is believed of `COEFFICIENTS`, about those of the first log's picture, shape (26,).
+    induced_size
+        Those of `INDUCED`, about zero, shape (2,).
     """
-    joint = _Joint(members, np.concatenate([members[0].plain.hull, np.zeros(len(LIFT))]), np.append(spread, lift_size))
+    joint = _Joint(
+        members, np.concatenate([members[0].plain.hull, np.zeros(len(INDUCED))]), np.append(spread, induced_size)
+    )
     z = np.zeros(len(joint.before))
     own = [np.zeros(0) for _ in members]
     empty = [replace(member, suspects=()) for member in members]
@@ -208,7 +210,7 @@ def left_over(member: Member, hull: SharedHull, place: int) -> Floats:
     """
     h = len(COEFFICIENTS)
     mean = hull.before + hull.spread * hull.step
-    picture = lift(replace(member.plain, hull=mean[:h]), mean[h:])
+    picture = induced(replace(member.plain, hull=mean[:h]), mean[h:])
     for suspect, values in zip(member.suspects, hull.values[place], strict=True):
         picture = suspect.act(picture, values)
     return member.windows.gap(picture)
@@ -225,7 +227,7 @@ class _Joint:
     def gap(self, i: int, z: Floats, own: Floats) -> Floats:
         member, h = self.members[i], len(COEFFICIENTS)
         hull = self.before + self.spread * z
-        picture = lift(replace(member.plain, hull=hull[:h]), hull[h:])
+        picture = induced(replace(member.plain, hull=hull[:h]), hull[h:])
         for suspect, values in zip(member.suspects, self.values(i, own), strict=True):
             picture = suspect.act(picture, values)
         return member.windows.gap(picture)
@@ -265,7 +267,7 @@ class _Joint:
         return noise.white(self.gap(i, z, own), self.members[i].windows.runs)
 
     def by_hull(self, i: int, z: Floats, own: Floats, noise: Noise) -> Floats:
-        """Return the derivatives of the whitened gaps of a log by the hull, shape (w, 28)."""
+        """Return the derivatives of the whitened gaps of a log by the hull, shape (w, h)."""
         w = self.white(i, z, own, noise)
         J = np.zeros((len(w), len(z)))
         for k in np.flatnonzero(self.spread > 0.0):
@@ -332,7 +334,7 @@ class _Joint:
             cuts = np.cumsum([len(suspect.parameters) for suspect in member.suspects])[:-1].tolist()
             errors.append(tuple(np.split(size * part.own_errors(A), cuts)) if member.suspects else ())
         return SharedHull(
-            names=(*COEFFICIENTS, *LIFT),
+            names=(*COEFFICIENTS, *INDUCED),
             before=self.before,
             spread=self.spread,
             step=z,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
 from ferryid.diagnose.search import ODDS
-from ferryid.effects.picture import MASS, SURGE, SWAY, YAW
+from ferryid.effects.picture import COEFFICIENTS
 from ferryid.vessel.profile import Floats
 
 SEEN = 0.5
@@ -24,12 +24,9 @@ LEARNT = 0.5
 MOVED = 1e-2
 """Step of derivatives, in sizes of a parameter."""
 
-_M11, _M22, _M23, _M32, _M33 = range(len(MASS))
-_FIRST = len(MASS)
 AXES = {
-    "surge": (_M11, *range(_FIRST, _FIRST + len(SURGE))),
-    "sway": (_M22, _M23, *range(_FIRST + len(SURGE), _FIRST + len(SURGE) + len(SWAY))),
-    "yaw": (_M32, _M33, *range(_FIRST + len(SURGE) + len(SWAY), _FIRST + len(SURGE) + len(SWAY) + len(YAW))),
+    axis: tuple(k for k, name in enumerate(COEFFICIENTS) if name.startswith(begins))
+    for axis, begins in (("surge", ("m1", "X_")), ("sway", ("m2", "Y_")), ("yaw", ("m3", "N_")))
 }
 """Places of each axis's coefficients in the hull's."""
 EXCITES = {

@@ -12,7 +12,7 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.hypothesis import Suspect
 from ferryid.diagnose.noise import ORDER
 from ferryid.diagnose.scene import dimensions, plain_picture, scene_of, window_lengths
-from ferryid.diagnose.shared_hull import LIFT, Member, SharedHull, fit_together, lift_spread
+from ferryid.diagnose.shared_hull import INDUCED, Member, SharedHull, fit_together, induced_spread
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.effects import effects
 from ferryid.effects.picture import Picture
@@ -86,8 +86,8 @@ def together(
         )
     progress(f"fitting one hull to {len(members)} logs")
     length, _, draught = dimensions(profile)
-    lift_size = np.zeros(len(LIFT)) if profile.hull.has_model else lift_spread(length, draught)
-    return Together(tuple(members), fit_together(members, np.max(spreads, axis=0), lift_size), place)
+    induced_size = np.zeros(len(INDUCED)) if profile.hull.has_model else induced_spread(length, draught)
+    return Together(tuple(members), fit_together(members, np.max(spreads, axis=0), induced_size), place)
 
 
 def own_of(seen: Windows, profile: Profile) -> tuple[Suspect, ...]:

@@ -21,13 +21,16 @@ MASS = ("m11", "m22", "m23", "m32", "m33")
 SURGE = ("X_u", "X_|u|u", "X_uuu")
 SWAY = ("Y_v", "Y_|v|v", "Y_|r|v", "Y_vvv", "Y_r", "Y_|v|r", "Y_|r|r")
 YAW = ("N_v", "N_|v|v", "N_|r|v", "N_r", "N_|v|r", "N_|r|r", "N_rrr")
-COEFFICIENTS = (*MASS, *SURGE, *SWAY, *YAW)
+LIFT = ("Y_uv", "Y_ur", "N_uv", "N_ur")
+"""Circulatory lift of a hull that moves ahead, on sway and yaw."""
+COEFFICIENTS = (*MASS, *SURGE, *SWAY, *YAW, *LIFT)
 """Order of the hull's coefficients in `Picture.hull`."""
 UNITS = (
     *("kg", "kg", "kg·m", "kg·m", "kg·m²"),
     *("kg/s", "kg/m", "kg·s/m²"),
     *("kg/s", "kg/m", "kg", "kg·s/m²", "kg·m/s", "kg", "kg·m"),
     *("kg·m/s", "kg", "kg·m", "kg·m²/s", "kg·m", "kg·m²", "kg·m²·s"),
+    *("kg/m", "kg", "kg", "kg·m"),
 )
 """Units of `COEFFICIENTS`, radians left out."""
 
@@ -115,7 +118,7 @@ class Picture:
     scene
         What was measured.
     hull
-        Coefficients in the order of `COEFFICIENTS`, shape (22,).
+        Coefficients in the order of `COEFFICIENTS`, shape (26,).
     parts, angles
         As in the scene, with what the effects make of them.
     external
@@ -227,7 +230,9 @@ def _balance(picture: Picture) -> tuple[tuple[Any, ...], Floats, Floats | None]:
         r = scene.nu[:, 2]
         turning = np.column_stack([r * v_c, -r * u_c, np.zeros_like(r)])
     u, v, r = nu.T
-    D = np.column_stack([X_D @ hull[5:8], Y_D @ hull[8:15], N_D @ hull[15:22]])
+    Y_uv, Y_ur, N_uv, N_ur = hull[22:]
+    Y_L, N_L = u * (Y_uv * v + Y_ur * r), u * (N_uv * v + N_ur * r)
+    D = np.column_stack([X_D @ hull[5:8], Y_D @ hull[8:15] + Y_L, N_D @ hull[15:22] + N_L])
     if picture.damping_factor is not None:
         D = D * picture.damping_factor[:, None]
     if picture.load is not None:

@@ -94,7 +94,7 @@ def base_estimator(model: Model) -> Estimator:
 
 
 def hull_values(model: Model) -> Floats:
-    """Return the hull's coefficients in the order of `COEFFICIENTS`, a model's terms counted in, shape (22,)."""
+    """Return the hull's coefficients in the order of `COEFFICIENTS`, a model's terms counted in, shape (26,)."""
     if model.hull:
         return np.array([model.hull[name].value for name in COEFFICIENTS])
     profile = parse_profile(model.profile_text, model.name)
@@ -103,7 +103,7 @@ def hull_values(model: Model) -> Floats:
 
 
 def with_hull(model: Model, profile: Profile, hull: Floats) -> tuple[Profile, Mapping[str, float]]:
-    """Return profile and factors on it so that with the model's terms the hull has these coefficients, shape (22,)."""
+    """Return profile and factors on it so that with the model's terms the hull has these coefficients, shape (26,)."""
     zeta = float(model.scale.get("zeta", 1.0))
     base = zeta * (hull - hull_part(model)[0])
     return replace(profile, hull=hull_with(scaled(profile.hull, model.scale), base)), {
@@ -114,7 +114,7 @@ def with_hull(model: Model, profile: Profile, hull: Floats) -> tuple[Profile, Ma
 
 
 def hull_with(hull: Hull, coefficients: Floats) -> Hull:
-    """Return a hull with other coefficients, in the order of `COEFFICIENTS`, shape (22,)."""
+    """Return a hull with other coefficients, in the order of `COEFFICIENTS`, shape (26,)."""
     m11, m22, m23, m32, m33 = coefficients[:5].tolist()
     return replace(
         hull,

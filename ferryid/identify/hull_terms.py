@@ -27,6 +27,10 @@ MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {
     "N_|v|r": (("|v|r", 2),),
     "N_|r|r": (("|r|r", 2), ("sgn(r)r^2", 2)),
     "N_rrr": (("r^3", 2),),
+    "Y_uv": (("uv", 1),),
+    "Y_ur": (("ur", 1),),
+    "N_uv": (("uv", 2),),
+    "N_ur": (("ur", 2),),
     "m11": (("u_dot", 0),),
     "m22": (("v_dot", 1),),
     "m23": (("r_dot", 1),),
@@ -37,7 +41,7 @@ MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {
 
 
 def hull_part(model: Model) -> tuple[Floats, Floats]:
-    """Return what a model's terms add to the hull's coefficients, and its variance, shape (22,) each."""
+    """Return what a model's terms add to the hull's coefficients, and its variance, shape (26,) each."""
     part, variance = np.zeros(len(COEFFICIENTS)), np.zeros(len(COEFFICIENTS))
     for index, name in enumerate(COEFFICIENTS):
         picked = [(model.terms.index(term), axis) for term, axis in MAPPED[name] if term in model.terms]

@@ -64,12 +64,12 @@ class Pictured:
 
     @cached_property
     def hull(self) -> Floats:
-        """Coefficients of the hull, shape (22,)."""
+        """Coefficients of the hull, shape (26,)."""
         return hull_values(self.model)
 
     @property
     def variance(self) -> Floats:
-        """Variance of the hull's coefficients, shape (22,); 0 where the model does not tell."""
+        """Variance of the hull's coefficients, shape (26,); 0 where the model does not tell."""
         variance = np.maximum(hull_part(self.model)[1], 0.0)
         if self.model.hull:
             ends = np.array([(self.model.hull[name].low, self.model.hull[name].high) for name in COEFFICIENTS])
@@ -127,7 +127,7 @@ class Pictured:
         return (*self.model.conditions_of(sha256), *self.model.vessel_effects)
 
     def altered_hull(self) -> Floats:
-        """Return the hull's coefficients as the properties of the vessel alter them, shape (22,)."""
+        """Return the hull's coefficients as the properties of the vessel alter them, shape (26,)."""
         profile = self.force.profile
         k, rows = len(profile.actuators), 2
         rest = np.zeros((rows, 3))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects import Effect, effects
-from ferryid.effects.picture import COEFFICIENTS, UNITS, Picture, from_onset
+from ferryid.effects.picture import COEFFICIENTS, LIFT, UNITS, Picture, from_onset
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.vessel.profile import Profile
 
@@ -132,10 +132,11 @@ def conditions_json(conditions: Conditions) -> dict[str, Any]:
 
 
 def hull_from(data: Any) -> dict[str, Quantity]:
-    """Read a refitted hull; KeyError, TypeError or ValueError where a part is missing or wrong."""
-    if not isinstance(data, dict) or set(data) != set(COEFFICIENTS):
-        raise ValueError("hull does not name the 22 coefficients")
-    hull = {name: _quantity(data[name], f"hull.{name}") for name in COEFFICIENTS}
+    """Read a refitted hull, without lift where a file has none; KeyError, TypeError or ValueError where a part is wrong."""
+    if not isinstance(data, dict) or {*data, *LIFT} != set(COEFFICIENTS):
+        raise ValueError("hull does not name the coefficients of a hull")
+    none = {name: {"value": 0.0, "low": 0.0, "high": 0.0, "unit": UNITS[COEFFICIENTS.index(name)]} for name in LIFT}
+    hull = {name: _quantity({**none, **data}[name], f"hull.{name}") for name in COEFFICIENTS}
     for name, unit in zip(COEFFICIENTS, UNITS, strict=True):
         if hull[name].unit != unit:
             raise ValueError(f"hull.{name} is in {hull[name].unit!r}, not {unit}")

@@ -33,7 +33,7 @@ def coriolis(M: Floats, nu: Floats) -> Floats:
 
 
 def damping(D: Mapping[str, float], nu_r: Floats) -> Floats:
-    """Return the damping matrix, shape (..., 3, 3); (2.14), with Y_vvv in d22 where it belongs.
+    """Return the damping matrix, shape (..., 3, 3); (2.14), with Y_vvv in d22 where it belongs, and lift.
 
     Parameters
     ----------
@@ -52,6 +52,8 @@ def damping(D: Mapping[str, float], nu_r: Floats) -> Floats:
     matrix[..., 1, 2] = -get("Y_r") - get("Y_|v|r") * size_v - get("Y_|r|r") * size_r
     matrix[..., 2, 1] = -get("N_v") - get("N_|v|v") * size_v - get("N_|r|v") * size_r
     matrix[..., 2, 2] = -get("N_r") - get("N_|v|r") * size_v - get("N_|r|r") * size_r - get("N_rrr") * r**2
+    matrix[..., 1:, 1] -= np.stack([get("Y_uv") * u, get("N_uv") * u], axis=-1)
+    matrix[..., 1:, 2] -= np.stack([get("Y_ur") * u, get("N_ur") * u], axis=-1)
     return matrix
 
 
@@ -183,6 +185,8 @@ def _damping_force(D: Mapping[str, float], nu_r: Floats) -> Floats:
     yaw = (-get("N_v") - get("N_|v|v") * size_v - get("N_|r|v") * size_r) * v + (
         -get("N_r") - get("N_|v|r") * size_v - get("N_|r|r") * size_r - get("N_rrr") * r**2
     ) * r
+    sway = sway - (get("Y_uv") * v + get("Y_ur") * r) * u
+    yaw = yaw - (get("N_uv") * v + get("N_ur") * r) * u
     return np.stack([surge, sway, yaw], axis=-1)
 
 

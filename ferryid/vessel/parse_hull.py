@@ -27,8 +27,12 @@ DAMPING_TERMS = (
     "N_|v|r",
     "N_|r|r",
     "N_rrr",
+    "Y_uv",
+    "Y_ur",
+    "N_uv",
+    "N_ur",
 )
-"""SNAME damping coefficients of the hull model, thesis (2.14) in its corrected form."""
+"""SNAME damping coefficients of the hull model, thesis (2.14) in its corrected form, and those of lift."""
 
 _DIAGONAL = (
     *("X_u", "X_|u|u", "X_uuu"),

@@ -72,7 +72,7 @@ def trial(true_force: float, seed: int = 0) -> Trial:
     plain = Picture(seen.scene, hull_of(FERRY), seen.scene.parts, seen.scene.angles, np.zeros((len(seen.scene.t), 3)))
     white = Noise(np.zeros((3, ORDER)), np.eye(3))
     # Next to no freedom of the hull, so that the case stays the linear one of the formula.
-    return Trial(moved, plain, white, np.full(22, 1e-9), Filter(NOISE))
+    return Trial(moved, plain, white, np.full(len(plain.hull), 1e-9), Filter(NOISE))
 
 
 def test_a_linear_hypothesis_has_the_mean_spread_and_evidence_of_the_formula() -> None:

@@ -13,7 +13,7 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.scene import scene_of
 from ferryid.diagnose.shared_evidence import MIRRORED, placebos
-from ferryid.diagnose.shared_hull import LIFT, SharedHull, fit_together
+from ferryid.diagnose.shared_hull import INDUCED, SharedHull, fit_together
 from ferryid.diagnose.together import together
 from ferryid.vessel import load_profile
 
@@ -75,7 +75,7 @@ def test_a_common_hull_points_to_the_hidden_wind_and_a_mirrored_one_does_not(sha
     hidden = [scene_of(log, vessel, None)[0].wind for log in logs]
     true = np.array([wind.mean(axis=0) for wind in hidden if wind is not None])
     mirrored = placebos(joint.members)[MIRRORED]
-    spread, lift = np.split(joint.hull.spread, [-len(LIFT)])
+    spread, lift = np.split(joint.hull.spread, [-len(INDUCED)])
     assert np.median(off(joint.hull, true)) < 25.0
     assert np.median(off(fit_together(mirrored, spread, lift), true)) > 40.0
 

@@ -165,8 +165,20 @@ def test_windows_follow_froude() -> None:
 @pytest.mark.parametrize("vessel", ["milliampere-2025", "esso-osaka", "gunnerus", "kvlcc2-model", "vtec-usv"])
 def test_a_hull_without_a_model_may_have_any_damping(short: Scene, vessel: str) -> None:
     spread = broad_spread(short, load_profile(vessel))
-    assert spread.shape == (22,)
+    assert spread.shape == (len(COEFFICIENTS),)
     assert np.all(np.isfinite(spread) & (spread > 0.0))
+
+
+def test_a_tanker_may_lift_as_tankers_do_and_a_known_hull_as_it_is_known(short: Scene) -> None:
+    # Kijima et al. (1990) with the KVLCC2's length, breadth, draught and block coefficient.
+    tanker = load_profile("kvlcc2-model")
+    L, T = tanker.hull.length_m, tanker.hull.draught_m
+    plate = 0.5 * 1000.0 * L * T
+    spread = dict(zip(COEFFICIENTS, broad_spread(short, tanker), strict=True))
+    usual = {"Y_uv": 0.4 * plate, "Y_ur": 0.08 * plate * L, "N_uv": 0.13 * plate * L, "N_ur": 0.05 * plate * L**2}
+    for name, value in usual.items():
+        assert 0.3 * value < spread[name] < 5.0 * value, name
+    assert plain_picture(short, FERRY)[1][-4:].tolist() == [0.0, 0.0, 0.0, 0.0]
 
 
 def test_broad_beliefs_hold_what_was_measured_of_a_ferry(short: Scene) -> None:

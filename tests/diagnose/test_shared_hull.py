@@ -12,7 +12,7 @@ from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.hypothesis import Suspect, fit, trial_of
 from ferryid.diagnose.scene import window_lengths
 from ferryid.diagnose.shared_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
-from ferryid.diagnose.shared_hull import LIFT, Member, SharedHull, fit_together
+from ferryid.diagnose.shared_hull import INDUCED, Member, SharedHull, fit_together
 from ferryid.diagnose.together import together
 from ferryid.diagnose.weak import windows
 from ferryid.effects import effects
@@ -27,7 +27,7 @@ WIND = effects()["wind"]
 SUSPECT = Suspect(WIND, None, WIND.parameters_of(FERRY))
 WINDS = ((-2.0, 1.5), (1.5, 2.5), (2.5, -1.0))
 SPREAD = 0.3 * np.abs(hull_of(FERRY))
-NO_LIFT = np.zeros(len(LIFT))
+NONE_INDUCED = np.zeros(len(INDUCED))
 
 
 @cache
@@ -51,14 +51,14 @@ def members(factor: float = 1.0) -> tuple[Member, ...]:
         seen = windows(scene, *window_lengths(FERRY))
         thin = seen.scene
         still = wind_force(FERRY.wind, np.zeros((len(thin.t), 2)), thin.psi, thin.nu)  # type: ignore[arg-type]
-        wrong = hull_of(FERRY) * np.where(np.arange(22) % 2, 1.15, 0.85)
+        wrong = hull_of(FERRY) * np.where(np.arange(len(SPREAD)) % 2, 1.15, 0.85)
         made.append(Member(seen, Picture(thin, wrong, thin.parts, thin.angles, still), (SUSPECT,)))
     return tuple(made)
 
 
 @cache
 def fitted() -> SharedHull:
-    return fit_together(members(), SPREAD, NO_LIFT)
+    return fit_together(members(), SPREAD, NONE_INDUCED)
 
 
 def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
@@ -70,28 +70,28 @@ def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
 
 def test_the_common_hull_is_nearer_the_true_one_than_it_was_thought() -> None:
     mean, covariance = fitted().belief()
-    known = np.sqrt(np.diag(covariance))[:22] < 0.3 * SPREAD
+    known = np.sqrt(np.diag(covariance))[: len(SPREAD)] < 0.3 * SPREAD
     assert known[:5].sum() >= 3
-    before = np.abs(fitted().before[:22] - hull_of(FERRY))
-    after = np.abs(mean[:22] - hull_of(FERRY))
+    before = np.abs(fitted().before[: len(SPREAD)] - hull_of(FERRY))
+    after = np.abs(mean[: len(SPREAD)] - hull_of(FERRY))
     assert after[known].sum() < 0.35 * before[known].sum()
 
 
 def test_a_log_has_no_part_in_what_the_others_say() -> None:
-    alone = fit_together(members()[:2], SPREAD, NO_LIFT)
+    alone = fit_together(members()[:2], SPREAD, NONE_INDUCED)
     mean, covariance = fitted().belief(without=2)
     expected, own = alone.belief()
-    error = np.sqrt(np.diag(own))[:22]
-    assert (np.abs(mean - expected)[:22] <= 0.8 * error).all()
+    error = np.sqrt(np.diag(own))[: len(SPREAD)]
+    assert (np.abs(mean - expected)[: len(SPREAD)] <= 0.8 * error).all()
     told = error > 0.0
-    assert np.sqrt(np.diag(covariance))[:22][told] == pytest.approx(error[told], rel=0.5)
+    assert np.sqrt(np.diag(covariance))[: len(SPREAD)][told] == pytest.approx(error[told], rel=0.5)
     # The log itself would have told more.
     assert np.linalg.norm(mean - fitted().belief()[0]) > np.linalg.norm(mean - expected)
 
 
 def test_logs_of_one_hull_agree_and_of_another_do_not() -> None:
     assert fitted().disagreement < 1.6
-    assert fit_together(members(1.4), SPREAD, NO_LIFT).disagreement > 2.0 * fitted().disagreement
+    assert fit_together(members(1.4), SPREAD, NONE_INDUCED).disagreement > 2.0 * fitted().disagreement
 
 
 def test_the_hull_as_a_suspect_has_the_same_mean_and_covariance() -> None:
@@ -103,14 +103,14 @@ def test_the_hull_as_a_suspect_has_the_same_mean_and_covariance() -> None:
     def moved(k: int) -> np.ndarray:
         p = np.zeros(len(suspect.parameters))
         p[k] = 1.0
-        return suspect.act(plain, p).hull - mean[:22]
+        return suspect.act(plain, p).hull - mean[: len(SPREAD)]
 
-    assert suspect.act(plain, np.zeros(len(suspect.parameters))).hull == pytest.approx(mean[:22])
+    assert suspect.act(plain, np.zeros(len(suspect.parameters))).hull == pytest.approx(mean[: len(SPREAD)])
     columns = np.column_stack([moved(k) for k in range(len(suspect.parameters))])
-    size = np.sqrt(np.diag(covariance))[:22]
+    size = np.sqrt(np.diag(covariance))[: len(SPREAD)]
     scale = np.where(size > 0.0, size, 1.0)
     assert columns @ columns.T / np.outer(scale, scale) == pytest.approx(
-        covariance[:22, :22] / np.outer(scale, scale), abs=1e-6
+        covariance[: len(SPREAD), : len(SPREAD)] / np.outer(scale, scale), abs=1e-6
     )
 
 
@@ -124,7 +124,7 @@ def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
 
 def test_winds_hold_on_held_out_stretches_and_placebos_do_not() -> None:
     bare = [replace(member, suspects=()) for member in members()]
-    gains = held_out_gains({"found": members(), **placebos(members())}, bare, SPREAD, NO_LIFT)
+    gains = held_out_gains({"found": members(), **placebos(members())}, bare, SPREAD, NONE_INDUCED)
     found = gains["found"]
     assert found.interval()[0] > 0.0
     for control in (MIRRORED, EXCHANGED):

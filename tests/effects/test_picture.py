@@ -19,7 +19,7 @@ from ferryid.effects.picture import (
     required_force,
 )
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import inverse_dynamics
+from ferryid.vessel.hull import damping, inverse_dynamics
 
 FERRY = load_profile("milliampere")
 RNG = np.random.default_rng(4)
@@ -100,3 +100,46 @@ def test_the_unit_of_a_coefficient_follows_from_its_name(name: str) -> None:
             (parts if power > 0 else over).append(text)
     told = "·".join(parts) + "".join(f"/{one}" for one in over)
     assert dict(zip(COEFFICIENTS, UNITS, strict=True))[name] == told
+
+
+LIFTING = {"Y_uv": -300.0, "Y_ur": 200.0, "N_uv": -150.0, "N_ur": -80.0}
+
+
+def lifting(one: Picture, nu: tuple[float, float, float]) -> np.ndarray:
+    """Return the force of lift [N, N, N·m] alone at a steady velocity: what a picture with lift needs less."""
+    hull = one.hull.copy()
+    for name, value in LIFTING.items():
+        hull[COEFFICIENTS.index(name)] = value
+    moving = replace(one, scene=replace(one.scene, nu=np.tile(nu, (N, 1))))
+    rest = np.zeros((N, 3))
+    return (required_force(moving, rest) - required_force(replace(moving, hull=hull), rest))[0]
+
+
+def test_lift_by_hand() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    assert lifting(one, (2.0, 0.5, 0.0)) == pytest.approx([0.0, -300.0, -150.0])
+    assert lifting(one, (2.0, 0.0, 0.1)) == pytest.approx([0.0, 40.0, -16.0])
+    assert lifting(one, (0.0, 0.5, 0.1)) == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_a_hull_and_its_mirror_image_lift_to_opposite_sides() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    to_starboard, to_port = lifting(one, (1.5, 0.4, 0.2)), lifting(one, (1.5, -0.4, -0.2))
+    assert to_starboard == pytest.approx(-to_port)
+    assert abs(to_starboard[1]) > 100.0
+
+
+def test_a_hull_lifts_in_the_water_that_it_moves_through() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    aground = replace(one, scene=replace(one.scene, eta=np.zeros((N, 3))), flow=np.tile([-2.0, -0.5], (N, 1)))
+    assert lifting(aground, (0.0, 0.0, 0.0)) == pytest.approx([0.0, -300.0, -150.0])
+
+
+def test_lift_is_that_of_the_vessel_layer() -> None:
+    lifts = replace(FERRY, hull=replace(FERRY.hull, D={**FERRY.hull.D, **LIFTING}))
+    one = replace(picture(flow=False, load=False, damped=False), hull=hull_of(lifts), external=np.zeros((N, 3)))
+    nu_dot, nu = RNG.normal(size=(N, 3)), one.scene.nu
+    np.testing.assert_allclose(required_force(one, nu_dot), inverse_dynamics(lifts.hull, nu_dot, nu), rtol=1e-9)
+    taken = damping(lifts.hull.D, nu) - damping(FERRY.hull.D, nu)
+    alone = inverse_dynamics(lifts.hull, nu_dot, nu) - inverse_dynamics(FERRY.hull, nu_dot, nu)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", taken, nu), alone, atol=1e-9)

@@ -13,7 +13,7 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.hypothesis import Suspect
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.shared_evidence import Gains, held_out_gains, on_heading, placebos
-from ferryid.diagnose.shared_hull import Member, SharedHull, fit_together, lift_spread
+from ferryid.diagnose.shared_hull import Member, SharedHull, fit_together, induced_spread
 from ferryid.diagnose.together import together
 from ferryid.diagnose.weak import windows
 from ferryid.effects.effect import Parameter
@@ -98,10 +98,10 @@ def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]
     members = list(joint.members)
     hidden = [hidden_wind(path, member) for path, member in zip(kept, members, strict=True)]
     usable = [wind[member.windows.scene.usable] for wind, member in zip(hidden, members, strict=True)]
-    spread, lift_size = np.split(joint.hull.spread, [len(COEFFICIENTS)])
+    spread, induced_size = np.split(joint.hull.spread, [len(COEFFICIENTS)])
     controls = placebos(members)
     winds = {FOUND: winds_of(joint.hull)}
-    winds |= {name: winds_of(fit_together(group, spread, lift_size)) for name, group in controls.items()}
+    winds |= {name: winds_of(fit_together(group, spread, induced_size)) for name, group in controls.items()}
     gains: dict[str, Gains] = {}
     if judged:
         bare = [replace(member, suspects=()) for member in members]
@@ -111,7 +111,7 @@ def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]
             blown(member, np.broadcast_to(rows.mean(axis=0), wind.shape))
             for member, wind, rows in zip(bare, hidden, usable, strict=True)
         ]
-        gains = held_out_gains(variants, bare, spread, lift_size)
+        gains = held_out_gains(variants, bare, spread, induced_size)
     made = Study(
         names=tuple(Path(path).stem for path in kept),
         measured=np.array([rows.mean(axis=0) for rows in usable]),
@@ -204,6 +204,6 @@ def bearing(wind: Floats) -> Floats:
 
 
 def spread_of(members: Sequence[Member]) -> Floats:
-    """Return what is believed of the hull of these runs before them, lift included, shape (28,)."""
+    """Return what is believed of the hull of these runs before them, induced drag included, shape (h,)."""
     coefficients = np.max([plain_picture(one.windows.scene, ESSO)[1] for one in members], axis=0)
-    return np.concatenate([coefficients, lift_spread(ESSO.hull.length_m, ESSO.hull.draught_m)])
+    return np.concatenate([coefficients, induced_spread(ESSO.hull.length_m, ESSO.hull.draught_m)])

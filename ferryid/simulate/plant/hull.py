@@ -17,7 +17,7 @@ State: TypeAlias = tuple[float, float, float, float, float, float]
 """North, east [m], heading [rad, not wrapped], surge, sway [m/s], yaw rate [rad/s]; all over ground."""
 
 Hydrodynamics: TypeAlias = tuple[float, ...]
-"""M (5) in the order of `MASS`, then the 17 damping coefficients in the order of `DAMPING`."""
+"""M (5) in the order of `MASS`, then the 21 damping coefficients in the order of `DAMPING`."""
 
 MASS = ("m11", "m22", "m23", "m32", "m33")
 MASS_PLACES = ((0, 0), (1, 1), (1, 2), (2, 1), (2, 2))
@@ -25,6 +25,7 @@ MASS_PLACES = ((0, 0), (1, 1), (1, 2), (2, 1), (2, 2))
 DAMPING = (
     *("X_u", "X_|u|u", "X_uuu", "Y_v", "Y_|v|v", "Y_|r|v", "Y_vvv", "Y_r", "Y_|v|r", "Y_|r|r"),
     *("N_v", "N_|v|v", "N_|r|v", "N_r", "N_|v|r", "N_|r|r", "N_rrr"),
+    *("Y_uv", "Y_ur", "N_uv", "N_ur"),
 )
 
 
@@ -68,12 +69,12 @@ def coriolis_load(m11: float, m22: float, m23: float, u: float, v: float, r: flo
 
 @borrowing
 def damping_load(p: Hydrodynamics, u: float, v: float, r: float) -> Force:
-    """Return D(nu) nu [N, N, N·m] for velocities through the water [m/s, m/s, rad/s]; (2.12)-(2.14)."""
+    """Return D(nu) nu [N, N, N·m] for velocities through the water [m/s, m/s, rad/s]; (2.12)-(2.14), and lift."""
     au, av, ar = abs(u), abs(v), abs(r)
     X = -(p[5] + p[6] * au + p[7] * u * u) * u
     Y = -(p[8] + p[9] * av + p[10] * ar + p[11] * v * v) * v - (p[12] + p[13] * av + p[14] * ar) * r
     N = -(p[15] + p[16] * av + p[17] * ar) * v - (p[18] + p[19] * av + p[20] * ar + p[21] * r * r) * r
-    return X, Y, N
+    return X, Y - (p[22] * v + p[23] * r) * u, N - (p[24] * v + p[25] * r) * u
 
 
 @borrowing

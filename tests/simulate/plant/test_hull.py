@@ -32,7 +32,7 @@ def test_every_coefficient_that_a_profile_may_have_counts():
     assert set(DAMPING) == set(DAMPING_TERMS)
     still = required_force(hydrodynamics(HULL), 0.0, 0.0, 0.0, 0.7, 0.5, 0.3)
     for name in DAMPING:
-        more = replace(HULL, D={**HULL.D, name: HULL.D[name] - 1.0})
+        more = replace(HULL, D={**HULL.D, name: HULL.D.get(name, 0.0) - 1.0})
         ours = required_force(hydrodynamics(more), 0.0, 0.0, 0.0, 0.7, 0.5, 0.3)
         theirs = inverse_dynamics(more, np.zeros((1, 3)), np.array([[0.7, 0.5, 0.3]]))[0]
         assert ours == pytest.approx(tuple(theirs), rel=1e-12)
