@@ -238,19 +238,33 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
         judged = held_out(trial, folds, [*rest, placebo], [*start, neutral])
         by_name[name] = _gains(trial, folds, without.gaps, judged.gaps)
     picks = draws(folds.block)
-    late = [one for name, one in by_name.items() if name != HEADING]
-    rivals = [sorted(late, key=lambda one: float(one.sum()))[len(late) // 2]]
-    rivals += [by_name[HEADING]] if HEADING in by_name else []
-    beaten = min(float(np.quantile(picks @ (gains - rival), 0.025)) for rival in rivals)
+    beaten = _beaten(picks, gains, by_name)
     scores = {name: float(one.sum()) for name, one in by_name.items()}
     holds = made.score_low > 0.0 and beaten > 0.0
     # What acts seldom shows in a block or two, which half of the draws leave out.
     seldom = made.score > PLAIN and made.score > PLAIN + max(scores.values())
     if not holds and not seldom and _hull_strains(trial, found, rest, start):
-        stiff = held_out(replace(trial, hull_spread=np.zeros_like(trial.hull_spread)), folds, rest, start)
+        rigid = replace(trial, hull_spread=np.zeros_like(trial.hull_spread))
+        stiff = held_out(rigid, folds, rest, start)
         made = improvement(trial, folds, stiff, full)
-        return Proof(suspect, made, scores, beaten, made.score_low > 0.0)
+        # The same force late, or on a mirrored heading, has to be worse there too.
+        own = held_out(rigid, folds, found.suspects, found.values)
+        gains, by_name = _gains(trial, folds, stiff.gaps, own.gaps), {}
+        for name, placebo in placebos(trial, suspect, values).items():
+            judged = held_out(rigid, folds, [*rest, placebo], [*start, neutral])
+            by_name[name] = _gains(trial, folds, stiff.gaps, judged.gaps)
+        beaten = _beaten(picks, gains, by_name)
+        scores = {name: float(one.sum()) for name, one in by_name.items()}
+        return Proof(suspect, made, scores, beaten, made.score_low > 0.0 and beaten > 0.0)
     return Proof(suspect, made, scores, beaten, holds or seldom)
+
+
+def _beaten(picks: Floats, gains: Floats, by_name: Mapping[str, Floats]) -> float:
+    """Return the lower end of how much more is gained than by the placebos; see `Proof`."""
+    late = [one for name, one in by_name.items() if name != HEADING]
+    rivals = [sorted(late, key=lambda one: float(one.sum()))[len(late) // 2]]
+    rivals += [by_name[HEADING]] if HEADING in by_name else []
+    return min(float(np.quantile(picks @ (gains - rival), 0.025)) for rival in rivals)
 
 
 def _hull_strains(trial: Trial, found: Fit, rest: Sequence[Suspect], start: Sequence[Floats]) -> bool:

@@ -59,7 +59,7 @@ class Fit:
     spread
         Covariance of all of them together, in their own units, in the same order, shape (q, q).
     hull
-        The hull's coefficients, shape (22,).
+        The hull's coefficients, shape (26,).
     evidence
         Logarithm of the evidence (Laplace) over that of a hypothesis whose parameters are all zero wide.
     """
@@ -89,7 +89,7 @@ class Trial:
     noise
         Of the windows.
     hull_spread
-        Standard deviations of what is believed of the hull's coefficients, shape (22,).
+        Standard deviations of what is believed of the hull's coefficients, shape (26,).
     filter
         Of the steps, in which hypotheses are fitted.
     """
@@ -116,7 +116,7 @@ class Trial:
         return self.hull_slopes(self.plain)
 
     def hull_slopes(self, picture: Picture) -> Floats:
-        """Return derivatives of the prediction errors by the hull's coefficients, in their spreads, shape (w, 22).
+        """Return derivatives of the prediction errors by the hull's coefficients, in their spreads, shape (w, 26).
 
         Coefficients that cannot move have none.
         """
@@ -200,7 +200,9 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
         A = J.T @ J + np.eye(h + q)
         if count == steps:
             break
-        step = -np.linalg.solve(A, J.T @ w + z)
+        least = np.concatenate([np.full(h, -np.inf), low - z[h:]])
+        most = np.concatenate([np.full(h, np.inf), high - z[h:]])
+        step = _step(A, J.T @ w + z, least, most)
         step *= min(1.0, TRUST / max(float(np.abs(step).max()), 1e-12))
         better = False
         for share in (1.0, 0.5, 0.25, 0.1):
@@ -223,6 +225,19 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
     hull = trial.plain.hull + trial.hull_spread * z[:h]
     return Fit(tuple(suspects), values, covariance, hull, evidence)
+
+
+def _step(A: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
+    """Return the Gauss-Newton step; what would go beyond its limit goes there, and the others as well as they can then."""
+    step, free = np.zeros(len(slope)), np.ones(len(slope), dtype=np.bool_)
+    while free.any():
+        step[free] = -np.linalg.solve(A[np.ix_(free, free)], slope[free] + A[np.ix_(free, ~free)] @ step[~free])
+        beyond = free & ((step < low) | (step > high))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(step, low, high)[beyond]
+        free &= ~beyond
+    return step
 
 
 def settled(trial: Trial, beside: Fit, suspect: Suspect) -> Suspect:

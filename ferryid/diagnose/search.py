@@ -196,11 +196,14 @@ def _round(found: Sequence[Candidate]) -> Round:
 
 def _void(trial: Trial, made: Fit) -> bool:
     """Tell whether the last effect of a fit moves the vessel too little to matter to anybody."""
-    seen = trial.windows
+    last, seen = made.suspects[-1], trial.windows
+    away = [abs(value - one.neutral) for value, one in zip(made.values[-1].tolist(), last.parameters, strict=True)]
+    if max(away) < last.effect.idle:
+        return True
     hull = replace(trial.plain, hull=made.hull)
     for suspect, values in zip(made.suspects[:-1], made.values[:-1], strict=True):
         hull = suspect.act(hull, values)
-    moved = seen.gap(made.suspects[-1].act(hull, made.values[-1])) - seen.gap(hull)
+    moved = seen.gap(last.act(hull, made.values[-1])) - seen.gap(hull)
     size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
     return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import exp, log
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
@@ -17,8 +18,6 @@ from ferryid.vessel.profile import Floats
 
 WORTH = 8.0
 """Logarithm of the evidence that a disturbance must show before its states are as likely as none."""
-PROMISING = 2.0
-"""The same at the best of a few parameters, from which on it is worth a search."""
 STRENGTHS, BANDS = (0.03, 0.1, 0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
 """What these few are, as shares of the usual ones."""
 VAGUE = 0.5
@@ -71,18 +70,11 @@ def disturbed(
                 assert suspect.effect.unsteady is not None
                 return suspect.effect.unsteady(picture, p)
 
-            begin, first = max(
-                (
-                    (one, _glance(trial, gaps, noise, processes(one), picture))
-                    for one in before.get(suspect.key, _starts(suspect))
-                ),
-                key=lambda one: one[1],
-            )
-            if first < best + PROMISING:
-                continue
+            places = before.get(suspect.key, _starts(suspect))
+            begin = max(places, key=lambda one: _glance(trial, gaps, noise, processes(one), picture))
             told, values, widths, after = learn_with(trial.steps, gaps, noise, processes, begin, picture)
             gain = after - best - 0.5 * len(values) * log(len(trial.steps.starts))
-            if (widths < VAGUE).all():
+            if _seen(suspect, widths):
                 tried.append((gain, told, State(suspect, values, widths, gain), after))
         if not tried:
             break
@@ -95,6 +87,16 @@ def disturbed(
     return replace(trial.with_noise_of(made), filter=noise), tuple(states)
 
 
+def _seen(suspect: Suspect, widths: Floats) -> bool:
+    """Tell whether a disturbance is known: when and how fast, and how strong on one axis at least."""
+    strength = _strengths(suspect)
+    return bool((widths[~strength] < VAGUE).all() and (widths[strength] < VAGUE).any())
+
+
+def _strengths(suspect: Suspect) -> NDArray[np.bool_]:
+    return np.array([parameter.name.endswith("std") for parameter in suspect.parameters])
+
+
 def _glance(trial: Trial, gaps: Floats, noise: Filter, processes: tuple[Process, ...], picture: Picture) -> float:
     return likelihood(Filter(noise.channels, (*noise.processes, *processes), picture), trial.steps, gaps)
 
@@ -102,7 +104,7 @@ def _glance(trial: Trial, gaps: Floats, noise: Filter, processes: tuple[Process,
 def _starts(suspect: Suspect) -> list[Floats]:
     """Return parameters to begin with: strengths, and frequencies where there is one, about the usual ones."""
     usual = _sizes(suspect)
-    strength = np.array([parameter.name.endswith("std") for parameter in suspect.parameters])
+    strength = _strengths(suspect)
     band = np.array([parameter.unit == "Hz" for parameter in suspect.parameters])
     bands = BANDS if band.any() else (1.0,)
     return [usual * np.where(strength, a, np.where(band, b, 1.0)) for a in STRENGTHS for b in bands]
@@ -122,7 +124,9 @@ def _finding(scene: Scene, trial: Trial, state: State) -> Finding:
     suspect = state.suspect
     assert suspect.effect.unsteady is not None
     parameters = {
-        one.name: Estimate(value, value * exp(-1.96 * width), value * exp(1.96 * width), one.unit)
+        one.name: Estimate(
+            value, value * exp(-1.96 * width), min(value * exp(1.96 * min(width, 9.0)), one.high), one.unit
+        )
         for one, value, width in zip(suspect.parameters, state.values.tolist(), state.widths.tolist(), strict=True)
     }
     picture = trial.filter.picture or trial.plain

@@ -92,9 +92,11 @@ class Effect:
     choose
         ``choose(picture, believed, residual)`` returns the parameters for a log whose forces are otherwise as in the picture,
         where there are alternatives to choose from (places, coefficients): a quick scan, in place of ``parameters_of``. The
-        picture's hull is the fitted one, `believed` its coefficients as believed before the log, shape (22,).
+        picture's hull is the fitted one, `believed` its coefficients as believed before the log, shape (26,).
     least
         How far the interval of a parameter has to stay from its neutral value for the parameter to be worth a report.
+    idle
+        An effect all of whose parameters are nearer to neutral than this is void: the hull may be as much off anyway.
     bends_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
     unsteady
@@ -117,6 +119,7 @@ class Effect:
     vessel: bool = False
     choose: Callable[[Picture, Floats, Residual], Choice] | None = None
     least: float = 0.0
+    idle: float = 0.0
     bends_hull: bool = False
     unsteady: Callable[[Picture, Floats], tuple[Process, ...]] | None = None
     regressor: Callable[[Picture, Floats, str | None, str], tuple[str, Floats]] | None = None

@@ -65,5 +65,6 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     regressor=regressor,
+    idle=0.12,
     bends_hull=True,
 )
