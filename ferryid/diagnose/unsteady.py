@@ -18,8 +18,8 @@ from ferryid.vessel.profile import Floats
 
 WORTH = 8.0
 """Logarithm of the evidence that a disturbance must show before its states are as likely as none."""
-STRENGTHS, BANDS = (0.03, 0.1, 0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
-"""What these few are, as shares of the usual ones."""
+STRENGTHS, BANDS = (0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
+"""Where the search begins, as shares of the usual ones; from hardly anything nothing leads on."""
 VAGUE = 0.5
 """A disturbance whose parameters are known no better than within this factor (as a logarithm) was not seen."""
 
