@@ -47,6 +47,8 @@ FEWEST_WINDOWS = 60
 SHOWN_RIVALS = 3
 OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
+MERE_HINT = 0.5
+"""Probability above which no force is named where the hull is known from nothing but the log that shows it."""
 ONSET_DROP = 50.0
 """Fall of the logarithm of the evidence as of which no onset farther away comes into question; smaller dips may lie between."""
 ONSET_STEP, ONSET_FIT = 0.125, 2
@@ -162,14 +164,16 @@ def _one(
     unknown = unknown_of(trial, kept, scene)
     progress("locating")
     steady = [suspect for suspect in library if suspect.effect.unsteady is None]
-    named = [*_findings(steady, trial, base, kept, proof, scene), *findings_of(trial, found.states)]
-    findings = [*_of_sensors(sensors), *named]
-    chances, still = powers(trial, kept, steady), unexcited(trial)
+    forces = _findings(steady, trial, base, kept, proof, scene)
     if model is None and common is None and not profile.hull.has_model:
+        forces = [hinted(one) for one in forces]
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
-            "stand in for what a hull model would explain. Take them as hints."
+            f"stand in for what a hull model would explain. Take them as hints, of probability {MERE_HINT:g} at most."
         )
+    named = [*forces, *findings_of(trial, found.states)]
+    findings = [*_of_sensors(sensors), *named]
+    chances, still = powers(trial, kept, steady), unexcited(trial)
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
     notes += advice(chances, still)
     if unknown.unsteady or found.states:
@@ -191,6 +195,16 @@ def _one(
         against=compared,
         # A simulation's hull is not the vessel's, and the lift of a common one is in no model file.
         learnt=learnt(trial, kept, findings, survey) if simulated is None and common is None else None,
+    )
+
+
+def hinted(finding: Finding) -> Finding:
+    """Return a finding of a force as it stands where the hull is known from nothing but the log that shows it."""
+    return replace(
+        finding,
+        probability=min(finding.probability, MERE_HINT),
+        unresolved_with=tuple(dict.fromkeys((*finding.unresolved_with, "hull_parameters"))),
+        separating_manoeuvre="a log in calm air and still water, to fit a hull model first",
     )
 
 

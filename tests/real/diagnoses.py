@@ -336,19 +336,12 @@ def tank() -> str:
     def judge(one: Diagnosis, finding: Finding) -> str:
         if finding.effect in ENVIRONMENT:
             return "**Wrong**: there is none in a towing tank."
-        if finding.effect == "unknown" and any(term in finding.says for term in ("uv", "ur", "u|r|")):
-            return (
-                "Likely: without other logs the hull has no lift, with u v and u r, which a hull that moves ahead has."
-            )
         if finding.effect == "lever_arm":
-            return "Doubtful: nothing says where the carriage measured, but lift that the hull lacks looks the same."
+            return "Doubtful: nothing says where the carriage measured, but what the hull's model lacks looks the same."
         return UNJUDGED
 
-    def judge_together(one: Diagnosis, finding: Finding) -> str:
-        return UNJUDGED if finding.effect == "unknown" else judge(one, finding)
-
     alone = told("kvlcc2-model", logs, judge)
-    one_hull, shared = told("kvlcc2-model", logs, judge_together, together=True)
+    one_hull, shared = told("kvlcc2-model", logs, judge, together=True)
     environment = sum(finding.effect in ENVIRONMENT for one in shared for finding in one.findings)
     arms = [
         sum(any(finding.effect == "lever_arm" for finding in one.findings) for one in made)
@@ -364,7 +357,7 @@ def tank() -> str:
             "",
             f"Of wind, current, gusts, waves, moorings and shallow water {environment} are named in {len(logs)} logs, each "
             f"diagnosed by itself and with one hull from the others. By itself {arms[0]} show an antenna off the origin, with "
-            f"a hull that has lift {arms[1]}.",
+            f"one hull {arms[1]}.",
             "",
             "Each by itself:",
             "",
