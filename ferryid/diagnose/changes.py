@@ -12,7 +12,7 @@ from ferryid.vessel.profile import Floats
 FEWEST = 4
 """Windows between two changes."""
 BREAK = 2.3
-"""Kuiper's statistic of changes of the mean, as of which they are believed: one in a thousand without any."""
+"""Kuiper's statistic of changes of the mean, as of which they are believed; three in a hundred series of noise have one."""
 MOST_BREAKS = 6
 ACTS = 0.25
 """An interval acts whose mean excess is more than this part of the strongest one's."""

@@ -3,7 +3,8 @@
 A window's weight w and its first derivatives vanish at both ends, so that integration by parts moves every derivative
 onto w: ``∫ w p'' = ∫ w'' p`` for a position, ``∫ w nu' = -∫ w' nu`` for a velocity. Either is compared with the
 acceleration that a picture of the forces gives, averaged with the same weight. Where positions were measured they alone
-are used: what they leave is free of the closed loop's bias, and steadier over the seconds in which forces act.
+are used: what they leave is steadier over the seconds in which forces act. Long windows show and judge what is left over;
+hypotheses are fitted in short steps, by the filter of `ferryid.diagnose.filter`.
 
 References
 ----------
