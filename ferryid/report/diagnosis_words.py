@@ -20,6 +20,8 @@ SMALL = 0.02
 UNKNOWN = "unknown"
 FAR = 1e6
 """Rivals that are less likely by more than this are told in one word."""
+UNSTEADY = frozenset({"gusts", "waves"})
+"""Effects that are states of the filter, which has them all along."""
 ENDS_S = 10.0
 """What begins and ends this near to the ends of the log acts throughout."""
 FREE_RUN = (
@@ -131,6 +133,8 @@ def where(finding: Finding) -> str:
 def _throughout(finding: Finding) -> bool:
     t = finding.evidence.get("t")
     first, last = finding.intervals[0]
+    if UNSTEADY & {finding.effect}:
+        return True
     return t is not None and len(t) > 0 and bool(first <= t[0] + ENDS_S and last >= t[-1] - ENDS_S)
 
 

@@ -162,7 +162,9 @@ def test_a_profile_of_noise_is_even_and_counts_every_window() -> None:
     statistics = []
     for _ in range(200):
         white = rng.standard_normal((360, 3))
-        one = profile_of("heading", "deg", rng.uniform(0.0, 360.0, 360), np.linspace(0.0, 360.0, 13), white, white, white)
+        one = profile_of(
+            "heading", "deg", rng.uniform(0.0, 360.0, 360), np.linspace(0.0, 360.0, 13), white, white, white
+        )
         assert one.count.sum() == 360
         statistics.append(one.statistic)
     assert abs(np.mean(statistics)) < 0.4
