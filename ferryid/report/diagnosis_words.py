@@ -133,7 +133,7 @@ def where(finding: Finding) -> str:
 def _throughout(finding: Finding) -> bool:
     t = finding.evidence.get("t")
     first, last = finding.intervals[0]
-    if UNSTEADY & {finding.effect}:
+    if finding.effect in UNSTEADY:
         return True
     return t is not None and len(t) > 0 and bool(first <= t[0] + ENDS_S and last >= t[-1] - ENDS_S)
 
