@@ -171,7 +171,11 @@ def _one(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
             f"stand in for what a hull model would explain. Take them as hints, of probability {MERE_HINT:g} at most."
         )
-    named = [*forces, *findings_of(trial, found.states)]
+    shaken = findings_of(trial, found.states)
+    if model is None and not profile.hull.has_model:
+        # Its own motion, too, is only guessed at: what shakes it may be its measurement.
+        shaken = tuple(hinted(one) for one in shaken)
+    named = [*forces, *shaken]
     findings = [*_of_sensors(sensors), *named]
     chances, still = powers(trial, kept, steady), unexcited(trial)
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]

@@ -239,7 +239,7 @@ def summed(gaps: Floats, steps: Windows) -> Floats:
 
 
 def _least(cost: Callable[[Floats], float], start: Floats, bounds: list[tuple[float, float]]) -> Floats:
-    best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": 1e-4, "ftol": 1e-7})
+    best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": 1e-4, "ftol": 1e-8})
     return np.asarray(best.x, dtype=np.float64)
 
 

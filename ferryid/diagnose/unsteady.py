@@ -9,17 +9,19 @@ from math import exp, log
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood
+from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood, stride_s
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
 from ferryid.diagnose.result import AXES, Estimate, Finding
 from ferryid.effects.effect import Process
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats
 
-WORTH = 8.0
+WORTH = 12.0
 """Logarithm of the evidence that a disturbance must show before its states are as likely as none."""
 STRENGTHS, BANDS = (0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
 """Where the search begins, as shares of the usual ones; from hardly anything nothing leads on."""
+FASTEST = 0.4
+"""Highest frequency that is believed, in steps of the filter; half of one is aliased."""
 VAGUE = 0.5
 """A disturbance whose parameters are known no better than within this factor (as a logarithm) was not seen."""
 
@@ -74,7 +76,7 @@ def disturbed(
             begin = max(places, key=lambda one: _glance(trial, gaps, noise, processes(one), picture))
             told, values, widths, after = learn_with(trial.steps, gaps, noise, processes, begin, picture)
             gain = after - best - 0.5 * len(values) * log(len(trial.steps.starts))
-            if _seen(suspect, widths):
+            if _seen(suspect, values, widths, stride_s(trial.steps)):
                 tried.append((gain, told, State(suspect, values, widths, gain), after))
         if not tried:
             break
@@ -87,10 +89,18 @@ def disturbed(
     return replace(trial.with_noise_of(made), filter=noise), tuple(states)
 
 
-def _seen(suspect: Suspect, widths: Floats) -> bool:
-    """Tell whether a disturbance is known: when and how fast, and how strong on one axis at least."""
+def _seen(suspect: Suspect, values: Floats, widths: Floats, step_s: float) -> bool:
+    """Tell whether a disturbance is known: how fast it is, how strong on one axis at least, and its moment if it has one.
+
+    A position's error in a narrow band looks like a force along it, but turns nothing; and what is faster than the filter's
+    steps was not seen by it.
+    """
+    band = np.array([parameter.unit == "Hz" for parameter in suspect.parameters])
+    if (values[band] * step_s > FASTEST).any():
+        return False
     strength = _strengths(suspect)
-    return bool((widths[~strength] < VAGUE).all() and (widths[strength] < VAGUE).any())
+    turning = np.array([parameter.unit == "N·m" for parameter in suspect.parameters])
+    return bool((widths[~strength | turning] < VAGUE).all() and (widths[strength] < VAGUE).any())
 
 
 def _strengths(suspect: Suspect) -> NDArray[np.bool_]:
