@@ -98,8 +98,8 @@ def test_a_profile_beside_the_scenario_is_taken_and_nothing_is_warned_of(folder:
 def test_motion_beyond_any_ferry_is_told(
     folder: Path, monkeypatch: pytest.MonkeyPatch, column: int, value: float
 ) -> None:
-    def wild(*asked: Any) -> Any:
-        simulation = simulate(*asked)
+    def wild(*asked: Any, **more: Any) -> Any:
+        simulation = simulate(*asked, **more)
         nu = simulation.truth.nu.copy()
         nu[40, column] = value
         return replace(simulation, truth=replace(simulation.truth, nu=nu))
