@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.diagnose.filter import Filter, Sieve, learn, sieve_of
 from ferryid.diagnose.noise import Noise, noise_of
 from ferryid.diagnose.weak import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
-from ferryid.effects.picture import Picture
+from ferryid.effects.picture import Picture, from_onset
 from ferryid.vessel.profile import Floats
 
 HULL_SPREAD = 0.12
@@ -43,7 +42,7 @@ class Suspect:
         after = self.effect.apply(picture, p, self.instance)
         if self.onset_s <= 0.0:
             return after
-        return _from(picture, after, picture.scene.t >= self.onset_s)
+        return from_onset(picture, after, self.onset_s)
 
 
 @dataclass(frozen=True)
@@ -274,25 +273,3 @@ def trial_of(windows: Windows, plain: Picture, hull_spread: Floats) -> Trial:
     for _ in range(2):
         trial = trial.with_noise_of(fit(trial, ()))
     return trial
-
-
-def _from(before: Picture, after: Picture, rows: NDArray[np.bool_]) -> Picture:
-    """Return the one picture before and the other from an onset on."""
-
-    def mixed(old: Floats, new: Floats) -> Floats:
-        return np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)
-
-    def either(old: Floats | None, new: Floats | None) -> Floats | None:
-        if old is None and new is None:
-            return None
-        blank = np.zeros_like(new if old is None else old)
-        return mixed(blank if old is None else old, blank if new is None else new)
-
-    return replace(
-        after,
-        parts=mixed(before.parts, after.parts),
-        angles=mixed(before.angles, after.angles),
-        external=mixed(before.external, after.external),
-        flow=either(before.flow, after.flow),
-        load=either(before.load, after.load),
-    )
