@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from math import exp
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,20 +20,20 @@ from ferryid.diagnose.against import (
 )
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
-from ferryid.diagnose.evidence import Evidence, Improvement, evidence, force_errors
+from ferryid.diagnose.evidence import Evidence, Improvement, force_errors
 from ferryid.diagnose.free_runs import FreeRuns
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, settled, trial_of
+from ferryid.diagnose.hypothesis import Fit, Trial, fit, imagined, trial_of
+from ferryid.diagnose.judged import judged
 from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import locate
-from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding, Rival, Withheld
+from ferryid.diagnose.named import MERE_HINT, doubted, forces_of, hinted
+from ferryid.diagnose.result import AXES, Diagnosis, Finding, Withheld
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
-from ferryid.diagnose.search import NEAR, ODDS, search, suspects_of
-from ferryid.diagnose.separate import manoeuvre
-from ferryid.diagnose.shown import columns_of, regressor_of
+from ferryid.diagnose.search import search, suspects_of
 from ferryid.diagnose.testable import advice, powers, tells, unexcited
 from ferryid.diagnose.together import Together, together
-from ferryid.diagnose.unknown import impostors, unknown_of
-from ferryid.diagnose.unsteady import findings_of
+from ferryid.diagnose.unknown import unknown_of
+from ferryid.diagnose.unsteady import unsteady_of
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
@@ -44,15 +42,6 @@ from ferryid.vessel.profile import Profile
 
 FEWEST_WINDOWS = 60
 """Windows below which nothing is tested."""
-SHOWN_RIVALS = 3
-OUT_OF_STEP = ("time_delay", "thruster_lag")
-"""Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
-MERE_HINT = 0.5
-"""Probability above which no force is named where the hull is known from nothing but the log that shows it."""
-ONSET_DROP = 50.0
-"""Fall of the logarithm of the evidence as of which no onset farther away comes into question; smaller dips may lie between."""
-ONSET_STEP, ONSET_FIT = 0.125, 2
-"""Step between onsets that are weighed, in lengths of a window, and steps of the fit for each."""
 WITHHELD_EFFECTS = {"wind": "wind", "current": "current", "payload": "payload"}
 
 
@@ -151,27 +140,23 @@ def _one(
         notes += [compared["says"], *told]
     trial = trial_of(seen, plain, spread)
     found = search(trial, progress, known=library)
-    trial, kept = found.trial, found.fit
-    progress("judging on held-out stretches")
-    proof = evidence(trial, kept) if kept.suspects else None
-    if proof is not None:
-        kept, proof, dropped = _proved(trial, kept, proof)
-        notes += dropped
-    progress("looking for what has no name")
-    kept, proof, told = _without_impostors(trial, kept, proof)
-    notes += told
+    trial = found.trial
+    steady = [suspect for suspect in library if suspect.effect.unsteady is None]
+    stands = judged(trial, found.fit, steady, progress)
+    kept, proof = stands.fit, stands.proof
+    notes += stands.told
     base = fit(trial, ())
+    progress("looking for what has no name")
     unknown = unknown_of(trial, kept, scene)
     progress("locating")
-    steady = [suspect for suspect in library if suspect.effect.unsteady is None]
-    forces = _findings(steady, trial, base, kept, proof, scene)
+    forces = forces_of(trial, stands, scene)
     if model is None and common is None and not profile.hull.has_model:
         forces = [hinted(one) for one in forces]
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
             f"stand in for what a hull model would explain. Take them as hints, of probability {MERE_HINT:g} at most."
         )
-    shaken = findings_of(trial, found.states)
+    shaken = unsteady_of(trial, found.states)
     if model is None and not profile.hull.has_model:
         # Its own motion, too, is only guessed at: what shakes it may be its measurement.
         shaken = tuple(hinted(one) for one in shaken)
@@ -181,8 +166,10 @@ def _one(
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
     notes += advice(chances, still)
     if unknown.unsteady or found.states:
-        findings = [_doubted(one) for one in findings]
-    verdict = _verdict(bool(findings), bool(unknown.findings), tells(chances, still))
+        findings = [doubted(one) for one in findings]
+    sure = [one for one in findings if one.probability > MERE_HINT]
+    more = bool(unknown.findings) or len(sure) < len(findings)
+    verdict = _verdict(bool(sure), more, tells(chances, still))
     findings += unknown.findings
     before, after = _scores(trial, base, kept, proof)
     return Diagnosis(
@@ -199,31 +186,6 @@ def _one(
         against=compared,
         # A simulation's hull is not the vessel's, and the lift of a common one is in no model file.
         learnt=learnt(trial, kept, findings, survey) if simulated is None and common is None else None,
-    )
-
-
-def hinted(finding: Finding) -> Finding:
-    """Return a finding of a force as it stands where the hull is known from nothing but the log that shows it."""
-    return replace(
-        finding,
-        probability=min(finding.probability, MERE_HINT),
-        unresolved_with=tuple(dict.fromkeys((*finding.unresolved_with, "hull_parameters"))),
-        separating_manoeuvre="a log in calm air and still water, to fit a hull model first",
-    )
-
-
-def _doubted(finding: Finding) -> Finding:
-    """Return a finding as it stands beside something unsteady that nobody measured.
-
-    A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
-    """
-    if finding.effect not in OUT_OF_STEP:
-        return finding
-    return replace(
-        finding,
-        probability=min(finding.probability, 0.5),
-        unresolved_with=(*finding.unresolved_with, "gusts"),
-        separating_manoeuvre="the same manoeuvres in calm air",
     )
 
 
@@ -256,154 +218,6 @@ def _of_sensors(sensors: Sequence[SensorFinding]) -> tuple[Finding, ...]:
         )
         for one in sensors
     )
-
-
-def _proved(trial: Trial, kept: Fit, proof: Evidence) -> tuple[Fit, Evidence | None, list[str]]:
-    """Drop what does not help on held-out data, or no more than a placebo, and judge the rest again."""
-    told = []
-    holds = []
-    for one in proof.proofs:
-        if one.holds:
-            holds.append(one.suspect)
-        else:
-            told.append(
-                f"{one.suspect.effect.title} was suspected, but does not improve held-out stretches beyond what a placebo "
-                "does: it is no finding."
-            )
-    if not told:
-        return kept, proof, told
-    start = [values for suspect, values in zip(kept.suspects, kept.values, strict=True) if suspect in holds]
-    again = fit(trial, holds, start)
-    return again, evidence(trial, again) if holds else None, told
-
-
-def _without_impostors(trial: Trial, kept: Fit, proof: Evidence | None) -> tuple[Fit, Evidence | None, list[str]]:
-    """Drop what an empirical law in its place makes idle: physics without a name here may look a little like an effect."""
-    told = []
-    while idle := impostors(trial, kept):
-        title = kept.suspects[idle[0]].effect.title
-        told.append(
-            f"{title} was suspected, but a law in its place explains more and leaves it nothing: it is no finding."
-        )
-        holds = [suspect for i, suspect in enumerate(kept.suspects) if i != idle[0]]
-        kept = fit(trial, holds, [values for i, values in enumerate(kept.values) if i != idle[0]])
-        proof = evidence(trial, kept) if holds else None
-    return kept, proof, told
-
-
-def _findings(
-    library: Sequence[Suspect], trial: Trial, base: Fit, kept: Fit, proof: Evidence | None, scene: Scene
-) -> list[Finding]:
-    made = []
-    for i, suspect in enumerate(kept.suspects):
-        others = [j for j in range(len(kept.suspects)) if j != i]
-        rest = [kept.suspects[j] for j in others]
-        without = fit(trial, rest, [kept.values[j] for j in others])
-        rivals, probability = _rivals(trial, suspect, kept, rest, without, library)
-        unresolved = tuple(
-            dict.fromkeys(
-                rival.effect for rival in rivals if rival.delta_score > -NEAR and rival.effect != suspect.effect.id
-            )
-        )
-        # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
-        bare = replace(kept, suspects=tuple(rest), values=tuple(kept.values[j] for j in others))
-        place = locate(trial, bare, kept, scene)
-        estimates = _estimates(trial, suspect, kept, i)
-        if not estimates:
-            # Every one of its parameters may be too near the neutral value to be worth a name: the hull's, for one.
-            continue
-        named = zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True)
-        values = {name: value for name, value in named if name in estimates}
-        if suspect.effect.onset:
-            values["onset"] = estimates["onset"].value if "onset" in estimates else suspect.onset_s
-        improved = None if proof is None else proof.proofs[i].improvement
-        made.append(
-            Finding(
-                effect=suspect.effect.id,
-                instance=suspect.instance,
-                probability=probability,
-                parameters=estimates,
-                axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
-                intervals=_intervals(trial, estimates),
-                onset_s=estimates["onset"].value if "onset" in estimates else None,
-                regime=place.regime,
-                improvement={} if improved is None else dict(zip(AXES, improved.removed.tolist(), strict=True)),
-                held_out=improved is not None,
-                rivals=rivals[:SHOWN_RIVALS],
-                unresolved_with=unresolved,
-                separating_manoeuvre=manoeuvre(suspect.effect.id, unresolved),
-                says=suspect.effect.says(values, suspect.instance),
-                **columns_of(trial, place, regressor_of(suspect, imagined(trial.plain, bare), kept.values[i], place)),
-            )
-        )
-    return sorted(made, key=lambda one: -sum(one.improvement.values()))
-
-
-def _rivals(
-    trial: Trial, suspect: Suspect, kept: Fit, rest: Sequence[Suspect], without: Fit, library: Sequence[Suspect]
-) -> tuple[tuple[Rival, ...], float]:
-    """Return what else could stand in a finding's place, the nearest first, and how probable the finding is."""
-    taken = {one.key for one in kept.suspects}
-    rivals = []
-    for other in library:
-        if other.key in taken:
-            continue
-        begins = replace(other, onset_s=suspect.onset_s if other.effect.onset else 0.0)
-        stand_in = settled(trial, without, begins)
-        neutral = np.array([parameter.neutral for parameter in stand_in.parameters])
-        made = fit(trial, [*rest, stand_in], [*without.values, neutral])
-        rivals.append(Rival(other.effect.id, other.instance, made.evidence - kept.evidence))
-    rivals.sort(key=lambda one: -one.delta_score)
-    none = without.evidence - kept.evidence + ODDS
-    against = exp(min(none, 50.0)) + sum(exp(min(one.delta_score, 50.0)) for one in rivals)
-    return tuple(rivals), 1.0 / (1.0 + against)
-
-
-def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[str, Estimate]:
-    error = kept.errors(index)
-    estimates = {}
-    for parameter, value, spread in zip(suspect.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
-        low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
-        least = suspect.effect.least
-        if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
-            continue
-        estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
-    if suspect.onset_s > 0.0:
-        estimates["onset"] = _onset(trial, kept, index)
-    return estimates
-
-
-def _onset(trial: Trial, kept: Fit, index: int) -> Estimate:
-    """Return when an effect began, as the median of its posterior with the interval: an idle thruster hides its fault."""
-    suspect = kept.suspects[index]
-    times = trial.windows.middle_s
-    step = ONSET_STEP * len(trial.windows.weight) * trial.windows.scene.step_s
-
-    def evidence_at(onset: float) -> float:
-        moved = [replace(one, onset_s=onset) if i == index else one for i, one in enumerate(kept.suspects)]
-        return fit(trial, moved, kept.values, steps=ONSET_FIT).evidence
-
-    tried = {suspect.onset_s: evidence_at(suspect.onset_s)}
-    for side in (-1.0, 1.0):
-        onset = suspect.onset_s + side * step
-        while times[0] < onset < times[-1]:
-            tried[onset] = evidence_at(onset)
-            if tried[onset] < max(tried.values()) - ONSET_DROP:
-                break
-            onset += side * step
-    onsets = np.array(sorted(tried))
-    weights = np.exp(np.array([tried[onset] for onset in onsets.tolist()]) - max(tried.values()))
-    # Each onset stands for the step about it.
-    shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
-    edges = np.concatenate([onsets - 0.5 * step, onsets[-1:] + 0.5 * step])
-    low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
-    return Estimate(middle, max(low, 0.0), high, "s")
-
-
-def _intervals(trial: Trial, estimates: Mapping[str, Estimate]) -> tuple[tuple[float, float], ...]:
-    t = trial.windows.scene.t
-    begun = estimates["onset"].value if "onset" in estimates else 0.0
-    return ((max(begun, float(t[0])), float(t[-1])),)
 
 
 def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple[dict[str, Any], dict[str, Any]]:

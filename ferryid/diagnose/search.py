@@ -106,7 +106,7 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
     shaken = [suspect for suspect in suspects if suspect.effect.unsteady is not None]
     base = fit(trial, ())
     trial, chosen, rounds = _selected(trial, base, steady, progress)
-    chosen = _pruned(trial, chosen)
+    chosen = pruned(trial, chosen)
     states: tuple[State, ...] = ()
     if shaken:
         progress("looking for gusts and waves")
@@ -114,12 +114,12 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
     if states:
         # What stood in for them falls, and what they hid may show.
         stood = [one.key for one in chosen.suspects]
-        chosen = _pruned(trial, fit(trial, chosen.suspects, chosen.values))
+        chosen = pruned(trial, fit(trial, chosen.suspects, chosen.values))
         trial, chosen, more = _selected(trial, chosen, steady, progress)
         rounds += more
         if [one.key for one in chosen.suspects] != stood:
             trial, states = disturbed(trial, chosen, shaken, states)
-        chosen = _pruned(trial, fit(trial, chosen.suspects, chosen.values))
+        chosen = pruned(trial, fit(trial, chosen.suspects, chosen.values))
     return Search(trial, fit(trial, ()), chosen, tuple(rounds), untested, states)
 
 
@@ -208,7 +208,7 @@ def _void(trial: Trial, made: Fit) -> bool:
     return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
 
 
-def _pruned(trial: Trial, chosen: Fit) -> Fit:
+def pruned(trial: Trial, chosen: Fit) -> Fit:
     """Drop one by one what the others explain as well without it."""
     while chosen.suspects:
         without = []

@@ -124,7 +124,7 @@ def _sizes(suspect: Suspect) -> Floats:
     return np.array([parameter.size for parameter in suspect.parameters])
 
 
-def findings_of(trial: Trial, states: Sequence[State]) -> tuple[Finding, ...]:
+def unsteady_of(trial: Trial, states: Sequence[State]) -> tuple[Finding, ...]:
     """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over."""
     seen = trial.windows.scene
     return tuple(_finding(seen, trial, state) for state in states)

@@ -17,6 +17,8 @@ RIVALS = 3
 """Rivals that are told; the others are in the JSON."""
 SMALL = 0.02
 """A smaller change of the squared error is not told."""
+SURE = 0.5
+"""Probability above which a finding stands in the verdict without doubt."""
 UNKNOWN = "unknown"
 FAR = 1e6
 """Rivals that are less likely by more than this are told in one word."""
@@ -43,23 +45,28 @@ def title(effect: str, instance: str | None = None) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
-    named = [one for one in diagnosis.findings if one.effect != UNKNOWN]
+    every = [one for one in diagnosis.findings if one.effect != UNKNOWN]
+    named = [one for one in every if one.probability > SURE]
+    doubtful = listed([_inline(title(one.effect, one.instance)) for one in every if one not in named])
     physics = [_inline(title(one.effect, one.instance)) for one in named if one.effect in effects()]
     sensors = [_inline(title(one.effect)) for one in named if one.effect not in effects()]
     base = "simulation" if diagnosis.against else "model"
     left_out = "the recording differs from the simulation in" if diagnosis.against else "the model left out"
     parts = [f"{left_out} {listed(physics)}"] if physics else []
     parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
-    names = "; ".join(parts)
+    names = "; ".join(parts) + (f"; perhaps also {doubtful}" if doubtful else "")
     change = changed({axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()})
     told = f"; with {'them' if len(physics) > 1 else 'it'}, the squared force error on held-out data {change}"
     more = told if change and physics else ""
     if diagnosis.verdict == "explained":
         return f"Explained: {names}{more}."
     if diagnosis.verdict == "partly_explained":
-        return f"Partly explained: {names}{more}. More is missing, which nothing known here explains."
+        nameless = any(one.effect == UNKNOWN for one in diagnosis.findings)
+        rest = " More is missing, which nothing known here explains." if nameless else ""
+        return f"Partly explained: {names}{more}.{rest}"
     if diagnosis.verdict == "unexplained":
-        return f"Unexplained: the recording differs from the {base}, and nothing known here accounts for it."
+        perhaps = f" Perhaps some of it is {doubtful}." if doubtful else ""
+        return f"Unexplained: the recording differs from the {base}, and nothing known here surely accounts for it.{perhaps}"
     if diagnosis.verdict == "not_testable":
         return f"Not testable: this log cannot show whether anything is missing from the {base}."
     return f"Matched: nothing that this log could show is missing from the {base}."

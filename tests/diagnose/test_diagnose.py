@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.diagnose.diagnose import MERE_HINT, diagnose, hinted
+from ferryid.diagnose.diagnose import diagnose
+from ferryid.diagnose.named import MERE_HINT, hinted
 from ferryid.diagnose.result import Diagnosis, Finding
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile

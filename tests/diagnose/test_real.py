@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import examine
-from ferryid.diagnose.diagnose import MERE_HINT, diagnose
+from ferryid.diagnose.diagnose import diagnose
+from ferryid.diagnose.named import MERE_HINT
 from ferryid.diagnose.scene import scene_of
 from ferryid.diagnose.shared_evidence import MIRRORED, placebos
 from ferryid.diagnose.shared_hull import INDUCED, SharedHull, fit_together

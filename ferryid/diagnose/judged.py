@@ -1,0 +1,94 @@
+"""Whether what was selected stands: on held-out data, against its placebos, its rivals, and laws without a name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from ferryid.diagnose.evidence import Evidence, evidence
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit
+from ferryid.diagnose.rivals import Standing, standing_of
+from ferryid.diagnose.search import pruned
+from ferryid.diagnose.unknown import impostors
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What is left of a selection.
+
+    Attributes
+    ----------
+    fit
+        Of it.
+    proof
+        Held-out evidence; None where nothing is left, or the log is too short to hold anything out.
+    standings
+        Of every suspect among its rivals.
+    told
+        What was dropped, and why.
+    """
+
+    fit: Fit
+    proof: Evidence | None
+    standings: tuple[Standing, ...]
+    told: tuple[str, ...]
+
+
+def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Callable[[str], None]) -> Judged:
+    """Drop what does not stand, one after the other, as the others are to be judged without it.
+
+    Parameters
+    ----------
+    trial
+        With the noise that the selection leaves.
+    found
+        The selection.
+    library
+        Every suspect, for rivals.
+    progress
+        Called with the name of each stage.
+    """
+    told: list[str] = []
+    tried = {_keys(found)}
+    kept = found
+    while kept.suspects:
+        progress("judging on held-out stretches")
+        proof = evidence(trial, kept)
+        fallen, why = _fallen(trial, kept, proof)
+        if fallen is not None:
+            told.append(f"{kept.suspects[fallen].effect.title} was suspected, but {why}: it is no finding.")
+            kept = pruned(trial, _without(trial, kept, fallen))
+            tried.add(_keys(kept))
+            continue
+        progress("weighing rivals")
+        standings = tuple(standing_of(trial, kept, i, library) for i in range(len(kept.suspects)))
+        better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
+        better = [one for one in better if _keys(one.fit) not in tried]
+        if not better:
+            return Judged(kept, proof, standings, tuple(told))
+        # What was selected first may be less likely beside what was selected later than another in its place.
+        best = max(better, key=lambda one: one.gain)
+        kept = pruned(trial, best.fit)
+        tried.add(_keys(best.fit))
+    return Judged(kept, None, (), tuple(told))
+
+
+def _keys(made: Fit) -> frozenset[tuple[str, str | None]]:
+    return frozenset(suspect.key for suspect in made.suspects)
+
+
+def _fallen(trial: Trial, kept: Fit, proof: Evidence | None) -> tuple[int | None, str]:
+    """Return the suspect that stands least, and why it falls; None where all stand."""
+    if proof is not None:
+        fallen = [i for i, one in enumerate(proof.proofs) if not one.holds]
+        if fallen:
+            worst = min(fallen, key=lambda i: proof.proofs[i].beaten)
+            return worst, "does not improve held-out stretches beyond what a placebo does"
+    # Physics without a name here may look a little like an effect.
+    idle = impostors(trial, kept)
+    return (idle[0], "a law in its place explains more and leaves it nothing") if idle else (None, "")
+
+
+def _without(trial: Trial, kept: Fit, index: int) -> Fit:
+    rest = [i for i in range(len(kept.suspects)) if i != index]
+    return fit(trial, [kept.suspects[i] for i in rest], [kept.values[i] for i in rest])

@@ -1,0 +1,150 @@
+"""What was found as findings: how probable, since when, on which axes, and what else could stand in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
+from ferryid.diagnose.judged import Judged
+from ferryid.diagnose.locate import locate
+from ferryid.diagnose.result import AXES, Estimate, Finding, Rival
+from ferryid.diagnose.search import NEAR
+from ferryid.diagnose.separate import manoeuvre
+from ferryid.diagnose.shown import columns_of, regressor_of
+from ferryid.effects.picture import Scene
+
+OUT_OF_STEP = ("time_delay", "thruster_lag")
+"""Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
+MERE_HINT = 0.5
+"""Probability above which no force is named where the hull is known from nothing but the log that shows it."""
+ONSET_DROP = 50.0
+"""Fall of the logarithm of the evidence as of which no onset farther away comes into question; smaller dips may lie between."""
+ONSET_STEP, ONSET_FIT = 0.125, 2
+"""Step between onsets that are weighed, in lengths of a window, and steps of the fit for each."""
+SHOWN_RIVALS = 3
+
+
+def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
+    """Return the findings of forces, that which removes most of the error first."""
+    made = []
+    kept, proof = stands.fit, stands.proof
+    for i, (suspect, standing) in enumerate(zip(kept.suspects, stands.standings, strict=True)):
+        others = [j for j in range(len(kept.suspects)) if j != i]
+        rest = [kept.suspects[j] for j in others]
+        rivals = tuple(
+            Rival(one.suspect.effect.id, one.suspect.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
+        )
+        unresolved = tuple(
+            dict.fromkeys(
+                one.suspect.effect.id
+                for one in standing.rivals
+                if one.gain > -NEAR and one.suspect.effect.id != suspect.effect.id
+            )
+        )
+        # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
+        bare = replace(kept, suspects=tuple(rest), values=tuple(kept.values[j] for j in others))
+        place = locate(trial, bare, kept, scene)
+        estimates = _estimates(trial, suspect, kept, i)
+        if not estimates:
+            # Every one of its parameters may be too near the neutral value to be worth a name: the hull's, for one.
+            continue
+        named = zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True)
+        values = {name: value for name, value in named if name in estimates}
+        if suspect.effect.onset:
+            values["onset"] = estimates["onset"].value if "onset" in estimates else suspect.onset_s
+        improved = None if proof is None else proof.proofs[i].improvement
+        made.append(
+            Finding(
+                effect=suspect.effect.id,
+                instance=suspect.instance,
+                probability=standing.probability,
+                parameters=estimates,
+                axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
+                intervals=_intervals(trial, estimates),
+                onset_s=estimates["onset"].value if "onset" in estimates else None,
+                regime=place.regime,
+                improvement={} if improved is None else dict(zip(AXES, improved.removed.tolist(), strict=True)),
+                held_out=improved is not None,
+                rivals=rivals,
+                unresolved_with=unresolved,
+                separating_manoeuvre=manoeuvre(suspect.effect.id, unresolved),
+                says=suspect.effect.says(values, suspect.instance),
+                **columns_of(trial, place, regressor_of(suspect, imagined(trial.plain, bare), kept.values[i], place)),
+            )
+        )
+    return sorted(made, key=lambda one: -sum(one.improvement.values()))
+
+
+def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[str, Estimate]:
+    error = kept.errors(index)
+    estimates = {}
+    for parameter, value, spread in zip(suspect.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
+        low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
+        least = suspect.effect.least
+        if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
+            continue
+        estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
+    if suspect.onset_s > 0.0:
+        estimates["onset"] = _onset(trial, kept, index)
+    return estimates
+
+
+def _onset(trial: Trial, kept: Fit, index: int) -> Estimate:
+    """Return when an effect began, as the median of its posterior with the interval: an idle thruster hides its fault."""
+    suspect = kept.suspects[index]
+    times = trial.windows.middle_s
+    step = ONSET_STEP * len(trial.windows.weight) * trial.windows.scene.step_s
+
+    def evidence_at(onset: float) -> float:
+        moved = [replace(one, onset_s=onset) if i == index else one for i, one in enumerate(kept.suspects)]
+        return fit(trial, moved, kept.values, steps=ONSET_FIT).evidence
+
+    tried = {suspect.onset_s: evidence_at(suspect.onset_s)}
+    for side in (-1.0, 1.0):
+        onset = suspect.onset_s + side * step
+        while times[0] < onset < times[-1]:
+            tried[onset] = evidence_at(onset)
+            if tried[onset] < max(tried.values()) - ONSET_DROP:
+                break
+            onset += side * step
+    onsets = np.array(sorted(tried))
+    weights = np.exp(np.array([tried[onset] for onset in onsets.tolist()]) - max(tried.values()))
+    # Each onset stands for the step about it.
+    shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
+    edges = np.concatenate([onsets - 0.5 * step, onsets[-1:] + 0.5 * step])
+    low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
+    return Estimate(middle, max(low, 0.0), high, "s")
+
+
+def _intervals(trial: Trial, estimates: Mapping[str, Estimate]) -> tuple[tuple[float, float], ...]:
+    t = trial.windows.scene.t
+    begun = estimates["onset"].value if "onset" in estimates else 0.0
+    return ((max(begun, float(t[0])), float(t[-1])),)
+
+
+def hinted(finding: Finding) -> Finding:
+    """Return a finding of a force as it stands where the hull is known from nothing but the log that shows it."""
+    return replace(
+        finding,
+        probability=min(finding.probability, MERE_HINT),
+        unresolved_with=tuple(dict.fromkeys((*finding.unresolved_with, "hull_parameters"))),
+        separating_manoeuvre="a log in calm air and still water, to fit a hull model first",
+    )
+
+
+def doubted(finding: Finding) -> Finding:
+    """Return a finding as it stands beside something unsteady that nobody measured.
+
+    A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
+    """
+    if finding.effect not in OUT_OF_STEP:
+        return finding
+    return replace(
+        finding,
+        probability=min(finding.probability, 0.5),
+        unresolved_with=(*finding.unresolved_with, "gusts"),
+        separating_manoeuvre="the same manoeuvres in calm air",
+    )

@@ -1,0 +1,72 @@
+"""What else could stand in a finding's place, and how probable that leaves the finding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import exp
+
+import numpy as np
+
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, settled
+from ferryid.diagnose.search import ODDS
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """Another suspect in the place of one that was found.
+
+    Attributes
+    ----------
+    suspect
+        What it is.
+    fit
+        Of it beside the others that were found.
+    gain
+        Its evidence over that of what was found.
+    """
+
+    suspect: Suspect
+    fit: Fit
+    gain: float
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How one of several suspects stands beside the others.
+
+    Attributes
+    ----------
+    rivals
+        The best first.
+    without
+        Fit of the others alone.
+    probability
+        Of the suspect, over its rivals and none of them.
+    """
+
+    rivals: tuple[StandIn, ...]
+    without: Fit
+    probability: float
+
+
+def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect]) -> Standing:
+    """Return how a suspect stands against every other of the library in its place, with its onset."""
+    suspect = kept.suspects[index]
+    others = [i for i in range(len(kept.suspects)) if i != index]
+    rest = [kept.suspects[i] for i in others]
+    without = fit(trial, rest, [kept.values[i] for i in others])
+    taken = {one.key for one in kept.suspects}
+    rivals = []
+    for other in library:
+        if other.key in taken:
+            continue
+        begins = replace(other, onset_s=suspect.onset_s if other.effect.onset else 0.0)
+        stand_in = settled(trial, without, begins)
+        neutral = np.array([parameter.neutral for parameter in stand_in.parameters])
+        made = fit(trial, [*rest, stand_in], [*without.values, neutral])
+        rivals.append(StandIn(stand_in, made, made.evidence - kept.evidence))
+    rivals.sort(key=lambda one: -one.gain)
+    none = without.evidence - kept.evidence + ODDS
+    against = exp(min(none, 50.0)) + sum(exp(min(one.gain, 50.0)) for one in rivals)
+    return Standing(tuple(rivals), without, 1.0 / (1.0 + against))
