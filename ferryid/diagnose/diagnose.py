@@ -185,7 +185,7 @@ def _one(
         withheld=_withheld(survey, scene, findings),
         against=compared,
         # A simulation's hull is not the vessel's, and the lift of a common one is in no model file.
-        learnt=learnt(trial, kept, findings, survey) if simulated is None and common is None else None,
+        learnt=learnt(trial, kept, found.states, findings, survey) if simulated is None and common is None else None,
     )
 
 

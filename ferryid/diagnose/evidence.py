@@ -23,7 +23,7 @@ from ferryid.diagnose.free_runs import FreeRuns, free_runs
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
 from ferryid.diagnose.noise import ORDER
 from ferryid.diagnose.weak import Windows
-from ferryid.effects.picture import Picture, acceleration
+from ferryid.effects.picture import Picture, as_measured
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
@@ -218,8 +218,8 @@ def placebos(trial: Trial, suspect: Suspect, values: Floats) -> dict[str, Suspec
     mirrored = _mirrored(suspect)
     true = suspect.act(trial.plain, values)
     wrong = mirrored.act(trial.plain, values)
-    size = np.abs(acceleration(true) - acceleration(trial.plain)).max()
-    if np.abs(acceleration(true) - acceleration(wrong)).max() > SAME * size:
+    size = np.abs(as_measured(true) - as_measured(trial.plain)).max()
+    if np.abs(as_measured(true) - as_measured(wrong)).max() > SAME * size:
         made[HEADING] = mirrored
     return made
 
@@ -316,5 +316,5 @@ def _mirrored(suspect: Suspect) -> Suspect:
 
 def _force_of(suspect: Suspect, picture: Picture, p: Floats) -> Floats:
     """Return what an effect changes, as a force [N, N, N·m], shape (n, 3)."""
-    more = acceleration(suspect.act(picture, p)) - acceleration(picture)
+    more = as_measured(suspect.act(picture, p)) - as_measured(picture)
     return np.asarray(more @ mass_of(picture.hull).T)

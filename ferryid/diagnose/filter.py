@@ -206,13 +206,26 @@ def learn_with(
     bounds += [(float(one) - 5.0, float(one) + 4.0) for one in np.log(start)]
     z = _least(cost, begin, bounds)
     best = cost(z)
-    width = np.full(len(start), np.inf)
-    for k in range(len(start)):
-        moved = np.zeros(len(z))
-        moved[len(z) - len(start) + k] = 0.05
-        bend = (cost(z + moved) + cost(z - moved) - 2.0 * best) / 0.05**2
-        width[k] = 1.0 / np.sqrt(bend) if bend > 0.0 else np.inf
+    width = _widths(cost, z, len(start), best)
     return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
+
+
+def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> Floats:
+    """Return standard deviations of the last k of the parameters, with the rest as they are; infinite where a cost is flat."""
+    d = 0.05
+    moves = np.eye(len(z))[len(z) - k :] * d
+    bend = np.empty((k, k))
+    for i in range(k):
+        bend[i, i] = (cost(z + moves[i]) + cost(z - moves[i]) - 2.0 * best) / d**2
+    for i in range(k):
+        for j in range(i):
+            corner = cost(z + moves[i] + moves[j]) + cost(z - moves[i] - moves[j]) - 2.0 * best
+            bend[i, j] = bend[j, i] = 0.5 * (corner / d**2 - bend[i, i] - bend[j, j])
+    known = np.flatnonzero(np.diag(bend) > 0.0)
+    inverse = np.linalg.pinv(bend[np.ix_(known, known)], hermitian=True)
+    width = np.full(k, np.inf)
+    width[known] = np.sqrt(np.maximum(np.diag(inverse), 1.0 / np.diag(bend)[known]))
+    return width
 
 
 def likelihood(noise: Filter, steps: Windows, gaps: Floats) -> float:

@@ -175,9 +175,7 @@ def fit(trial: Trial, suspects: Sequence[Suspect], start: Sequence[Floats] | Non
 
     def picture_of(z: Floats) -> Picture:
         picture = replace(trial.plain, hull=trial.plain.hull + trial.hull_spread * z[:h])
-        for suspect, p in zip(suspects, np.split(neutral + size * z[h:], cuts), strict=True) if every else ():
-            picture = suspect.act(picture, p)
-        return picture
+        return acted(picture, suspects, np.split(neutral + size * z[h:], cuts)) if every else picture
 
     def white(z: Floats) -> Floats:
         return trial.white(picture_of(z))
@@ -250,9 +248,15 @@ def settled(trial: Trial, beside: Fit, suspect: Suspect) -> Suspect:
 
 def imagined(plain: Picture, made: Fit) -> Picture:
     """Return the picture that a fit has of the log."""
-    picture = replace(plain, hull=made.hull)
-    for suspect, values in zip(made.suspects, made.values, strict=True):
-        picture = suspect.act(picture, values)
+    return acted(replace(plain, hull=made.hull), made.suspects, made.values)
+
+
+def acted(picture: Picture, suspects: Sequence[Suspect], values: Sequence[Floats]) -> Picture:
+    """Return the picture with some suspects in it: first what corrects the measurements, then the others in their order."""
+    for first in (True, False):
+        for suspect, p in zip(suspects, values, strict=True):
+            if suspect.effect.of_sensor is first:
+                picture = suspect.act(picture, p)
     return picture
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
 from ferryid.diagnose.result import Finding
 from ferryid.diagnose.scene import Survey
+from ferryid.diagnose.unsteady import State
 from ferryid.effects.picture import COEFFICIENTS
 from ferryid.identify.excitation import ranges
 from ferryid.identify.stored_effect import Quantity, Source, StoredEffect
@@ -53,13 +54,17 @@ class Learnt:
     notes: tuple[str, ...] = ()
 
 
-def learnt(trial: Trial, kept: Fit, findings: Sequence[Finding], survey: Survey) -> Learnt | None:
+def learnt(
+    trial: Trial, kept: Fit, states: Sequence[State], findings: Sequence[Finding], survey: Survey
+) -> Learnt | None:
     """Return what a log teaches; None where no force was left out that is more likely than not.
 
     Parameters
     ----------
     trial, kept
         The log and what was found, hull included.
+    states
+        Disturbances that came and went by chance: conditions of the log, where a steady one was found as well.
     findings
         The same as it is told; those that are doubtful there do not count, and the hull is refitted without them.
     survey
@@ -91,6 +96,12 @@ def learnt(trial: Trial, kept: Fit, findings: Sequence[Finding], survey: Survey)
                 finding.unresolved_with,
             )
             stored.append((suspect.effect.vessel, _stored(suspect, kept.values[i], kept.errors(i), source)))
+    for state in states:
+        suspect = state.suspect
+        if suspect.key in told and told[suspect.key].probability > BELIEVED:
+            source = Source(motion.log, recording.sha256, told[suspect.key].probability)
+            found = {name: Quantity(one.value, one.low, one.high, one.unit) for name, one in state.estimates.items()}
+            stored.append((False, StoredEffect(*suspect.key, found, (source,))))
     rows = motion.valid
     return Learnt(
         training={

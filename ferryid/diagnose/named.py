@@ -81,9 +81,12 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
 def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[str, Estimate]:
     error = kept.errors(index)
     estimates = {}
+    untold = suspect.effect.untold(trial.plain.scene, kept.values[index])
     for parameter, value, spread in zip(suspect.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
         low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
         least = suspect.effect.least
+        if parameter.name in untold:
+            continue
         if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
             continue
         estimates[parameter.name] = Estimate(value, low, high, parameter.unit)

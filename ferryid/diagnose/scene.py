@@ -23,7 +23,6 @@ from ferryid.signals.smooth import Measured, measure, moving_mean, odd_rows, smo
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Floats, Profile
-from ferryid.vessel.wind import wind_force
 
 Flags = NDArray[np.bool_]
 
@@ -168,10 +167,8 @@ def plain_picture(
     if model is not None:
         return _modelled(scene, profile, model, sha256)
     bare = bare_picture(scene, hull_of(profile))
-    air = np.zeros((len(scene.t), 2)) if scene.wind is None else scene.wind
-    external = bare.external if profile.wind is None else wind_force(profile.wind, air, scene.psi, scene.nu)
     spread = HULL_SPREAD * np.abs(bare.hull) if profile.hull.has_model else broad_spread(scene, profile)
-    return replace(bare, external=external), spread
+    return replace(bare, external=scene.air_load, ambient=lambda now: now.air_load), spread
 
 
 def broad_spread(scene: Scene, profile: Profile) -> Floats:
@@ -236,7 +233,8 @@ def _modelled(scene: Scene, profile: Profile, model: Model, sha256: str) -> tupl
             f"{model.label}: a model of {known.force.profile.name} says nothing about {profile.name}. "
             "Fix: give a model and logs of one vessel"
         )
-    picture = known.altered(known.plain(scene), sha256).picture
+    plain = replace(known.plain(scene), ambient=lambda now: known.plain(now).external)
+    picture = known.altered(plain, sha256).picture
     spread = np.sqrt((HULL_SPREAD * picture.hull) ** 2 + known.variance)
     if not known.force.profile.hull.has_model:
         # What the base does not know, the fit had to learn; terms that it left out may be anything.

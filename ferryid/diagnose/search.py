@@ -8,7 +8,7 @@ from math import exp, log
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, settled
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, settled
 from ferryid.diagnose.unsteady import State, disturbed
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
@@ -104,13 +104,13 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         suspects = list(known)
     steady = [suspect for suspect in suspects if suspect.effect.unsteady is None]
     shaken = [suspect for suspect in suspects if suspect.effect.unsteady is not None]
-    base = fit(trial, ())
+    base, calm = fit(trial, ()), trial.plain
     trial, chosen, rounds = _selected(trial, base, steady, progress)
     chosen = pruned(trial, chosen)
     states: tuple[State, ...] = ()
     if shaken:
         progress("looking for gusts and waves")
-        trial, states = disturbed(trial, chosen, shaken)
+        trial, states = disturbed(trial, chosen, shaken, calm)
     if states:
         # What stood in for them falls, and what they hid may show.
         stood = [one.key for one in chosen.suspects]
@@ -118,7 +118,7 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         trial, chosen, more = _selected(trial, chosen, steady, progress)
         rounds += more
         if [one.key for one in chosen.suspects] != stood:
-            trial, states = disturbed(trial, chosen, shaken, states)
+            trial, states = disturbed(trial, chosen, shaken, calm, states)
         chosen = pruned(trial, fit(trial, chosen.suspects, chosen.values))
     return Search(trial, fit(trial, ()), chosen, tuple(rounds), untested, states)
 
@@ -200,10 +200,8 @@ def _void(trial: Trial, made: Fit) -> bool:
     away = [abs(value - one.neutral) for value, one in zip(made.values[-1].tolist(), last.parameters, strict=True)]
     if max(away) < last.effect.idle:
         return True
-    hull = replace(trial.plain, hull=made.hull)
-    for suspect, values in zip(made.suspects[:-1], made.values[:-1], strict=True):
-        hull = suspect.act(hull, values)
-    moved = seen.gap(last.act(hull, made.values[-1])) - seen.gap(hull)
+    before = replace(made, suspects=made.suspects[:-1], values=made.values[:-1])
+    moved = seen.gap(imagined(trial.plain, made)) - seen.gap(imagined(trial.plain, before))
     size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
     return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
 

@@ -24,7 +24,7 @@ from itertools import product
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ferryid.diagnose.hypothesis import Suspect
+from ferryid.diagnose.hypothesis import Suspect, acted
 from ferryid.diagnose.noise import Noise, noise_of
 from ferryid.diagnose.weak import Windows
 from ferryid.effects.effect import Effect, Parameter, Values
@@ -211,9 +211,7 @@ def left_over(member: Member, hull: SharedHull, place: int) -> Floats:
     h = len(COEFFICIENTS)
     mean = hull.before + hull.spread * hull.step
     picture = induced(replace(member.plain, hull=mean[:h]), mean[h:])
-    for suspect, values in zip(member.suspects, hull.values[place], strict=True):
-        picture = suspect.act(picture, values)
-    return member.windows.gap(picture)
+    return member.windows.gap(acted(picture, member.suspects, hull.values[place]))
 
 
 @dataclass(frozen=True)
@@ -228,9 +226,7 @@ class _Joint:
         member, h = self.members[i], len(COEFFICIENTS)
         hull = self.before + self.spread * z
         picture = induced(replace(member.plain, hull=hull[:h]), hull[h:])
-        for suspect, values in zip(member.suspects, self.values(i, own), strict=True):
-            picture = suspect.act(picture, values)
-        return member.windows.gap(picture)
+        return member.windows.gap(acted(picture, member.suspects, self.values(i, own)))
 
     def values(self, i: int, own: Floats) -> tuple[Floats, ...]:
         found, first = [], 0

@@ -22,6 +22,8 @@ STRENGTHS, BANDS = (0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
 """Where the search begins, as shares of the usual ones; from hardly anything nothing leads on."""
 FASTEST = 0.4
 """Highest frequency that is believed, in steps of the filter; half of one is aliased."""
+WIDEST = 9.0
+"""Standard deviation of a logarithm beyond which nothing is known."""
 VAGUE = 0.5
 """A disturbance whose parameters are known no better than within this factor (as a logarithm) was not seen."""
 
@@ -35,9 +37,21 @@ class State:
     widths: Floats
     gain: float
 
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Parameters with their 95 % intervals, which are even in the logarithm."""
+        away = np.exp(1.96 * np.minimum(self.widths, WIDEST))
+        low, high = self.values / away, self.values * away
+        return {
+            one.name: Estimate(value, max(a, one.low), min(b, one.high), one.unit)
+            for one, value, a, b in zip(
+                self.suspect.parameters, self.values.tolist(), low.tolist(), high.tolist(), strict=True
+            )
+        }
+
 
 def disturbed(
-    trial: Trial, made: Fit, suspects: Sequence[Suspect], near: Sequence[State] = ()
+    trial: Trial, made: Fit, suspects: Sequence[Suspect], calm: Picture, near: Sequence[State] = ()
 ) -> tuple[Trial, tuple[State, ...]]:
     """Return the trial with the disturbances in its filter that what a fit leaves speaks for, and these.
 
@@ -51,6 +65,8 @@ def disturbed(
         What has been found.
     suspects
         Disturbances that the scene can show.
+    calm
+        The plain picture without any of them.
     near
         What they were beside another fit: where the search begins.
     """
@@ -86,7 +102,11 @@ def disturbed(
         noise, best = told, after
         states.append(state)
         left.remove(state.suspect)
-    return replace(trial.with_noise_of(made), filter=noise), tuple(states)
+    plain = calm
+    for state in states:
+        # On average, too, they may do something.
+        plain = state.suspect.act(plain, state.values)
+    return replace(trial.with_noise_of(made), filter=noise, plain=plain), tuple(states)
 
 
 def _seen(suspect: Suspect, values: Floats, widths: Floats, step_s: float) -> bool:
@@ -133,12 +153,8 @@ def unsteady_of(trial: Trial, states: Sequence[State]) -> tuple[Finding, ...]:
 def _finding(scene: Scene, trial: Trial, state: State) -> Finding:
     suspect = state.suspect
     assert suspect.effect.unsteady is not None
-    parameters = {
-        one.name: Estimate(
-            value, value * exp(-1.96 * width), min(value * exp(1.96 * min(width, 9.0)), one.high), one.unit
-        )
-        for one, value, width in zip(suspect.parameters, state.values.tolist(), state.widths.tolist(), strict=True)
-    }
+    known = {one.name for one, width in zip(suspect.parameters, state.widths, strict=True) if width < VAGUE}
+    parameters = {name: one for name, one in state.estimates.items() if name in known}
     picture = trial.filter.picture or trial.plain
     pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in suspect.effect.unsteady(picture, state.values)]
     # Newtons and newton metres compare as what they do to the vessel.

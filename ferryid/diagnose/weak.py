@@ -19,7 +19,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Picture, Scene, acceleration
+from ferryid.effects.picture import Picture, Scene, as_measured
 from ferryid.vessel.profile import Floats
 
 CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
@@ -65,7 +65,7 @@ class Windows:
     def gap(self, picture: Picture) -> Floats:
         """Return the picture's acceleration less the measured one in every window, shape (J, channels)."""
         scene = self.scene
-        rates = acceleration(picture)
+        rates = as_measured(picture)
         if self.channels[0]:
             u, v, r = scene.nu.T
             c, s = scene.pointing

@@ -95,10 +95,14 @@ class Effect:
         picture's hull is the fitted one, `believed` its coefficients as believed before the log, shape (26,).
     least
         How far the interval of a parameter has to stay from its neutral value for the parameter to be worth a report.
+    untold
+        ``untold(scene, p)`` returns the names of parameters about which a log tells nothing, wherever they are fitted to be.
     idle
         An effect all of whose parameters are nearer to neutral than this is void: the hull may be as much off anyway.
     bends_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
+    of_sensor
+        True where it corrects what was measured: such effects act first, as the others act on what is true.
     unsteady
         ``unsteady(picture, p)`` returns what comes and goes by chance, from positive parameters; none where the picture has
         nothing for it to act on. Such an effect changes no picture: it is a state of the filter.
@@ -119,7 +123,9 @@ class Effect:
     vessel: bool = False
     choose: Callable[[Picture, Floats, Residual], Choice] | None = None
     least: float = 0.0
+    untold: Callable[[Scene, Floats], frozenset[str]] = lambda scene, p: frozenset()
     idle: float = 0.0
     bends_hull: bool = False
+    of_sensor: bool = False
     unsteady: Callable[[Picture, Floats], tuple[Process, ...]] | None = None
     regressor: Callable[[Picture, Floats, str | None, str], tuple[str, Floats]] | None = None

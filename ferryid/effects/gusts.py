@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,8 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 
 
 def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
-    """Change nothing: on average gusts are no wind."""
-    return picture
+    """Let a wind be gusty, which raises its mean load."""
+    return replace(picture, gust_std=float(p[0]))
 
 
 def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.lever_arm import with_acceleration
-from ferryid.effects.picture import Picture
+from ferryid.effects.picture import Picture, corrected
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -23,11 +22,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 
 
 def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
-    """Turn heading and velocity to the true axes, for all that depends on them.
-
-    What is compared stays along the axes measured: with R the turn from these to the true ones and a the measured
-    acceleration, ``a_true - R a`` is compared as ``(a_true + (1 - R) a) - a``: (1 - R) a comes in as the force that it takes.
-    """
+    """Turn heading and velocity to the true axes, for all that depends on them; what is compared stays along those measured."""
     b = radians(float(p[0]))
     if b == 0.0:
         return picture
@@ -36,9 +31,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     u, v, r = scene.nu.T
     nu = np.column_stack([c * u - s * v, s * u + c * v, r])
     eta = scene.eta - np.array([0.0, 0.0, b])
-    u_dot, v_dot = np.gradient(u, scene.step_s), np.gradient(v, scene.step_s)
-    force = with_acceleration(picture, (1.0 - c) * u_dot + s * v_dot, (1.0 - c) * v_dot - s * u_dot)
-    return replace(picture, scene=replace(scene, eta=eta, nu=nu), external=picture.external + force)
+    return replace(corrected(picture, replace(scene, eta=eta, nu=nu)), turned=picture.turned + b)
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -58,4 +51,14 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
     return f"thrusters' {other} force [N]", picture.parts[:, :, j].sum(axis=1)
 
 
-EFFECT = Effect("heading_bias", "Heading bias", parameters_of, apply, says, scenario, vessel=True, regressor=regressor)
+EFFECT = Effect(
+    "heading_bias",
+    "Heading bias",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    vessel=True,
+    of_sensor=True,
+    regressor=regressor,
+)

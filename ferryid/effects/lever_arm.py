@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.picture import Picture
+from ferryid.effects.picture import Picture, corrected
 from ferryid.vessel.frames import to_world
 from ferryid.vessel.profile import Floats, Profile
 
@@ -24,12 +24,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
 
 
 def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
-    """Move position and velocity to the body origin, for all that depends on them.
-
-    What is compared stays the antenna's: its acceleration along the body's axes is the body origin's and
-    ``[-y dr/dt, x dr/dt, 0]``, which comes in as the force that it takes. The measured yaw acceleration stands for the true
-    one; a window's weight averages it as ``-∫ w' r``, so that its noise matters no more than that of r.
-    """
+    """Move position and velocity to the body origin, for all that depends on them; what is compared stays the antenna's."""
     x, y = float(p[0]), float(p[1])
     if x == 0.0 and y == 0.0:
         return picture
@@ -38,15 +33,8 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     nu = scene.nu + np.column_stack([r * y, -r * x, np.zeros_like(r)])
     arm = to_world(np.full_like(r, x), np.full_like(r, y), scene.psi)
     eta = scene.eta - np.column_stack([*arm, np.zeros_like(r)])
-    force = with_acceleration(picture, -y * np.gradient(r, scene.step_s), x * np.gradient(r, scene.step_s))
-    return replace(picture, scene=replace(scene, eta=eta, nu=nu), external=picture.external + force)
-
-
-def with_acceleration(picture: Picture, surge: Floats, sway: Floats) -> Floats:
-    """Return the force that gives the vessel, with its load, an acceleration more [m/s²], shape (n, 3)."""
-    m11, m22, m32 = picture.hull[0], picture.hull[1], picture.hull[3]
-    m, mx = (0.0, 0.0) if picture.load is None else (picture.load[:, 0], picture.load[:, 1])
-    return np.column_stack([(m11 + m) * surge, (m22 + m) * sway, (m32 + mx) * sway])
+    antenna = (picture.antenna[0] + x, picture.antenna[1] + y)
+    return replace(corrected(picture, replace(scene, eta=eta, nu=nu)), antenna=antenna)
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -74,6 +62,7 @@ EFFECT = Effect(
     says,
     scenario,
     vessel=True,
+    of_sensor=True,
     regressor=regressor,
     bends_hull=True,
 )

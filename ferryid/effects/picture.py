@@ -5,9 +5,10 @@ An effect takes a picture and returns another, in which its own physics acts. Ef
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import cos, sin
 from typing import Any
 
 import numpy as np
@@ -94,14 +95,12 @@ class Scene:
         return np.cos(self.psi), np.sin(self.psi)
 
     @cached_property
-    def still_air(self) -> Floats:
-        """Load of air that does not move [N, N, N·m], shape (n, 3)."""
+    def air_load(self) -> Floats:
+        """Load of the wind that was measured, of still air where none was [N, N, N·m], shape (n, 3)."""
         areas = self.profile.wind
-        return (
-            np.zeros((len(self.t), 3))
-            if areas is None
-            else wind_force(areas, np.zeros((len(self.t), 2)), self.psi, self.nu)
-        )
+        if areas is None:
+            return np.zeros((len(self.t), 3))
+        return wind_force(areas, np.zeros((len(self.t), 2)) if self.wind is None else self.wind, self.psi, self.nu)
 
     @cached_property
     def regressors(self) -> tuple[Floats, Floats, Floats]:
@@ -132,6 +131,14 @@ class Picture:
     air
         Where an air flow goes to that is imagined and not measured, north and east [m/s], shape (2,), or None; its load is
         among the external forces.
+    gust_std
+        Standard deviation of gusts about that flow, of north and east each [m/s].
+    ambient
+        Those of the external forces that follow from what was measured: ``ambient(scene)``, shape (n, 3); None where none do.
+    turned
+        Angle from the axes that the navigation measures along to the vessel's, counterclockwise [rad].
+    antenna
+        What the navigation measures the motion of, ahead and to starboard of the body origin [m].
     """
 
     scene: Scene
@@ -143,6 +150,10 @@ class Picture:
     load: Floats | None = None
     damping_factor: Floats | None = None
     air: Floats | None = None
+    gust_std: float = 0.0
+    ambient: Callable[[Scene], Floats] | None = None
+    turned: float = 0.0
+    antenna: tuple[float, float] = (0.0, 0.0)
 
 
 def damping_regressors(nu: Floats) -> tuple[Floats, Floats, Floats]:
@@ -197,6 +208,26 @@ def acceleration(picture: Picture) -> Floats:
     det = m22 * m33 - m23 * m32
     rates = np.column_stack([X / m11, (m33 * Y - m23 * N) / det, (m22 * N - m32 * Y) / det])
     return rates if turning is None else rates + turning
+
+
+def corrected(picture: Picture, scene: Scene) -> Picture:
+    """Return the picture of a scene whose measurements were corrected, with the ambient forces at what it then shows."""
+    if picture.ambient is None:
+        return replace(picture, scene=scene)
+    more = picture.ambient(scene) - picture.ambient(picture.scene)
+    return replace(picture, scene=scene, external=picture.external + more)
+
+
+def as_measured(picture: Picture) -> Floats:
+    """Return `acceleration` as the navigation would measure it: that of its antenna, along its own axes, shape (n, 3)."""
+    rates = acceleration(picture)
+    x, y = picture.antenna
+    if x != 0.0 or y != 0.0:
+        rates = rates + rates[:, 2:] * np.array([-y, x, 0.0])
+    if picture.turned != 0.0:
+        c, s = cos(picture.turned), sin(picture.turned)
+        rates = rates @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return rates
 
 
 def required_force(picture: Picture, nu_dot: Floats) -> Floats:

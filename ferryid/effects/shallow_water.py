@@ -26,6 +26,8 @@ CELLS = 8
 LEAST, MOST = 0.05, 0.8
 """Shares of the log that lie in a place, the latter with all its sides as far out as they may be fitted to: one cell. What
 is nearly everywhere is the hull's own damping, or its fouling."""
+BEYOND = 0.02
+"""Share of the log that must lie beyond a side for the log to tell where it is."""
 FACTOR = Parameter("factor", "-", 0.4, 0.2, 6.0, neutral=1.0)
 SIDES = ("south", "north", "west", "east")
 
@@ -117,13 +119,31 @@ def cannot(scene: Scene) -> str:
     return "" if np.isfinite(scene.eta[scene.usable, :2]).all() else "the log has no position"
 
 
+def untold(scene: Scene, p: Floats) -> frozenset[str]:
+    """Return the sides beyond which the vessel hardly went: the place may reach any farther there."""
+    x, y = scene.eta[scene.usable, 0], scene.eta[scene.usable, 1]
+    south, north, west, east = p[1:].tolist()
+    outside = (x < south, x > north, y < west, y > east)
+    return frozenset(name for name, rows in zip(SIDES, outside, strict=True) if float(np.mean(rows)) < BEYOND)
+
+
 def says(values: Values, instance: str | None) -> str:
-    """Return the finding as a sentence."""
-    south, north, west, east = (values[name] for name in SIDES)
-    return (
-        f"Damping is {values['factor']:.2f} times as large from {south:.0f} to {north:.0f} m north and {west:.0f} to "
-        f"{east:.0f} m east, as over shallow ground."
-    )
+    """Return the finding as a sentence; sides that the log does not tell are left out."""
+    where = [
+        told
+        for low, high, axis in (("south", "north", "north"), ("west", "east", "east"))
+        if (told := _between(values.get(low), values.get(high), axis))
+    ]
+    place = f" {' and '.join(where)}," if where else " in some of these waters,"
+    return f"Damping is {values['factor']:.2f} times as large{place} as over shallow ground."
+
+
+def _between(low: float | None, high: float | None, axis: str) -> str:
+    if low is not None and high is not None:
+        return f"from {low:.0f} to {high:.0f} m {axis}"
+    if low is not None:
+        return f"from {low:.0f} m {axis} on"
+    return "" if high is None else f"up to {high:.0f} m {axis}"
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
@@ -141,5 +161,6 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     choose=choose,
+    untold=untold,
     bends_hull=True,
 )

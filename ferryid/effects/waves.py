@@ -56,9 +56,12 @@ def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
+    forces = [
+        f"{values[name]:.0f} {unit}" for name, unit in (("force_std", "N"), ("moment_std", "N·m")) if name in values
+    ]
     return (
-        f"Waves of {1.0 / values['peak_frequency']:.1f} s pushed the vessel with {values['force_std']:.0f} N and "
-        f"{values['moment_std']:.0f} N·m (standard deviations), which nothing measured explains."
+        f"Waves of {1.0 / values['peak_frequency']:.1f} s pushed the vessel with {' and '.join(forces)} "
+        f"(standard deviation{'s' if len(forces) > 1 else ''}), which nothing measured explains."
     )
 
 

@@ -95,7 +95,9 @@ def taught(log: str, *names: str, onset_s: float = 0.0, doubtful: str = "") -> t
     kept = fit(trial, suspects)
     trial = trial.with_noise_of(kept)
     kept = fit(trial, suspects, kept.values)
-    found = learnt(trial, kept, [finding(one, 0.3 if one.effect.id == doubtful else 0.99) for one in suspects], survey)
+    found = learnt(
+        trial, kept, (), [finding(one, 0.3 if one.effect.id == doubtful else 0.99) for one in suspects], survey
+    )
     assert found is not None
     return found, trial
 
@@ -212,7 +214,7 @@ def test_a_diagnosis_of_a_diagnosed_model_changes_what_it_adds_alone(model: Mode
     trial, survey = trial_on(log, model)
     suspect = Suspect(effects()["fouling"], None, effects()["fouling"].parameters_of(FERRY))
     kept = fit(trial, [suspect])
-    found = learnt(trial, kept, [finding(suspect, 0.99)], survey)
+    found = learnt(trial, kept, (), [finding(suspect, 0.99)], survey)
     assert found is not None
     made, _ = remodelled(told(found), FERRY, model, "milliampere")
     assert made is not None
@@ -283,7 +285,7 @@ def test_a_wrong_hull_model_becomes_the_hull(fouled: str) -> None:
     factors = np.where(np.array(names) == "m11", 1.5, 1.0)
     # Without a step the factors stay as they are given, and the hull is the profile's.
     kept = fit(trial, [suspect], [factors], steps=0)
-    found = learnt(trial, kept, [finding(suspect, 0.99)], survey)
+    found = learnt(trial, kept, (), [finding(suspect, 0.99)], survey)
     assert found is not None
     assert (found.vessel, found.conditions) == ((), ())
     made, _ = remodelled(told(found), FERRY, None, "ferry")
