@@ -27,6 +27,8 @@ GROUPS = (0, 0, 1)
 STARTS = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5))
 """Where the search for a channel's noise begins: white error, as a share of all; time constant of the coloured, in steps; and
 disturbance, as a share of the acceleration left over."""
+GLIMPSE, SIGHT = 12, 20.0
+"""Steps of the search for a disturbance after which it is given up if the likelihood is farther than this from being enough."""
 LONGEST = 500.0
 """Longest time constant, in steps."""
 
@@ -91,12 +93,15 @@ class Sieve:
         return sum(float(np.log(spread[DIFFUSE:]).sum()) for part in self.parts for _, spread in part.gains)
 
 
-def sieve_of(noise: Filter, steps: Windows) -> Sieve:
-    """Return a filter with its gains for some steps. Channels that share no disturbance are filtered by themselves."""
+def sieve_of(noise: Filter, steps: Windows, pushes: Floats | None = None) -> Sieve:
+    """Return a filter with its gains for some steps. Channels that share no disturbance are filtered by themselves.
+
+    `pushes` are those of `pushes_of`, for whoever knows them already.
+    """
     h, integrals = stride_s(steps), integrals_of(steps)
     scale = _scales(steps)
     if noise.processes and noise.picture is not None:
-        columns = np.concatenate([_pushes(steps, noise.picture, one) for one in noise.processes], axis=2)
+        columns = pushes_of(noise, steps) if pushes is None else pushes
         blocks, drive = _blocks(noise.processes, h)
         by_run = tuple(
             gains(scale, noise.channels, integrals, blocks, drive, np.ascontiguousarray(columns[a:b]), h)
@@ -109,6 +114,19 @@ def sieve_of(noise: Filter, steps: Windows) -> Sieve:
         by_run = tuple(_alone(scale[j : j + 1], own, integrals, b - a, h) for a, b in steps.runs)
         parts.append(Part((j,), own, np.empty((0, 0)), _no_columns(len(steps.starts)), by_run))
     return Sieve(steps, tuple(parts))
+
+
+def pushes_of(noise: Filter, steps: Windows) -> Floats:
+    """Return the acceleration of every channel by a unit of every state of the shared disturbances, shape (J, c, states)."""
+    assert noise.picture is not None
+    columns = []
+    for process in noise.processes:
+        pushed = replace(noise.picture, external=noise.picture.external + process.force)
+        column = (steps.gap(pushed) - steps.gap(noise.picture))[:, :, None]
+        columns.append(column)
+        if process.frequency_hz > 0.0:
+            columns.append(np.zeros_like(column))
+    return np.concatenate(columns, axis=2)
 
 
 def learn(steps: Windows, gaps: Floats, near: Filter | None = None) -> Filter:
@@ -163,6 +181,7 @@ def learn_with(
     made: Callable[[Floats], tuple[Process, ...]],
     start: Floats,
     picture: Picture,
+    worth: float = -np.inf,
 ) -> tuple[Filter, Floats, Floats, float]:
     """Return the noise that gaps have if disturbances push beside each channel's own noise.
 
@@ -178,6 +197,8 @@ def learn_with(
         These to begin with, shape (k,).
     picture
         In which all push.
+    worth
+        Logarithm of the likelihood that has to come into sight before the search goes on to its end.
 
     Returns
     -------
@@ -197,14 +218,19 @@ def learn_with(
         own, rest = np.exp(z[: 5 * len(first)].reshape(-1, 5)), np.exp(z[5 * len(first) :])
         return Filter(own[list(GROUPS)], (*alone.processes, *made(rest)), picture)
 
+    # How a disturbance pushes does not depend on its parameters.
+    pushes = pushes_of(Filter(alone.channels, (*alone.processes, *made(start)), picture), steps)
+
     def cost(z: Floats) -> float:
-        return -likelihood(noise(z), steps, gaps)
+        return -likelihood(noise(z), steps, gaps, pushes)
 
     channels = np.log(alone.channels[first])
     begin = np.concatenate([channels.ravel(), np.log(start)])
     bounds = [pair for row in channels for pair in _bounds(row, h)]
     bounds += [(float(one) - 5.0, float(one) + 4.0) for one in np.log(start)]
-    z = _least(cost, begin, bounds)
+    z = _least(cost, begin, bounds, most=GLIMPSE)
+    if -cost(z) > worth - SIGHT:
+        z = _least(cost, z, bounds)
     best = cost(z)
     width = _widths(cost, z, len(start), best)
     return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
@@ -228,9 +254,9 @@ def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> 
     return width
 
 
-def likelihood(noise: Filter, steps: Windows, gaps: Floats) -> float:
-    """Return the logarithm of the likelihood of gaps, but for a constant."""
-    ready = sieve_of(noise, steps)
+def likelihood(noise: Filter, steps: Windows, gaps: Floats, pushes: Floats | None = None) -> float:
+    """Return the logarithm of the likelihood of gaps, but for a constant; `pushes` as in `sieve_of`."""
+    ready = sieve_of(noise, steps, pushes)
     return -0.5 * float(np.sum(ready.white(gaps) ** 2)) - ready.log_scale
 
 
@@ -251,8 +277,8 @@ def summed(gaps: Floats, steps: Windows) -> Floats:
     return np.ascontiguousarray(np.cumsum(total, axis=0) * h if integrals_of(steps) == 2 else total)
 
 
-def _least(cost: Callable[[Floats], float], start: Floats, bounds: list[tuple[float, float]]) -> Floats:
-    best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": 1e-4, "ftol": 1e-8})
+def _least(cost: Callable[[Floats], float], start: Floats, bounds: list[tuple[float, float]], most: int = 60) -> Floats:
+    best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": most, "eps": 1e-4, "ftol": 1e-8})
     return np.asarray(best.x, dtype=np.float64)
 
 
@@ -274,13 +300,6 @@ def _no_columns(n: int) -> Floats:
 
 def _alone(scale: Floats, noise: Floats, integrals: int, n: int, h: float) -> tuple[Floats, Floats]:
     return gains(scale, noise, integrals, np.empty((0, 0)), np.empty((2, 0, 0)), _no_columns(n), h)
-
-
-def _pushes(steps: Windows, picture: Picture, process: Process) -> Floats:
-    """Return the acceleration of every channel by a process's states, shape (J, c, states)."""
-    pushed = replace(picture, external=picture.external + process.force)
-    column = (steps.gap(pushed) - steps.gap(picture))[:, :, None]
-    return column if process.frequency_hz == 0.0 else np.concatenate([column, np.zeros_like(column)], axis=2)
 
 
 def _blocks(processes: tuple[Process, ...], h: float) -> tuple[Floats, Floats]:

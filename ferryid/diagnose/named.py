@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, near
 from ferryid.diagnose.judged import Judged
 from ferryid.diagnose.locate import locate
 from ferryid.diagnose.result import AXES, Estimate, Finding, Rival
@@ -22,7 +22,7 @@ MERE_HINT = 0.5
 """Probability above which no force is named where the hull is known from nothing but the log that shows it."""
 ONSET_DROP = 50.0
 """Fall of the logarithm of the evidence as of which no onset farther away comes into question; smaller dips may lie between."""
-ONSET_STEP, ONSET_FIT = 0.125, 2
+ONSET_STEP, ONSET_FIT = 0.125, 3
 """Step between onsets that are weighed, in lengths of a window, and steps of the fit for each."""
 SHOWN_RIVALS = 3
 
@@ -101,9 +101,11 @@ def _onset(trial: Trial, kept: Fit, index: int) -> Estimate:
     times = trial.windows.middle_s
     step = ONSET_STEP * len(trial.windows.weight) * trial.windows.scene.step_s
 
+    begin = near(trial, kept)
+
     def evidence_at(onset: float) -> float:
         moved = [replace(one, onset_s=onset) if i == index else one for i, one in enumerate(kept.suspects)]
-        return fit(trial, moved, kept.values, steps=ONSET_FIT).evidence
+        return fit(trial, moved, kept.values, steps=ONSET_FIT, begin=begin).evidence
 
     tried = {suspect.onset_s: evidence_at(suspect.onset_s)}
     for side in (-1.0, 1.0):

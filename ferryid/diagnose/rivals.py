@@ -8,8 +8,11 @@ from math import exp
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, settled
-from ferryid.diagnose.search import ODDS
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, settled
+from ferryid.diagnose.search import GLANCE, ODDS
+
+NEAREST = 4
+"""Rivals that are fitted to the end."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect])
     others = [i for i in range(len(kept.suspects)) if i != index]
     rest = [kept.suspects[i] for i in others]
     without = fit(trial, rest, [kept.values[i] for i in others])
+    begin = near(trial, without)
     taken = {one.key for one in kept.suspects}
     rivals = []
     for other in library:
@@ -64,8 +68,15 @@ def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect])
         begins = replace(other, onset_s=suspect.onset_s if other.effect.onset else 0.0)
         stand_in = settled(trial, without, begins)
         neutral = np.array([parameter.neutral for parameter in stand_in.parameters])
-        made = fit(trial, [*rest, stand_in], [*without.values, neutral])
+        made = fit(trial, [*rest, stand_in], [*without.values, neutral], steps=GLANCE, begin=begin)
         rivals.append(StandIn(stand_in, made, made.evidence - kept.evidence))
+    rivals.sort(key=lambda one: -one.gain)
+    # How far behind the others are does not matter to the digit.
+    near_ones = [fit(trial, one.fit.suspects, one.fit.values, begin=begin) for one in rivals[:NEAREST]]
+    rivals[:NEAREST] = [
+        StandIn(one.suspect, made, made.evidence - kept.evidence)
+        for one, made in zip(rivals[:NEAREST], near_ones, strict=True)
+    ]
     rivals.sort(key=lambda one: -one.gain)
     none = without.evidence - kept.evidence + ODDS
     against = exp(min(none, 50.0)) + sum(exp(min(one.gain, 50.0)) for one in rivals)

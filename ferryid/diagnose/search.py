@@ -8,7 +8,7 @@ from math import exp, log
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, settled
+from ferryid.diagnose.hypothesis import Fit, Near, Suspect, Trial, fit, imagined, near, settled
 from ferryid.diagnose.unsteady import State, disturbed
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
@@ -26,6 +26,8 @@ MOST = 4
 """Effects looked for at once."""
 ONSETS = 12
 """Onsets tried at first, evenly over the log; then ever finer around the best."""
+NEARBY_S, FINEST_S = 8.0, 0.2
+"""Steps [s] with which an onset is searched for nearby, from the first down to the last."""
 VOID = 0.02
 """An effect whose acceleration is less than this share of the measured one, by every channel's root mean square, is void."""
 
@@ -125,7 +127,8 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
 
 def rejudged(trial: Trial, made: Fit) -> Fit:
     """Return a fit with the evidence that it has under the noise that it leaves itself: with that two are fairly compared."""
-    return fit(trial.with_noise_of(made), made.suspects, made.values)
+    fair = trial.with_noise_of(made)
+    return fit(fair, made.suspects, made.values, begin=near(fair, made))
 
 
 def _selected(
@@ -138,7 +141,8 @@ def _selected(
         left = [suspect for suspect in suspects if suspect.key not in taken]
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
         current = fit(trial, chosen.suspects, chosen.values)
-        found = sorted((_best(trial, current, suspect) for suspect in left), key=lambda one: -one.gain)
+        begin = near(trial, current)
+        found = sorted((_best(trial, current, begin, suspect) for suspect in left), key=lambda one: -one.gain)
         fair = [_fairly(trial, one) for one in found[:REJUDGED]]
         found = sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
         done = _round(found)
@@ -147,7 +151,7 @@ def _selected(
         if not good or len(taken) == MOST:
             return trial, chosen, rounds
         trial = trial.with_noise_of(good[0].fit)
-        chosen = fit(trial, good[0].fit.suspects, good[0].fit.values)
+        chosen = timed(trial, fit(trial, good[0].fit.suspects, good[0].fit.values))
 
 
 def _fairly(trial: Trial, one: Candidate) -> Candidate:
@@ -155,13 +159,13 @@ def _fairly(trial: Trial, one: Candidate) -> Candidate:
     return replace(one, fit=made, gain=max(one.gain, one.gain + made.evidence - one.fit.evidence))
 
 
-def _best(trial: Trial, current: Fit, suspect: Suspect) -> Candidate:
+def _best(trial: Trial, current: Fit, begin: Near, suspect: Suspect) -> Candidate:
     """Return a suspect's best fit beside the current ones, over all onsets where it can have one."""
 
     def tried(one: Suspect, values: Floats | None = None) -> Candidate:
         neutral = np.array([parameter.neutral for parameter in one.parameters])
         start = (*current.values, neutral if values is None else values)
-        made = fit(trial, (*current.suspects, one), start, steps=GLANCE)
+        made = fit(trial, (*current.suspects, one), start, steps=GLANCE, begin=begin)
         penalty = 0.0 if one.onset_s <= 0.0 else log(len(trial.windows.starts))
         return Candidate(one, made, made.evidence - current.evidence - penalty)
 
@@ -172,18 +176,41 @@ def _best(trial: Trial, current: Fit, suspect: Suspect) -> Candidate:
     times = trial.windows.middle_s
     first, last = float(times[0]), float(times[-1])
     step = (last - first) / (ONSETS + 1)
+    # The kick of an onset shows within seconds of it only; what is changed from then on leads there.
+    changed = replace(suspect, effect=replace(suspect.effect, kick=None))
     for onset in first + step * np.arange(1, ONSETS + 1):
-        best = max(best, tried(replace(suspect, onset_s=float(onset))), key=lambda one: one.gain)
+        best = max(best, tried(replace(changed, onset_s=float(onset))), key=lambda one: one.gain)
     if best.suspect.onset_s <= 0.0 or best.gain < 0.5 * ODDS:
         return best
-    while step > 1.0:
+    while step > FINEST_S:
         step *= 0.5
+        if step < NEARBY_S and best.suspect.effect is changed.effect:
+            best = tried(replace(best.suspect, effect=suspect.effect), best.fit.values[-1])
         middle = best.suspect.onset_s
         for onset in (middle - step, middle + step):
             if first < onset < last:
-                moved = tried(replace(suspect, onset_s=onset), best.fit.values[-1])
+                moved = tried(replace(best.suspect, onset_s=onset), best.fit.values[-1])
                 best = max(best, moved, key=lambda one: one.gain)
     return best
+
+
+def timed(trial: Trial, made: Fit) -> Fit:
+    """Return a fit with every onset where it is likeliest nearby: noise that is less now may show it better."""
+    for i, suspect in enumerate(made.suspects):
+        if suspect.onset_s <= 0.0:
+            continue
+        begin, step = near(trial, made), NEARBY_S
+        best = fit(trial, made.suspects, made.values, steps=GLANCE, begin=begin)
+        while step > FINEST_S:
+            middle = best.suspects[i].onset_s
+            for onset in (middle - step, middle + step):
+                moved = [replace(one, onset_s=onset) if k == i else one for k, one in enumerate(best.suspects)]
+                if trial.windows.middle_s[0] < onset < trial.windows.middle_s[-1]:
+                    tried = fit(trial, moved, best.values, steps=GLANCE, begin=begin)
+                    best = max(best, tried, key=lambda one: one.evidence)
+            step *= 0.5 if best.suspects[i].onset_s == middle else 1.0
+        made = fit(trial, best.suspects, best.values, begin=begin)
+    return made
 
 
 def _round(found: Sequence[Candidate]) -> Round:
@@ -215,7 +242,7 @@ def pruned(trial: Trial, chosen: Fit) -> Fit:
             start = [chosen.values[j] for j in rest]
             without.append(fit(trial, [chosen.suspects[j] for j in rest], start))
         best = max((rejudged(trial, one) for one in without), key=lambda one: one.evidence)
-        if chosen.evidence - best.evidence >= ODDS:
+        if max(chosen.evidence, rejudged(trial, chosen).evidence) - best.evidence >= ODDS:
             break
         chosen = best
     return chosen

@@ -90,8 +90,11 @@ def disturbed(
 
             places = before.get(suspect.key, _starts(suspect))
             begin = max(places, key=lambda one: _glance(trial, gaps, noise, processes(one), picture))
-            told, values, widths, after = learn_with(trial.steps, gaps, noise, processes, begin, picture)
-            gain = after - best - 0.5 * len(values) * log(len(trial.steps.starts))
+            price = 0.5 * len(begin) * log(len(trial.steps.starts))
+            told, values, widths, after = learn_with(
+                trial.steps, gaps, noise, processes, begin, picture, best + price + WORTH
+            )
+            gain = after - best - price
             if _seen(suspect, values, widths, stride_s(trial.steps)):
                 tried.append((gain, told, State(suspect, values, widths, gain), after))
         if not tried:

@@ -83,6 +83,9 @@ class Effect:
         Why the scene cannot show it, as a sentence; empty where it can.
     onset
         True where it may begin during the log.
+    kick
+        ``kick(picture, p)`` returns the momentum that an effect gives the vessel if it begins in a row [N·s, N·s, N·m·s], shape
+        (n, 3).
     says
         One sentence on a finding, from its values by name and its instance.
     scenario
@@ -120,6 +123,7 @@ class Effect:
     instances: Callable[[Profile], tuple[str | None, ...]] = lambda profile: (None,)
     cannot: Callable[[Scene], str] = lambda scene: ""
     onset: bool = False
+    kick: Callable[[Picture, Floats], Floats] | None = None
     vessel: bool = False
     choose: Callable[[Picture, Floats, Residual], Choice] | None = None
     least: float = 0.0

@@ -29,6 +29,13 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, load=load if picture.load is None else picture.load + load)
 
 
+def kick(picture: Picture, p: Floats) -> Floats:
+    """Return the momentum that a load takes which lay still over ground before it came aboard, shape (n, 3)."""
+    m, x = float(p[0]), float(p[1])
+    u, v, r = picture.scene.nu.T
+    return -m * np.column_stack([u, v + x * r, x * (v + x * r)])
+
+
 def cannot(scene: Scene) -> str:
     """Say why the scene cannot show a payload."""
     return "the payload was measured and is part of the model" if scene.payload is not None else ""
@@ -64,6 +71,7 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     onset=True,
+    kick=kick,
     regressor=regressor,
     bends_hull=True,
 )

@@ -275,9 +275,16 @@ def _balance(picture: Picture) -> tuple[tuple[Any, ...], Floats, Floats | None]:
     return (m11, m22, m23, m32, m33), picture.external + D - C, turning
 
 
-def from_onset(before: Picture, after: Picture, onset_s: float) -> Picture:
-    """Return the one picture before an onset [s] and the other from it on, whose hull and scene it has all along."""
+def from_onset(before: Picture, after: Picture, onset_s: float, kick: Floats | None = None) -> Picture:
+    """Return the one picture before an onset [s] and the other from it on, whose hull and scene it has all along.
+
+    `kick` is a momentum by row, as of `ferryid.effects.effect.Effect`; that of the first row of the onset acts there.
+    """
     rows = before.scene.t >= onset_s
+    if kick is not None and rows.any() and not rows.all():
+        external, first = after.external.copy(), int(np.argmax(rows))
+        external[first] += kick[first] / before.scene.step_s
+        after = replace(after, external=external)
 
     def mixed(old: Floats, new: Floats) -> Floats:
         return np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)

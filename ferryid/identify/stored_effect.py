@@ -79,9 +79,12 @@ class StoredEffect:
 
     def act(self, picture: Picture, sha256: str) -> Picture:
         """Return the picture of a log with the effect in it."""
-        after = effects()[self.effect].apply(picture, np.array(list(self.values.values())), self.instance)
+        effect, p = effects()[self.effect], np.array(list(self.values.values()))
+        after = effect.apply(picture, p, self.instance)
         onset_s = self.onset_in(sha256)
-        return after if onset_s <= 0.0 else from_onset(picture, after, onset_s)
+        if onset_s <= 0.0:
+            return after
+        return from_onset(picture, after, onset_s, None if effect.kick is None else effect.kick(picture, p))
 
     def says(self) -> str:
         """Return the effect as a sentence."""
