@@ -149,7 +149,8 @@ def score(lines: Iterable[Line]) -> Score:
             told = next((one for one in line["findings"] if (one["effect"], one["instance"]) == key), None)
             if told is None or key not in found:
                 continue
-            more, wide, held = _parameters(truth, told, line["draw"]["place"])
+            acted = line.get("acted", {}).get(truth["effect"], truth["values"])
+            more, wide, held = _parameters({**truth, "values": acted}, told, line["draw"]["place"])
             errors += more
             widths += wide
             covered += held
