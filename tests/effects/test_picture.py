@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ferryid.diagnose.hypothesis import Suspect, acted
 from ferryid.effects import effects
 from ferryid.effects.picture import (
     COEFFICIENTS,
@@ -14,12 +15,15 @@ from ferryid.effects.picture import (
     Picture,
     Scene,
     acceleration,
+    as_measured,
     from_onset,
     hull_of,
     required_force,
 )
+from ferryid.effects.wind import mean_load
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import damping, inverse_dynamics
+from ferryid.vessel.wind import wind_force
 
 FERRY = load_profile("milliampere")
 RNG = np.random.default_rng(4)
@@ -143,3 +147,66 @@ def test_lift_is_that_of_the_vessel_layer() -> None:
     taken = damping(lifts.hull.D, nu) - damping(FERRY.hull.D, nu)
     alone = inverse_dynamics(lifts.hull, nu_dot, nu) - inverse_dynamics(FERRY.hull, nu_dot, nu)
     np.testing.assert_allclose(np.einsum("nij,nj->ni", taken, nu), alone, atol=1e-9)
+
+
+def test_a_load_that_lay_still_takes_its_share_of_the_momentum() -> None:
+    before = picture(flow=False, load=False, damped=False)
+    payload, p, row = effects()["payload"], np.array([300.0, 0.8]), 17
+    assert payload.kick is not None
+    onset_s = float(before.scene.t[row])
+    after = payload.apply(before, p, None)
+    kicked = from_onset(before, after, onset_s, payload.kick(before, p))
+    change = (acceleration(kicked) - acceleration(from_onset(before, after, onset_s))) * before.scene.step_s
+    nu = before.scene.nu[row]
+    own = FERRY.hull.M
+    load = np.array([[300.0, 0.0, 0.0], [0.0, 300.0, 240.0], [0.0, 240.0, 192.0]])
+    # What the vessel had, vessel and load have together; the mass matrix has no surge row in common with the others.
+    together = own + load
+    np.testing.assert_allclose(together @ (nu + change[row]), own @ nu, atol=1e-9 * np.abs(own @ nu).max())
+    assert not np.delete(change, row, axis=0).any()
+
+
+def test_an_acceleration_ahead_is_one_to_port_on_axes_turned_to_starboard() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    ahead = acceleration(one)
+    turned = as_measured(replace(one, turned=np.pi / 2.0))
+    np.testing.assert_allclose(turned, np.column_stack([ahead[:, 1], -ahead[:, 0], ahead[:, 2]]), atol=1e-12)
+
+
+def test_an_antenna_ahead_swings_to_starboard_where_the_vessel_begins_to_turn_so() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    rates = acceleration(one)
+    apart = as_measured(replace(one, antenna=(2.0, 0.0))) - rates
+    np.testing.assert_allclose(apart, np.column_stack([np.zeros(N), 2.0 * rates[:, 2], np.zeros(N)]), atol=1e-12)
+    apart = as_measured(replace(one, antenna=(0.0, 1.5))) - rates
+    np.testing.assert_allclose(apart, np.column_stack([-1.5 * rates[:, 2], np.zeros(N), np.zeros(N)]), atol=1e-12)
+
+
+def suspect(name: str) -> Suspect:
+    return Suspect(effects()[name], None, effects()[name].parameters_of(FERRY))
+
+
+def test_what_corrects_the_measurements_acts_before_the_wind_whatever_the_order() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    plain = replace(one, external=one.scene.air_load, ambient=lambda scene: scene.air_load)
+    wind, bias = np.array([-6.0, 3.0]), np.array([20.0])
+    names, values = (suspect("wind"), suspect("heading_bias")), (wind, bias)
+    forth, back = acted(plain, names, values), acted(plain, names[::-1], values[::-1])
+    np.testing.assert_array_equal(forth.external, back.external)
+    # The same air on a vessel that points where it truly points.
+    true = wind_force(FERRY.wind, np.broadcast_to(wind, (N, 2)), one.scene.psi - np.radians(20.0), forth.scene.nu)
+    np.testing.assert_allclose(forth.external, true, atol=1e-9 * np.abs(true).max())
+
+
+def test_gusts_raise_the_mean_load_as_an_average_over_many_does() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    air, std = np.array([1.5, -2.5]), 1.2
+    found = mean_load(one.scene, FERRY.wind, air, std)
+    draws = air + std * RNG.normal(size=(20_000, 2))
+    for row in (0, 7, 23):
+        psi, nu = (np.repeat(values[row : row + 1], len(draws), axis=0) for values in (one.scene.psi, one.scene.nu))
+        average = wind_force(FERRY.wind, draws, psi, nu).mean(axis=0)
+        calm = wind_force(FERRY.wind, air[None], psi[:1], nu[:1])[0]
+        scale = np.abs(average[:2]).max()
+        np.testing.assert_allclose(found[row, :2], average[:2], atol=0.06 * scale)
+        assert np.abs(calm[:2] - average[:2]).max() > 0.1 * scale
