@@ -52,24 +52,24 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
     tried = {_keys(found)}
     kept = found
     while kept.suspects:
-        progress("judging on held-out stretches")
-        proof = evidence(trial, kept)
-        fallen, why = _fallen(trial, kept, proof)
-        if fallen is not None:
-            told.append(f"{kept.suspects[fallen].effect.title} was suspected, but {why}: it is no finding.")
-            kept = pruned(trial, _without(trial, kept, fallen))
-            tried.add(_keys(kept))
-            continue
         progress("weighing rivals")
         standings = tuple(standing_of(trial, kept, i, library) for i in range(len(kept.suspects)))
         better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
         better = [one for one in better if _keys(one.fit) not in tried]
-        if not better:
+        if better:
+            # What was selected first may be less likely beside what was selected later than another in its place.
+            best = max(better, key=lambda one: one.gain)
+            tried.add(_keys(best.fit))
+            kept = pruned(trial, best.fit)
+            continue
+        progress("judging on held-out stretches")
+        proof = evidence(trial, kept)
+        fallen, why = _fallen(trial, kept, proof)
+        if fallen is None:
             return Judged(kept, proof, standings, tuple(told))
-        # What was selected first may be less likely beside what was selected later than another in its place.
-        best = max(better, key=lambda one: one.gain)
-        kept = pruned(trial, best.fit)
-        tried.add(_keys(best.fit))
+        told.append(f"{kept.suspects[fallen].effect.title} was suspected, but {why}: it is no finding.")
+        kept = pruned(trial, _without(trial, kept, fallen))
+        tried.add(_keys(kept))
     return Judged(kept, None, (), tuple(told))
 
 

@@ -1,0 +1,96 @@
+"""Selection and judgement on a log in which one thruster's gain and a loss by inflow together look like the other's gain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, trial_of
+from ferryid.diagnose.judged import judged
+from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
+from ferryid.diagnose.search import search, suspects_of
+from ferryid.diagnose.weak import windows
+from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+
+FERRY = load_profile("milliampere")
+TRIAL = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "twelve-corner" }
+controller = { delta = 0.7, sigma = 0.7 }
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+thrusters = { inflow_loss_per_mps = 0.25, faults = [{ thruster = "thruster1", factor = 1.26 }] }
+"""
+OFF = {
+    "m11": 0.9,
+    "m22": 1.1,
+    "m33": 0.9,
+    "X_u": 1.1,
+    "Y_v": 0.9,
+    "Y_|r|v": 1.1,
+    "N_r": 1.1,
+    "N_|r|r": 0.9,
+    "N_|r|v": 1.1,
+}
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> Trial:
+    log = tmp_path_factory.mktemp("both") / "trial.mcap"
+    write_log(simulate(replace(parse_scenario(TRIAL, "both"), true_hull=OFF), 8), log)
+    scene, _ = scene_of(str(log), FERRY, None)
+    seen = windows(scene, *window_lengths(FERRY))
+    return trial_of(seen, *plain_picture(seen.scene, FERRY))
+
+
+def suspects(trial: Trial) -> list[Suspect]:
+    return [one for one in suspects_of(trial.plain.scene)[0] if one.effect.unsteady is None]
+
+
+def of(trial: Trial, *keys: tuple[str, str | None]) -> list[Suspect]:
+    return [next(one for one in suspects(trial) if one.key == key) for key in keys]
+
+
+LOSS, FIRST, SECOND = ("thrust_inflow_loss", None), ("thruster_gain", "thruster1"), ("thruster_gain", "thruster2")
+
+
+def test_a_fit_ends_at_the_same_place_wherever_it_begins(trial: Trial) -> None:
+    rough = fit(trial, of(trial, LOSS, FIRST))
+    # Under the little noise that is left the profile's hull is far away, in standard deviations.
+    sharp = trial.with_noise_of(rough)
+    afar = fit(sharp, rough.suspects)
+    close = fit(sharp, rough.suspects, rough.values, begin=near(sharp, rough))
+    assert afar.evidence == pytest.approx(close.evidence, abs=0.5)
+    for one, other, errors in zip(afar.values, close.values, (afar.errors(0), afar.errors(1)), strict=True):
+        assert np.all(np.abs(one - other) < 0.05 * errors)
+
+
+def test_both_are_found_though_the_other_thrusters_gain_is_likelier_alone(trial: Trial) -> None:
+    found = search(trial, lambda stage: None)
+    kept = judged(found.trial, found.fit, suspects(trial), lambda stage: None).fit
+    values = dict(zip([one.key for one in kept.suspects], kept.values, strict=True))
+    assert set(values) == {LOSS, FIRST}
+    assert values[LOSS][0] == pytest.approx(0.25, rel=0.1)
+    assert values[FIRST][0] == pytest.approx(1.26, rel=0.02)
+
+
+def test_a_likelier_rival_takes_the_place_of_what_was_selected_first(trial: Trial) -> None:
+    wrong = fit(trial, of(trial, LOSS, SECOND))
+    told = judged(trial.with_noise_of(wrong), wrong, suspects(trial), lambda stage: None)
+    assert {one.key for one in told.fit.suspects} == {LOSS, FIRST}
+    assert all(one.probability > 0.99 for one in told.standings)
+    assert all(one.gain < 0.0 for standing in told.standings for one in standing.rivals)
+
+
+def test_what_helps_no_held_out_stretch_falls_and_is_told(trial: Trial) -> None:
+    right = fit(trial, of(trial, LOSS, FIRST))
+    idle = of(trial, ("wind", None))
+    breeze = Fit((*right.suspects, *idle), (*right.values, np.array([0.2, 0.1])), np.eye(4), right.hull, right.evidence)
+    told = judged(trial.with_noise_of(right), breeze, [], lambda stage: None)
+    assert {one.key for one in told.fit.suspects} == {LOSS, FIRST}
+    assert told.told == (
+        f"{idle[0].effect.title} was suspected, but does not improve held-out stretches beyond what a placebo does: it is no finding.",
+    )
