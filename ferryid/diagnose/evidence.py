@@ -232,10 +232,9 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
     without = held_out(trial, folds, rest, start) if rest else base
     made = improvement(trial, folds, without, full)
     gains = _gains(trial, folds, without.gaps, full.gaps)
-    neutral = np.array([parameter.neutral for parameter in suspect.parameters])
     by_name = {}
     for name, placebo in placebos(trial, suspect, values).items():
-        judged = held_out(trial, folds, [*rest, placebo], [*start, neutral])
+        judged = held_out(trial, folds, [*rest, placebo], [*start, suspect.start])
         by_name[name] = _gains(trial, folds, without.gaps, judged.gaps)
     picks = draws(folds.block)
     beaten = _beaten(picks, gains, by_name)
@@ -251,7 +250,7 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
         own = held_out(rigid, folds, found.suspects, found.values)
         gains, by_name = _gains(trial, folds, stiff.gaps, own.gaps), {}
         for name, placebo in placebos(trial, suspect, values).items():
-            judged = held_out(rigid, folds, [*rest, placebo], [*start, neutral])
+            judged = held_out(rigid, folds, [*rest, placebo], [*start, suspect.start])
             by_name[name] = _gains(trial, folds, stiff.gaps, judged.gaps)
         beaten = _beaten(picks, gains, by_name)
         scores = {name: float(one.sum()) for name, one in by_name.items()}

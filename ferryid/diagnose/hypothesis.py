@@ -45,6 +45,11 @@ class Suspect:
         """Effect and instance."""
         return self.effect.id, self.instance
 
+    @property
+    def start(self) -> Floats:
+        """Parameters with which a search begins."""
+        return np.array([one.neutral if one.start is None else one.start for one in self.parameters])
+
     def act(self, picture: Picture, p: Floats) -> Picture:
         """Return the picture with the effect in it."""
         after = self.effect.apply(picture, p, self.instance)
@@ -188,7 +193,7 @@ def fit(
     suspects
         Effects, in the order in which they act.
     start
-        Parameters to begin with; the neutral ones where None.
+        Parameters to begin with; the suspects' own where None.
     steps
         Most Gauss-Newton steps; with 0 the spread is that at the start.
     begin
@@ -212,8 +217,8 @@ def fit(
         return trial.white(picture_of(z))
 
     z = np.zeros(h + q)
-    if start is not None and every:
-        z[h:] = (np.concatenate(start) - neutral) / size
+    if every:
+        z[h:] = (np.concatenate([one.start for one in suspects] if start is None else start) - neutral) / size
     if begin is not None:
         free = trial.hull_spread > 0.0
         z[:h][free] = (begin.hull - trial.plain.hull)[free] / trial.hull_spread[free]

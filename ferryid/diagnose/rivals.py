@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import exp
 
-import numpy as np
-
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, settled
-from ferryid.diagnose.search import GLANCE, ODDS
+from ferryid.diagnose.search import FAR, GLANCE, ODDS
 
 NEAREST = 4
 """Rivals that are fitted to the end."""
@@ -67,12 +65,15 @@ def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect])
             continue
         begins = replace(other, onset_s=suspect.onset_s if other.effect.onset else 0.0)
         stand_in = settled(trial, without, begins)
-        neutral = np.array([parameter.neutral for parameter in stand_in.parameters])
-        made = fit(trial, [*rest, stand_in], [*without.values, neutral], steps=GLANCE, begin=begin)
+        start = [*without.values, stand_in.start]
+        if stand_in.effect.bends_hull:
+            made = fit(trial, [*rest, stand_in], start, steps=FAR)
+        else:
+            made = fit(trial, [*rest, stand_in], start, steps=GLANCE, begin=begin)
         rivals.append(StandIn(stand_in, made, made.evidence - kept.evidence))
     rivals.sort(key=lambda one: -one.gain)
     # How far behind the others are does not matter to the digit.
-    near_ones = [fit(trial, one.fit.suspects, one.fit.values, begin=begin) for one in rivals[:NEAREST]]
+    near_ones = [fit(trial, one.fit.suspects, one.fit.values, begin=near(trial, one.fit)) for one in rivals[:NEAREST]]
     rivals[:NEAREST] = [
         StandIn(one.suspect, made, made.evidence - kept.evidence)
         for one, made in zip(rivals[:NEAREST], near_ones, strict=True)

@@ -18,8 +18,8 @@ ODDS = 8.0
 """Logarithm of the evidence that an effect must show over none before it is as likely as none."""
 NEAR = 3.0
 """Rivals whose evidence is less than this behind are not told apart."""
-GLANCE = 3
-"""Steps of a fit by which candidates are sorted; the best are then fitted to the end."""
+GLANCE, FAR = 3, 8
+"""Steps of a fit by which candidates are sorted, from nearby and from afar; the best are then fitted to the end."""
 REJUDGED = 5
 """Candidates whose evidence is weighed under the noise that each leaves itself."""
 MOST = 4
@@ -163,9 +163,10 @@ def _best(trial: Trial, current: Fit, begin: Near, suspect: Suspect) -> Candidat
     """Return a suspect's best fit beside the current ones, over all onsets where it can have one."""
 
     def tried(one: Suspect, values: Floats | None = None) -> Candidate:
-        neutral = np.array([parameter.neutral for parameter in one.parameters])
-        start = (*current.values, neutral if values is None else values)
-        made = fit(trial, (*current.suspects, one), start, steps=GLANCE, begin=begin)
+        start = (*current.values, one.start if values is None else values)
+        # Where the hull has strained to stand in for an effect that multiplies it, the way to both leads from the profile's.
+        afar = one.effect.bends_hull and one.onset_s <= 0.0
+        made = fit(trial, (*current.suspects, one), start, steps=FAR if afar else GLANCE, begin=None if afar else begin)
         penalty = 0.0 if one.onset_s <= 0.0 else log(len(trial.windows.starts))
         return Candidate(one, made, made.evidence - current.evidence - penalty)
 

@@ -96,8 +96,7 @@ def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
         return False
     told, coefficients = law.fit.suspects[-1], law.fit.values[-1]
     suspect, values = kept.suspects[index], kept.values[index]
-    neutral = np.array([parameter.neutral for parameter in suspect.parameters])
-    both = fit(trial, [*rest, told, suspect], [*start, coefficients, neutral])
+    both = fit(trial, [*rest, told, suspect], [*start, coefficients, suspect.start])
     fair = trial.with_noise_of(both)
     with_law = fit(fair, [*rest, told], [*start, coefficients]).evidence
     with_effect = fit(fair, [*rest, suspect], [*start, values]).evidence

@@ -22,7 +22,8 @@ class Parameter:
     """One parameter of an effect.
 
     `size` is what a parameter of moderate size is, in `unit`: the standard deviation of what is believed of it before a log is
-    seen. `low` and `high` are the ends of what is possible. `neutral` changes nothing.
+    seen. `low` and `high` are the ends of what is possible. `neutral` changes nothing. `start` is where a search begins, if not
+    there: where another parameter has no meaning at the neutral value of this one.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Parameter:
     low: float
     high: float
     neutral: float = 0.0
+    start: float | None = None
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     mass, length = profile.hull.mass_kg, profile.hull.length_m
     half = 0.5 * length if np.isfinite(length) else mass ** (1.0 / 3.0)
     return (
-        Parameter("mass", "kg", 0.15 * mass, 0.0, 2.0 * mass),
+        Parameter("mass", "kg", 0.15 * mass, 0.0, 2.0 * mass, start=0.05 * mass),
         Parameter("x", "m", 0.3 * half, -half, half),
     )
 
