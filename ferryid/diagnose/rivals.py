@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import exp
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, settled
-from ferryid.diagnose.search import FAR, GLANCE, ODDS
+from ferryid.diagnose.search import FAR, ODDS
 
 NEAREST = 4
 """Rivals that are fitted to the end."""
@@ -66,10 +66,7 @@ def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect])
         begins = replace(other, onset_s=suspect.onset_s if other.effect.onset else 0.0)
         stand_in = settled(trial, without, begins)
         start = [*without.values, stand_in.start]
-        if stand_in.effect.bends_hull:
-            made = fit(trial, [*rest, stand_in], start, steps=FAR)
-        else:
-            made = fit(trial, [*rest, stand_in], start, steps=GLANCE, begin=begin)
+        made = fit(trial, [*rest, stand_in], start, steps=FAR, begin=None if stand_in.effect.bends_hull else begin)
         rivals.append(StandIn(stand_in, made, made.evidence - kept.evidence))
     rivals.sort(key=lambda one: -one.gain)
     # How far behind the others are does not matter to the digit.
