@@ -84,9 +84,13 @@ class Fit:
     evidence: float
 
     def errors(self, index: int) -> Floats:
-        """Return the standard deviations of one suspect's parameters, `WIDER` than the posterior's."""
+        """Return the posterior's standard deviations of one suspect's parameters."""
         first = sum(len(values) for values in self.values[:index])
-        return WIDER * np.sqrt(np.diag(self.spread)[first : first + len(self.values[index])])
+        return np.sqrt(np.diag(self.spread)[first : first + len(self.values[index])])
+
+    def told_errors(self, index: int) -> Floats:
+        """Return the standard deviations that are told: `WIDER`."""
+        return WIDER * self.errors(index)
 
 
 @dataclass(frozen=True)

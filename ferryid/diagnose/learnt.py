@@ -95,7 +95,7 @@ def learnt(
                 dict(finding.improvement),
                 finding.unresolved_with,
             )
-            stored.append((suspect.effect.vessel, _stored(suspect, kept.values[i], kept.errors(i), source)))
+            stored.append((suspect.effect.vessel, _stored(suspect, kept.values[i], kept.told_errors(i), source)))
     for state in states:
         suspect = state.suspect
         if suspect.key in told and told[suspect.key].probability > BELIEVED:

@@ -79,7 +79,7 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
 
 
 def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[str, Estimate]:
-    error = kept.errors(index)
+    error = kept.told_errors(index)
     estimates = {}
     untold = suspect.effect.untold(trial.plain.scene, kept.values[index])
     for parameter, value, spread in zip(suspect.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
