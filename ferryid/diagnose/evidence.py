@@ -34,6 +34,8 @@ would make a single shift fit by accident."""
 HEADING = "heading mirrored"
 PLAIN = 8.0
 """Logarithm of a likelihood ratio that needs no bootstrap to be believed."""
+MATCHED = 0.7
+"""Share of an improvement as of which a placebo is said to match it, whatever the interval of the difference."""
 SAME = 1e-6
 """A placebo that differs less than this from its effect, as a share of it, is none."""
 
@@ -102,7 +104,7 @@ class Proof:
         Lower end of the 95 % interval of how much better its score is than that of the placebos: the least of the mirrored
         heading's and the median of the shifted ones'. Infinite where there is no placebo.
     holds
-        True where it improves held-out data, and beyond its placebos; or, of what the hull can imitate only by being off in
+        True where it improves held-out data, and beyond its placebos, none of which comes to `MATCHED` of it; or, of what the hull can imitate only by being off in
         all its coefficients together, where it improves them over the hull as it is in the model.
     """
 
@@ -242,7 +244,8 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
     holds = made.score_low > 0.0 and beaten > 0.0
     # What acts seldom shows in a block or two, which half of the draws leave out.
     seldom = made.score > PLAIN and made.score > PLAIN + max(scores.values())
-    if not holds and not seldom and _hull_strains(trial, found, rest, start):
+    holds = (holds or seldom) and not _matched(made.score, scores)
+    if not holds and _hull_strains(trial, found, rest, start):
         rigid = replace(trial, hull_spread=np.zeros_like(trial.hull_spread))
         stiff = held_out(rigid, folds, rest, start)
         made = improvement(trial, folds, stiff, full)
@@ -254,8 +257,14 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
             by_name[name] = _gains(trial, folds, stiff.gaps, judged.gaps)
         beaten = _beaten(picks, gains, by_name)
         scores = {name: float(one.sum()) for name, one in by_name.items()}
-        return Proof(suspect, made, scores, beaten, made.score_low > 0.0 and beaten > 0.0)
-    return Proof(suspect, made, scores, beaten, holds or seldom)
+        holds = made.score_low > 0.0 and beaten > 0.0 and not _matched(made.score, scores)
+        return Proof(suspect, made, scores, beaten, holds)
+    return Proof(suspect, made, scores, beaten, holds)
+
+
+def _matched(score: float, placebos: Mapping[str, float]) -> bool:
+    late = sorted(value for name, value in placebos.items() if name != HEADING)
+    return max(late[len(late) // 2], placebos.get(HEADING, -np.inf)) > MATCHED * score
 
 
 def _beaten(picks: Floats, gains: Floats, by_name: Mapping[str, Floats]) -> float:

@@ -112,7 +112,9 @@ def _lawful(law: Law, kept: Fit, scene: Scene) -> Finding:
     picture = imagined(trial.plain, before)
     terms = [
         _told(term, picture, trial, float(value), float(error))
-        for term, value, error in zip(law.terms, law.fit.values[-1], law.fit.told_errors(len(kept.suspects)), strict=True)
+        for term, value, error in zip(
+            law.terms, law.fit.values[-1], law.fit.told_errors(len(kept.suspects)), strict=True
+        )
     ]
     first = law.terms[0]
     size = "" if first.name == "1" else f"{first.name} [{first.unit}]" if first.unit else first.name
