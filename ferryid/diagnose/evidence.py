@@ -104,8 +104,9 @@ class Proof:
         Lower end of the 95 % interval of how much better its score is than that of the placebos: the least of the mirrored
         heading's and the median of the shifted ones'. Infinite where there is no placebo.
     holds
-        True where it improves held-out data, and beyond its placebos, none of which comes to `MATCHED` of it; or, of what the hull can imitate only by being off in
-        all its coefficients together, where it improves them over the hull as it is in the model.
+        True where it improves held-out data, and beyond its placebos, none of which comes to `MATCHED` of it; or, of what
+        the hull can imitate only by being off in all its coefficients together, where it improves them over the hull as it
+        is in the model.
     """
 
     suspect: Suspect
