@@ -53,6 +53,9 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
     places = [COEFFICIENTS.index(name) for name in able]
     J, e = by_hull(picture, believed, residual, places)
     chosen, doubt = _best_subset(J.T @ J, -J.T @ e, able)
+    if 2 * len(chosen) > len(able):
+        # A model that is wrong all over is wrong there, too.
+        chosen |= frozenset(ARMS)
     return Choice(tuple(_factor(name, OFF if name in chosen else HELD) for name in names), doubt)
 
 
