@@ -22,6 +22,7 @@ from ferryid.diagnose.folds import Folds, by_block, draws, folds_of, subset
 from ferryid.diagnose.free_runs import FreeRuns, free_runs
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
 from ferryid.diagnose.noise import ORDER
+from ferryid.diagnose.parallel import over
 from ferryid.diagnose.weak import Windows
 from ferryid.effects.picture import Picture, as_measured
 from ferryid.vessel.profile import Floats
@@ -164,10 +165,8 @@ def held_out(trial: Trial, folds: Folds, suspects: Sequence[Suspect], start: Seq
     """
     gaps = np.empty((len(trial.windows.starts), int(trial.windows.channels.sum())))
     errors = np.empty((len(trial.windows.starts), 3))
-    fits = []
-    for k, training in enumerate(folds.training):
-        made = fit(_part(trial, training), suspects, start)
-        fits.append(made)
+    fits = over(lambda training: fit(_part(trial, training), suspects, start), folds.training)
+    for k, made in enumerate(fits):
         own = folds.fold == k
         judged, picture = subset(trial.windows, own), imagined(trial.plain, made)
         gaps[own] = judged.gap(picture)

@@ -16,7 +16,8 @@ from math import cos, exp, pi, sin
 import numpy as np
 from scipy.optimize import minimize
 
-from ferryid.diagnose.kalman import DIFFUSE, errors, gains
+from ferryid.diagnose.kalman import DIFFUSE, errors, errors_alone, gains
+from ferryid.diagnose.parallel import over
 from ferryid.diagnose.weak import Windows
 from ferryid.effects.effect import Process
 from ferryid.effects.picture import Picture
@@ -29,6 +30,10 @@ STARTS = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5)
 disturbance, as a share of the acceleration left over."""
 GLIMPSE, SIGHT = 12, 20.0
 """Steps of the search for a disturbance after which it is given up if the likelihood is farther than this from being enough."""
+SMALL = 1e-4
+"""Move of a parameter's logarithm by which a slope is found."""
+EXCERPT, PIECES = 1800, 3
+"""Steps from which noise is learnt, of longer logs from so many stretches: with more its sizes are hardly known better."""
 LONGEST = 500.0
 """Longest time constant, in steps."""
 
@@ -81,8 +86,11 @@ class Sieve:
             own = list(part.channels)
             for (first, end), (K, spread) in zip(self.steps.runs, part.gains, strict=True):
                 series = summed(gaps[first:end][:, own].reshape(end - first, len(own), -1), self.steps)
-                columns = part.columns[first:end]
-                errors_ = errors(K, spread, part.noise, integrals, part.blocks, columns, h, series)
+                if len(own) == 1:
+                    errors_ = errors_alone(K, spread, part.noise, integrals, h, series[:, 0])[:, None]
+                else:
+                    columns = part.columns[first:end]
+                    errors_ = errors(K, spread, part.noise, integrals, part.blocks, columns, h, series)
                 errors_[:DIFFUSE] = 0.0
                 left[first:end, own] = errors_
         return np.ascontiguousarray(left.reshape(-1) if gaps.ndim == 2 else left.reshape(-1, gaps.shape[2]))
@@ -144,7 +152,7 @@ def learn(steps: Windows, gaps: Floats, near: Filter | None = None) -> Filter:
     channels = np.empty((gaps.shape[1], 5))
     for group in sorted(set(GROUPS)):
         own = [j for j, g in enumerate(GROUPS) if g == group]
-        series = [summed(gaps[a:b][:, own], steps)[:, None, :] for a, b in steps.runs]
+        series = [summed(gaps[a:b][:, own], steps) for a, b in steps.runs]
         size = scale[own].mean(keepdims=True)
 
         def cost(z: Floats, series: list[Floats] = series, size: Floats = size) -> float:
@@ -152,25 +160,24 @@ def learn(steps: Windows, gaps: Floats, near: Filter | None = None) -> Filter:
             for part in series:
                 noise = np.exp(z).reshape(1, 5)
                 K, spread = _alone(size, noise, integrals, len(part), h)
-                nothing = _no_columns(len(part))
-                left = errors(K, spread, noise, integrals, np.empty((0, 0)), nothing, h, part)[DIFFUSE:]
-                total += 0.5 * float(np.sum(left**2)) + part.shape[2] * float(np.log(spread[DIFFUSE:]).sum())
+                left = errors_alone(K, spread, noise, integrals, h, part)[DIFFUSE:]
+                total += 0.5 * float(np.sum(left**2)) + part.shape[1] * float(np.log(spread[DIFFUSE:]).sum())
             return total
 
         rough = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
         # The second difference of a position has six times the variance of its errors, the first of a velocity's twice.
         error = rough * h**integrals / (2.4 if integrals == 2 else 1.4)
         # The likelihood has several tops: the same roughness may be of short errors, of long ones or of pushes.
-        found = []
         begin = [
             np.log([white * error, error, error_s * h, pushed * rough, 10.0 * h])
             for white, error_s, pushed in STARTS[: 1 if near else None]
         ]
         begin += [np.log(near.channels[own[0]])] if near else []
-        for start in begin:
-            z = _least(cost, start, _bounds(start, h))
-            found.append((cost(z), z))
-        channels[own] = np.exp(min(found, key=lambda one: one[0])[1])
+
+        def searched(start: Floats, h: float = h, cost: Callable[[Floats], float] = cost) -> Floats:
+            return _least(cost, start, _bounds(start, h))
+
+        channels[own] = np.exp(min(over(searched, begin), key=cost))
     return Filter(channels)
 
 
@@ -236,6 +243,25 @@ def learn_with(
     return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
 
 
+def excerpt(steps: Windows) -> Windows:
+    """Return the steps from which noise is learnt: all of a short log, evenly spread stretches of a long one."""
+    n = len(steps.starts)
+    if n <= EXCERPT:
+        return steps
+    length = EXCERPT // PIECES
+    runs: list[tuple[int, int]] = []
+    rows: list[int] = []
+    for middle in np.linspace(0.0, n, 2 * PIECES + 1)[1::2]:
+        first, end = int(middle) - length // 2, int(middle) + length // 2
+        for a, b in steps.runs:
+            own = range(max(a, first), min(b, end))
+            if len(own) > DIFFUSE:
+                runs.append((len(rows), len(rows) + len(own)))
+                rows += own
+    at = np.array(rows, dtype=np.int64)
+    return replace(steps, starts=steps.starts[at], measured=steps.measured[at], runs=tuple(runs))
+
+
 def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> Floats:
     """Return standard deviations of the last k of the parameters, with the rest as they are; infinite where a cost is flat."""
     d = 0.05
@@ -278,7 +304,13 @@ def summed(gaps: Floats, steps: Windows) -> Floats:
 
 
 def _least(cost: Callable[[Floats], float], start: Floats, bounds: list[tuple[float, float]], most: int = 60) -> Floats:
-    best = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"maxiter": most, "eps": 1e-4, "ftol": 1e-8})
+    def with_slope(z: Floats) -> tuple[float, Floats]:
+        here, *moved = over(cost, [z, *(z + SMALL * np.eye(len(z)))])
+        return here, (np.array(moved) - here) / SMALL
+
+    best = minimize(
+        with_slope, start, method="L-BFGS-B", jac=True, bounds=bounds, options={"maxiter": most, "ftol": 1e-8}
+    )
     return np.asarray(best.x, dtype=np.float64)
 
 

@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ferryid.diagnose.filter import Filter, Sieve, learn, sieve_of
+from ferryid.diagnose.filter import Filter, Sieve, excerpt, learn, sieve_of
 from ferryid.diagnose.noise import Noise, noise_of
+from ferryid.diagnose.parallel import over
 from ferryid.diagnose.weak import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.picture import Picture, from_onset
@@ -123,6 +124,11 @@ class Trial:
         return steps_of(self.windows)
 
     @cached_property
+    def excerpt(self) -> Windows:
+        """Those of the steps from which noise is learnt."""
+        return excerpt(self.steps)
+
+    @cached_property
     def sieve(self) -> Sieve:
         """The filter, ready for the steps."""
         return sieve_of(self.filter, self.steps)
@@ -139,14 +145,15 @@ class Trial:
         """
         base = self.steps.gap(picture)
         free = np.flatnonzero(self.hull_spread)
-        columns = np.zeros((*base.shape, len(free)))
-        for column, k in enumerate(free):
+
+        def slope(k: int) -> Floats:
             hull = picture.hull.copy()
             hull[k] += 0.1 * self.hull_spread[k]
-            columns[:, :, column] = (self.steps.gap(replace(picture, hull=hull)) - base) / 0.1
+            return (self.steps.gap(replace(picture, hull=hull)) - base) / 0.1
+
         every = np.zeros((base.size, len(self.hull_spread)))
         if free.size:
-            every[:, free] = self.sieve.white(columns)
+            every[:, free] = self.sieve.white(np.stack(over(slope, free.tolist()), axis=2))
         return every
 
     def white(self, picture: Picture) -> Floats:
@@ -156,7 +163,7 @@ class Trial:
     def with_noise_of(self, made: Fit) -> Trial:
         """Return the trial with the noise that a fit leaves; a filter that has shared disturbances stays as it is."""
         picture = imagined(self.plain, made)
-        own = self.filter if self.filter.processes else learn(self.steps, self.steps.gap(picture), self.filter)
+        own = self.filter if self.filter.processes else learn(self.excerpt, self.excerpt.gap(picture), self.filter)
         return replace(self, noise=noise_of(self.windows.gap(picture), self.windows.runs), filter=own)
 
     def part(self, windows: Windows) -> Trial:
@@ -271,6 +278,12 @@ def fit(
     return Fit(tuple(suspects), values, covariance, hull, evidence)
 
 
+def without(trial: Trial, made: Fit, index: int) -> Fit:
+    """Return the fit of a hypothesis that lacks one of its suspects."""
+    rest = [k for k in range(len(made.suspects)) if k != index]
+    return fit(trial, [made.suspects[k] for k in rest], [made.values[k] for k in rest])
+
+
 def _step(A: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
     """Return the Gauss-Newton step; what would go beyond its limit goes there, and the others as well as they can then."""
     step, free = np.zeros(len(slope)), np.ones(len(slope), dtype=np.bool_)
@@ -313,7 +326,7 @@ def trial_of(windows: Windows, plain: Picture, hull_spread: Floats) -> Trial:
     What an effect leaves in the gaps is in that noise too, until a hypothesis that holds takes it out: see
     `ferryid.diagnose.search`.
     """
-    first = steps_of(windows)
+    first = excerpt(steps_of(windows))
     trial = Trial(
         windows,
         plain,

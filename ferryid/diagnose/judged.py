@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ferryid.diagnose.evidence import Evidence, evidence
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, without
 from ferryid.diagnose.rivals import Standing, standing_of
 from ferryid.diagnose.search import pruned
 from ferryid.diagnose.unknown import impostors
@@ -68,7 +68,7 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
         if fallen is None:
             return Judged(kept, proof, standings, tuple(told))
         told.append(f"{kept.suspects[fallen].effect.title} was suspected, but {why}: it is no finding.")
-        kept = pruned(trial, _without(trial, kept, fallen))
+        kept = pruned(trial, without(trial, kept, fallen))
         tried.add(_keys(kept))
     return Judged(kept, None, (), tuple(told))
 
@@ -87,8 +87,3 @@ def _fallen(trial: Trial, kept: Fit, proof: Evidence | None) -> tuple[int | None
     # Physics without a name here may look a little like an effect.
     idle = impostors(trial, kept)
     return (idle[0], "a law in its place explains more and leaves it nothing") if idle else (None, "")
-
-
-def _without(trial: Trial, kept: Fit, index: int) -> Fit:
-    rest = [i for i in range(len(kept.suspects)) if i != index]
-    return fit(trial, [kept.suspects[i] for i in rest], [kept.values[i] for i in rest])

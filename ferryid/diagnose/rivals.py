@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import exp
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, settled
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, settled, without
+from ferryid.diagnose.parallel import over
 from ferryid.diagnose.search import FAR, ODDS
 
 NEAREST = 4
@@ -40,42 +41,39 @@ class Standing:
     ----------
     rivals
         The best first.
-    without
-        Fit of the others alone.
     probability
         Of the suspect, over its rivals and none of them.
     """
 
     rivals: tuple[StandIn, ...]
-    without: Fit
     probability: float
 
 
 def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect]) -> Standing:
     """Return how a suspect stands against every other of the library in its place, with its onset."""
     suspect = kept.suspects[index]
-    others = [i for i in range(len(kept.suspects)) if i != index]
-    rest = [kept.suspects[i] for i in others]
-    without = fit(trial, rest, [kept.values[i] for i in others])
-    begin = near(trial, without)
+    bare = without(trial, kept, index)
+    begin = near(trial, bare)
     taken = {one.key for one in kept.suspects}
-    rivals = []
-    for other in library:
-        if other.key in taken:
-            continue
+
+    def instead(other: Suspect) -> StandIn:
         begins = replace(other, onset_s=suspect.onset_s if other.effect.onset else 0.0)
-        stand_in = settled(trial, without, begins)
-        start = [*without.values, stand_in.start]
-        made = fit(trial, [*rest, stand_in], start, steps=FAR, begin=None if stand_in.effect.bends_hull else begin)
-        rivals.append(StandIn(stand_in, made, made.evidence - kept.evidence))
+        stand_in = settled(trial, bare, begins)
+        start = [*bare.values, stand_in.start]
+        made = fit(
+            trial, [*bare.suspects, stand_in], start, steps=FAR, begin=None if stand_in.effect.bends_hull else begin
+        )
+        return StandIn(stand_in, made, made.evidence - kept.evidence)
+
+    def settled_in(one: StandIn) -> StandIn:
+        made = fit(trial, one.fit.suspects, one.fit.values, begin=near(trial, one.fit))
+        return StandIn(one.suspect, made, made.evidence - kept.evidence)
+
+    rivals = over(instead, [other for other in library if other.key not in taken])
     rivals.sort(key=lambda one: -one.gain)
     # How far behind the others are does not matter to the digit.
-    near_ones = [fit(trial, one.fit.suspects, one.fit.values, begin=near(trial, one.fit)) for one in rivals[:NEAREST]]
-    rivals[:NEAREST] = [
-        StandIn(one.suspect, made, made.evidence - kept.evidence)
-        for one, made in zip(rivals[:NEAREST], near_ones, strict=True)
-    ]
+    rivals[:NEAREST] = over(settled_in, rivals[:NEAREST])
     rivals.sort(key=lambda one: -one.gain)
-    none = without.evidence - kept.evidence + ODDS
+    none = bare.evidence - kept.evidence + ODDS
     against = exp(min(none, 50.0)) + sum(exp(min(one.gain, 50.0)) for one in rivals)
-    return Standing(tuple(rivals), without, 1.0 / (1.0 + against))
+    return Standing(tuple(rivals), 1.0 / (1.0 + against))

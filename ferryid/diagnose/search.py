@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import exp, log
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Near, Suspect, Trial, fit, imagined, near, settled
+from ferryid.diagnose.hypothesis import Fit, Near, Suspect, Trial, fit, imagined, near, settled, without
+from ferryid.diagnose.parallel import over
 from ferryid.diagnose.unsteady import State, disturbed
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
@@ -142,8 +144,9 @@ def _selected(
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
         current = fit(trial, chosen.suspects, chosen.values)
         begin = near(trial, current)
-        found = sorted((_best(trial, current, begin, suspect) for suspect in left), key=lambda one: -one.gain)
-        fair = [_fairly(trial, one) for one in found[:REJUDGED]]
+        found = over(partial(_best, trial, current, begin), left)
+        found.sort(key=lambda one: -one.gain)
+        fair = over(partial(_fairly, trial), found[:REJUDGED])
         found = sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
         done = _round(found)
         rounds.append(done)
@@ -237,12 +240,8 @@ def _void(trial: Trial, made: Fit) -> bool:
 def pruned(trial: Trial, chosen: Fit) -> Fit:
     """Drop one by one what the others explain as well without it."""
     while chosen.suspects:
-        without = []
-        for i in range(len(chosen.suspects)):
-            rest = [j for j in range(len(chosen.suspects)) if j != i]
-            start = [chosen.values[j] for j in rest]
-            without.append(fit(trial, [chosen.suspects[j] for j in rest], start))
-        best = max((rejudged(trial, one) for one in without), key=lambda one: one.evidence)
+        fewer = over(partial(without, trial, chosen), range(len(chosen.suspects)))
+        best = max(over(partial(rejudged, trial), fewer), key=lambda one: one.evidence)
         if max(chosen.evidence, rejudged(trial, chosen).evidence) - best.evidence >= ODDS:
             break
         chosen = best

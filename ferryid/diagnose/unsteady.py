@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood, stride_s
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
 from ferryid.diagnose.result import AXES, Estimate, Finding
+from ferryid.diagnose.weak import Windows
 from ferryid.effects.effect import Process
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats
@@ -71,10 +72,11 @@ def disturbed(
         What they were beside another fit: where the search begins.
     """
     picture = imagined(trial.plain, made)
-    gaps = trial.steps.gap(picture)
-    noise = learn(trial.steps, gaps, trial.filter)
+    steps = trial.excerpt
+    gaps = steps.gap(picture)
+    noise = learn(steps, gaps, trial.filter)
     before = {state.suspect.key: [state.values] for state in near}
-    best = likelihood(noise, trial.steps, gaps)
+    best = likelihood(noise, steps, gaps)
     states: list[State] = []
     left = list(suspects)
     while left:
@@ -89,13 +91,13 @@ def disturbed(
                 return suspect.effect.unsteady(picture, p)
 
             places = before.get(suspect.key, _starts(suspect))
-            begin = max(places, key=lambda one: _glance(trial, gaps, noise, processes(one), picture))
-            price = 0.5 * len(begin) * log(len(trial.steps.starts))
+            begin = max(places, key=lambda one: _glance(steps, gaps, noise, processes(one), picture))
+            price = 0.5 * len(begin) * log(len(steps.starts))
             told, values, widths, after = learn_with(
-                trial.steps, gaps, noise, processes, begin, picture, best + price + WORTH
+                steps, gaps, noise, processes, begin, picture, best + price + WORTH
             )
             gain = after - best - price
-            if _seen(suspect, values, widths, stride_s(trial.steps)):
+            if _seen(suspect, values, widths, stride_s(steps)):
                 tried.append((gain, told, State(suspect, values, widths, gain), after))
         if not tried:
             break
@@ -130,8 +132,8 @@ def _strengths(suspect: Suspect) -> NDArray[np.bool_]:
     return np.array([parameter.name.endswith("std") for parameter in suspect.parameters])
 
 
-def _glance(trial: Trial, gaps: Floats, noise: Filter, processes: tuple[Process, ...], picture: Picture) -> float:
-    return likelihood(Filter(noise.channels, (*noise.processes, *processes), picture), trial.steps, gaps)
+def _glance(steps: Windows, gaps: Floats, noise: Filter, processes: tuple[Process, ...], picture: Picture) -> float:
+    return likelihood(Filter(noise.channels, (*noise.processes, *processes), picture), steps, gaps)
 
 
 def _starts(suspect: Suspect) -> list[Floats]:
