@@ -27,6 +27,7 @@ def parse_signals(
     by_name = {actuator.name: actuator for actuator in actuators}
     before = len(faults)
     signals: list[Signal] = []
+    read: dict[tuple[str, str], Signal] = {}
     for quantity in reader.data:
         table = reader.table(quantity)
         if table is None:
@@ -37,6 +38,7 @@ def parse_signals(
             signal = _actuator_signal(quantity, table, by_name)
         if signal is not None:
             signals.append(signal)
+            _check_own_fields(table, signal, read)
     if len(faults) == before:
         _check_complete(reader, signals, actuators)
     return tuple(signals)
@@ -160,6 +162,7 @@ def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Act
         unit = _unit(table, ROLE_KINDS[role])
     sign, offset = _sign(table), table.number("offset", 0.0)
     required = table.flag("required", not quantity.endswith(".command"))
+    table.has("shared")
     table.close()
     return Signal(
         quantity=quantity,
@@ -220,6 +223,32 @@ def _degrees_offset(table: TableReader) -> float:
 def _mount(table: TableReader) -> tuple[float, float]:
     place = table.numbers("mount_m", 2)
     return (place[0], place[1]) if place else (0.0, 0.0)
+
+
+def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, str], Signal]) -> None:
+    """Note a field that is read twice: lines that were copied and not changed.
+
+    Two actuators may follow one signal where the file says so, and the commanded force may be the order of the only one.
+    """
+    if signal.quantity == "tau_d":
+        return
+    name, _, rest = signal.quantity.partition(".")
+    may_share = bool(rest) and table.flag("shared", False)
+    for place, path in enumerate(signal.fields):
+        other = read.setdefault((signal.topic.strip("/"), path), signal)
+        if not path or (other is signal and path not in signal.fields[:place]):
+            continue
+        other_name, _, other_rest = other.quantity.partition(".")
+        alike = bool(rest) and rest == other_rest and name != other_name
+        if may_share and alike:
+            continue
+        who = "it is named twice here" if other is signal else f"so is {other.quantity} on line {other.line}"
+        table.fault(
+            f'{signal.quantity} is read from the field "{path}" of {signal.topic}, and {who}. '
+            "Fix: correct the topic or the field"
+            + (f", or add shared = true here where {other_name} and {name} really have one signal" if alike else "")
+        )
+        return
 
 
 def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple[Actuator, ...]) -> None:

@@ -146,6 +146,23 @@ CASES = {
         "valid = [100, 900] }@",
         "leaves out a stopped propeller",
     ),
+    "two actuators with one signal": (
+        '[signals."right.speed"]\ntopic = "/right"',
+        '[signals."right.speed"]@\ntopic = "left/"',
+        'right.speed is read from the field "n" of left/, and so is left.speed on line 53. Fix: correct the topic or the '
+        "field, or add shared = true here where left and right really have one signal",
+    ),
+    "an angle that is another one's speed": (
+        '[signals."right.rudder"]\ntopic = "/right"\nfield = "d"',
+        '[signals."right.rudder"]@\ntopic = "/right"\nfield = "n"\nshared = true',
+        "so is right.speed on line 61. Fix: correct the topic or the field",
+    ),
+    "one field for both axes": (
+        '[signals.velocity]\ntopic = "/nav"\nfields = ["u", "v"]',
+        '[signals.velocity]@\ntopic = "/nav"\nfields = ["u", "u"]',
+        "it is named twice here",
+    ),
+    "yaw rate from the field of the velocity": ('field = "r"', 'field = "u"', "so is velocity on line"),
     "thrust of the wrong sign": (
         "[0.01, 0.0, 1e-7], valid = [-900, 900] }",
         "[-0.01, 0.0, 1e-7], valid = [-900, 900] }@",
@@ -306,6 +323,14 @@ def test_fault_is_explained_with_its_line(case: str, tmp_path: Path) -> None:
         with pytest.raises(FerryIdError, match=r"boat\.toml:\d+: ") as caught:
             load_profile(path)
         assert "\n" not in str(caught.value)
+
+
+def test_two_actuators_may_have_one_signal_where_the_file_says_so() -> None:
+    old = '[signals."right.speed"]\ntopic = "/right"'
+    assert old in SOUND
+    text = SOUND.replace(old, '[signals."right.speed"]\nshared = true\ntopic = "/left"')
+    signals = {signal.quantity: signal for signal in parse_profile(text, "boat.toml").signals}
+    assert signals["left.speed"].fields == signals["right.speed"].fields
 
 
 def test_every_fault_is_found_at_once(tmp_path: Path) -> None:
