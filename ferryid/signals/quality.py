@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
+from ferryid.signals.mirror import mirrored
 from ferryid.signals.track import Doubt, Track
 from ferryid.vessel.frames import wrap
 
@@ -298,8 +299,13 @@ def cross_checks(track: Track) -> tuple[Doubt, ...]:
         c, s = np.cos(psi), np.sin(psi)
         ahead, u = _changes("x", c * north + s * east, columns["u"], track, span)
         aside, v = _changes("y", c * east - s * north, columns["v"], track, span)
-        said += _compare("surge velocity", "position", ahead, u, 0.2, _SPEED_GAINS)
-        said += _compare("sway velocity", "position", aside, v, 0.2, _SPEED_GAINS)
+        speeds = _compare("surge velocity", "position", ahead, u, 0.2, _SPEED_GAINS)
+        speeds += _compare("sway velocity", "position", aside, v, 0.2, _SPEED_GAINS)
+        if speeds and not any(doubt.certain for doubt in speeds):
+            pose, velocity = (np.column_stack([columns[name] for name in names]) for names in (("x", "y", "psi"), "uv"))
+            _, says = mirrored(pose, velocity, track.valid, track.rate_hz)
+            speeds = [Doubt(says, True)] if says else speeds
+        said += speeds
     return tuple(said)
 
 

@@ -58,6 +58,26 @@ def test_wrong_signs_and_units_are_named(name: str, factor: float, said: str) ->
     assert finding.certain is (factor != 1.3)
 
 
+@pytest.mark.parametrize("turned", [0.0, 0.4])
+def test_frames_of_the_wrong_hand_are_named(turned: float) -> None:
+    track = voyage()
+    x, y, psi = (track.columns[name] for name in ("x", "y", "psi"))
+    (finding,) = cross_checks(voyage(x=y, y=x))
+    assert finding.says.startswith("The positions are mirrored")
+    assert finding.certain
+    doubts = cross_checks(voyage(psi=0.5 * np.pi + turned - psi))
+    assert [doubt.certain for doubt in doubts] == [True, True]
+    assert "wrong sign against the heading" in doubts[0].says
+    assert doubts[1].says.startswith("The heading turns the wrong way round")
+
+
+def test_a_turned_frame_is_not_of_the_wrong_hand() -> None:
+    track = voyage()
+    doubts = cross_checks(voyage(psi=track.columns["psi"] + 1.5))
+    assert doubts
+    assert not any(doubt.certain for doubt in doubts if "mirrored" in doubt.says or "round" in doubt.says)
+
+
 def test_a_yaw_rate_from_elsewhere_is_named() -> None:
     (finding,) = cross_checks(voyage(r=0.1 * np.sin(2.1 * T)))
     assert "does not follow the heading" in finding.says

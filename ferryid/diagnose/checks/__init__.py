@@ -14,6 +14,8 @@ from pkgutil import iter_modules
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.effects.picture import Scene
+from ferryid.errors import FerryIdError
+from ferryid.signals.mirror import mirrored
 
 __all__ = ["Check", "SensorFinding", "checks", "examine"]
 
@@ -27,7 +29,19 @@ def checks() -> tuple[Check, ...]:
 
 
 def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
-    """Return what is wrong with the sensors of a scene, and the scene without it."""
+    """Return what is wrong with the sensors of a scene, and the scene without it.
+
+    Raises
+    ------
+    FerryIdError
+        For frames of the wrong hand, which say nothing of their true axes.
+    """
+    wrong, says = mirrored(scene.eta, scene.nu_raw, scene.usable, 1.0 / scene.step_s)
+    if wrong:
+        raise FerryIdError(
+            f"{scene.profile.path}: signals contradict each other, so nothing can be learnt from them. {says} "
+            f"Fix: correct the frame of [signals.{wrong}] in the profile {scene.profile.name}, or of what it is held against"
+        )
     findings = []
     for check in checks():
         finding = check.find(scene)

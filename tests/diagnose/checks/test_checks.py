@@ -11,6 +11,7 @@ import pytest
 
 from ferryid.diagnose.checks import SensorFinding, checks, examine
 from ferryid.effects.picture import Scene
+from ferryid.errors import FerryIdError
 from ferryid.simulate import load_scenario
 from ferryid.simulate.sections import Navigation, Wind
 from ferryid.simulate.trial import sail
@@ -222,3 +223,16 @@ def test_a_vessel_at_rest_and_a_short_log_tell_nothing() -> None:
     assert examine(scene)[0] == ()
     still = np.zeros((len(scene.t), 3))
     assert examine(replace(scene, eta=still, nu_raw=still, nu=still))[0] == ()
+
+
+@pytest.mark.parametrize(
+    ("signal", "hand"),
+    [
+        ("position", lambda one: replace(one, eta=one.eta[:, [1, 0, 2]])),
+        ("heading", lambda one: replace(one, eta=np.column_stack([one.eta[:, :2], 0.5 * np.pi - one.psi]))),
+        ("velocity", lambda one: replace(one, nu_raw=one.nu_raw * [1.0, -1.0, -1.0])),
+    ],
+)
+def test_frames_of_the_wrong_hand_are_refused(signal: str, hand: Callable[[Scene], Scene]) -> None:
+    with pytest.raises(FerryIdError, match=rf"milliampere.*Fix: correct the frame of \[signals\.{signal}\]"):
+        examine(hand(quiet(1)))

@@ -1,0 +1,73 @@
+"""Frames of the wrong hand: positions, headings or velocities that are the mirror image of what the others say.
+
+With positions as complex numbers p = north + i east and velocities as w = u + i v, ``dp = w exp(i psi) dt``. East taken for
+north conjugates p up to a turn, a heading that counts the other way conjugates the exponential, and a y axis to port conjugates
+w. A turn and a factor remain free in each, so that none of them is taken for a heading's bias, or for a unit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+SPAN_S = 4.0
+FEWEST = 15
+LEAST_M = 0.2
+"""Root mean square of the way made good in `SPAN_S`; less is lost in noise."""
+FITS, BETTER = 0.9, 10.0
+"""A frame is wrong beyond doubt if its mirror image correlates so well, and leaves so many times less unexplained."""
+
+SAYS = {
+    "position": "The positions are mirrored against heading and velocity, as with north and east exchanged",
+    "heading": "The heading turns the wrong way round against positions and velocity",
+    "velocity": "The sway velocity has the wrong sign against positions and heading, as with y to port, or heading and "
+    "positions are both of the other hand",
+}
+"""What is of the wrong hand, by the signal to look at first."""
+
+
+def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float) -> tuple[str, str]:
+    """Return which signal is of the wrong hand and a sentence that says so, empty where none certainly is.
+
+    Parameters
+    ----------
+    eta
+        Position north, east [m] and heading [rad], shape (n, 3), NaN where not measured.
+    nu
+        Surge and sway velocity over ground [m/s], shape (n, 2) or more.
+    usable
+        Rows that were measured, shape (n,).
+    rate_hz
+        Rows per second.
+    """
+    span = max(2, round(SPAN_S * rate_hz))
+    good = usable & np.isfinite(eta).all(axis=1) & np.isfinite(nu[:, :2]).all(axis=1)
+    starts = np.arange(0, len(good) - span, span)
+    starts = starts[[bool(good[start : start + span + 1].all()) for start in starts]]
+    if len(starts) < FEWEST:
+        return "", ""
+    place = eta[:, 0] + 1j * eta[:, 1]
+    way = place[starts + span] - place[starts]
+    if np.sqrt(np.mean(np.abs(way) ** 2)) < LEAST_M:
+        return "", ""
+    water = nu[:, 0] + 1j * nu[:, 1]
+    ahead, astern = np.exp(1j * eta[:, 2]), np.exp(-1j * eta[:, 2])
+    every = {"": water * ahead, "position": np.conj(water * ahead), "heading": water * astern}
+    every["velocity"] = np.conj(water) * ahead
+    fits = {name: _fit(way, _summed(values, starts, span)) for name, values in every.items()}
+    best = max(fits, key=lambda name: fits[name])
+    if fits[best] < FITS or BETTER * (1.0 - fits[best] ** 2) > 1.0 - fits[""] ** 2:
+        return "", ""
+    return best, f"{SAYS[best]} (correlation {fits[best]:.2f} so, {fits['']:.2f} as declared)."
+
+
+def _summed(values: NDArray[np.complex128], starts: NDArray[np.int64], span: int) -> NDArray[np.complex128]:
+    return np.array([values[start : start + span].sum() for start in starts])
+
+
+def _fit(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> float:
+    """Return the size of the correlation of two complex series, their means left out: water may carry the vessel."""
+    one, other = one - one.mean(), other - other.mean()
+    return float(np.abs(np.vdot(one, other)) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-12))
