@@ -35,6 +35,9 @@ _SIMPLE = {
 }
 _ROLE_KIND = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force": "force", "thrust": "force"}
 
+_NEAR_TURN = 0.1
+"""A step is a full turn to within this share of one."""
+
 
 @dataclass(frozen=True)
 class Selection:
@@ -159,13 +162,14 @@ def convert(profile: Profile, series: Series) -> dict[str, Floats]:
     Raises
     ------
     FerryIdError
-        For a field that is not numeric, and for latitudes beyond ±90°.
+        For a field that is not numeric, latitudes beyond ±90°, and an angle that wraps at the full turn of another unit.
     """
     columns: dict[str, Floats] = {}
     for signal in profile.signals:
         if _bare(signal.topic) != _bare(series.topic) or not set(signal.fields) <= set(series.columns):
             continue
         values = [_numeric(series, path, signal) for path in signal.fields]
+        _check_turns(profile, signal, values)
         columns.update(zip(canonical_columns(signal), _convert(signal, values, series.topic), strict=True))
     return columns
 
@@ -199,6 +203,31 @@ def _convert(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
     if signal.full_rpm:
         return [_scalar(signal, values[0], factor(signal.unit, "fraction") * signal.full_rpm)]
     return [_scalar(signal, values[0], factor(signal.unit, _ROLE_KIND[role]))]
+
+
+def _check_turns(profile: Profile, signal: Signal, values: list[Floats]) -> None:
+    """Refuse an angle that jumps from end to end of its range by the full turn of the unit that it is not declared in."""
+    if signal.quantity == "wind" and not signal.frame:
+        unit, path, angle = signal.options["direction_unit"], signal.fields[1], values[1]
+    elif signal.quantity == "heading" or signal.quantity.removesuffix(".command").endswith(".angle"):
+        unit, path, angle = signal.unit, signal.fields[0], values[0]
+    else:
+        return
+    other = {"deg": "rad", "rad": "deg"}.get(unit, "")
+    known = angle[np.isfinite(angle)]
+    if not other or known.size < 3:
+        return
+    turn = 2.0 * math.pi / factor(other, "angle")
+    step = np.abs(np.diff(known))
+    jumps = int(np.count_nonzero(np.abs(step / turn - 1.0) < _NEAR_TURN))
+    moving = step[step > 0.0]
+    # Small steps but for the jumps: what swings between two angles a full turn of radians apart is in degrees.
+    if jumps < 2 or np.ptp(known) > 1.001 * turn or np.quantile(moving, 0.5) > _NEAR_TURN * turn:
+        return
+    raise FerryIdError(
+        f"{profile.path}:{signal.line}: {signal.quantity} is declared in {unit}, found a field {path} in {signal.topic} that "
+        f"stays within {turn:.4g} and jumps by as much {jumps} times, as {other} do at a full turn. Fix: correct the unit"
+    )
 
 
 def _scalar(signal: Signal, values: Floats, scale: float) -> Floats:

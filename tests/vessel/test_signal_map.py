@@ -216,6 +216,38 @@ def test_sign_then_offset_then_unit() -> None:
     assert columns["psi"] == pytest.approx([math.radians(-20.0)])
 
 
+HEADING = '[signals.heading]\ntopic = "/nav"\nfield = "h"\nunit = "{}"\nframe = "NED"\n'
+TURNING = np.mod(np.arange(0.0, 20.0, 0.05), 2.0 * math.pi)
+
+
+@pytest.mark.parametrize("low", [0.0, math.pi])
+@pytest.mark.parametrize(("unit", "other", "scale"), [("rad", "deg", 180.0 / math.pi), ("deg", "rad", 1.0)])
+def test_an_angle_that_wraps_in_another_unit_is_refused(unit: str, other: str, scale: float, low: float) -> None:
+    angle = scale * (TURNING - low)
+    with pytest.raises(
+        FerryIdError, match=rf"boat.toml:\d+: heading is declared in {unit}, .* as {other} do at a full turn"
+    ):
+        convert(profile(BODY + HEADING.format(unit)), series("/nav", h=angle))
+    assert convert(profile(BODY + HEADING.format(other)), series("/nav", h=angle))["psi"].size == angle.size
+    if unit == "deg":
+        with pytest.raises(FerryIdError, match=r"t1\.angle is declared in deg"):
+            convert(profile(BODY), Series("/t1", np.arange(angle.size), None, {"angle[1]": angle}))
+
+
+@pytest.mark.parametrize(
+    ("unit", "angle"),
+    [
+        ("rad", np.arange(0.0, 100.0, 0.1)),
+        ("deg", 3.14 * np.sign(np.sin(np.arange(100.0)))),
+        ("deg", 40.0 * np.sin(np.arange(100.0))),
+        ("deg", np.zeros(9)),
+        ("rad", np.full(9, np.nan)),
+    ],
+)
+def test_honest_angles_are_in_their_unit(unit: str, angle: Floats) -> None:
+    convert(profile(BODY + HEADING.format(unit)), series("/nav", h=angle))
+
+
 def test_quaternion_with_offset() -> None:
     text = BODY + (
         '[signals.heading]\ntopic = "/att"\nquaternion = ["x", "y", "z", "w"]\nframe = "ENU"\noffset_deg = 5.0\n'
