@@ -116,7 +116,7 @@ def _one(
     sensors, scene = examine(scene)
     seen = windows(scene, *window_lengths(profile))
     name = survey.motion.log
-    notes = list(survey.doubts)
+    notes = [*survey.doubts, *_of_actuators(survey, profile)]
     if len(seen.starts) < FEWEST_WINDOWS:
         notes.append(
             f"Only {len(seen.starts)} stretches of {window_lengths(profile)[0]:.0f} s without a gap: too little to tell. "
@@ -195,6 +195,12 @@ def _verdict(found: bool, more: bool, telling: bool) -> str:
     if not telling:
         return "not_testable"
     return "unexplained" if more else "matched"
+
+
+def _of_actuators(survey: Survey, profile: Profile) -> list[str]:
+    """Return what was noted of single actuators: speeds beyond the thrust curve, or never near it."""
+    names = tuple(f"{actuator.name}{end}" for actuator in profile.actuators for end in (": ", " never "))
+    return [one for one in survey.motion.repairs if one.startswith(names)]
 
 
 def _of_sensors(sensors: Sequence[SensorFinding]) -> tuple[Finding, ...]:

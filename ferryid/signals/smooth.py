@@ -12,7 +12,7 @@ from ferryid.signals.align import segments
 from ferryid.signals.kalman import fit_levels, smooth_runs
 from ferryid.signals.quality import require_excited
 from ferryid.signals.track import Motion, Track
-from ferryid.vessel import applied_force
+from ferryid.vessel import applied_force, speed_doubts
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
 
@@ -89,7 +89,7 @@ def measure(track: Track, profile: Profile) -> Measured:
     Raises
     ------
     FerryIdError
-        Where velocities or the applied force never change.
+        Where velocities or the applied force never change, and where a propeller turns far too fast.
     """
     columns, n = track.columns, track.t.size
     nothing = np.full(n, np.nan)
@@ -104,7 +104,7 @@ def measure(track: Track, profile: Profile) -> Measured:
     payload = _payload(track, profile, usable, repairs)
     through_water = nu if current is None else nu - current_in_body(current, eta[:, 2])
     tau, notes = applied_force(profile, columns, through_water)
-    repairs.extend(notes)
+    repairs.extend((*notes, *speed_doubts(profile, columns)))
     tau_d = None
     if {"X_d", "Y_d", "N_d"} <= set(columns):
         tau_d = np.column_stack([columns[name] for name in ("X_d", "Y_d", "N_d")])

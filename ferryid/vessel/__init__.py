@@ -5,7 +5,7 @@ from ferryid.vessel.faults import Fault
 from ferryid.vessel.load import bundled, check_profile, load_profile, parse_profile
 from ferryid.vessel.resolve import resolve, resolve_notes
 from ferryid.vessel.signal_map import Selection, convert, select, survey
-from ferryid.vessel.thrusters import actuator_columns, applied_force
+from ferryid.vessel.thrusters import actuator_columns, applied_force, speed_doubts
 
 __all__ = [
     "Fault",
@@ -21,5 +21,6 @@ __all__ = [
     "resolve",
     "resolve_notes",
     "select",
+    "speed_doubts",
     "survey",
 ]

@@ -15,6 +15,9 @@ from ferryid.vessel.rudder import inflow_speed, rudder_force
 FRESH_WATER = 1000.0
 """Density of water [kg/m³] where an actuator states none."""
 
+SLOW, FAST = 0.03, 3.0
+"""Parts of the highest speed of a thrust curve below which a propeller as good as rests, and which none exceeds for long."""
+
 ROLE_PREFIX = {"speed": "n", "angle": "alpha", "rudder": "delta", "force": "F", "thrust": "F"}
 """Role of an actuator's signal to the prefix of its column."""
 
@@ -147,6 +150,44 @@ def actuator_columns(
             if order and measured:
                 notes.append(order_note(actuator.name, role))
     return chosen, tuple(notes)
+
+
+def speed_doubts(profile: Profile, columns: Mapping[str, Floats]) -> tuple[str, ...]:
+    """Say which propellers never come near the speeds that their thrust curves cover, as with a wrong unit.
+
+    Parameters
+    ----------
+    profile, columns
+        As for `applied_force`.
+
+    Raises
+    ------
+    FerryIdError
+        For a propeller that mostly turns far faster than its curve knows.
+    """
+    told = []
+    for (name, role), column in actuator_columns(profile, columns)[0].items():
+        curve = next(one.thrust for one in profile.actuators if one.name == name)
+        if role != "speed" or curve is None:
+            continue
+        limit = max(map(abs, curve.valid)) * (60.0 if curve.input_unit == "rps" else 1.0)
+        speed = np.abs(np.asarray(columns[column], dtype=np.float64))
+        turning = speed[np.isfinite(speed) & (speed > SLOW * limit)]
+        fastest = float(np.max(speed, initial=0.0, where=np.isfinite(speed)))
+        if not math.isfinite(limit) or fastest == 0.0:
+            continue
+        if turning.size == 0:
+            told.append(
+                f"{name} never turned faster than {fastest:.3g} rpm, {100.0 * fastest / limit:.2g} % of what its thrust curve "
+                "covers: if it did not rest all the time, correct the unit of its speed."
+            )
+        elif np.mean(turning > FAST * limit) > 0.5:
+            line = next((one.line for one in profile.signals if one.quantity.startswith(f"{name}.speed")), 0)
+            raise FerryIdError(
+                f"{profile.path}:{line}: {name} cannot turn at {np.median(turning):.4g} rpm most of the time, as the unit of "
+                f"its speed has it: its thrust curve ends at {limit:.4g} rpm. Fix: correct the unit, or the curve"
+            )
+    return tuple(told)
 
 
 def applied_force(

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ferryid.errors import FerryIdError
-from ferryid.vessel import applied_force, load_profile
+from ferryid.vessel import applied_force, load_profile, speed_doubts
 from ferryid.vessel.profile import Floats, Profile, ThrustCurve
 from ferryid.vessel.thrusters import thrust
 
@@ -52,6 +52,30 @@ def test_clipping_is_said() -> None:
     }
     notes = applied_force(MILLIAMPERE, columns, np.zeros((3, 3)))[1]
     assert notes == ("thruster1: 2 of 3 rows lie outside the thrust curve's -1050 to 1050 rpm and were clipped.",)
+
+
+def speeds(first: Floats) -> dict[str, Floats]:
+    return {
+        f"{column}_thruster{k}": first if (column, k) == ("n", 1) else np.zeros(9)
+        for column in ("n", "alpha")
+        for k in (1, 2)
+    }
+
+
+def test_turns_per_second_declared_for_minutes_are_refused() -> None:
+    turned = np.array([0.0, 0.0, 0.0, 0.0, 300.0, 400.0, -200.0, 10.0, np.nan])
+    assert speed_doubts(MILLIAMPERE, speeds(turned)) == ()
+    with pytest.raises(
+        FerryIdError, match=r"milliampere\.toml:\d+: thruster1 cannot turn at 1\.5e\+04 rpm.*Fix: correct the unit"
+    ):
+        speed_doubts(MILLIAMPERE, speeds(60.0 * turned))
+    # One wild sample is no unit.
+    assert speed_doubts(MILLIAMPERE, speeds(np.where(turned == 400.0, 24e3, turned))) == ()
+
+
+def test_a_propeller_that_as_good_as_rests_is_told() -> None:
+    (told,) = speed_doubts(MILLIAMPERE, speeds(np.array([0.0, 1.0, 6.0, -5.0, 0.0, 0.0, 0.0, 0.0, np.nan])))
+    assert told.startswith("thruster1 never turned faster than 6 rpm, 0.57 % of what its thrust curve covers: if")
 
 
 def test_quadratic_in_turns_per_second() -> None:
