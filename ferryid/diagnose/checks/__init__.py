@@ -8,14 +8,26 @@ delay of them all) leaves no trace in them, and only forces can tell: see `ferry
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
+import numpy as np
+
 from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.contradiction import opposed
+from ferryid.diagnose.velocity import steadied
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored
+from ferryid.signals.smooth import moving_mean, odd_rows
+from ferryid.vessel.profile import Floats
+
+MEAN_S = 1.0
+"""Moving mean of the velocities that enter products [s], as in `ferryid.diagnose.scene.scene_of`."""
+GROSS = frozenset({"held_samples", "heading_wrap", "heading_bias"})
+"""Errors of position and heading that spoil the velocity made of them; small shifts in time hardly do."""
 
 __all__ = ["Check", "SensorFinding", "checks", "examine"]
 
@@ -34,7 +46,7 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
     Raises
     ------
     FerryIdError
-        For frames of the wrong hand, which say nothing of their true axes.
+        For frames of the wrong hand, which say nothing of their true axes, and for actuators that push the wrong way.
     """
     wrong, says = mirrored(scene.eta, scene.nu_raw, scene.usable, 1.0 / scene.step_s)
     if wrong:
@@ -48,4 +60,20 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
         if finding is not None:
             findings.append(finding)
             scene = finding.correct(scene)
+    if GROSS & {finding.effect for finding in findings}:
+        scene = replace(scene, nu=_steadied(scene))
+    if says := opposed(scene):
+        raise FerryIdError(
+            f"{scene.profile.path}: force and motion contradict each other, so nothing can be learnt from them. {says} "
+            f"Fix: correct the sign of the speeds or angles in the profile {scene.profile.name}, or the clocks of the log"
+        )
     return tuple(findings), scene
+
+
+def _steadied(scene: Scene) -> Floats:
+    """Return the velocity that enters products anew: its slow part comes from positions and headings, now corrected."""
+    rate = 1.0 / scene.step_s
+    rows = odd_rows(MEAN_S, rate)
+    padded = np.pad(scene.nu_raw, ((rows // 2, rows // 2), (0, 0)), mode="edge")
+    eta = np.where(scene.usable[:, None], scene.eta, np.nan)
+    return steadied(moving_mean(padded, rows)[rows // 2 : rows // 2 + len(scene.t)], scene.nu_raw, eta, rate)

@@ -46,7 +46,9 @@ def find(scene: Scene) -> SensorFinding | None:
     percent = 100.0 * share
 
     def correct(seen: Scene) -> Scene:
-        return replace(seen, usable=seen.usable & ~rows)
+        # What was held is bridged: the jump at its end is no motion, and means reach over it.
+        eta, nu_raw = (_bridged(now, gone) for now, gone in ((seen.eta, held[:, :3]), (seen.nu_raw, held[:, 3:])))
+        return replace(seen, eta=eta, nu_raw=nu_raw, usable=seen.usable & ~rows)
 
     return SensorFinding(
         "held_samples",
@@ -56,6 +58,14 @@ def find(scene: Scene) -> SensorFinding | None:
         correct,
         {"first_s": scene.t[edges[:, 0]], "last_s": scene.t[edges[:, 1] - 1]},
     )
+
+
+def _bridged(values: Floats, gone: NDArray[np.bool_]) -> Floats:
+    result, row = values.copy(), np.arange(len(values))
+    for column, rows in zip(result.T, gone.T, strict=True):
+        if rows.any() and not rows.all():
+            column[rows] = np.interp(row[rows], row[~rows], column[~rows])
+    return result
 
 
 def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArray[np.bool_]:

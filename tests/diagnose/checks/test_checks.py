@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import SensorFinding, checks, examine
+from ferryid.diagnose.velocity import steadied
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.simulate import load_scenario
@@ -223,6 +224,23 @@ def test_a_vessel_at_rest_and_a_short_log_tell_nothing() -> None:
     assert examine(scene)[0] == ()
     still = np.zeros((len(scene.t), 3))
     assert examine(replace(scene, eta=still, nu_raw=still, nu=still))[0] == ()
+
+
+@pytest.mark.parametrize("error", ["heading", "hold"])
+def test_the_velocity_in_products_is_made_anew_of_what_was_corrected(error: str) -> None:
+    right = quiet(2)
+    eta = right.eta.copy()
+    if error == "heading":
+        eta[:, 2] += np.radians(20.0)
+    else:
+        eta[2000:4000, :2] = eta[2000, :2]
+    wrong = replace(right, eta=eta)
+    steady, made = (steadied(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
+    findings, corrected = examine(replace(wrong, nu=made))
+    assert [one.effect for one in findings] == ["heading_bias" if error == "heading" else "held_samples"]
+    rows = corrected.usable
+    assert np.abs(made - steady)[rows, :2].max() > 0.1
+    assert np.abs(corrected.nu - steady)[rows, :2].max() < 0.05
 
 
 @pytest.mark.parametrize(
