@@ -153,7 +153,10 @@ def _curve(reader: TableReader | None) -> ThrustCurve | None:
     else:
         curve = _table_curve(reader, unit, valid)
     reader.close()
-    if curve is not None and kind == "polynomial" and valid:
+    if curve is not None and kind != "quadratic" and not any(curve.coefficients) and not any(curve.table[1]):
+        key = "coefficients" if kind == "polynomial" else "force"
+        reader.fault("the thrust curve is zero everywhere. Fix: give its coefficients or forces [N]", key)
+    elif curve is not None and kind == "polynomial" and valid:
         _check_monotone(reader, curve)
     return curve
 

@@ -163,6 +163,12 @@ CASES = {
         "it is named twice here",
     ),
     "yaw rate from the field of the velocity": ('field = "r"', 'field = "u"', "so is velocity on line"),
+    "a curve without thrust": (
+        "[0.01, 0.0, 1e-7], valid = [-900, 900] }",
+        "[0.0, 0.0], valid = [-900, 900] }@",
+        "zero everywhere",
+    ),
+    "a table without thrust": ("force = [-200, 0, 300]", "force = [0, 0, 0]@", "zero everywhere"),
     "thrust of the wrong sign": (
         "[0.01, 0.0, 1e-7], valid = [-900, 900] }",
         "[-0.01, 0.0, 1e-7], valid = [-900, 900] }@",
