@@ -26,8 +26,9 @@ from ferryid.diagnose.hypothesis import Fit, Trial, fit, imagined, trial_of
 from ferryid.diagnose.judged import judged
 from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import locate
-from ferryid.diagnose.named import MERE_HINT, doubted, forces_of, hinted
-from ferryid.diagnose.result import AXES, Diagnosis, Finding, Withheld
+from ferryid.diagnose.named import doubted, forces_of, hinted, merely_hinted
+from ferryid.diagnose.noisy import drowned_axes, says_drowned
+from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding, Withheld
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import search, suspects_of
 from ferryid.diagnose.testable import advice, powers, tells, unexcited
@@ -154,23 +155,26 @@ def _one(
         forces = [hinted(one) for one in forces]
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
-            f"stand in for what a hull model would explain. Take them as hints, of probability {MERE_HINT:g} at most."
+            f"stand in for what a hull model would explain. Take them as hints, of probability {HINT:g} at most."
         )
     shaken = unsteady_of(trial, found.states)
     if model is None and not profile.hull.has_model:
         # Its own motion, too, is only guessed at: what shakes it may be its measurement.
         shaken = tuple(hinted(one) for one in shaken)
-    named = [*forces, *shaken]
+    named, nameless = [*forces, *shaken], list(unknown.findings)
+    if drowned := drowned_axes(trial):
+        notes.append(says_drowned(drowned))
+        named, nameless = ([merely_hinted(one) for one in every] for every in (named, nameless))
     findings = [*_of_sensors(sensors), *named]
     chances, still = powers(trial, kept, steady), unexcited(trial)
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
     notes += advice(chances, still)
     if unknown.unsteady or found.states:
         findings = [doubted(one) for one in findings]
-    sure = [one for one in findings if one.probability > MERE_HINT]
-    more = bool(unknown.findings) or len(sure) < len(findings)
+    sure = [one for one in findings if one.sure]
+    more = bool(nameless) or len(sure) < len(findings)
     verdict = _verdict(bool(sure), more, tells(chances, still))
-    findings += unknown.findings
+    findings += nameless
     before, after = _scores(trial, base, kept, proof)
     return Diagnosis(
         name,

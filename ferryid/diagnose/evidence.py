@@ -233,11 +233,16 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
     start = [found.values[k] for k in others]
     without = held_out(trial, folds, rest, start) if rest else base
     made = improvement(trial, folds, without, full)
-    gains = _gains(trial, folds, without.gaps, full.gaps)
-    by_name = {}
-    for name, placebo in placebos(trial, suspect, values).items():
-        judged = held_out(trial, folds, [*rest, placebo], [*start, suspect.start])
-        by_name[name] = _gains(trial, folds, without.gaps, judged.gaps)
+    in_its_place = placebos(trial, suspect, values)
+
+    def gains_of_placebos(trial: Trial, without: HeldOut) -> dict[str, Floats]:
+        judged = {
+            name: held_out(trial, folds, [*rest, placebo], [*start, suspect.start])
+            for name, placebo in in_its_place.items()
+        }
+        return {name: _gains(trial, folds, without.gaps, one.gaps) for name, one in judged.items()}
+
+    gains, by_name = _gains(trial, folds, without.gaps, full.gaps), gains_of_placebos(trial, without)
     picks = draws(folds.block)
     beaten = _beaten(picks, gains, by_name)
     scores = {name: float(one.sum()) for name, one in by_name.items()}
@@ -251,14 +256,10 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
         made = improvement(trial, folds, stiff, full)
         # The same force late, or on a mirrored heading, has to be worse there too.
         own = held_out(rigid, folds, found.suspects, found.values)
-        gains, by_name = _gains(trial, folds, stiff.gaps, own.gaps), {}
-        for name, placebo in placebos(trial, suspect, values).items():
-            judged = held_out(rigid, folds, [*rest, placebo], [*start, suspect.start])
-            by_name[name] = _gains(trial, folds, stiff.gaps, judged.gaps)
+        gains, by_name = _gains(trial, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
         beaten = _beaten(picks, gains, by_name)
         scores = {name: float(one.sum()) for name, one in by_name.items()}
         holds = made.score_low > 0.0 and beaten > 0.0 and not _matched(made.score, scores)
-        return Proof(suspect, made, scores, beaten, holds)
     return Proof(suspect, made, scores, beaten, holds)
 
 

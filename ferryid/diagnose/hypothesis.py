@@ -13,7 +13,7 @@ from ferryid.diagnose.noise import Noise, noise_of
 from ferryid.diagnose.parallel import over
 from ferryid.diagnose.weak import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
-from ferryid.effects.picture import Picture, from_onset
+from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
 
 HULL_SPREAD = 0.12
@@ -53,11 +53,7 @@ class Suspect:
 
     def act(self, picture: Picture, p: Floats) -> Picture:
         """Return the picture with the effect in it."""
-        after = self.effect.apply(picture, p, self.instance)
-        if self.onset_s <= 0.0:
-            return after
-        kick = None if self.effect.kick is None else self.effect.kick(picture, p)
-        return from_onset(picture, after, self.onset_s, kick)
+        return self.effect.act(picture, p, self.instance, self.onset_s)
 
 
 @dataclass(frozen=True)
@@ -312,11 +308,9 @@ def imagined(plain: Picture, made: Fit) -> Picture:
 
 
 def acted(picture: Picture, suspects: Sequence[Suspect], values: Sequence[Floats]) -> Picture:
-    """Return the picture with some suspects in it: first what corrects the measurements, then the others in their order."""
-    for first in (True, False):
-        for suspect, p in zip(suspects, values, strict=True):
-            if suspect.effect.of_sensor is first:
-                picture = suspect.act(picture, p)
+    """Return the picture with some suspects in it, each in its turn."""
+    for suspect, p in sorted(zip(suspects, values, strict=True), key=lambda one: one[0].effect.turn):
+        picture = suspect.act(picture, p)
     return picture
 
 

@@ -11,6 +11,9 @@ from ferryid.diagnose.rivals import Standing, standing_of
 from ferryid.diagnose.search import pruned
 from ferryid.diagnose.unknown import impostors
 
+SWAPS = 6
+"""Selections that are tried: physics without a name here may send one effect after the other to stand in for it."""
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -56,7 +59,7 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
         standings = tuple(standing_of(trial, kept, i, library) for i in range(len(kept.suspects)))
         better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
         better = [one for one in better if _keys(one.fit) not in tried]
-        if better:
+        if better and len(tried) <= SWAPS:
             # What was selected first may be less likely beside what was selected later than another in its place.
             best = max(better, key=lambda one: one.gain)
             tried.add(_keys(best.fit))
@@ -67,7 +70,9 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
         fallen, why = _fallen(trial, kept, proof)
         if fallen is None:
             return Judged(kept, proof, standings, tuple(told))
-        told.append(f"{kept.suspects[fallen].effect.title} was suspected, but {why}: it is no finding.")
+        one = kept.suspects[fallen]
+        where = "" if one.instance is None else f" of {one.instance}"
+        told.append(f"{one.effect.title}{where} was suspected, but {why}: it is no finding.")
         kept = pruned(trial, without(trial, kept, fallen))
         tried.add(_keys(kept))
     return Judged(kept, None, (), tuple(told))

@@ -16,8 +16,6 @@ from ferryid.identify.excitation import ranges
 from ferryid.identify.stored_effect import Quantity, Source, StoredEffect
 from ferryid.vessel.profile import Floats
 
-BELIEVED = 0.5
-"""A finding enters a model where it is more likely than this."""
 IN_THE_HULL = "hull_parameters"
 """The effect that is nothing but other coefficients of the hull: it becomes these."""
 _STEP = 1e-2
@@ -71,7 +69,7 @@ def learnt(
         Of the log.
     """
     told = {(one.effect, one.instance): one for one in findings}
-    believed = [i for i, one in enumerate(kept.suspects) if one.key in told and told[one.key].probability > BELIEVED]
+    believed = [i for i, one in enumerate(kept.suspects) if one.key in told and told[one.key].sure]
     if not believed:
         return None
     notes = [
@@ -98,7 +96,7 @@ def learnt(
             stored.append((suspect.effect.vessel, _stored(suspect, kept.values[i], kept.told_errors(i), source)))
     for state in states:
         suspect = state.suspect
-        if suspect.key in told and told[suspect.key].probability > BELIEVED:
+        if suspect.key in told and told[suspect.key].sure:
             source = Source(motion.log, recording.sha256, told[suspect.key].probability)
             found = {name: Quantity(one.value, one.low, one.high, one.unit) for name, one in state.estimates.items()}
             stored.append((False, StoredEffect(*suspect.key, found, (source,))))

@@ -10,16 +10,13 @@ import numpy as np
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, near
 from ferryid.diagnose.judged import Judged
 from ferryid.diagnose.locate import locate
-from ferryid.diagnose.result import AXES, Estimate, Finding, Rival
-from ferryid.diagnose.search import NEAR
+from ferryid.diagnose.result import AXES, HINT, NEAR, Estimate, Finding, Rival
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shown import columns_of, regressor_of
 from ferryid.effects.picture import Scene
 
 OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
-MERE_HINT = 0.5
-"""Probability above which no force is named where the hull is known from nothing but the log that shows it."""
 ONSET_DROP = 50.0
 """Fall of the logarithm of the evidence as of which no onset farther away comes into question; smaller dips may lie between."""
 ONSET_STEP, ONSET_FIT = 0.125, 3
@@ -37,13 +34,7 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
         rivals = tuple(
             Rival(one.suspect.effect.id, one.suspect.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
         )
-        unresolved = tuple(
-            dict.fromkeys(
-                one.suspect.effect.id
-                for one in standing.rivals
-                if one.gain > -NEAR and one.suspect.effect.id != suspect.effect.id
-            )
-        )
+        unresolved = tuple(dict.fromkeys(one.suspect.effect.id for one in standing.rivals if one.gain > -NEAR))
         # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
         bare = replace(kept, suspects=tuple(rest), values=tuple(kept.values[j] for j in others))
         place = locate(trial, bare, kept, scene)
@@ -134,10 +125,15 @@ def hinted(finding: Finding) -> Finding:
     """Return a finding of a force as it stands where the hull is known from nothing but the log that shows it."""
     return replace(
         finding,
-        probability=min(finding.probability, MERE_HINT),
+        probability=min(finding.probability, HINT),
         unresolved_with=tuple(dict.fromkeys((*finding.unresolved_with, "hull_parameters"))),
         separating_manoeuvre="a log in calm air and still water, to fit a hull model first",
     )
+
+
+def merely_hinted(finding: Finding) -> Finding:
+    """Return a finding of a force as it stands where the velocity's noise drowns what it rests on."""
+    return replace(finding, probability=min(finding.probability, HINT))
 
 
 def doubted(finding: Finding) -> Finding:
@@ -149,7 +145,7 @@ def doubted(finding: Finding) -> Finding:
         return finding
     return replace(
         finding,
-        probability=min(finding.probability, 0.5),
+        probability=min(finding.probability, HINT),
         unresolved_with=(*finding.unresolved_with, "gusts"),
         separating_manoeuvre="the same manoeuvres in calm air",
     )

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
 
 SCHEMA = "ferryid.diagnosis/1"
 AXES = ("surge", "sway", "yaw")
+HINT = 0.5
+"""Probability up to which a finding is a hint and names nothing: not more likely than not."""
+NEAR = 3.0
+"""Rivals whose evidence is less than this behind are not told apart."""
 VERDICTS = ("matched", "explained", "partly_explained", "unexplained", "not_testable")
 
 
@@ -111,6 +115,11 @@ class Finding:
     labels: Mapping[str, str] = field(default_factory=dict)
     band_hz: tuple[float, float] | None = None
     law: tuple[LawTerm, ...] = ()
+
+    @property
+    def sure(self) -> bool:
+        """True where it is more than a hint."""
+        return self.probability > HINT
 
 
 @dataclass(frozen=True)

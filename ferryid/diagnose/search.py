@@ -18,8 +18,6 @@ from ferryid.vessel.profile import Floats
 
 ODDS = 8.0
 """Logarithm of the evidence that an effect must show over none before it is as likely as none."""
-NEAR = 3.0
-"""Rivals whose evidence is less than this behind are not told apart."""
 GLANCE, FAR = 3, 8
 """Steps of a fit by which candidates are sorted, from nearby and from afar; the best are then fitted to the end."""
 REJUDGED = 5

@@ -35,10 +35,15 @@ def steadied(nu: Floats, nu_raw: Floats, eta: Floats, rate_hz: float, slow_s: fl
     rows = odd_rows(slow_s, rate_hz)
     if len(nu) < rows:
         return nu
-    north, east, turn = (derivative(column, rate_hz) for column in eta.T)
-    surge, sway = to_body(north, east, eta[:, 2])
-    apart = nu_raw - np.column_stack([surge, sway, turn])
+    apart = nu_raw - placed(eta, rate_hz)
     apart = np.where(np.isfinite(apart), apart, 0.0)
     half = rows // 2
     slow = moving_mean(np.pad(apart, ((half, half), (0, 0)), mode="edge"), rows)[half:-half]
     return nu - slow
+
+
+def placed(eta: Floats, rate_hz: float) -> Floats:
+    """Return the velocities that positions and headings give [m/s, m/s, rad/s], shape (n, 3); NaN at the ends."""
+    north, east, turn = (derivative(column, rate_hz) for column in eta.T)
+    surge, sway = to_body(north, east, eta[:, 2])
+    return np.column_stack([surge, sway, turn])

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.picture import Picture, Scene, from_onset
 from ferryid.vessel.profile import Floats, Profile
 
 Values = Mapping[str, float]
@@ -135,3 +135,15 @@ class Effect:
     of_sensor: bool = False
     unsteady: Callable[[Picture, Floats], tuple[Process, ...]] | None = None
     regressor: Callable[[Picture, Floats, str | None, str], tuple[str, Floats]] | None = None
+
+    @property
+    def turn(self) -> int:
+        """When it acts among others: what corrects the measurements first, then what the others build on."""
+        return 0 if self.of_sensor else 1 if self.unsteady is not None else 2
+
+    def act(self, picture: Picture, p: Floats, instance: str | None, onset_s: float) -> Picture:
+        """Return the picture with the effect in it from an onset on; with 0 it acts all along."""
+        after = self.apply(picture, p, instance)
+        if onset_s <= 0.0:
+            return after
+        return from_onset(picture, after, onset_s, None if self.kick is None else self.kick(picture, p))

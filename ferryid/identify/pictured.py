@@ -125,11 +125,7 @@ class Pictured:
 
     def _effects(self, sha256: str) -> tuple[StoredEffect, ...]:
         every = (*self.model.conditions_of(sha256), *self.model.vessel_effects)
-        # What corrects the measurements acts first, then what the others build on.
-        known = [(effects()[stored.effect], stored) for stored in every]
-        return tuple(
-            stored for _, stored in sorted(known, key=lambda one: (not one[0].of_sensor, one[0].unsteady is None))
-        )
+        return tuple(sorted(every, key=lambda stored: effects()[stored.effect].turn))
 
     def altered_hull(self) -> Floats:
         """Return the hull's coefficients as the properties of the vessel alter them, shape (26,)."""

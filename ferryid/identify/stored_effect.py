@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects import Effect, effects
-from ferryid.effects.picture import COEFFICIENTS, LIFT, UNITS, Picture, from_onset
+from ferryid.effects.picture import COEFFICIENTS, LIFT, UNITS, Picture
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.vessel.profile import Profile
 
@@ -79,12 +79,8 @@ class StoredEffect:
 
     def act(self, picture: Picture, sha256: str) -> Picture:
         """Return the picture of a log with the effect in it."""
-        effect, p = effects()[self.effect], np.array(list(self.values.values()))
-        after = effect.apply(picture, p, self.instance)
-        onset_s = self.onset_in(sha256)
-        if onset_s <= 0.0:
-            return after
-        return from_onset(picture, after, onset_s, None if effect.kick is None else effect.kick(picture, p))
+        p = np.array(list(self.values.values()))
+        return effects()[self.effect].act(picture, p, self.instance, self.onset_in(sha256))
 
     def says(self) -> str:
         """Return the effect as a sentence."""

@@ -7,7 +7,7 @@ from math import exp, isfinite, log
 from pathlib import PurePath
 from typing import Any
 
-from ferryid.diagnose.result import AXES, Diagnosis, Estimate, Finding
+from ferryid.diagnose.result import AXES, NEAR, Diagnosis, Estimate, Finding
 from ferryid.effects import effects
 
 EVERYWHERE = "all along"
@@ -17,8 +17,6 @@ RIVALS = 3
 """Rivals that are told; the others are in the JSON."""
 SMALL = 0.02
 """A smaller change of the squared error is not told."""
-SURE = 0.5
-"""Probability above which a finding stands in the verdict without doubt."""
 UNKNOWN = "unknown"
 FAR = 1e6
 """Rivals that are less likely by more than this are told in one word."""
@@ -46,7 +44,7 @@ def title(effect: str, instance: str | None = None) -> str:
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
     every = [one for one in diagnosis.findings if one.effect != UNKNOWN]
-    named = [one for one in every if one.probability > SURE]
+    named = [one for one in every if one.sure]
     doubtful = listed([_inline(title(one.effect, one.instance)) for one in every if one not in named])
     physics = [_inline(title(one.effect, one.instance)) for one in named if one.effect in effects()]
     sensors = [_inline(title(one.effect)) for one in named if one.effect not in effects()]
@@ -165,7 +163,7 @@ def rivals(finding: Finding) -> list[str]:
     """Return what else was considered, and what would tell it apart."""
     lines = []
     if finding.unresolved_with:
-        names = listed([_inline(title(name)) for name in finding.unresolved_with], "or")
+        names = listed([_inline(one) for name in finding.unresolved_with for one in _meant(finding, name)], "or")
         lines.append(f"This log cannot tell it from {names}.")
     shown = sorted(finding.rivals, key=lambda rival: -rival.delta_score)[:RIVALS]
     near = [one for one in shown if one.delta_score > -log(FAR)]
@@ -180,6 +178,13 @@ def rivals(finding: Finding) -> list[str]:
         manoeuvre = finding.separating_manoeuvre.rstrip(".")
         lines.append(f"To tell them apart, record this: {manoeuvre}.")
     return lines
+
+
+def _meant(finding: Finding, name: str) -> list[str]:
+    """Return what an effect that is not told apart is called: of the finding's own it is that of another thruster."""
+    if name != finding.effect:
+        return [title(name)]
+    return [title(name, one.instance) for one in finding.rivals if one.effect == name and one.delta_score > -NEAR]
 
 
 def new_model(diagnosis: Diagnosis) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.named import MERE_HINT, hinted
+from ferryid.diagnose.named import hinted
 from ferryid.diagnose.result import Diagnosis, Finding
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile
@@ -69,7 +69,7 @@ def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull() -> None
         says="Wind.",
     )
     hint = hinted(wind)
-    assert hint.probability == MERE_HINT == 0.5
+    assert hint.probability == 0.5
     assert hint.unresolved_with == ("current", "hull_parameters")
     assert "to fit a hull model first" in str(hint.separating_manoeuvre)
     assert hinted(replace(wind, probability=0.2)).probability == 0.2

@@ -11,7 +11,6 @@ import pytest
 
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.named import MERE_HINT
 from ferryid.diagnose.scene import scene_of
 from ferryid.diagnose.shared_evidence import MIRRORED, placebos
 from ferryid.diagnose.shared_hull import INDUCED, SharedHull, fit_together
@@ -41,7 +40,7 @@ def test_no_environment_is_named_in_a_towing_tank(run: str, shared_data: Locate)
     found = diagnose([str(log)], replace(tanker, wind=areas), None, progress=quiet)[0]
     assert not ENVIRONMENT & {finding.effect for finding in found.findings}
     # One log alone knows too little of the hull to name any force.
-    assert all(finding.probability <= MERE_HINT for finding in found.findings if finding.effect in effects())
+    assert not any(finding.sure for finding in found.findings if finding.effect in effects())
     assert any("no hull model" in note for note in found.notes)
 
 

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from scipy.stats import beta
 
+from ferryid.diagnose.result import HINT
 from ferryid.effects import effects
 from tests.reach.draw import groups
 from tests.reach.places import PLACES
 
 Line = Mapping[str, Any]
 NONE, UNKNOWN, OTHER = "none", "unknown", "wrong thruster"
-CERTAIN = 0.5
-"""A finding of a higher probability is a name."""
 WITHIN = 0.1
 """Relative error of a parameter that the targets allow."""
 ONSET_S = 5.0
@@ -109,7 +108,7 @@ def names(line: Line) -> list[tuple[str, str | None]]:
     return [
         (one["effect"], one["instance"])
         for one in line["findings"]
-        if one["probability"] > CERTAIN and one["effect"] != UNKNOWN
+        if one["probability"] > HINT and one["effect"] != UNKNOWN
     ]
 
 

@@ -1,0 +1,63 @@
+"""Axes on which the velocity's noise drowns the motion.
+
+Damping is taken at the measured velocity. Where a vessel is as quick as its controller and hardly moves, the noise of the
+velocity, times damping, is no longer small against the thrust. Regressors that are noise bias what is fitted to them, and a
+controller that answers this noise makes it look like a change of mass, delay or thrust (Fuller 1987, Measurement error models).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+
+from ferryid.diagnose.hypothesis import Trial
+from ferryid.diagnose.result import AXES
+from ferryid.diagnose.velocity import placed
+from ferryid.effects.picture import acceleration
+from ferryid.signals.smooth import moving_mean, odd_rows
+
+MEAN_S = 2.0
+"""Time over which a slope of positions is about as noisy as the velocity in use."""
+DROWNED = 0.15
+"""Noise of the acceleration that a picture gives, as a share of what the thrust does to it, beyond which nothing is certain."""
+
+
+def noise_shares(trial: Trial) -> dict[str, float]:
+    """Return by axis how large the velocity's noise is, times damping, against the thrust; empty without positions.
+
+    The noise is that between two velocities: the one in use, and the slope of positions. It is shared between them evenly.
+    """
+    seen, plain = trial.windows, trial.plain
+    scene = seen.scene
+    rows = odd_rows(MEAN_S, 1.0 / scene.step_s)
+    if not seen.channels[0] or len(scene.t) < rows:
+        return {}
+    slope = np.nan_to_num(placed(scene.eta, 1.0 / scene.step_s))
+    half = rows // 2
+    other = moving_mean(np.pad(slope, ((half, half), (0, 0)), mode="edge"), rows)[half:-half]
+    here = acceleration(plain)
+    there = acceleration(replace(plain, scene=replace(scene, nu=np.ascontiguousarray(other))))
+    idle = acceleration(replace(plain, parts=np.zeros_like(plain.parts)))
+    noise = np.std(seen.mean(here - there), axis=0) / sqrt(2.0)
+    thrust = np.std(seen.mean(here - idle), axis=0)
+    return dict(zip(AXES, (noise / np.maximum(thrust, 1e-12)).tolist(), strict=True))
+
+
+def drowned_axes(trial: Trial) -> dict[str, float]:
+    """Return the axes that the noise drowns, with its share.
+
+    Such an axis spoils the findings on the others, too: a mass or a delay that it asks for belongs to all of them.
+    """
+    return {axis: share for axis, share in noise_shares(trial).items() if share > DROWNED}
+
+
+def says_drowned(shares: Mapping[str, float]) -> str:
+    """Return a sentence on the axes that the noise drowns."""
+    told = " and ".join(f"{100.0 * share:.0f} % of the thrust in {axis}" for axis, share in shares.items())
+    return (
+        f"The noise of the velocity, times damping, is {told}: all that is found of forces is a hint. "
+        "Record larger motions, or a velocity with less noise."
+    )
