@@ -183,9 +183,13 @@ def _verdict(entry: dict[str, Any]) -> str:
     worse = [axis for axis in AXES if np.isfinite(entry["per_axis"][axis]) and entry["per_axis"][axis] > 1.05]
     if not np.isfinite(mean):
         return "cannot be judged: the base model makes no error here"
-    word = "better" if mean < 1.0 else "worse"
-    told = f"{abs(mean - 1.0):.0%} {word} than its base model here (mean square force error)"
-    return told + (f", but worse in {' and '.join(worse)}" if worse else "")
+    better = mean < 1.0
+    told = f"{abs(mean - 1.0):.0%} {'better' if better else 'worse'} than its base model here (mean square force error)"
+    if not worse:
+        return told
+    if len(worse) == len(AXES):
+        return f"{told}, on every axis"
+    return f"{told}, {'but worse' if better else 'namely'} in {' and '.join(worse)}"
 
 
 def _free_run_lines(runs: dict[str, Any]) -> list[str]:
