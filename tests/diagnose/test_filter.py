@@ -12,7 +12,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from ferryid.diagnose.filter import Filter, learn, likelihood, sieve_of, stride_s
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit
-from ferryid.diagnose.kalman import DIFFUSE, errors, gains
+from ferryid.diagnose.kalman import DIFFUSE, errors, errors_alone, gains
 from ferryid.diagnose.noise import ORDER, Noise
 from ferryid.diagnose.weak import Windows, steps_of, windows
 from ferryid.effects import effects
@@ -90,6 +90,30 @@ def test_one_channel_has_the_likelihood_of_its_dense_covariance(integrals: int) 
     filtered, known = np.array(here).T
     assert np.ptp(known) > 10.0
     np.testing.assert_allclose(filtered - filtered[0], known - known[0], atol=2e-3)
+
+
+@pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])
+@pytest.mark.parametrize("row", [TRUE[0], TRUE[2], OTHER[0]], ids=["first", "turn", "other"])
+def test_one_channel_alone_has_the_innovations_of_its_dense_covariance(row: Floats, integrals: int) -> None:
+    n, h = 90, 0.4
+    rng = np.random.default_rng(2)
+    error, push = covariances(row, n, h)
+    G = moved_by(n, integrals, h)
+    # Series of the model itself, one of a model that is not, and one that starts elsewhere and at speed.
+    own = np.linalg.cholesky(error) @ rng.standard_normal((n, 2)) + G @ np.linalg.cholesky(push) @ rng.standard_normal(
+        (n, 2)
+    )
+    elsewhere = 0.3 + 0.2 * h * np.arange(n) if integrals == 2 else np.full(n, 0.3)
+    series = np.column_stack([own, 0.05 * np.cumsum(rng.standard_normal(n)), own[:, 0] + elsewhere])
+    nothing, none = np.empty((n, 1, 0)), np.empty((0, 0))
+    K, spread = gains(np.array([1.0]), row[None], integrals, none, np.empty((2, 0, 0)), nothing, h)
+    left = errors_alone(K, spread, row[None], integrals, h, series)
+    among = errors(K, spread, row[None], integrals, none, nothing, h, series[:, None])[:, 0]
+    np.testing.assert_allclose(left, among, rtol=1e-7, atol=1e-9)
+    # Gauss: what is new in every step of a normal vector, over its standard deviation.
+    D = contrasts(1, n, integrals)
+    new = np.linalg.solve(np.linalg.cholesky(D @ (error + G @ push @ G.T) @ D.T), D @ series)
+    np.testing.assert_allclose(left[DIFFUSE:], new[DIFFUSE - integrals :], atol=1e-4)
 
 
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
