@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import toeplitz
 from scipy.stats import chi2, multivariate_normal
 
-from ferryid.diagnose.filter import Filter, learn, likelihood, sieve_of, stride_s
+from ferryid.diagnose.filter import EXCERPT, PIECES, Filter, _widths, excerpt, learn, likelihood, sieve_of, stride_s
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit
 from ferryid.diagnose.kalman import DIFFUSE, errors, errors_alone, gains
 from ferryid.diagnose.noise import ORDER, Noise
@@ -231,6 +231,122 @@ def test_a_break_of_a_run_starts_the_filter_anew() -> None:
         )
         alone = sieve_of(noise, mirrored).white(gaps[end:]).reshape(-1, 3)
         np.testing.assert_allclose(alone, together[end:], rtol=1e-3, atol=1e-3)
+
+
+def marked(seconds: float, *breaks: float) -> Windows:
+    """Return steps with breaks of 10 s from these seconds on; what was measured in a step is its time."""
+    t = np.arange(0.0, seconds, STEP_S)
+    usable = np.ones(len(t), dtype=bool)
+    for start in breaks:
+        usable &= (t < start) | (t > start + 10.0)
+    steps, _ = at_rest(seconds, usable=usable)
+    return replace(steps, measured=np.tile(steps.middle_s[:, None], 6))
+
+
+def test_a_short_log_is_its_own_excerpt() -> None:
+    steps = marked(700.0, 200.0)
+    assert EXCERPT - 100 < len(steps.starts) <= EXCERPT
+    assert excerpt(steps) is steps
+
+
+@pytest.mark.parametrize(
+    ("seconds", "breaks"),
+    [
+        (740.0, ()),
+        (3000.0, ()),
+        (3000.0, (400.0, 470.0, 1500.0, 2500.0)),
+    ],
+    ids=["hardly too long", "unbroken", "broken"],
+)
+def test_an_excerpt_of_a_long_log_is_spread_evenly_and_crosses_no_break(
+    seconds: float, breaks: tuple[float, ...]
+) -> None:
+    steps = marked(seconds, *breaks)
+    n, stride = len(steps.starts), int(steps.starts[1] - steps.starts[0])
+    assert n > EXCERPT
+    assert len(steps.runs) == len(breaks) + 1
+    part = excerpt(steps)
+    assert len(part.starts) == EXCERPT
+    np.testing.assert_array_equal(part.measured[:, 0], part.middle_s)
+    assert set(part.starts.tolist()) <= set(steps.starts.tolist())
+    assert (np.diff(part.starts) > 0).all()
+    # The runs follow each other, each goes on without a step left out, and none has a break within.
+    ends = [0, *(end for _, end in part.runs)]
+    assert [first for first, _ in part.runs] == ends[:-1]
+    assert ends[-1] == len(part.starts) == len(part.measured)
+    for first, end in part.runs:
+        assert end - first > DIFFUSE
+        assert (np.diff(part.starts[first:end]) == stride).all()
+        assert part.scene.usable[part.starts[first] : part.starts[end - 1] + len(part.weight)].all()
+    # One third of the excerpt in the middle of each third of the log, by count.
+    where = np.searchsorted(steps.starts, part.starts)
+    for k, one in enumerate(np.array_split(where, PIECES)):
+        assert np.mean(one) == pytest.approx((k + 0.5) * n / PIECES, abs=0.01 * n)
+
+
+@pytest.mark.parametrize("sliver", range(5))
+def test_what_only_starts_a_filter_is_left_out_of_an_excerpt(sliver: int) -> None:
+    longer = marked(3002.0)
+    n = len(longer.starts) - 5
+    first = int(n / (2 * PIECES)) - EXCERPT // PIECES // 2
+    # The first piece begins so many steps before a break.
+    kept = np.delete(np.arange(n + 5), np.arange(first + sliver, first + sliver + 5))
+    runs = ((0, first + sliver), (first + sliver, n))
+    part = excerpt(replace(longer, starts=longer.starts[kept], measured=longer.measured[kept], runs=runs))
+    assert len(part.starts) == EXCERPT - (sliver if sliver <= DIFFUSE else 0)
+    assert len(part.runs) == PIECES + (sliver > DIFFUSE)
+    np.testing.assert_array_equal(part.measured[:, 0], part.middle_s)
+
+
+def test_an_excerpt_is_filtered_as_its_runs_are() -> None:
+    steps = marked(3000.0, 400.0, 1500.0)
+    gaps = np.random.default_rng(7).standard_normal((len(steps.starts), 3))
+    steps = replace(steps, measured=np.tile(gaps, 2))
+    part = excerpt(steps)
+    left = sieve_of(Filter(TRUE), part).white(part.measured[:, :3]).reshape(-1, 3)
+    for first, end in part.runs:
+        a = int(np.searchsorted(steps.starts, part.starts[first]))
+        alone = replace(
+            steps,
+            starts=steps.starts[a : a + end - first],
+            measured=steps.measured[a : a + end - first],
+            runs=((0, end - first),),
+        )
+        np.testing.assert_allclose(
+            left[first:end],
+            sieve_of(Filter(TRUE), alone).white(gaps[a : a + end - first]).reshape(-1, 3),
+            rtol=1e-3,
+            atol=1e-3,
+        )
+
+
+HESSIAN = np.array([[9.0, 2.0, -1.0], [2.0, 40.0, 23.0], [-1.0, 23.0, 16.0]])
+PEAK = np.array([0.3, -1.2, 0.7])
+
+
+def test_widths_are_the_marginal_standard_deviations_of_a_normal_density() -> None:
+    def cost(z: Floats) -> float:
+        return 4.0 + 0.5 * float((z - PEAK) @ HESSIAN @ (z - PEAK))
+
+    # The first is not asked for, and stays as it is.
+    known = np.sqrt(np.diag(np.linalg.inv(HESSIAN[1:, 1:])))
+    np.testing.assert_allclose(_widths(cost, PEAK, 2, 4.0), known, rtol=1e-6)
+    assert (known > 2.0 / np.sqrt(np.diag(HESSIAN)[1:])).all()
+    np.testing.assert_allclose(_widths(cost, PEAK, 3, 4.0), np.sqrt(np.diag(np.linalg.inv(HESSIAN))), rtol=1e-6)
+    np.testing.assert_allclose(_widths(cost, PEAK, 1, 4.0), 0.25, rtol=1e-6)
+
+
+def test_widths_are_infinite_along_what_a_cost_does_not_depend_on() -> None:
+    rest = HESSIAN[np.ix_([0, 2], [0, 2])]
+
+    def flat(z: Floats) -> float:
+        return 4.0 + 0.5 * float((z - PEAK)[[0, 2]] @ rest @ (z - PEAK)[[0, 2]])
+
+    known = np.sqrt(np.diag(np.linalg.inv(rest)))
+    np.testing.assert_allclose(_widths(flat, PEAK, 3, 4.0), [known[0], np.inf, known[1]], rtol=1e-6)
+    # Nor does the edge of a cliff tell anything.
+    falling = _widths(lambda z: flat(z) - 0.5 * float(z[1] - PEAK[1]) ** 2, PEAK, 3, 4.0)
+    np.testing.assert_allclose(falling, [known[0], np.inf, known[1]], rtol=1e-6)
 
 
 LAG_S, PERIOD_S, SECONDS, SEEDS = 0.5, 0.05, 500.0, 40
