@@ -1,0 +1,91 @@
+"""Parts side by side on threads: in order, one level deep, and on one thread where the cores are busy already."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from operator import call
+from threading import Barrier, get_ident
+
+import pytest
+
+from ferryid.diagnose import parallel
+from ferryid.diagnose.parallel import over
+
+CORES = 3
+
+
+@pytest.fixture(autouse=True)
+def several(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three cores, whatever machine this is."""
+    monkeypatch.setattr(parallel.os, "sched_getaffinity", lambda pid: set(range(CORES)), raising=False)
+
+
+def test_results_are_in_the_order_of_the_items_whatever_ends_first() -> None:
+    ended: list[int] = []
+
+    def slow(k: int) -> int:
+        time.sleep(0.02 * (2 * CORES - k))
+        ended.append(k)
+        return 10 * k
+
+    assert over(slow, range(2 * CORES)) == [0, 10, 20, 30, 40, 50]
+    assert ended != sorted(ended)
+    assert over(slow, iter([4])) == [40]
+    assert over(slow, []) == []
+
+
+def test_as_many_run_at_once_as_there_are_cores() -> None:
+    together = Barrier(CORES, timeout=10.0)
+
+    def meet(k: int) -> int:
+        together.wait()
+        return get_ident()
+
+    assert len(set(over(meet, range(CORES)))) == CORES
+    assert get_ident() not in over(meet, range(2 * CORES))
+
+
+def test_what_one_raises_is_raised() -> None:
+    def fails(k: int) -> int:
+        if k == 4:
+            raise KeyError("the fifth")
+        return k
+
+    with pytest.raises(KeyError, match="the fifth"):
+        over(fails, range(2 * CORES))
+    # On one thread, too, and afterwards there are threads again.
+    with pytest.raises(KeyError, match="the fifth"):
+        over(fails, [4])
+    assert get_ident() not in over(lambda k: get_ident(), range(CORES))
+
+
+def test_calls_within_stay_on_the_thread_that_they_are_made_on() -> None:
+    together = Barrier(CORES, timeout=10.0)
+
+    def inner(k: int) -> int:
+        return get_ident()
+
+    def middle(k: int) -> list[int]:
+        return [get_ident(), *over(inner, range(5))]
+
+    def outer(k: int) -> list[int]:
+        # All threads are taken before any goes on.
+        together.wait()
+        return [get_ident(), *(ident for row in over(middle, range(4)) for ident in row)]
+
+    rows = over(outer, range(CORES))
+    assert all(len(row) == 1 + 4 * 6 and len(set(row)) == 1 for row in rows)
+    assert len({row[0] for row in rows}) == CORES
+
+
+def test_one_of_several_processes_uses_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as started:
+        started.setattr(parallel, "parent_process", object)
+        assert set(over(lambda k: get_ident(), range(4))) == {get_ident()}
+    assert get_ident() not in over(lambda k: get_ident(), range(4))
+    # What a process really knows of having been started; its own machine has the cores that it has.
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        main = pool.submit(call, get_ident).result(timeout=60.0)
+        assert pool.submit(over, call, [get_ident] * 4).result(timeout=60.0) == [main] * 4
