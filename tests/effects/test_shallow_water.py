@@ -1,0 +1,86 @@
+"""Shallow water: sides beyond which nobody went are neither told nor of any matter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.effects import effects
+from ferryid.effects.picture import Picture, Scene, acceleration, hull_of
+from ferryid.effects.shallow_water import EDGE_M, SIDES
+from ferryid.vessel import load_profile
+
+FERRY = load_profile("milliampere")
+EFFECT = effects()["shallow_water"]
+N = 2000
+FACTOR = 1.8
+OUTWARD = dict(zip(SIDES, (-1.0, 1.0, -1.0, 1.0), strict=True))
+
+
+def sailed() -> Picture:
+    """Return the picture of a vessel that goes over waters from 0 to 100 m north and 0 to 40 m east."""
+    rng = np.random.default_rng(3)
+    eta = np.column_stack([rng.uniform(0.0, 100.0, N), rng.uniform(0.0, 40.0, N), rng.uniform(-3.0, 3.0, N)])
+    nu = rng.normal(size=(N, 3)) * [1.0, 0.5, 0.2]
+    rest = np.zeros((N, 2, 3))
+    scene = Scene(FERRY, 0.2 * np.arange(N), eta, nu, nu, rest, np.zeros((N, 2)), np.ones(N, dtype=bool))
+    return Picture(scene, hull_of(FERRY), rest, scene.angles, np.zeros((N, 3)))
+
+
+def values(**sides: float) -> np.ndarray:
+    return np.array([FACTOR, *(sides[name] for name in SIDES)])
+
+
+PLACES = [
+    ({"south": -EDGE_M, "north": 60.0, "west": 10.0, "east": 42.5}, {"south", "east"}),
+    ({"south": 30.0, "north": 60.0, "west": 10.0, "east": 30.0}, set()),
+    ({"south": -500.0, "north": 500.0, "west": -500.0, "east": 500.0}, set(SIDES)),
+    ({"south": 50.0, "north": 130.0, "west": -20.0, "east": 20.0}, {"north", "west"}),
+]
+
+
+@pytest.mark.parametrize(("sides", "wanted"), PLACES)
+def test_sides_beyond_which_nobody_went_are_untold(sides: dict[str, float], wanted: set[str]) -> None:
+    picture = sailed()
+    assert EFFECT.untold(picture.scene, values(**sides)) == wanted
+    here = acceleration(EFFECT.apply(picture, values(**sides), None))
+    for name in SIDES:
+        # Whatever the log could tell of a side would be told by a change of the forces there.
+        farther = values(**{**sides, name: sides[name] + 7.0 * OUTWARD[name]})
+        same = np.array_equal(acceleration(EFFECT.apply(picture, farther, None)), here)
+        assert same == (name in wanted), name
+
+
+def test_a_share_of_two_per_cent_of_what_was_measured_makes_a_side_told() -> None:
+    scene = sailed().scene
+    east = np.sort(scene.eta[:, 1])
+    for beyond, wanted in ((N // 50 - 1, {"east"}), (N // 50, set())):
+        # Half-way between two rows, so many of them beyond.
+        side = float(0.5 * (east[-beyond - 1] + east[-beyond]))
+        p = values(south=30.0, north=60.0, west=10.0, east=side)
+        assert EFFECT.untold(scene, p) == wanted
+    # Where nothing was measured nobody is known to have been.
+    blind = replace(scene, usable=scene.eta[:, 0] < 60.0)
+    assert EFFECT.untold(blind, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {"north"}
+    assert EFFECT.untold(scene, values(south=30.0, north=60.0, west=10.0, east=30.0)) == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("told", "where"),
+    [
+        (SIDES, "from 12 to 34 m north and from -18 to 4 m east,"),
+        (("north", "west", "east"), "up to 34 m north and from -18 to 4 m east,"),
+        (("south", "west", "east"), "from 12 m north on and from -18 to 4 m east,"),
+        (("south", "north", "east"), "from 12 to 34 m north and up to 4 m east,"),
+        (("south", "west"), "from 12 m north on and from -18 m east on,"),
+        (("south", "north"), "from 12 to 34 m north,"),
+        (("west",), "from -18 m east on,"),
+        ((), "in some of these waters,"),
+    ],
+)
+def test_the_sentence_tells_the_sides_that_are_known(told: tuple[str, ...], where: str) -> None:
+    sides = {"south": 12.4, "north": 33.6, "west": -18.2, "east": 4.1}
+    says = EFFECT.says({"factor": 1.6, **{name: sides[name] for name in told}}, None)
+    assert says == f"Damping is 1.60 times as large {where} as over shallow ground."
