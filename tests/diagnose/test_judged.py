@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, trial_of
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near
 from ferryid.diagnose.judged import judged
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import search, suspects_of
-from ferryid.diagnose.weak import windows
-from ferryid.simulate import parse_scenario, simulate, write_log
-from ferryid.vessel import load_profile
+from tests.diagnose.trials import sailed, trial_on
 
-FERRY = load_profile("milliampere")
 TRIAL = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"
@@ -24,26 +18,11 @@ controller = { delta = 0.7, sigma = 0.7 }
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 thrusters = { inflow_loss_per_mps = 0.25, faults = [{ thruster = "thruster1", factor = 1.26 }] }
 """
-OFF = {
-    "m11": 0.9,
-    "m22": 1.1,
-    "m33": 0.9,
-    "X_u": 1.1,
-    "Y_v": 0.9,
-    "Y_|r|v": 1.1,
-    "N_r": 1.1,
-    "N_|r|r": 0.9,
-    "N_|r|v": 1.1,
-}
 
 
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory: pytest.TempPathFactory) -> Trial:
-    log = tmp_path_factory.mktemp("both") / "trial.mcap"
-    write_log(simulate(replace(parse_scenario(TRIAL, "both"), true_hull=OFF), 8), log)
-    scene, _ = scene_of(str(log), FERRY, None)
-    seen = windows(scene, *window_lengths(FERRY))
-    return trial_of(seen, *plain_picture(seen.scene, FERRY))
+    return trial_on(sailed(tmp_path_factory.mktemp("both"), "both", TRIAL, 8))
 
 
 def suspects(trial: Trial) -> list[Suspect]:
@@ -69,7 +48,10 @@ def test_a_fit_ends_at_the_same_place_wherever_it_begins(trial: Trial) -> None:
 
 
 def test_both_are_found_though_the_other_thrusters_gain_is_likelier_alone(trial: Trial) -> None:
+    alone = {key: fit(trial, of(trial, key)).evidence for key in (LOSS, FIRST, SECOND)}
+    assert max(alone, key=lambda key: alone[key]) == SECOND
     found = search(trial, lambda stage: None)
+    assert found.rounds[0].candidates[0].suspect.key == SECOND
     kept = judged(found.trial, found.fit, suspects(trial), lambda stage: None).fit
     values = dict(zip([one.key for one in kept.suspects], kept.values, strict=True))
     assert set(values) == {LOSS, FIRST}

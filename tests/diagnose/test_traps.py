@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import ferryid.diagnose.search as search_module
 from ferryid.diagnose.evidence import HEADING, evidence
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
 from ferryid.diagnose.search import search, suspects_of
-from ferryid.diagnose.weak import windows
 from ferryid.effects.picture import COEFFICIENTS, Scene
-from ferryid.simulate import parse_scenario, simulate, write_log
-from ferryid.vessel import load_profile
+from tests.diagnose.trials import FERRY, OFF, sailed, trial_on
 
-FERRY = load_profile("milliampere")
 BASE = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"
@@ -26,30 +21,6 @@ path = { kind = "twelve-corner", dwell_s = 40 }
 controller = { delta = 0.7, sigma = 0.7 }
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 """
-OFF = {
-    "m11": 0.9,
-    "m22": 1.1,
-    "m33": 0.9,
-    "X_u": 1.1,
-    "Y_v": 0.9,
-    "Y_|r|v": 1.1,
-    "N_r": 1.1,
-    "N_|r|r": 0.9,
-    "N_|r|v": 1.1,
-}
-"""What the true hull is off the profile's."""
-
-
-def sailed(folder: Path, name: str, tables: str, seed: int) -> Scene:
-    scenario = replace(parse_scenario(BASE + tables, name), true_hull=OFF)
-    log = folder / f"{name}.mcap"
-    write_log(simulate(scenario, seed), log)
-    return scene_of(str(log), FERRY, None)[0]
-
-
-def trial_on(scene: Scene) -> Trial:
-    seen = windows(scene, *window_lengths(FERRY))
-    return trial_of(seen, *plain_picture(seen.scene, FERRY))
 
 
 def suspect(trial: Trial, name: str, instance: str | None = None) -> Suspect:
@@ -63,7 +34,7 @@ def gain(trial: Trial, made: Fit) -> float:
 @pytest.fixture(scope="module")
 def raw(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     """A closed-loop trial with coloured navigation noise, in which nothing acts but a hull that is ten per cent off."""
-    return sailed(tmp_path_factory.mktemp("clean"), "clean", "", 3)
+    return sailed(tmp_path_factory.mktemp("clean"), "clean", BASE, 3)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +47,7 @@ def clean(raw: Scene) -> Trial:
 def inflow(tmp_path_factory: pytest.TempPathFactory) -> Trial:
     """The same with thrusters that lose force to their inflow, which damping resembles."""
     return trial_on(
-        sailed(tmp_path_factory.mktemp("inflow"), "inflow", "thrusters = { inflow_loss_per_mps = 0.3 }\n", 4)
+        sailed(tmp_path_factory.mktemp("inflow"), "inflow", f"{BASE}thrusters = {{ inflow_loss_per_mps = 0.3 }}\n", 4)
     )
 
 

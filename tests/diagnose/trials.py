@@ -1,0 +1,40 @@
+"""Simulated trials for tests, of a ferry whose true hull is ten per cent off its profile's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from ferryid.diagnose.hypothesis import Trial, trial_of
+from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
+from ferryid.diagnose.weak import windows
+from ferryid.effects.picture import Scene
+from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+
+FERRY = load_profile("milliampere")
+OFF = {
+    "m11": 0.9,
+    "m22": 1.1,
+    "m33": 0.9,
+    "X_u": 1.1,
+    "Y_v": 0.9,
+    "Y_|r|v": 1.1,
+    "N_r": 1.1,
+    "N_|r|r": 0.9,
+    "N_|r|v": 1.1,
+}
+"""What the true hull is off the profile's."""
+
+
+def sailed(folder: Path, name: str, scenario: str, seed: int) -> Scene:
+    """Simulate a scenario, TOML without a true hull, and return the scene that its log shows."""
+    log = folder / f"{name}.mcap"
+    write_log(simulate(replace(parse_scenario(scenario, name), true_hull=OFF), seed), log)
+    return scene_of(str(log), FERRY, None)[0]
+
+
+def trial_on(scene: Scene) -> Trial:
+    """Return a scene ready for hypotheses."""
+    seen = windows(scene, *window_lengths(FERRY))
+    return trial_of(seen, *plain_picture(seen.scene, FERRY))
