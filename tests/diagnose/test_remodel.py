@@ -15,6 +15,7 @@ from ferryid.diagnose.learnt import Learnt, learnt
 from ferryid.diagnose.remodel import keep, remodelled
 from ferryid.diagnose.result import AXES, Diagnosis, Finding
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
+from ferryid.diagnose.unsteady import State
 from ferryid.diagnose.weak import windows
 from ferryid.effects import effects
 from ferryid.effects.picture import acceleration
@@ -25,6 +26,7 @@ from ferryid.identify.store import load_file
 from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.simulate.vessel_model import sailed_by
 from ferryid.vessel import load_profile
+from ferryid.vessel.wind import wind_force
 
 FERRY = load_profile("milliampere")
 FOULED = "[fouling]\nsurge = 1.8\nsway = 1.3\nyaw = 1.3\n"
@@ -275,6 +277,85 @@ def test_what_is_doubtful_or_nothing_makes_no_model(fouled: str, folder: Path) -
     assert remodelled([nothing], FERRY, None, "ferry") == (None, ())
     assert keep([nothing], FERRY, None, folder / "none") == (nothing,)
     assert not (folder / "none").exists()
+
+
+GUST_STD = 1.5
+CHANCE = {
+    "gusts": (np.array([GUST_STD, 9.0]), np.array([0.1, 0.3])),
+    "waves": (np.array([0.4, 60.0, 100.0, 6.0]), np.array([0.05, np.inf, 0.1, 0.2])),
+}
+"""Parameters of disturbances, and the standard deviations of their logarithms."""
+
+
+def gusty(log: str, **probabilities: float) -> Learnt:
+    """Return what a log teaches in which a wind was found, and these disturbances with their probabilities."""
+    trial, survey = trial_on(log)
+    wind = Suspect(effects()["wind"], None, effects()["wind"].parameters_of(FERRY))
+    chance = {name: Suspect(effects()[name], None, effects()[name].parameters_of(FERRY)) for name in probabilities}
+    states = [State(suspect, *CHANCE[name], gain=40.0) for name, suspect in chance.items()]
+    findings = [finding(wind, 0.99), *(finding(chance[name], value) for name, value in probabilities.items())]
+    found = learnt(trial, fit(trial, [wind]), states, findings, survey)
+    assert found is not None
+    return found
+
+
+def test_what_came_and_went_by_chance_is_a_condition_of_its_log(fouled: str) -> None:
+    found = gusty(fouled, gusts=0.97, waves=0.9)
+    assert found.vessel == ()
+    wind, gusts, waves = found.conditions
+    assert [one.key for one in (wind, gusts, waves)] == [("wind", None), ("gusts", None), ("waves", None)]
+    for stored, probability in ((gusts, 0.97), (waves, 0.9)):
+        (source,) = stored.sources
+        assert (source.log, source.sha256) == ("fouled", wind.sources[0].sha256)
+        assert (source.probability, source.onset_s) == (probability, None)
+        units = {one.name: one.unit for one in effects()[stored.effect].parameters_of(FERRY)}
+        assert {name: one.unit for name, one in stored.parameters.items()} == units
+        assert list(stored.values.values()) == CHANCE[stored.effect][0].tolist()
+    # 95 % of a normal distribution of the logarithm.
+    strength, memory = gusts.parameters["std"], gusts.parameters["time_constant"]
+    assert (strength.low, strength.high) == pytest.approx((1.5 / 1.2165, 1.5 * 1.2165), rel=1e-3)
+    assert (memory.low, memory.high) == pytest.approx((9.0 / 1.8004, 9.0 * 1.8004), rel=1e-3)
+    # What is not known is bounded by what is possible.
+    force = waves.parameters["force_std"]
+    most = next(one.high for one in effects()["waves"].parameters_of(FERRY) if one.name == "force_std")
+    assert 0.0 <= force.low < 1e-3 * force.value
+    assert force.high == most
+    assert [one.effect for one in gusty(fouled, gusts=0.4, waves=0.9).conditions] == ["wind", "waves"]
+
+
+def test_stored_gusts_load_the_vessel_as_many_winds_drawn_at_random_do(fouled: str, folder: Path) -> None:
+    (kept,) = keep(told(gusty(fouled, gusts=0.97)), FERRY, None, folder / "out", name="gusty")
+    assert kept.model is not None
+    stored = load_file(Path(kept.model))
+    (known,) = stored.conditions
+    scene = trial_on(fouled)[0].plain.scene
+    rows = np.flatnonzero(scene.usable)[:: int(np.count_nonzero(scene.usable) / 12)]
+
+    def load(of: Model, sha256: str = known.sha256) -> np.ndarray:
+        """Return the external force beyond that in still air."""
+        still = replace(of, conditions=())
+        return np.subtract(*(plain_picture(scene, FERRY, one, sha256)[0].external[rows] for one in (of, still)))
+
+    assert {one.effect for one in known.effects} == {"wind", "gusts"}
+    wind = next(one for one in known.effects if one.effect == "wind")
+    air = np.array([wind.values["north"], wind.values["east"]])
+    draws = air + GUST_STD * np.random.default_rng(13).normal(size=(20_000, 2))
+    average, steady = np.empty((2, len(rows), 3))
+    for k, row in enumerate(rows.tolist()):
+        psi, nu = np.full(len(draws), scene.psi[row]), np.tile(scene.nu[row], (len(draws), 1))
+        average[k] = wind_force(FERRY.wind, draws, psi, nu).mean(axis=0)
+        steady[k] = wind_force(FERRY.wind, air[None], psi[:1], nu[:1])[0]
+    still = scene.air_load[rows]
+    scale = np.sqrt(np.mean(average**2, axis=0))
+    assert (np.abs(load(stored) - (average - still)) < 0.02 * scale).all()
+    assert (np.abs(average - steady).max(axis=0) > 0.09 * scale).all()
+    # Without them the load is that of the steady wind; in another log there is neither.
+    alone = replace(stored, conditions=(replace(known, effects=(wind,)),))
+    np.testing.assert_allclose(load(alone), steady - still, atol=1e-9 * np.abs(steady).max())
+    assert not load(stored, "of another log").any()
+    # In whatever order a file lists them.
+    turned = replace(stored, conditions=(replace(known, effects=known.effects[::-1]),))
+    np.testing.assert_array_equal(load(turned), load(stored))
 
 
 def test_a_wrong_hull_model_becomes_the_hull(fouled: str) -> None:
