@@ -20,7 +20,7 @@ HULL_SPREAD = 0.12
 """Standard deviation of what is believed of each of the hull's coefficients, as a share of it."""
 WIDER = 1.5
 """Factor on standard deviations of the posterior, which takes the measured velocity and heading for true where they enter
-products: for eight effects in 10 to 20 simulated logs each, errors were 0.5 to 2.2 times what it says, 1.4 times as a rule."""
+products. Chosen in view of simulated logs; `make reach` tells how wide intervals would have to be in others."""
 STEPS = 24
 ANEW = 4
 """Steps after which the derivatives by the hull's coefficients are taken anew."""

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 from typing import Any
 
+from ferryid.diagnose.hypothesis import WIDER
+from ferryid.diagnose.result import HINT
 from tests.reach.cells import KINDS, Cell
 from tests.reach.places import HULL_ERROR, PLACES, USUAL
 from tests.reach.scores import WITHIN, Line, Score, Share, confusion, quantile, score
@@ -114,6 +116,17 @@ def as_json(one: Score) -> dict[str, Any]:
     return told
 
 
+def _widths(lines: Sequence[Line]) -> list[str]:
+    """Return how wide intervals would have to be."""
+    reaches = score(line for line in lines if line["draw"]["place"] == USUAL).reaches
+    if not reaches:
+        return []
+    return [
+        f"Intervals {quantile(reaches, 0.95):.2f} times as wide as told would hold 95 % of the {len(reaches)} parameters",
+        f"of all that was rightly named there; told, they are {WIDER:g} times as wide as the posterior's.",
+    ]
+
+
 def _in_order(lines: Sequence[Line]) -> list[Line]:
     return sorted(lines, key=lambda line: KINDS.index(line["draw"]["kind"]))
 
@@ -173,7 +186,7 @@ def page(
         else:
             value = f"{100.0 * row['value']:.1f} %"
         text.append(f"| {row['what']} | {value} | {row['target']} | {_verdict(row)} |")
-    text.append("")
+    text += ["", *_widths(lines), ""]
     for place in PLACES.values():
         for kind in KINDS:
             own = [cell for cell in cells if cell.kind == kind and cell.place == place.name]
@@ -258,7 +271,7 @@ def _row(kind: str, cell: Cell, own: Sequence[Line]) -> str:
         count: dict[str, int] = {}
         for line in own:
             told = (
-                ", ".join(f"{f['effect']}{'' if f['probability'] > 0.5 else '?'}" for f in line["findings"])
+                ", ".join(f"{f['effect']}{'' if f['probability'] > HINT else '?'}" for f in line["findings"])
                 or line["verdict"]
             )
             count[told] = count.get(told, 0) + 1

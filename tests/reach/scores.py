@@ -69,8 +69,8 @@ class Score:
         Relative errors of parameters of what was named rightly; of vectors, in their length.
     half_widths
         Half of the 95 % intervals, relative in the same way.
-    covered
-        Parameters whose 95 % interval holds the truth.
+    reaches
+        How far the truth is from each parameter that was found, in parts of the way to the end of its 95 % interval there.
     onsets_s
         Errors of onsets [s], infinite where none was found.
     onset_held
@@ -87,7 +87,7 @@ class Score:
     refused: int
     errors: Sequence[float] = field(default_factory=tuple)
     half_widths: Sequence[float] = field(default_factory=tuple)
-    covered: Share = Share(0, 0)
+    reaches: Sequence[float] = field(default_factory=tuple)
     onsets_s: Sequence[float] = field(default_factory=tuple)
     onset_held: Share = Share(0, 0)
     seconds: Sequence[float] = field(default_factory=tuple)
@@ -96,6 +96,11 @@ class Score:
     def within(self) -> Share:
         """Return how many parameters are within `WITHIN`."""
         return Share(sum(error <= WITHIN for error in self.errors), len(self.errors))
+
+    @property
+    def covered(self) -> Share:
+        """Return how many parameters' intervals hold the truth."""
+        return Share(sum(reach <= 1.0 for reach in self.reaches), len(self.reaches))
 
     @property
     def in_time(self) -> Share:
@@ -129,7 +134,7 @@ def score(lines: Iterable[Line]) -> Score:
     first = every = false = mentioned = refused = true = 0
     errors: list[float] = []
     widths: list[float] = []
-    covered: list[bool] = []
+    reaches: list[float] = []
     onsets: list[float] = []
     onset_held: list[bool] = []
     for line in lines:
@@ -149,10 +154,10 @@ def score(lines: Iterable[Line]) -> Score:
             if told is None or key not in found:
                 continue
             acted = line.get("acted", {}).get(truth["effect"], truth["values"])
-            more, wide, held = _parameters({**truth, "values": acted}, told, line["draw"]["place"])
+            more, wide, apart = _parameters({**truth, "values": acted}, told, line["draw"]["place"])
             errors += more
             widths += wide
-            covered += held
+            reaches += apart
             if truth["onset_s"] is not None:
                 onsets.append(abs(told["onset"] - truth["onset_s"]) if told["onset"] is not None else float("inf"))
                 interval = told["parameters"].get("onset")
@@ -167,7 +172,7 @@ def score(lines: Iterable[Line]) -> Score:
         refused,
         errors,
         widths,
-        Share(sum(covered), len(covered)),
+        reaches,
         onsets,
         Share(sum(onset_held), len(onset_held)),
         [line["seconds"] for line in lines],
@@ -176,14 +181,14 @@ def score(lines: Iterable[Line]) -> Score:
 
 def _parameters(
     truth: Mapping[str, Any], told: Mapping[str, Any], place: str
-) -> tuple[list[float], list[float], list[bool]]:
-    """Return relative errors and half widths by vectors, and by parameters whether the interval holds the truth."""
+) -> tuple[list[float], list[float], list[float]]:
+    """Return relative errors and half widths by vectors, and by parameters where in its interval the truth is (1: the end)."""
     effect = effects().get(truth["effect"])
     values = truth["values"]
     parameters = () if effect is None else effect.parameters_of(PLACES[place].profile)
     neutral = {one.name: one.neutral for one in parameters} or NEUTRAL.get(truth["effect"], {})
     vectors = [group for group in groups(parameters) if set(group) <= set(values)] or [(name,) for name in values]
-    errors, widths, held = [], [], []
+    errors, widths, reaches = [], [], []
     for vector in vectors:
         known = [name for name in vector if name in told["parameters"]]
         size = sqrt(sum((values[name] - neutral.get(name, 0.0)) ** 2 for name in vector))
@@ -193,8 +198,17 @@ def _parameters(
         away = sqrt(sum((one["value"] - values[name]) ** 2 for one, name in zip(found, vector, strict=True)))
         errors.append(away / size)
         widths.append(sqrt(sum((0.5 * (one["high"] - one["low"])) ** 2 for one in found)) / size)
-        held += [one["low"] <= values[name] <= one["high"] for one, name in zip(found, vector, strict=True)]
-    return errors, widths, held
+        reaches += [_reach(one, values[name]) for one, name in zip(found, vector, strict=True)]
+    return errors, widths, reaches
+
+
+def _reach(estimate: Mapping[str, float], truth: float) -> float:
+    """Return how far the truth is from an estimate, in parts of the way to the end of its interval on that side."""
+    value = estimate["value"]
+    end = estimate["high"] if truth > value else estimate["low"]
+    if truth == value:
+        return 0.0
+    return abs(truth - value) / abs(end - value) if end != value else float("inf")
 
 
 def quantile(values: Sequence[float], share: float) -> float:

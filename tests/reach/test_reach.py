@@ -106,6 +106,7 @@ def test_scores_of_runs_worked_by_hand() -> None:
     assert one.errors == pytest.approx([0.1, 0.05])
     assert one.half_widths == pytest.approx([0.35 * 2**0.5 / 5.0, 0.1])
     assert one.covered == Share(2, 3)
+    assert one.reaches == pytest.approx([0.3 / 0.35, 0.4 / 0.35, 0.5])
     assert (one.onsets_s, one.onset_held) == ([4.0], Share(0, 1))
     assert [first_name(each) for each in lines] == ["wind", "current", OTHER, "thruster_gain", NONE, NONE]
     rows, columns, counts = confusion(lines)

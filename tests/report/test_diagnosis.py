@@ -246,6 +246,12 @@ def test_a_finding_is_told_in_numbers() -> None:
     )
 
 
+def test_another_thruster_that_does_as_well_is_told_by_its_name() -> None:
+    other = (Rival("thruster_gain", "thruster2", -1.0), Rival("thruster_gain", "bow", -9.0))
+    told = rivals(replace(gain(), unresolved_with=("thruster_gain",), rivals=other))
+    assert told[0] == "This log cannot tell it from thruster force (thruster2)."
+
+
 def test_rivals_are_told_by_how_much_less_likely_they_are() -> None:
     told = rivals(wind())
     assert told[0] == "This log cannot tell it from current."

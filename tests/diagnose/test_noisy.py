@@ -1,0 +1,61 @@
+"""How large the velocity's noise is against the thrust, on a hull whose only force is linear damping in sway."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.noisy import DROWNED, drowned_axes, noise_shares, says_drowned
+from ferryid.diagnose.weak import windows
+from ferryid.effects.picture import COEFFICIENTS, Picture, Scene
+from tests.diagnose.trials import FERRY
+
+MASS, DAMPING, THRUST_N, NOISE_MPS = 1000.0, 400.0, 100.0, 0.02
+T = np.arange(20000) * 0.2
+
+
+def still(*, noise_mps: float = NOISE_MPS, damping: float = DAMPING, mass: float = MASS, placed: bool = True) -> Any:
+    """Return the trial of a vessel that lies still, as its positions know, under a slow swing of sideways thrust."""
+    nu = np.zeros((len(T), 3))
+    nu[:, 1] = noise_mps * np.random.default_rng(3).standard_normal(len(T))
+    parts = np.zeros((len(T), len(FERRY.actuators), 3))
+    parts[:, 0, 1] = THRUST_N * np.sqrt(2.0) * np.sin(2.0 * np.pi * T / 200.0)
+    eta = np.zeros((len(T), 3)) if placed else np.full((len(T), 3), [np.nan, np.nan, 0.0])
+    scene = Scene(FERRY, T, eta, nu, nu, parts, parts[:, :, 0], np.ones(len(T), dtype=bool))
+    hull = dict.fromkeys(COEFFICIENTS, 0.0) | {"m11": mass, "m22": mass, "m33": mass, "Y_v": -damping}
+    seen = windows(scene, 8.0, 2.0)
+    plain = Picture(seen.scene, np.array(list(hull.values())), parts, parts[:, :, 0], np.zeros((len(T), 3)))
+    return SimpleNamespace(windows=seen, plain=plain)
+
+
+def test_noise_times_damping_is_held_against_the_thrust() -> None:
+    trial = still()
+    # Independent errors in every row average out in a window by the root of the sum of its weights' squares; of two equally
+    # noisy velocities each has half of the variance between them, and here one has all of it.
+    share = np.sqrt(np.sum((trial.windows.weight * 0.2) ** 2))
+    assert noise_shares(trial)["sway"] == pytest.approx(NOISE_MPS * DAMPING * share / np.sqrt(2.0) / THRUST_N, rel=0.05)
+    assert noise_shares(trial)["surge"] == 0.0
+    assert drowned_axes(trial) == {}
+
+
+def test_mass_plays_no_part_and_noise_and_damping_do() -> None:
+    once = noise_shares(still())["sway"]
+    assert noise_shares(still(mass=3.0 * MASS))["sway"] == pytest.approx(once)
+    assert noise_shares(still(noise_mps=3.0 * NOISE_MPS))["sway"] == pytest.approx(3.0 * once, rel=1e-3)
+    assert noise_shares(still(damping=3.0 * DAMPING))["sway"] == pytest.approx(3.0 * once, rel=1e-3)
+
+
+def test_an_axis_that_noise_drowns_is_told() -> None:
+    drowned = drowned_axes(still(noise_mps=20.0 * NOISE_MPS))
+    assert list(drowned) == ["sway"]
+    assert drowned["sway"] > DROWNED
+    assert says_drowned({"sway": 0.221}).startswith(
+        "The noise of the velocity, times damping, is 22 % of the thrust in sway"
+    )
+
+
+def test_without_positions_nothing_is_known_of_the_noise() -> None:
+    assert noise_shares(still(placed=False)) == {}
