@@ -92,6 +92,7 @@ def borrowing(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _compiled(function: Callable[P, R], **options: bool) -> Callable[P, R]:
+    # Threads may run them side by side: see ferryid.diagnose.parallel.
     dispatcher = numba.njit(function, nogil=True, **options)
     if not numba.config.DISABLE_JIT:
         with suppress(RuntimeError, OSError):  # RuntimeError is numba's word for "no folder to keep it in"

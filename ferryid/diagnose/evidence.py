@@ -235,12 +235,12 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
     made = improvement(trial, folds, without, full)
     in_its_place = placebos(trial, suspect, values)
 
-    def gains_of_placebos(trial: Trial, without: HeldOut) -> dict[str, Floats]:
+    def gains_of_placebos(weighed: Trial, bare: HeldOut) -> dict[str, Floats]:
         judged = {
-            name: held_out(trial, folds, [*rest, placebo], [*start, suspect.start])
+            name: held_out(weighed, folds, [*rest, placebo], [*start, suspect.start])
             for name, placebo in in_its_place.items()
         }
-        return {name: _gains(trial, folds, without.gaps, one.gaps) for name, one in judged.items()}
+        return {name: _gains(weighed, folds, bare.gaps, one.gaps) for name, one in judged.items()}
 
     gains, by_name = _gains(trial, folds, without.gaps, full.gaps), gains_of_placebos(trial, without)
     picks = draws(folds.block)

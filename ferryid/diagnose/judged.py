@@ -12,7 +12,7 @@ from ferryid.diagnose.search import pruned
 from ferryid.diagnose.unknown import impostors
 
 SWAPS = 6
-"""Selections that are tried: physics without a name here may send one effect after the other to stand in for it."""
+"""Times that a rival takes a place: physics without a name here may send one effect after the other to stand in for it."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,17 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
     """
     told: list[str] = []
     tried = {_keys(found)}
-    kept = found
+    kept, swaps = found, 0
     while kept.suspects:
         progress("weighing rivals")
         standings = tuple(standing_of(trial, kept, i, library) for i in range(len(kept.suspects)))
         better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
         better = [one for one in better if _keys(one.fit) not in tried]
-        if better and len(tried) <= SWAPS:
+        if better and swaps < SWAPS:
             # What was selected first may be less likely beside what was selected later than another in its place.
             best = max(better, key=lambda one: one.gain)
             tried.add(_keys(best.fit))
+            swaps += 1
             kept = pruned(trial, best.fit)
             continue
         progress("judging on held-out stretches")

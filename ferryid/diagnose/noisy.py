@@ -17,16 +17,18 @@ from ferryid.diagnose.hypothesis import Trial
 from ferryid.diagnose.result import AXES
 from ferryid.diagnose.velocity import placed
 from ferryid.effects.picture import acceleration
-from ferryid.signals.smooth import moving_mean, odd_rows
+from ferryid.signals.smooth import odd_rows, steady_mean
 
 MEAN_S = 2.0
 """Time over which a slope of positions is about as noisy as the velocity in use."""
 DROWNED = 0.15
-"""Noise of the acceleration that a picture gives, as a share of what the thrust does to it, beyond which nothing is certain."""
+"""Noise of the acceleration that a picture gives, as a share of what moves the vessel, beyond which nothing is certain."""
 
 
 def noise_shares(trial: Trial) -> dict[str, float]:
-    """Return by axis how large the velocity's noise is, times damping, against the thrust; empty without positions.
+    """Return how large the velocity's noise is, times damping, against what moves the vessel, on axes with thrust.
+
+    Nothing is known of it without positions.
 
     The noise is that between two velocities: the one in use, and the slope of positions. It is shared between them evenly.
     """
@@ -35,15 +37,16 @@ def noise_shares(trial: Trial) -> dict[str, float]:
     rows = odd_rows(MEAN_S, 1.0 / scene.step_s)
     if not seen.channels[0] or len(scene.t) < rows:
         return {}
-    slope = np.nan_to_num(placed(scene.eta, 1.0 / scene.step_s))
-    half = rows // 2
-    other = moving_mean(np.pad(slope, ((half, half), (0, 0)), mode="edge"), rows)[half:-half]
-    here = acceleration(plain)
-    there = acceleration(replace(plain, scene=replace(scene, nu=np.ascontiguousarray(other))))
+    # Motion that is faster than the mean is left out of both.
+    own = steady_mean(scene.nu, rows)
+    other = steady_mean(np.nan_to_num(placed(scene.eta, 1.0 / scene.step_s)), rows)
+    here, there = (acceleration(replace(plain, scene=replace(scene, nu=nu))) for nu in (own, other))
     idle = acceleration(replace(plain, parts=np.zeros_like(plain.parts)))
     noise = np.std(seen.mean(here - there), axis=0) / sqrt(2.0)
     thrust = np.std(seen.mean(here - idle), axis=0)
-    return dict(zip(AXES, (noise / np.maximum(thrust, 1e-12)).tolist(), strict=True))
+    moved = np.maximum(thrust, np.std(seen.mean(here), axis=0))
+    # Where nothing pushes, noise is not taken for what a push does.
+    return {axis: float(noise[j] / moved[j]) for j, axis in enumerate(AXES) if thrust[j] > 0.0}
 
 
 def drowned_axes(trial: Trial) -> dict[str, float]:
@@ -56,7 +59,7 @@ def drowned_axes(trial: Trial) -> dict[str, float]:
 
 def says_drowned(shares: Mapping[str, float]) -> str:
     """Return a sentence on the axes that the noise drowns."""
-    told = " and ".join(f"{100.0 * share:.0f} % of the thrust in {axis}" for axis, share in shares.items())
+    told = " and ".join(f"{100.0 * share:.0f} % of what moves the vessel in {axis}" for axis, share in shares.items())
     return (
         f"The noise of the velocity, times damping, is {told}: all that is found of forces is a hint. "
         "Record larger motions, or a velocity with less noise."

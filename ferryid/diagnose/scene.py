@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.hypothesis import HULL_SPREAD
-from ferryid.diagnose.velocity import steadied
+from ferryid.diagnose.velocity import MEAN_S, steadied
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, hull_of
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.model import Model
 from ferryid.identify.pictured import Pictured, bare_picture, bridged, pushes
 from ferryid.signals.align import align
 from ferryid.signals.recording import Recording, data_quality, record
-from ferryid.signals.smooth import Measured, measure, moving_mean, odd_rows, smooth_measured
+from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Floats, Profile
@@ -77,7 +77,7 @@ def scene_of(
     out: Path | None,
     *,
     withhold: Sequence[str] = (),
-    window_s: float = 1.0,
+    window_s: float = MEAN_S,
     verify: bool = False,
     progress: Callable[[str], None] = quiet,
 ) -> tuple[Scene, Survey]:
@@ -300,18 +300,11 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         t=measured.t,
         eta=eta,
         nu_raw=nu_raw,
-        nu=steadied(_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
+        nu=steadied(steady_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
         parts=parts,
         angles=angles,
         usable=usable,
-        wind=None if measured.wind is None else _mean(bridged(measured.wind, usable), rows),
-        current=None if current is None else _mean(current, rows),
+        wind=None if measured.wind is None else steady_mean(bridged(measured.wind, usable), rows),
+        current=None if current is None else steady_mean(current, rows),
         payload=None if measured.payload is None else bridged(measured.payload, usable, held=True),
     )
-
-
-def _mean(values: Floats, rows: int) -> Floats:
-    """Return the moving mean with the ends carried on, so that no row is lost."""
-    half = rows // 2
-    padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
-    return np.ascontiguousarray(moving_mean(padded, rows)[half : half + len(values)])

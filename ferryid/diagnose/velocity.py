@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ferryid.signals.smooth import moving_mean, odd_rows
+from ferryid.signals.smooth import odd_rows, steady_mean
 from ferryid.vessel.frames import derivative, to_body
 from ferryid.vessel.profile import Floats
 
+MEAN_S = 1.0
+"""Moving mean of the velocities [s]."""
 SLOW_S = 5.0
 """Time over which the two are compared [s]."""
 
@@ -37,9 +39,7 @@ def steadied(nu: Floats, nu_raw: Floats, eta: Floats, rate_hz: float, slow_s: fl
         return nu
     apart = nu_raw - placed(eta, rate_hz)
     apart = np.where(np.isfinite(apart), apart, 0.0)
-    half = rows // 2
-    slow = moving_mean(np.pad(apart, ((half, half), (0, 0)), mode="edge"), rows)[half:-half]
-    return nu - slow
+    return nu - steady_mean(apart, rows)
 
 
 def placed(eta: Floats, rate_hz: float) -> Floats:

@@ -184,7 +184,8 @@ def _meant(finding: Finding, name: str) -> list[str]:
     """Return what an effect that is not told apart is called: of the finding's own it is that of another thruster."""
     if name != finding.effect:
         return [title(name)]
-    return [title(name, one.instance) for one in finding.rivals if one.effect == name and one.delta_score > -NEAR]
+    others = [title(name, one.instance) for one in finding.rivals if one.effect == name and one.delta_score > -NEAR]
+    return others or [title(name)]
 
 
 def new_model(diagnosis: Diagnosis) -> str:

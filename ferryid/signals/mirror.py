@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 SPAN_S = 4.0
 FEWEST = 15
 LEAST_M = 0.2
 """Root mean square of the way made good in `SPAN_S`; less is lost in noise."""
-FITS, BETTER = 0.9, 10.0
+FITS, BETTER = 0.95, 10.0
 """A frame is wrong beyond doubt if its mirror image correlates so well, and leaves so many times less unexplained."""
 
 SAYS = {
@@ -52,22 +53,26 @@ def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float)
     way = place[starts + span] - place[starts]
     if np.sqrt(np.mean(np.abs(way) ** 2)) < LEAST_M:
         return "", ""
-    water = nu[:, 0] + 1j * nu[:, 1]
-    ahead, astern = np.exp(1j * eta[:, 2]), np.exp(-1j * eta[:, 2])
-    every = {"": water * ahead, "position": np.conj(water * ahead), "heading": water * astern}
-    every["velocity"] = np.conj(water) * ahead
-    fits = {name: _fit(way, _summed(values, starts, span)) for name, values in every.items()}
+    body = nu[:, 0] + 1j * nu[:, 1]
+    pointing, mirrored_pointing = np.exp(1j * eta[:, 2]), np.exp(-1j * eta[:, 2])
+    every = {"": body * pointing, "position": np.conj(body * pointing), "heading": body * mirrored_pointing}
+    every["velocity"] = np.conj(body) * pointing
+    # Water may carry the vessel, and the antenna may be elsewhere than what measures the velocity.
+    free = np.column_stack([np.ones(len(starts)), pointing[starts + span] - pointing[starts]])
+    fits = {name: _fit(way, _summed(values, starts, span), free) for name, values in every.items()}
     best = max(fits, key=lambda name: fits[name])
     if fits[best] < FITS or BETTER * (1.0 - fits[best] ** 2) > 1.0 - fits[""] ** 2:
         return "", ""
     return best, f"{SAYS[best]} (correlation {fits[best]:.2f} so, {fits['']:.2f} as declared)."
 
 
-def _summed(values: NDArray[np.complex128], starts: NDArray[np.int64], span: int) -> NDArray[np.complex128]:
-    return np.array([values[start : start + span].sum() for start in starts])
+def _summed(values: Complex, starts: NDArray[np.int64], span: int) -> Complex:
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray(total[starts + span] - total[starts])
 
 
-def _fit(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> float:
-    """Return the size of the correlation of two complex series, their means left out: water may carry the vessel."""
-    one, other = one - one.mean(), other - other.mean()
-    return float(np.abs(np.vdot(one, other)) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-12))
+def _fit(one: Complex, other: Complex, free: Complex) -> float:
+    """Return the size of the correlation of two complex series, what is free in both left out."""
+    both = np.column_stack([one, other])
+    a, b = (both - free @ np.linalg.lstsq(free, both, rcond=None)[0]).T
+    return float(np.abs(np.vdot(a, b)) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-12))

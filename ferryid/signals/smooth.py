@@ -180,6 +180,13 @@ def odd_rows(window_s: float, rate_hz: float) -> int:
     return 2 * int(np.floor(window_s * rate_hz / 2)) + 1
 
 
+def steady_mean(values: Floats, rows: int) -> Floats:
+    """Return `moving_mean` with the ends carried on, so that no row is lost, shape (n, c)."""
+    half = rows // 2
+    padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
+    return np.ascontiguousarray(moving_mean(padded, rows)[half : half + len(values)])
+
+
 def moving_mean(values: Floats, rows: int) -> Floats:
     """Return the centred moving average, shape (n, c); NaN where the window leaves the data or meets a NaN.
 

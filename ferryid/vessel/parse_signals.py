@@ -239,7 +239,7 @@ def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, 
         if not path or (other is signal and path not in signal.fields[:place]):
             continue
         other_name, _, other_rest = other.quantity.partition(".")
-        alike = bool(rest) and rest == other_rest and name != other_name
+        alike = bool(rest) and _role(rest) == _role(other_rest) and name != other_name
         if may_share and alike:
             continue
         who = "it is named twice here" if other is signal else f"so is {other.quantity} on line {other.line}"
@@ -249,6 +249,10 @@ def _check_own_fields(table: TableReader, signal: Signal, read: dict[tuple[str, 
             + (f", or add shared = true here where {other_name} and {name} really have one signal" if alike else "")
         )
         return
+
+
+def _role(rest: str) -> str:
+    return rest.removesuffix(".command")
 
 
 def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple[Actuator, ...]) -> None:

@@ -219,10 +219,13 @@ def _check_turns(profile: Profile, signal: Signal, values: list[Floats]) -> None
         return
     turn = 2.0 * math.pi / factor(other, "angle")
     step = np.abs(np.diff(known))
-    jumps = int(np.count_nonzero(np.abs(step / turn - 1.0) < _NEAR_TURN))
-    moving = step[step > 0.0]
+    jump = np.abs(step / turn - 1.0) < _NEAR_TURN
+    jumps, moving = int(np.count_nonzero(jump)), step[step > 0.0]
     # Small steps but for the jumps: what swings between two angles a full turn of radians apart is in degrees.
     if jumps < 2 or np.ptp(known) > 1.001 * turn or np.quantile(moving, 0.5) > _NEAR_TURN * turn:
+        return
+    # At a full turn the motion goes on as it was, but for the turn.
+    if np.median(np.abs(step[jump] - turn)) > np.quantile(step[~jump], 0.99):
         return
     raise FerryIdError(
         f"{profile.path}:{signal.line}: {signal.quantity} is declared in {unit}, found a field {path} in {signal.topic} that "

@@ -17,17 +17,15 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.contradiction import opposed
-from ferryid.diagnose.velocity import steadied
+from ferryid.diagnose.velocity import MEAN_S, steadied
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored
-from ferryid.signals.smooth import moving_mean, odd_rows
+from ferryid.signals.smooth import odd_rows, steady_mean
 from ferryid.vessel.profile import Floats
 
-MEAN_S = 1.0
-"""Moving mean of the velocities that enter products [s], as in `ferryid.diagnose.scene.scene_of`."""
-GROSS = frozenset({"held_samples", "heading_wrap", "heading_bias"})
-"""Errors of position and heading that spoil the velocity made of them; small shifts in time hardly do."""
+SPOILS = frozenset({"held_samples", "heading_wrap", "heading_bias", "velocity_scale", "yaw_rate_scale"})
+"""Errors that spoil the velocity in products, which is made of position, heading and velocity; small shifts in time do not."""
 
 __all__ = ["Check", "SensorFinding", "checks", "examine"]
 
@@ -60,7 +58,7 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
         if finding is not None:
             findings.append(finding)
             scene = finding.correct(scene)
-    if GROSS & {finding.effect for finding in findings}:
+    if SPOILS & {finding.effect for finding in findings}:
         scene = replace(scene, nu=_steadied(scene))
     if says := opposed(scene):
         raise FerryIdError(
@@ -71,9 +69,7 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
 
 
 def _steadied(scene: Scene) -> Floats:
-    """Return the velocity that enters products anew: its slow part comes from positions and headings, now corrected."""
+    """Return the velocity that enters products anew, of what is corrected now."""
     rate = 1.0 / scene.step_s
-    rows = odd_rows(MEAN_S, rate)
-    padded = np.pad(scene.nu_raw, ((rows // 2, rows // 2), (0, 0)), mode="edge")
     eta = np.where(scene.usable[:, None], scene.eta, np.nan)
-    return steadied(moving_mean(padded, rows)[rows // 2 : rows // 2 + len(scene.t)], scene.nu_raw, eta, rate)
+    return steadied(steady_mean(scene.nu_raw, odd_rows(MEAN_S, rate)), scene.nu_raw, eta, rate)

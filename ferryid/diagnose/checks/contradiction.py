@@ -1,9 +1,9 @@
 """Actuators that push against what follows, angles that count the other way round, and clocks that are far apart.
 
 Over windows of some seconds, the change of the velocity over ground is regressed on the force of all actuators together, as
-complex numbers (north + i east), beside drag and a steady push. The coefficient of the force is one over the mass, and real:
-noise and a controller change its size, but not its sign. Where the force explains next to nothing as declared, and nearly all
-with a sign, an angle or a clock changed, the profile or the recorder is wrong, and no effect has to stand in for it.
+complex numbers (north + i east), beside drag, a steady push and the lift of a turning hull. The coefficient of the force is one
+over the mass, and real. Where the force explains next to nothing as declared, and nearly all with a sign, an angle or a clock
+changed, the profile or the recorder is wrong, and no effect has to stand in for it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from ferryid.effects.picture import Scene
 
 SPAN_S = 4.0
+"""Length of a window: long against noise, short against manoeuvres."""
 FEWEST = 60
+"""Windows below which nothing is certain."""
 LEAST, MOST = 0.2, 5.0
 """Parts of one over the mass between which the coefficient of a force lies."""
 TURNED_DEG = 30.0
@@ -26,8 +28,14 @@ TURNED_DEG = 30.0
 LEFT, BETTER = 0.3, 3.0
 """A change is believed that leaves at most this share of the accelerations unexplained, and so many times less than without."""
 MOST_ACTUATORS = 6
-LATE_S = np.concatenate([np.arange(-60.0, -3.0), np.arange(4.0, 61.0)])
-"""Clock offsets [s] beyond what the effect of a delay is for."""
+"""Actuators whose signs are tried in all combinations."""
+SHIFTS_S = np.arange(-60.0, 61.0)
+SHORTEST_S = 4.0
+"""Clock offset [s] beyond what the effect of a delay is for."""
+ALONE = 10.0
+"""Every other shift leaves so many times more, if clocks are apart."""
+NOTHING = 1e-6
+"""Share of a push below which drag and lift have taken all of it."""
 
 
 def opposed(scene: Scene) -> str:
@@ -52,16 +60,33 @@ def opposed(scene: Scene) -> str:
         if azimuths.any():
             other = f"as if the angle of {_listed(scene, azimuths)} counted the other way round"
             tried.append((_left(scene, mirrored @ sign), " and ".join(filter(None, (other, against)))))
-    for late_s in LATE_S:
-        rows = round(late_s / scene.step_s)
-        moved = replace(scene, usable=scene.usable & np.roll(scene.usable, rows) & _inside(len(scene.t), rows))
-        when = f"{abs(late_s):.0f} s {'later' if late_s > 0.0 else 'earlier'} than the force that is recorded for it"
-        tried.append((_left(moved, np.roll(force.sum(axis=1), rows)), when))
+    when = _apart(scene, force.sum(axis=1))
+    if when is not None:
+        left, late_s = when
+        tried.append(
+            (left, f"{abs(late_s):.0f} s {'later' if late_s > 0.0 else 'earlier'} than the force recorded for it")
+        )
     best, says = min(tried)
     if not says or best > LEFT or BETTER * best > declared:
         return ""
-    so, not_so = (f"{100.0 * (1.0 - left):.0f} %" for left in (best, declared))
-    return f"The vessel moves {says} (that explains {so} of its accelerations, as declared {not_so})."
+    not_so = f"{100.0 * (1.0 - declared):.0f} %" if declared < 1.0 else "it does not even push that way"
+    return f"The vessel moves {says} (that explains {100.0 * (1.0 - best):.0f} % of its accelerations; as declared {not_so})."
+
+
+def _apart(scene: Scene, force: NDArray[np.complexfloating[Any, Any]]) -> tuple[float, float] | None:
+    """Return what is left if force and motion are shifted in time, and by how much [s]; None where that is no offset of clocks.
+
+    A force that answers a swell fits at many shifts, and one that lags at several; clocks are apart by one time.
+    """
+    left = {}
+    for late_s in SHIFTS_S.tolist():
+        rows = round(late_s / scene.step_s)
+        moved = replace(scene, usable=scene.usable & np.roll(scene.usable, rows) & _inside(len(scene.t), rows))
+        left[late_s] = _left(moved, np.roll(force, rows))
+    best = min(left, key=lambda late_s: left[late_s])
+    others = min(share for late_s, share in left.items() if abs(late_s - best) > SPAN_S)
+    alone = abs(best) >= SHORTEST_S and others >= ALONE * left[best]
+    return (left[best], best) if alone else None
 
 
 def _inside(count: int, rows: int) -> NDArray[np.bool_]:
@@ -75,7 +100,10 @@ def _listed(scene: Scene, chosen: NDArray[np.bool_]) -> str:
 
 
 def _left(scene: Scene, push: NDArray[np.complexfloating[Any, Any]]) -> float:
-    """Return the share of the accelerations that a push along the body leaves unexplained; 1 if it does not push that way."""
+    """Return the share of the accelerations that a push along the body leaves unexplained; 1 if it does not push that way.
+
+    Shares are of what drag, a steady push and the lift of a turning hull leave: that lift is against a stern thruster's force.
+    """
     span = max(2, round(SPAN_S / scene.step_s))
     starts = np.arange(0, len(scene.t) - span, span)
     gone = np.concatenate([[0], np.cumsum(~scene.usable)])
@@ -83,14 +111,21 @@ def _left(scene: Scene, push: NDArray[np.complexfloating[Any, Any]]) -> float:
     if len(starts) < FEWEST:
         return 1.0
     turn = np.exp(1j * scene.psi)
-    velocity = (scene.nu_raw[:, 0] + 1j * scene.nu_raw[:, 1]) * turn
+    u, v, r = scene.nu_raw.T
+    velocity = (u + 1j * v) * turn
     change = (velocity[starts + span] - velocity[starts]) / (span * scene.step_s)
-    columns = np.column_stack([push * turn, velocity, np.abs(velocity) * velocity, np.ones_like(velocity)])
-    summed = np.concatenate([np.zeros((1, 4)), np.cumsum(columns, axis=0)])
+    lift = 1j * turn * u
+    columns = np.column_stack(
+        [push * turn, velocity, np.abs(velocity) * velocity, np.ones_like(velocity), lift * v, lift * r]
+    )
+    summed = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
     means = (summed[starts + span] - summed[starts]) / span
-    solution, _, rank, _ = np.linalg.lstsq(means, change, rcond=None)
-    gain, spread = complex(solution[0]), float(np.linalg.norm(change - change.mean()) ** 2)
-    pushes = LEAST < abs(gain) < MOST and abs(np.angle(gain)) < np.radians(TURNED_DEG)
-    if rank < means.shape[1] or spread == 0.0 or not pushes:
+    both = np.column_stack([means[:, 0], change])
+    felt, rest = (both - means[:, 1:] @ np.linalg.lstsq(means[:, 1:], both, rcond=None)[0]).T
+    size, spread = float(np.linalg.norm(felt)), float(np.linalg.norm(rest))
+    if size <= NOTHING * float(np.linalg.norm(means[:, 0])) or spread == 0.0:
         return 1.0
-    return float(np.linalg.norm(change - means @ solution) ** 2) / spread
+    gain = complex(np.vdot(felt, rest)) / size**2
+    if not LEAST < abs(gain) < MOST or abs(np.angle(gain)) > np.radians(TURNED_DEG):
+        return 1.0
+    return float(np.linalg.norm(rest - gain * felt) / spread) ** 2

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.result import Estimate
 from ferryid.effects.picture import Scene
+from ferryid.identify.pictured import bridged
 from ferryid.vessel.profile import Floats
 
 NAMES = ("north", "east", "heading", "surge", "sway", "yaw rate")
@@ -47,7 +48,8 @@ def find(scene: Scene) -> SensorFinding | None:
 
     def correct(seen: Scene) -> Scene:
         # What was held is bridged: the jump at its end is no motion, and means reach over it.
-        eta, nu_raw = (_bridged(now, gone) for now, gone in ((seen.eta, held[:, :3]), (seen.nu_raw, held[:, 3:])))
+        both = ((seen.eta, held[:, :3]), (seen.nu_raw, held[:, 3:]))
+        eta, nu_raw = (bridged(np.where(gone, np.nan, now), seen.usable) for now, gone in both)
         return replace(seen, eta=eta, nu_raw=nu_raw, usable=seen.usable & ~rows)
 
     return SensorFinding(
@@ -58,14 +60,6 @@ def find(scene: Scene) -> SensorFinding | None:
         correct,
         {"first_s": scene.t[edges[:, 0]], "last_s": scene.t[edges[:, 1] - 1]},
     )
-
-
-def _bridged(values: Floats, gone: NDArray[np.bool_]) -> Floats:
-    result, row = values.copy(), np.arange(len(values))
-    for column, rows in zip(result.T, gone.T, strict=True):
-        if rows.any() and not rows.all():
-            column[rows] = np.interp(row[rows], row[~rows], column[~rows])
-    return result
 
 
 def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArray[np.bool_]:

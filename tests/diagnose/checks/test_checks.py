@@ -13,6 +13,7 @@ from ferryid.diagnose.checks import SensorFinding, checks, examine
 from ferryid.diagnose.velocity import steadied
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
+from ferryid.signals.mirror import mirrored
 from ferryid.simulate import load_scenario
 from ferryid.simulate.sections import Navigation, Wind
 from ferryid.simulate.trial import sail
@@ -241,6 +242,31 @@ def test_the_velocity_in_products_is_made_anew_of_what_was_corrected(error: str)
     rows = corrected.usable
     assert np.abs(made - steady)[rows, :2].max() > 0.1
     assert np.abs(corrected.nu - steady)[rows, :2].max() < 0.05
+
+
+@pytest.mark.parametrize(("along", "turning"), [(1.9438, 1.0), (1.0, 1.2)])
+def test_the_velocity_in_products_has_the_scale_that_was_found(along: float, turning: float) -> None:
+    right = quiet(2)
+    wrong = scaled(right, along, along, turning)
+    steady, made = (steadied(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
+    findings, corrected = examine(replace(wrong, nu=made))
+    assert [one.effect for one in findings] == ["velocity_scale" if along != 1.0 else "yaw_rate_scale"]
+    rows = corrected.usable
+    column = 1 if along != 1.0 else 2
+    gain = float(np.polyfit(steady[rows, column], corrected.nu[rows, column], 1)[0])
+    assert gain == pytest.approx(1.0, abs=0.02)
+
+
+def test_an_antenna_far_from_the_velocity_sensor_is_no_frame_of_the_wrong_hand() -> None:
+    t = np.arange(0.0, 900.0, 0.1)
+    psi = 2.0 * np.sin(2.0 * np.pi * t / 40.0)
+    r = np.gradient(psi, 0.1)
+    # It turns about its middle: what is ahead of it goes to starboard as what is aft goes to port.
+    u, v = 0.05 * np.sin(t / 30.0), 0.0 * t
+    way = np.cumsum((u + 1j * v) * np.exp(1j * psi)) * 0.1 + 2.0 * np.exp(1j * psi)
+    nu = np.column_stack([u, v - 2.0 * r, r])
+    eta = np.column_stack([way.real, way.imag, psi])
+    assert mirrored(eta, nu, np.ones(len(t), dtype=np.bool_), 10.0) == ("", "")
 
 
 @pytest.mark.parametrize(
