@@ -181,7 +181,8 @@ def speed_doubts(profile: Profile, columns: Mapping[str, Floats]) -> tuple[str, 
                 f"{name} never turned faster than {fastest:.3g} rpm, {100.0 * fastest / limit:.2g} % of what its thrust curve "
                 "covers: if it did not rest all the time, correct the unit of its speed."
             )
-        elif np.mean(turning[turning < fastest] > FAST * limit) > 0.5 and (turning < fastest).any():
+        # The highest value may be one that stands for none.
+        elif (lower := turning[turning < fastest]).size > 0 and np.mean(lower > FAST * limit) > 0.5:
             line = next((one.line for one in profile.signals if one.quantity.startswith(f"{name}.speed")), 0)
             raise FerryIdError(
                 f"{profile.path}:{line}: {name} cannot turn at {np.median(turning):.4g} rpm most of the time, as the unit of "

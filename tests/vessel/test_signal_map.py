@@ -220,6 +220,14 @@ HEADING = '[signals.heading]\ntopic = "/nav"\nfield = "h"\nunit = "{}"\nframe = 
 TURNING = np.mod(np.arange(0.0, 20.0, 0.05), 2.0 * math.pi)
 
 
+@pytest.mark.parametrize("steps", [1, 40])
+def test_helm_that_jumps_by_six_degrees_is_no_full_turn_of_radians(steps: int) -> None:
+    noise = np.random.default_rng(8).normal(0.0, 0.01, 2000)
+    helm = 3.08 * np.sign(np.sin(np.pi * (steps + 1) * np.arange(2000) / 2000.0 + 0.1)) + noise
+    columns = convert(profile(BODY + HEADING.format("deg")), series("/nav", h=helm))
+    assert columns["psi"] == pytest.approx(np.radians(helm))
+
+
 @pytest.mark.parametrize("low", [0.0, math.pi])
 @pytest.mark.parametrize(("unit", "other", "scale"), [("rad", "deg", 180.0 / math.pi), ("deg", "rad", 1.0)])
 def test_an_angle_that_wraps_in_another_unit_is_refused(unit: str, other: str, scale: float, low: float) -> None:

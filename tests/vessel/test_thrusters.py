@@ -69,7 +69,8 @@ def test_turns_per_second_declared_for_minutes_are_refused() -> None:
         FerryIdError, match=r"milliampere\.toml:\d+: thruster1 cannot turn at 1\.5e\+04 rpm.*Fix: correct the unit"
     ):
         speed_doubts(MILLIAMPERE, speeds(60.0 * turned))
-    # One wild sample is no unit.
+    # A value that stands for none, and one wild sample, are no unit.
+    assert speed_doubts(MILLIAMPERE, speeds(np.where(np.abs(turned) > 100.0, 32767.0, turned))) == ()
     assert speed_doubts(MILLIAMPERE, speeds(np.where(turned == 400.0, 24e3, turned))) == ()
 
 
