@@ -32,7 +32,7 @@ GLIMPSE, SIGHT = 12, 20.0
 """Steps of the search for a disturbance after which it is given up if the likelihood is farther than this from being enough."""
 SMALL = 1e-4
 """Move of a parameter's logarithm by which a slope is found."""
-EXCERPT, PIECES = 1800, 8
+EXCERPT, PIECES = 3600, 8
 """Steps from which noise is learnt, of longer logs from so many stretches: with more its sizes are hardly known better."""
 LONGEST = 500.0
 """Longest time constant, in steps."""

@@ -89,7 +89,8 @@ def learnt(
                 motion.log,
                 recording.sha256,
                 finding.probability,
-                suspect.onset_s if suspect.onset_s > 0.0 else None,
+                # The one that is told, which is the middle of its interval.
+                finding.onset_s or suspect.onset_s or None,
                 dict(finding.improvement),
                 finding.unresolved_with,
             )

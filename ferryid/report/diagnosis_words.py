@@ -18,6 +18,8 @@ RIVALS = 3
 SMALL = 0.02
 """A smaller change of the squared error is not told."""
 UNKNOWN = "unknown"
+USUAL_OUT = "ferryid-out"
+"""Output folder where none was given."""
 FAR = 1e6
 """Rivals that are less likely by more than this are told in one word."""
 UNSTEADY = frozenset({"gusts", "waves"})
@@ -194,7 +196,9 @@ def new_model(diagnosis: Diagnosis) -> str:
         return ""
     path = PurePath(diagnosis.model)
     label = f"{path.parent.name}@{path.stem}"
-    return f"{label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG"
+    out = path.parents[2] if len(path.parents) > 2 else PurePath(USUAL_OUT)
+    where = "" if out == PurePath(USUAL_OUT) else f" --out {out}"
+    return f"{label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
 
 
 def overall(diagnoses: Sequence[Diagnosis]) -> str:

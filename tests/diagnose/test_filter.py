@@ -244,7 +244,7 @@ def marked(seconds: float, *breaks: float) -> Windows:
 
 
 def test_a_short_log_is_its_own_excerpt() -> None:
-    steps = marked(700.0, 200.0)
+    steps = marked(1430.0, 200.0)
     assert EXCERPT - 100 < len(steps.starts) <= EXCERPT
     assert excerpt(steps) is steps
 
@@ -252,7 +252,7 @@ def test_a_short_log_is_its_own_excerpt() -> None:
 @pytest.mark.parametrize(
     ("seconds", "breaks"),
     [
-        (740.0, ()),
+        (1480.0, ()),
         (3000.0, ()),
         (3000.0, (400.0, 470.0, 1500.0, 2500.0)),
     ],
@@ -278,7 +278,7 @@ def test_an_excerpt_of_a_long_log_is_spread_evenly_and_crosses_no_break(
         assert end - first > DIFFUSE
         assert (np.diff(part.starts[first:end]) == stride).all()
         assert part.scene.usable[part.starts[first] : part.starts[end - 1] + len(part.weight)].all()
-    # One third of the excerpt in the middle of each third of the log, by count.
+    # An equal part of the excerpt in the middle of each part of the log, by count.
     where = np.searchsorted(steps.starts, part.starts)
     for k, one in enumerate(np.array_split(where, PIECES)):
         assert np.mean(one) == pytest.approx((k + 0.5) * n / PIECES, abs=0.01 * n)

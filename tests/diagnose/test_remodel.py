@@ -84,7 +84,9 @@ def finding(suspect: Suspect, probability: float) -> Finding:
     )
 
 
-def taught(log: str, *names: str, onset_s: float = 0.0, doubtful: str = "") -> tuple[Learnt, Trial]:
+def taught(
+    log: str, *names: str, onset_s: float = 0.0, told_s: float | None = None, doubtful: str = ""
+) -> tuple[Learnt, Trial]:
     """Fit effects to a log whose presence is known, so that nothing here depends on a search."""
     trial, survey = trial_on(log)
     suspects = [
@@ -97,9 +99,8 @@ def taught(log: str, *names: str, onset_s: float = 0.0, doubtful: str = "") -> t
     kept = fit(trial, suspects)
     trial = trial.with_noise_of(kept)
     kept = fit(trial, suspects, kept.values)
-    found = learnt(
-        trial, kept, (), [finding(one, 0.3 if one.effect.id == doubtful else 0.99) for one in suspects], survey
-    )
+    findings = [replace(finding(one, 0.3 if one.effect.id == doubtful else 0.99), onset_s=told_s) for one in suspects]
+    found = learnt(trial, kept, (), findings, survey)
     assert found is not None
     return found, trial
 
@@ -188,11 +189,11 @@ def test_the_wind_of_one_log_is_not_that_of_another(model: Model, fouled: str, f
 def test_a_fault_that_began_in_one_log_lasts_in_the_next(folder: Path) -> None:
     first = sailed(folder, "fault", TWELVE, 4, f"{BROKEN}from_s = 300\n")
     second = sailed(folder, "after", BRISK, 5, BROKEN)
-    found, _ = taught(first, "thruster_gain", onset_s=300.0)
+    found, _ = taught(first, "thruster_gain", onset_s=300.0, told_s=300.5)
     made, _ = remodelled(told(found), FERRY, None, "ferry")
     assert made is not None
     assert made.vessel_effects[0].values["factor"] == pytest.approx(0.6, abs=0.03)
-    assert made.vessel_effects[0].sources[0].onset_s == 300.0
+    assert made.vessel_effects[0].sources[0].onset_s == 300.5, "the onset that was told"
     for log in (first, second):
         ratio = judged(made, log, folder / "out")["logs"][0]["per_axis"]
         assert ratio["yaw"] < 0.3
