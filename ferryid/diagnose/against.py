@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -199,7 +200,7 @@ def base_picture(simulated: Simulated, scene: Scene, shift_s: float = 0.0) -> tu
     scene
         The recording's.
     shift_s
-        What is added to the simulation's times, of onsets.
+        What is added to the simulation's times, of onsets and offsets.
     """
     plain, _ = plain_picture(scene, scene.profile)
     picture = replace(plain, hull=simulated.hull)
@@ -210,12 +211,16 @@ def base_picture(simulated: Simulated, scene: Scene, shift_s: float = 0.0) -> tu
 
 def _carried(simulated: Simulated, scene: Scene, shift_s: float) -> list[Condition]:
     return [
-        replace(one, suspect=replace(one.suspect, onset_s=max(one.suspect.onset_s + shift_s, 0.0)))
-        if one.suspect.onset_s > 0.0
-        else one
+        replace(one, suspect=_later(one.suspect, shift_s))
         for one in simulated.conditions
         if not one.in_hull and not one.suspect.effect.cannot(scene)
     ]
+
+
+def _later(suspect: Suspect, shift_s: float) -> Suspect:
+    for end in suspect.times:
+        suspect = suspect.moved(end, max(getattr(suspect, end) + shift_s, 0.0))
+    return suspect
 
 
 def differing(simulated: Simulated, scene: Scene, shift_s: float = 0.0) -> list[Suspect]:
@@ -364,6 +369,7 @@ def plain_against(simulated: Simulated, compared: Paths | str) -> dict[str, Any]
             "effect": one.suspect.effect.id,
             "instance": one.suspect.instance,
             "onset": one.suspect.onset_s if one.suspect.onset_s > 0.0 else None,
+            "offset": one.suspect.offset_s if isfinite(one.suspect.offset_s) else None,
             "parameters": {
                 parameter.name: vars(Estimate(value, value - 1.96 * error, value + 1.96 * error, parameter.unit))
                 for parameter, value, error in zip(

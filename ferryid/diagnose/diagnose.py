@@ -28,7 +28,7 @@ from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import locate
 from ferryid.diagnose.named import doubted, forces_of, hinted, merely_hinted
 from ferryid.diagnose.noisy import drowned_axes, says_drowned
-from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding, Withheld
+from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import search, suspects_of
 from ferryid.diagnose.testable import advice, powers, tells, unexcited
@@ -36,14 +36,13 @@ from ferryid.diagnose.together import Together, together
 from ferryid.diagnose.unknown import unknown_of
 from ferryid.diagnose.unsteady import unsteady_of
 from ferryid.diagnose.weak import Windows, windows
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.withheld import withheld as withheld_beside
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.vessel.profile import Profile
 
 FEWEST_WINDOWS = 60
 """Windows below which nothing is tested."""
-WITHHELD_EFFECTS = {"wind": "wind", "current": "current", "payload": "payload"}
 
 
 def diagnose(
@@ -186,7 +185,7 @@ def _one(
         tuple(notes),
         evidence=_leftover(trial, base, kept),
         located=locate(trial, base, kept, scene) if kept.suspects else unknown.left,
-        withheld=_withheld(survey, scene, findings),
+        withheld=withheld_beside(survey.hidden, scene, findings),
         against=compared,
         # A simulation's hull is not the vessel's, and the lift of a common one is in no model file.
         learnt=learnt(trial, kept, found.states, findings, survey) if simulated is None and common is None else None,
@@ -271,27 +270,3 @@ def _leftover(trial: Trial, base: Fit, kept: Fit) -> dict[str, Any]:
         "heading": np.degrees(np.mod(psi, 2.0 * np.pi)),
         "speed": speed,
     }
-
-
-def _withheld(survey: Survey, scene: Scene, findings: Sequence[Finding]) -> tuple[Withheld, ...]:
-    made = []
-    for signal, hidden in survey.hidden.items():
-        mean = np.nanmean(hidden[scene.usable], axis=0)
-        found = next((one for one in findings if one.effect == WITHHELD_EFFECTS.get(signal)), None)
-        names = ("mass", "x") if signal == "payload" else ("north", "east")
-        measured = dict(zip(names, mean.tolist(), strict=True))
-        shown = ", ".join(f"{name} {value:.2f}" for name, value in measured.items())
-        told = (
-            "nothing of it was found"
-            if found is None
-            else "found: " + ", ".join(f"{name} {found.parameters[name].value:.2f}" for name in names)
-        )
-        made.append(
-            Withheld(
-                signal,
-                {} if found is None else {name: found.parameters[name] for name in names},
-                measured,
-                f"{signal} was hidden; measured on average: {shown}; {told}.",
-            )
-        )
-    return tuple(made)

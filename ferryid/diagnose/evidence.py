@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -310,7 +311,7 @@ def _shifted(suspect: Suspect, share: float) -> Suspect:
         late = np.roll(force, round(share * len(force)), axis=0)
         return replace(picture, external=picture.external + late)
 
-    return replace(suspect, effect=replace(suspect.effect, apply=apply), onset_s=0.0)
+    return replace(suspect, effect=replace(suspect.effect, apply=apply), onset_s=0.0, offset_s=inf)
 
 
 def _mirrored(suspect: Suspect) -> Suspect:
@@ -320,7 +321,7 @@ def _mirrored(suspect: Suspect) -> Suspect:
         force = _force_of(suspect, replace(picture, scene=replace(scene, eta=eta)), p)
         return replace(picture, external=picture.external + force)
 
-    return replace(suspect, effect=replace(suspect.effect, apply=apply), onset_s=0.0)
+    return replace(suspect, effect=replace(suspect.effect, apply=apply), onset_s=0.0, offset_s=inf)
 
 
 def _force_of(suspect: Suspect, picture: Picture, p: Floats) -> Floats:

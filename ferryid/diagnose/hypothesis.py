@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf, isfinite
 
 import numpy as np
 
@@ -27,19 +28,34 @@ ANEW = 4
 ENOUGH = 1e-2
 """Gain in cost of a step that is worth another."""
 DAMPINGS = (0.0, 0.3, 3.0, 30.0, 300.0)
+MOVED = 1e-2
+"""Move of a parameter, in its size, by which a slope is found."""
 TRUST = 4.0
 """Longest Gauss-Newton step, in sizes of a parameter."""
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """An effect in one instance, acting from `onset_s` on (0: all along); `doubt` as in `ferryid.effects.effect.Choice`."""
+    """An effect in one instance; `doubt` as in `ferryid.effects.effect.Choice`.
+
+    It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end).
+    """
 
     effect: Effect
     instance: str | None
     parameters: tuple[Parameter, ...]
     onset_s: float = 0.0
+    offset_s: float = inf
     doubt: float = 0.0
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """Which of the two ends of its span lie within the log."""
+        return (*(("onset_s",) if self.onset_s > 0.0 else ()), *(("offset_s",) if isfinite(self.offset_s) else ()))
+
+    def moved(self, end: str, time_s: float) -> Suspect:
+        """Return the suspect with one of its `times` elsewhere."""
+        return replace(self, onset_s=time_s) if end == "onset_s" else replace(self, offset_s=time_s)
 
     @property
     def key(self) -> tuple[str, str | None]:
@@ -53,7 +69,7 @@ class Suspect:
 
     def act(self, picture: Picture, p: Floats) -> Picture:
         """Return the picture with the effect in it."""
-        return self.effect.act(picture, p, self.instance, self.onset_s)
+        return self.effect.act(picture, p, self.instance, self.onset_s, self.offset_s)
 
 
 @dataclass(frozen=True)
@@ -241,7 +257,7 @@ def fit(
         J[:, :h] = by_hull
         for k in np.flatnonzero(size > HELD).tolist():
             moved = z.copy()
-            d = 1e-2 if z[h + k] + 1e-2 <= high[k] else -1e-2
+            d = MOVED if z[h + k] + MOVED <= high[k] else -MOVED
             moved[h + k] += d
             J[:, h + k] = (white(moved) - w) / d
         A = J.T @ J + np.eye(h + q)
@@ -272,6 +288,20 @@ def fit(
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
     hull = trial.plain.hull + trial.hull_spread * z[:h]
     return Fit(tuple(suspects), values, covariance, hull, evidence)
+
+
+def effect_slopes(trial: Trial, kept: Fit) -> Floats:
+    """Return derivatives of the prediction errors by the parameters of a fit's effects, in their sizes, shape (w, q)."""
+    left = trial.white(imagined(trial.plain, kept))
+    columns = []
+    for i, suspect in enumerate(kept.suspects):
+        for k, one in enumerate(suspect.parameters):
+            d = MOVED if kept.values[i][k] + MOVED * one.size <= one.high else -MOVED
+            moved = kept.values[i].copy()
+            moved[k] += d * one.size
+            changed = (*kept.values[:i], moved, *kept.values[i + 1 :])
+            columns.append((trial.white(imagined(trial.plain, replace(kept, values=changed))) - left) / d)
+    return np.stack(columns, axis=1) if columns else np.empty((len(left), 0))
 
 
 def without(trial: Trial, made: Fit, index: int) -> Fit:

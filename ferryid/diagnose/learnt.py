@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, effect_slopes, fit
 from ferryid.diagnose.result import Finding
 from ferryid.diagnose.scene import Survey
 from ferryid.diagnose.unsteady import State
@@ -18,7 +19,6 @@ from ferryid.vessel.profile import Floats
 
 IN_THE_HULL = "hull_parameters"
 """The effect that is nothing but other coefficients of the hull: it becomes these."""
-_STEP = 1e-2
 
 
 @dataclass(frozen=True)
@@ -89,12 +89,15 @@ def learnt(
                 motion.log,
                 recording.sha256,
                 finding.probability,
-                # The one that is told, which is the middle of its interval.
+                # Those that are told, which are the middles of their intervals.
                 finding.onset_s or suspect.onset_s or None,
                 dict(finding.improvement),
                 finding.unresolved_with,
+                finding.offset_s or (suspect.offset_s if isfinite(suspect.offset_s) else None),
             )
-            stored.append((suspect.effect.vessel, _stored(suspect, kept.values[i], kept.told_errors(i), source)))
+            # A fault that passed within the log is no property that others have.
+            lasts = suspect.effect.vessel and source.offset_s is None
+            stored.append((lasts, _stored(suspect, kept.values[i], kept.told_errors(i), source)))
     for state in states:
         suspect = state.suspect
         if suspect.key in told and told[suspect.key].sure:
@@ -138,7 +141,7 @@ def _hull(trial: Trial, kept: Fit) -> tuple[Floats, Floats, Floats, Floats]:
     h = len(COEFFICIENTS)
     parameters = [one for suspect in kept.suspects for one in suspect.parameters]
     sizes = np.array([one.size for one in parameters])
-    J = np.column_stack([trial.by_hull, _by_effects(trial, kept)])
+    J = np.column_stack([trial.by_hull, effect_slopes(trial, kept)])
     posterior = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))
     units = np.append(trial.hull_spread, sizes)
     posterior = posterior * np.outer(units, units)
@@ -155,17 +158,3 @@ def _hull(trial: Trial, kept: Fit) -> tuple[Floats, Floats, Floats, Floats]:
                 hull[k] *= factor
             column += 1
     return trial.plain.hull, spread, hull, into @ posterior @ into.T
-
-
-def _by_effects(trial: Trial, kept: Fit) -> Floats:
-    """Return the derivatives of what is left by the effects' parameters, in their sizes, shape (w, q)."""
-    left = trial.white(imagined(trial.plain, kept))
-    columns = []
-    for i, suspect in enumerate(kept.suspects):
-        for k, one in enumerate(suspect.parameters):
-            d = _STEP if kept.values[i][k] + _STEP * one.size <= one.high else -_STEP
-            moved = kept.values[i].copy()
-            moved[k] += d * one.size
-            changed = (*kept.values[:i], moved, *kept.values[i + 1 :])
-            columns.append((trial.white(imagined(trial.plain, replace(kept, values=changed))) - left) / d)
-    return np.column_stack(columns)

@@ -13,14 +13,15 @@ from ferryid.diagnose.locate import locate
 from ferryid.diagnose.result import AXES, HINT, NEAR, Estimate, Finding, Rival
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shown import columns_of, regressor_of
+from ferryid.diagnose.spans import swapped
 from ferryid.effects.picture import Scene
 
 OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
-ONSET_DROP = 50.0
-"""Fall of the logarithm of the evidence as of which no onset farther away comes into question; smaller dips may lie between."""
-ONSET_STEP, ONSET_FIT = 0.125, 3
-"""Step between onsets that are weighed, in lengths of a window, and steps of the fit for each."""
+TIME_DROP = 50.0
+"""Fall of the logarithm of the evidence as of which no time farther away comes into question; smaller dips may lie between."""
+TIME_STEP, TIME_FIT = 0.125, 3
+"""Step between times that are weighed, in lengths of a window, and steps of the fit for each."""
 SHOWN_RIVALS = 3
 
 
@@ -44,8 +45,6 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
             continue
         named = zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True)
         values = {name: value for name, value in named if name in estimates}
-        if suspect.effect.onset:
-            values["onset"] = estimates["onset"].value if "onset" in estimates else suspect.onset_s
         improved = None if proof is None else proof.proofs[i].improvement
         made.append(
             Finding(
@@ -55,7 +54,8 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
                 parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
                 intervals=_intervals(trial, estimates),
-                onset_s=estimates["onset"].value if "onset" in estimates else None,
+                onset_s=_value(estimates, "onset"),
+                offset_s=_value(estimates, "offset"),
                 regime=place.regime,
                 improvement={} if improved is None else dict(zip(AXES, improved.removed.tolist(), strict=True)),
                 held_out=improved is not None,
@@ -81,44 +81,62 @@ def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[st
         if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
             continue
         estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
-    if suspect.onset_s > 0.0:
-        estimates["onset"] = _onset(trial, kept, index)
+    for end in suspect.times:
+        estimates[end.removesuffix("_s")] = _time(trial, kept, index, end)
     return estimates
 
 
-def _onset(trial: Trial, kept: Fit, index: int) -> Estimate:
-    """Return when an effect began, as the median of its posterior with the interval: an idle thruster hides its fault."""
+def _value(estimates: Mapping[str, Estimate], name: str) -> float | None:
+    return estimates[name].value if name in estimates else None
+
+
+def _time(trial: Trial, kept: Fit, index: int, end: str) -> Estimate:
+    """Return when an effect began or ended, as the median of its posterior with the interval.
+
+    An idle thruster hides its fault, so that the posterior may be wide, and have several tops.
+
+    Parameters
+    ----------
+    trial, kept, index
+        The log, what was found, and which of it.
+    end
+        ``onset_s`` or ``offset_s``.
+    """
     suspect = kept.suspects[index]
     times = trial.windows.middle_s
-    step = ONSET_STEP * len(trial.windows.weight) * trial.windows.scene.step_s
+    step = TIME_STEP * len(trial.windows.weight) * trial.windows.scene.step_s
 
     begin = near(trial, kept)
 
-    def evidence_at(onset: float) -> float:
-        moved = [replace(one, onset_s=onset) if i == index else one for i, one in enumerate(kept.suspects)]
-        return fit(trial, moved, kept.values, steps=ONSET_FIT, begin=begin).evidence
+    def evidence_at(time: float) -> float:
+        moved = swapped(kept.suspects, index, suspect.moved(end, time))
+        return fit(trial, moved, kept.values, steps=TIME_FIT, begin=begin).evidence
 
-    tried = {suspect.onset_s: evidence_at(suspect.onset_s)}
+    # It ends after it began.
+    first = max(suspect.onset_s, float(times[0])) if end == "offset_s" else float(times[0])
+    last = min(suspect.offset_s, float(times[-1])) if end == "onset_s" else float(times[-1])
+    here = getattr(suspect, end)
+    tried = {here: evidence_at(here)}
     for side in (-1.0, 1.0):
-        onset = suspect.onset_s + side * step
-        while times[0] < onset < times[-1]:
-            tried[onset] = evidence_at(onset)
-            if tried[onset] < max(tried.values()) - ONSET_DROP:
+        time = here + side * step
+        while first < time < last:
+            tried[time] = evidence_at(time)
+            if tried[time] < max(tried.values()) - TIME_DROP:
                 break
-            onset += side * step
-    onsets = np.array(sorted(tried))
-    weights = np.exp(np.array([tried[onset] for onset in onsets.tolist()]) - max(tried.values()))
-    # Each onset stands for the step about it.
+            time += side * step
+    moments = np.array(sorted(tried))
+    weights = np.exp(np.array([tried[time] for time in moments.tolist()]) - max(tried.values()))
+    # Each moment stands for the step about it.
     shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
-    edges = np.concatenate([onsets - 0.5 * step, onsets[-1:] + 0.5 * step])
+    edges = np.concatenate([moments - 0.5 * step, moments[-1:] + 0.5 * step])
     low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
     return Estimate(middle, max(low, 0.0), high, "s")
 
 
 def _intervals(trial: Trial, estimates: Mapping[str, Estimate]) -> tuple[tuple[float, float], ...]:
     t = trial.windows.scene.t
-    begun = estimates["onset"].value if "onset" in estimates else 0.0
-    return ((max(begun, float(t[0])), float(t[-1])),)
+    begun, ended = _value(estimates, "onset"), _value(estimates, "offset")
+    return ((max(begun or 0.0, float(t[0])), float(t[-1]) if ended is None else min(ended, float(t[-1]))),)
 
 
 def hinted(finding: Finding) -> Finding:

@@ -66,8 +66,8 @@ class Finding:
         Share of the improvement on each axis; they add up to 1.
     intervals
         When it acts [s], pairs of first and last.
-    onset_s
-        When it began, None where it acted all along.
+    onset_s, offset_s
+        When it began and when it ended, None where it acted from the start, and to the end.
     regime
         Where it shows most, in words.
     improvement
@@ -115,6 +115,14 @@ class Finding:
     labels: Mapping[str, str] = field(default_factory=dict)
     band_hz: tuple[float, float] | None = None
     law: tuple[LawTerm, ...] = ()
+    offset_s: float | None = None
+
+    @property
+    def ends(self) -> tuple[tuple[str, float], ...]:
+        """Onset and offset by name [s], those within the log."""
+        return tuple(
+            (name, time) for name, time in (("onset", self.onset_s), ("offset", self.offset_s)) if time is not None
+        )
 
     @property
     def sure(self) -> bool:
@@ -126,8 +134,8 @@ class Finding:
 class Withheld:
     """What the diagnosis found of a signal that it was not shown, beside what the sensor had measured.
 
-    `found` and `measured` are by the names of the effect's parameters; `measured` is the mean over the log, in the unit
-    of `found`.
+    `found` and `measured` are by the names of the effect's parameters; `measured` is the mean over the log, of a payload
+    over the time that it was aboard, in the unit of `found`.
     """
 
     signal: str
@@ -229,6 +237,7 @@ def _finding(one: Finding) -> dict[str, Any]:
             "axes": dict(one.axes),
             "intervals": [list(pair) for pair in one.intervals],
             "onset": one.onset_s,
+            "offset": one.offset_s,
             "regime": one.regime,
             **({} if one.band_hz is None else {"band_hz": list(one.band_hz)}),
             **({"law": [{**vars(term), "coefficient": vars(term.coefficient)} for term in one.law]} if one.law else {}),

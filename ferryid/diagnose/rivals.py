@@ -50,15 +50,15 @@ class Standing:
 
 
 def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect]) -> Standing:
-    """Return how a suspect stands against every other of the library in its place, with its onset."""
+    """Return how a suspect stands against every other of the library in its place, in its span."""
     suspect = kept.suspects[index]
     bare = without(trial, kept, index)
     begin = near(trial, bare)
     taken = {one.key for one in kept.suspects}
 
     def instead(other: Suspect) -> StandIn:
-        begins = replace(other, onset_s=suspect.onset_s if other.effect.onset else 0.0)
-        stand_in = settled(trial, bare, begins)
+        timed = replace(other, onset_s=suspect.onset_s, offset_s=suspect.offset_s) if other.effect.onset else other
+        stand_in = settled(trial, bare, timed)
         start = [*bare.values, stand_in.start]
         made = fit(
             trial, [*bare.suspects, stand_in], start, steps=FAR, begin=None if stand_in.effect.bends_hull else begin

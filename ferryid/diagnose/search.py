@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import exp, log
+from math import exp
 
 import numpy as np
 
 from ferryid.diagnose.hypothesis import Fit, Near, Suspect, Trial, fit, imagined, near, settled, without
 from ferryid.diagnose.parallel import over
+from ferryid.diagnose.spans import GLANCE, NEARBY_S, Ground, ground_of, part_s, price, promising, sharpened, timed
 from ferryid.diagnose.unsteady import State, disturbed
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
@@ -18,16 +19,12 @@ from ferryid.vessel.profile import Floats
 
 ODDS = 8.0
 """Logarithm of the evidence that an effect must show over none before it is as likely as none."""
-GLANCE, FAR = 3, 8
-"""Steps of a fit by which candidates are sorted, from nearby and from afar; the best are then fitted to the end."""
+FAR = 8
+"""Steps of a fit by which candidates are sorted from afar, `GLANCE` from nearby; the best are then fitted to the end."""
 REJUDGED = 5
 """Candidates whose evidence is weighed under the noise that each leaves itself."""
 MOST = 4
 """Effects looked for at once."""
-ONSETS = 12
-"""Onsets tried at first, evenly over the log; then ever finer around the best."""
-NEARBY_S, FINEST_S = 8.0, 0.2
-"""Steps [s] with which an onset is searched for nearby, from the first down to the last."""
 VOID = 0.02
 """An effect whose acceleration is less than this share of the measured one, by every channel's root mean square, is void."""
 
@@ -142,7 +139,8 @@ def _selected(
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
         current = fit(trial, chosen.suspects, chosen.values)
         begin = near(trial, current)
-        found = over(partial(_best, trial, current, begin), left)
+        ground = ground_of(trial, current, begin)
+        found = over(partial(_best, trial, current, begin, ground), left)
         found.sort(key=lambda one: -one.gain)
         fair = over(partial(_fairly, trial), found[:REJUDGED])
         found = sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
@@ -160,59 +158,35 @@ def _fairly(trial: Trial, one: Candidate) -> Candidate:
     return replace(one, fit=made, gain=max(one.gain, one.gain + made.evidence - one.fit.evidence))
 
 
-def _best(trial: Trial, current: Fit, begin: Near, suspect: Suspect) -> Candidate:
-    """Return a suspect's best fit beside the current ones, over all onsets where it can have one."""
+def _best(trial: Trial, current: Fit, begin: Near, ground: Ground, suspect: Suspect) -> Candidate:
+    """Return a suspect's best fit beside the current ones, over all spans where it can begin or end."""
+
+    def candidate(made: Fit) -> Candidate:
+        gain = made.evidence - current.evidence - price(trial, made.suspects[-1])
+        return Candidate(made.suspects[-1], made, gain)
 
     def tried(one: Suspect, values: Floats | None = None) -> Candidate:
         start = (*current.values, one.start if values is None else values)
         # Where the hull has strained to stand in for an effect that multiplies it, the way to both leads from the profile's.
-        afar = one.effect.bends_hull and one.onset_s <= 0.0
+        afar = one.effect.bends_hull and not one.times
         made = fit(trial, (*current.suspects, one), start, steps=FAR if afar else GLANCE, begin=None if afar else begin)
-        penalty = 0.0 if one.onset_s <= 0.0 else log(len(trial.windows.starts))
-        return Candidate(one, made, made.evidence - current.evidence - penalty)
+        return candidate(made)
 
     suspect = settled(trial, current, suspect)
     best = tried(suspect)
     if not suspect.effect.onset:
         return best
-    times = trial.windows.middle_s
-    first, last = float(times[0]), float(times[-1])
-    step = (last - first) / (ONSETS + 1)
     # The kick of an onset shows within seconds of it only; what is changed from then on leads there.
-    changed = replace(suspect, effect=replace(suspect.effect, kick=None))
-    for onset in first + step * np.arange(1, ONSETS + 1):
-        best = max(best, tried(replace(changed, onset_s=float(onset))), key=lambda one: one.gain)
-    if best.suspect.onset_s <= 0.0 or best.gain < 0.5 * ODDS:
+    smooth = replace(suspect, effect=replace(suspect.effect, kick=None))
+    spans = promising(trial, ground, smooth)
+    best = max([best, *(tried(one) for one in spans)], key=lambda one: one.gain)
+    if not best.suspect.times or best.gain < 0.5 * ODDS:
         return best
-    while step > FINEST_S:
-        step *= 0.5
-        if step < NEARBY_S and best.suspect.effect is changed.effect:
-            best = tried(replace(best.suspect, effect=suspect.effect), best.fit.values[-1])
-        middle = best.suspect.onset_s
-        for onset in (middle - step, middle + step):
-            if first < onset < last:
-                moved = tried(replace(best.suspect, onset_s=onset), best.fit.values[-1])
-                best = max(best, moved, key=lambda one: one.gain)
-    return best
-
-
-def timed(trial: Trial, made: Fit) -> Fit:
-    """Return a fit with every onset where it is likeliest nearby: noise that is less now may show it better."""
-    for i, suspect in enumerate(made.suspects):
-        if suspect.onset_s <= 0.0:
-            continue
-        begin, step = near(trial, made), NEARBY_S
-        best = fit(trial, made.suspects, made.values, steps=GLANCE, begin=begin)
-        while step > FINEST_S:
-            middle = best.suspects[i].onset_s
-            for onset in (middle - step, middle + step):
-                moved = [replace(one, onset_s=onset) if k == i else one for k, one in enumerate(best.suspects)]
-                if trial.windows.middle_s[0] < onset < trial.windows.middle_s[-1]:
-                    tried = fit(trial, moved, best.values, steps=GLANCE, begin=begin)
-                    best = max(best, tried, key=lambda one: one.evidence)
-            step *= 0.5 if best.suspects[i].onset_s == middle else 1.0
-        made = fit(trial, best.suspects, best.values, begin=begin)
-    return made
+    index = len(current.suspects)
+    coarse = sharpened(trial, best.fit, index, begin, 0.5 * part_s(trial), NEARBY_S)
+    kicked = tried(replace(coarse.suspects[-1], effect=suspect.effect), coarse.values[-1])
+    fine = sharpened(trial, kicked.fit, index, begin, NEARBY_S)
+    return candidate(fine)
 
 
 def _round(found: Sequence[Candidate]) -> Round:

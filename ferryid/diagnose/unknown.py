@@ -220,6 +220,7 @@ def _unsteady(trial: Trial, left: Location) -> Finding:
         axes=dict(zip(AXES, left.shares.tolist(), strict=True)),
         intervals=left.intervals,
         onset_s=left.onset_s,
+        offset_s=left.offset_s,
         regime=left.regime,
         improvement={},
         held_out=False,

@@ -64,14 +64,19 @@ class Windows:
 
     def gap(self, picture: Picture) -> Floats:
         """Return the picture's acceleration less the measured one in every window, shape (J, channels)."""
-        scene = self.scene
         rates = as_measured(picture)
         if self.channels[0]:
-            u, v, r = scene.nu.T
-            c, s = scene.pointing
-            ahead, across = rates[:, 0] - r * v, rates[:, 1] + r * u
-            rates = np.column_stack([c * ahead - s * across, s * ahead + c * across, rates[:, 2]])
-        return self.mean(rates) - self.measured[:, self.channels]
+            u, v, r = self.scene.nu.T
+            rates = np.column_stack([rates[:, 0] - r * v, rates[:, 1] + r * u, rates[:, 2]])
+        return self.mean(self.along(rates)) - self.measured[:, self.channels]
+
+    def along(self, rates: Floats) -> Floats:
+        """Return accelerations along the vessel's axes as those along the channels, shape (n, 3) each."""
+        if not self.channels[0]:
+            return rates
+        c, s = self.scene.pointing
+        ahead, across, turning = rates.T
+        return np.column_stack([c * ahead - s * across, s * ahead + c * across, turning])
 
 
 STEPS_A_WINDOW = 20

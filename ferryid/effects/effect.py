@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import inf, isfinite
 from typing import Any
 
-from ferryid.effects.picture import Picture, Scene, from_onset
+from ferryid.effects.picture import Picture, Scene, between
 from ferryid.vessel.profile import Floats, Profile
 
 Values = Mapping[str, float]
@@ -15,6 +16,12 @@ Residual = Callable[[Picture], Floats]
 
 HELD = 1e-6
 """Size of a parameter that is not to move: one of several alternatives that was not chosen."""
+
+
+def span(values: Values) -> dict[str, float]:
+    """Return from when until when an effect acts as a scenario has it, from its ``onset`` and ``offset`` [s] if it has them."""
+    until = {"until_s": values["offset"]} if "offset" in values else {}
+    return {"from_s": values.get("onset", 0.0), **until}
 
 
 @dataclass(frozen=True)
@@ -84,10 +91,10 @@ class Effect:
     cannot
         Why the scene cannot show it, as a sentence; empty where it can.
     onset
-        True where it may begin during the log.
+        True where it may begin or end during the log.
     kick
         ``kick(picture, p)`` returns the momentum that an effect gives the vessel if it begins in a row [N·s, N·s, N·m·s], shape
-        (n, 3).
+        (n, 3). What ends leaves the vessel as fast as it is.
     says
         One sentence on a finding, from its values by name and its instance.
     scenario
@@ -141,9 +148,12 @@ class Effect:
         """When it acts among others: what corrects the measurements first, then what the others build on."""
         return 0 if self.of_sensor else 1 if self.unsteady is not None else 2
 
-    def act(self, picture: Picture, p: Floats, instance: str | None, onset_s: float) -> Picture:
-        """Return the picture with the effect in it from an onset on; with 0 it acts all along."""
+    def act(
+        self, picture: Picture, p: Floats, instance: str | None, onset_s: float = 0.0, offset_s: float = inf
+    ) -> Picture:
+        """Return the picture with the effect in it from an onset until an offset [s]; as they stand here, all along."""
         after = self.apply(picture, p, instance)
-        if onset_s <= 0.0:
+        if onset_s <= 0.0 and not isfinite(offset_s):
             return after
-        return from_onset(picture, after, onset_s, None if self.kick is None else self.kick(picture, p))
+        kick = None if self.kick is None or onset_s <= 0.0 else self.kick(picture, p)
+        return between(picture, after, onset_s, offset_s, kick)

@@ -1,4 +1,4 @@
-"""Payload: rigid mass aboard, which enters the vessel's own mass matrix; it may board during the log."""
+"""Payload: rigid mass aboard, which enters the vessel's own mass matrix; it may come aboard and leave during the log."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats, Profile
 
@@ -50,7 +50,7 @@ def says(values: Values, instance: str | None) -> str:
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's payload."""
-    return {"payload": [{"mass_kg": values["mass"], "x_m": values["x"], "from_s": values.get("onset", 0.0)}]}
+    return {"payload": [{"mass_kg": values["mass"], "x_m": values["x"], **span(values)}]}
 
 
 def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import cos, sin
+from math import cos, inf, sin
 from typing import Any
 
 import numpy as np
@@ -275,13 +275,15 @@ def _balance(picture: Picture) -> tuple[tuple[Any, ...], Floats, Floats | None]:
     return (m11, m22, m23, m32, m33), picture.external + D - C, turning
 
 
-def from_onset(before: Picture, after: Picture, onset_s: float, kick: Floats | None = None) -> Picture:
-    """Return the one picture before an onset [s] and the other from it on, whose hull and scene it has all along.
+def between(
+    before: Picture, after: Picture, onset_s: float, offset_s: float = inf, kick: Floats | None = None
+) -> Picture:
+    """Return the second picture from an onset until an offset [s], else the first; hull and scene are the second's.
 
     `kick` is a momentum by row, as of `ferryid.effects.effect.Effect`; that of the first row of the onset acts there.
     """
-    rows = before.scene.t >= onset_s
-    if kick is not None and rows.any() and not rows.all():
+    rows = (before.scene.t >= onset_s) & (before.scene.t < offset_s)
+    if kick is not None and rows.any() and not rows[0]:
         external, first = after.external.copy(), int(np.argmax(rows))
         external[first] += kick[first] / before.scene.step_s
         after = replace(after, external=external)

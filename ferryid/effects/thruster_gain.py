@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats, Profile
 
@@ -35,7 +35,7 @@ def says(values: Values, instance: str | None) -> str:
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's fault."""
-    fault = {"thruster": instance, "factor": values["factor"], "from_s": values.get("onset", 0.0)}
+    fault = {"thruster": instance, "factor": values["factor"], **span(values)}
     return {"thrusters": {"faults": [fault]}}
 
 

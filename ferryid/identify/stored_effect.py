@@ -36,8 +36,8 @@ class Source:
     ----------
     log, sha256
         Name and hash.
-    onset_s
-        When it began there [s], None where it acted all along.
+    onset_s, offset_s
+        When it began and when it ended there [s], None where it acted from the start, and to the end.
     probability
         Of the finding.
     improvement
@@ -52,6 +52,7 @@ class Source:
     onset_s: float | None = None
     improvement: Mapping[str, float] = field(default_factory=dict)
     unresolved_with: tuple[str, ...] = ()
+    offset_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -77,10 +78,16 @@ class StoredEffect:
         """Return when it begins in a log [s]; 0 in a log that it was not found in: what began before lasts."""
         return next((one.onset_s or 0.0 for one in self.sources if one.sha256 == sha256), 0.0)
 
+    def offset_in(self, sha256: str) -> float:
+        """Return when it ends in a log [s]; infinite in a log in which it was not seen to end."""
+        ends = [one.offset_s for one in self.sources if one.sha256 == sha256 and one.offset_s is not None]
+        return ends[0] if ends else math.inf
+
     def act(self, picture: Picture, sha256: str) -> Picture:
         """Return the picture of a log with the effect in it."""
         p = np.array(list(self.values.values()))
-        return effects()[self.effect].act(picture, p, self.instance, self.onset_in(sha256))
+        span = self.onset_in(sha256), self.offset_in(sha256)
+        return effects()[self.effect].act(picture, p, self.instance, *span)
 
     def says(self) -> str:
         """Return the effect as a sentence."""
@@ -113,6 +120,7 @@ def effect_json(stored: StoredEffect) -> dict[str, Any]:
                 "sha256": one.sha256,
                 "probability": one.probability,
                 "onset_s": one.onset_s,
+                "offset_s": one.offset_s,
                 "improvement": dict(one.improvement),
                 "unresolved_with": list(one.unresolved_with),
             }
@@ -176,13 +184,14 @@ def _effect(data: Mapping[str, Any], profile: Profile, where: str, vessel: bool)
             f'{where}: holds the effect "{name}", which this version of ferryid does not know.'
             f"{did_you_mean(name, effects())} Fix: install the version that wrote the file, or take the effect out of it"
         )
-    if effect.vessel != vessel:
-        raise ValueError(f"{name} is {'no property of the vessel' if vessel else 'no condition of a log'}")
     if instance not in effect.instances(profile):
         raise ValueError(f"{name} has no instance {instance!r}")
     sources = tuple(_source(one) for one in data["found_in"])
     if not sources:
         raise ValueError(f"{name} was found in no log")
+    # What passed within a log is a condition of that log, of whatever it is.
+    if (effect.vessel and not any(one.offset_s is not None for one in sources)) != vessel:
+        raise ValueError(f"{name} is {'no property of the vessel' if vessel else 'no condition of a log'}")
     return StoredEffect(name, instance, _parameters(effect, data["parameters"], profile), sources)
 
 
@@ -200,15 +209,21 @@ def _parameters(effect: Effect, data: Mapping[str, Any], profile: Profile) -> di
 
 
 def _source(data: Mapping[str, Any]) -> Source:
-    onset_s = data["onset_s"]
+    # Files of before effects could end have no offset.
+    onset_s, offset_s = (_time(data.get(name), name) for name in ("onset_s", "offset_s"))
     return Source(
         _text(data["log"]),
         _text(data["sha256"]),
         _finite(data["probability"], "probability"),
-        None if onset_s is None else _finite(onset_s, "onset_s"),
+        onset_s,
         {str(axis): _finite(share, f"improvement.{axis}") for axis, share in data["improvement"].items()},
         tuple(_text(one) for one in _listed(data["unresolved_with"])),
+        offset_s,
     )
+
+
+def _time(value: Any, what: str) -> float | None:
+    return None if value is None else _finite(value, what)
 
 
 def _quantity(data: Mapping[str, Any], what: str) -> Quantity:

@@ -50,15 +50,15 @@ def compared(finding: Finding) -> bool:
 
 
 def in_time(finding: Finding) -> str:
-    """Draw what was left over before and after a finding against time; when it acts is shaded, its onset marked."""
+    """Draw what was left over before and after a finding against time; when it acts is shaded, its ends marked."""
     evidence = finding.evidence
     t = evidence["t"]
     with mpl.rc_context(STYLE):
         figure, (ax,) = canvas(1, 3.2)
         for first, last in finding.intervals:
             ax.axvspan(first, last, color=SHADE, linewidth=0)
-        if finding.onset_s is not None:
-            ax.axvline(finding.onset_s, color=MEASURED, linewidth=0.9, linestyle="--", label="onset")
+        for name, time in finding.ends:
+            ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--" if name == "onset" else ":", label=name)
         ax.plot(*envelope(t, evidence["before"]), color=BASE, label=WITHOUT if "after" in evidence else "left over")
         if "after" in evidence:
             ax.plot(*envelope(t, evidence["after"]), color=NEW, label=WITH)
@@ -76,9 +76,10 @@ def on_regressor(finding: Finding) -> str:
     residual = finding.labels.get("residual", "left over")
     own = "regressor" not in evidence
     x = evidence.get("explained", evidence["t"]) if own else evidence["regressor"]
-    # What has not begun cannot give itself away.
-    since = np.ones(len(x), dtype=bool) if finding.onset_s is None else evidence["t"] >= finding.onset_s
-    x, seen = x[since], {name: values[since] for name, values in evidence.items()}
+    # What has not begun, or is over, cannot give itself away.
+    ends = dict(finding.ends)
+    acts = (evidence["t"] >= ends.get("onset", -np.inf)) & (evidence["t"] < ends.get("offset", np.inf))
+    x, seen = x[acts], {name: values[acts] for name, values in evidence.items()}
     with mpl.rc_context(STYLE):
         figure, (ax,) = canvas(1, 3.2)
         for name, colour, label in (("before", BASE, WITHOUT), ("after", NEW, WITH)):
@@ -96,7 +97,7 @@ def on_regressor(finding: Finding) -> str:
 
 
 def left_over(diagnosis: Diagnosis) -> str:
-    """Draw the force that was left over in the whole log, axis by axis, with the onsets of what was found."""
+    """Draw the force that was left over in the whole log, axis by axis, with onsets and offsets of what was found."""
     evidence = diagnosis.evidence
     with mpl.rc_context(STYLE):
         figure, axes = canvas(3, 5.2)
@@ -105,8 +106,8 @@ def left_over(diagnosis: Diagnosis) -> str:
                 if name in evidence and (name == "before" or diagnosis.findings):
                     ax.plot(*envelope(evidence["t"], evidence[name][:, j]), color=colour, label=label)
             for finding in diagnosis.findings:
-                if finding.onset_s is not None:
-                    ax.axvline(finding.onset_s, color=MEASURED, linewidth=0.9, linestyle="--")
+                for name, time in finding.ends:
+                    ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--" if name == "onset" else ":")
             ax.axhline(0.0, color="#888888", linewidth=0.7)
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")

@@ -142,7 +142,7 @@ def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
     if drawn and diagnosis_figures.compared(finding):
         what = finding.labels.get("regressor", "") if "regressor" in finding.evidence else ""
         against = what.partition(" [")[0] or "what the finding adds"
-        since = "" if finding.onset_s is None else " from its onset on"
+        since = " while it acts" if finding.ends else ""
         shown.append(
             {
                 "file": f"{file}-evidence",

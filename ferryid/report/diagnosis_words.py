@@ -116,8 +116,9 @@ def estimate(one: Estimate) -> str:
 
 def where(finding: Finding) -> str:
     """Return since when a finding acts, and where it shows."""
-    if finding.onset_s is not None and len(finding.intervals) < 2:
-        told = f"It began at {finding.onset_s:.0f} s"
+    if finding.ends and len(finding.intervals) < 2:
+        did = {"onset": "began", "offset": "ended"}
+        told = f"It {listed([f'{did[name]} at {time:.0f} s' for name, time in finding.ends])}"
     elif len(finding.intervals) > 1:
         spans = [f"{first:.0f} to {last:.0f} s" for first, last in finding.intervals[:SPANS]]
         more = " and later" if len(finding.intervals) > SPANS else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Any
 
 from ferryid.effects import effects
@@ -113,6 +114,8 @@ def _tables(stored: StoredEffect, sha256: str) -> dict[str, Any]:
     values = stored.values
     if effects()[stored.effect].onset:
         values["onset"] = stored.onset_in(sha256)
+        if isfinite(offset := stored.offset_in(sha256)):
+            values["offset"] = offset
     return effects()[stored.effect].scenario(values, stored.instance)
 
 

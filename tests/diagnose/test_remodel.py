@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -85,14 +86,19 @@ def finding(suspect: Suspect, probability: float) -> Finding:
 
 
 def taught(
-    log: str, *names: str, onset_s: float = 0.0, told_s: float | None = None, doubtful: str = ""
+    log: str,
+    *names: str,
+    onset_s: float = 0.0,
+    told_s: float | None = None,
+    offset_s: float = inf,
+    doubtful: str = "",
 ) -> tuple[Learnt, Trial]:
     """Fit effects to a log whose presence is known, so that nothing here depends on a search."""
     trial, survey = trial_on(log)
     suspects = [
         Suspect(
             effects()[name], effects()[name].instances(FERRY)[-1], effects()[name].parameters_of(FERRY),
-            onset_s if effects()[name].onset else 0.0,
+            onset_s if effects()[name].onset else 0.0, offset_s if effects()[name].onset else inf,
         )
         for name in names
     ]  # fmt: skip
@@ -198,6 +204,22 @@ def test_a_fault_that_began_in_one_log_lasts_in_the_next(folder: Path) -> None:
         ratio = judged(made, log, folder / "out")["logs"][0]["per_axis"]
         assert ratio["yaw"] < 0.3
         assert max(ratio["surge"], ratio["sway"]) < 0.8
+
+
+def test_a_fault_that_passed_in_one_log_is_not_in_the_next(folder: Path) -> None:
+    log = sailed(folder, "passed", TWELVE, 4, f"{BROKEN}from_s = 300\nuntil_s = 500\n")
+    found, trial = taught(log, "thruster_gain", onset_s=300.0, offset_s=500.0)
+    assert found.vessel == ()
+    (stored,) = found.conditions
+    assert (stored.effect, stored.offset_in(str(found.training["sha256"]))) == ("thruster_gain", 500.0)
+    made, _ = remodelled(told(found), FERRY, None, "ferry")
+    assert made is not None
+    assert not made.accepted, "nothing of it holds for the vessel"
+    here, there = (plain_picture(trial.plain.scene, FERRY, made, sha)[0] for sha in (found.training["sha256"], "other"))
+    t = trial.plain.scene.t
+    weak = np.any(here.parts != there.parts, axis=(1, 2))
+    assert weak.any()
+    assert ((t[weak] >= 300.0) & (t[weak] < 500.0)).all()
 
 
 def test_the_model_moves_as_the_picture_that_was_fitted(model: Model, fouled: str) -> None:

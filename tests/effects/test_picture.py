@@ -16,7 +16,7 @@ from ferryid.effects.picture import (
     Scene,
     acceleration,
     as_measured,
-    from_onset,
+    between,
     hull_of,
     required_force,
 )
@@ -79,11 +79,25 @@ def test_the_force_is_that_of_inverse_dynamics() -> None:
 def test_what_begins_later_changes_nothing_before() -> None:
     one = picture(flow=False, load=False, damped=False)
     after = effects()["payload"].apply(one, np.array([300.0, 0.5]), None)
-    late = from_onset(one, after, 4.0)
+    late = between(one, after, 4.0)
     rows = one.scene.t >= 4.0
     assert 0 < rows.sum() < N
     np.testing.assert_array_equal(acceleration(late)[~rows], acceleration(one)[~rows])
     np.testing.assert_array_equal(acceleration(late)[rows], acceleration(after)[rows])
+
+
+def test_what_ends_changes_nothing_afterwards_and_leaves_the_vessel_as_fast_as_it_is() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    payload, p = effects()["payload"], np.array([300.0, 0.5])
+    t = one.scene.t
+    for onset_s, offset_s in ((0.0, float(t[20])), (float(t[5]), float(t[20]))):
+        seen = acceleration(payload.act(one, p, None, onset_s, offset_s))
+        aboard = (t >= onset_s) & (t < offset_s)
+        assert aboard.sum() == (20 if onset_s == 0.0 else 15)
+        np.testing.assert_array_equal(seen[~aboard], acceleration(one)[~aboard])
+        steady = aboard & (t != onset_s) if onset_s > 0.0 else aboard
+        np.testing.assert_array_equal(seen[steady], acceleration(payload.apply(one, p, None))[steady])
+        assert (seen[5] != acceleration(payload.apply(one, p, None))[5]).any() == (onset_s > 0.0), "the kick"
 
 
 @pytest.mark.parametrize("name", COEFFICIENTS)
@@ -155,8 +169,8 @@ def test_a_load_that_lay_still_takes_its_share_of_the_momentum() -> None:
     assert payload.kick is not None
     onset_s = float(before.scene.t[row])
     after = payload.apply(before, p, None)
-    kicked = from_onset(before, after, onset_s, payload.kick(before, p))
-    change = (acceleration(kicked) - acceleration(from_onset(before, after, onset_s))) * before.scene.step_s
+    kicked = between(before, after, onset_s, kick=payload.kick(before, p))
+    change = (acceleration(kicked) - acceleration(between(before, after, onset_s))) * before.scene.step_s
     nu = before.scene.nu[row]
     own = FERRY.hull.M
     load = np.array([[300.0, 0.0, 0.0], [0.0, 300.0, 240.0], [0.0, 240.0, 192.0]])

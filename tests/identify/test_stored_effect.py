@@ -121,6 +121,11 @@ def test_a_model_of_a_fit_has_no_key_more() -> None:
         (lambda data: data["vessel_effects"][1]["parameters"].pop("factor"), "takes the parameters factor"),
         (lambda data: data["vessel_effects"][1].update(found_in=[]), "found in no log"),
         (lambda data: data["vessel_effects"][1]["found_in"][0].update(onset_s="late"), "onset_s is no number"),
+        (lambda data: data["vessel_effects"][1]["found_in"][0].update(offset_s=900.0), "thruster_gain is no property"),
+        (
+            lambda data: data["conditions"][0].update(effects=data["vessel_effects"][1:]),
+            "thruster_gain is no condition of a log",
+        ),
         (lambda data: data["conditions"][0]["effects"][0]["parameters"]["north"].update(unit="kn"), "wind takes"),
         (lambda data: data["conditions"][0].pop("sha256"), "sha256"),
         (lambda data: data.update(conditions={}), "no list"),
@@ -173,6 +178,21 @@ def test_the_vessels_own_effects_alter_the_hull_that_a_controller_needs() -> Non
     force = acting_estimator(model)(0.0 * nu, nu, np.zeros(1), None, None)
     clean = estimator(model)(0.0 * nu, nu, np.zeros(1), None, None)
     assert force[0, 0] - clean[0, 0] == pytest.approx(-0.8 * hull_of(FERRY)[k])
+
+
+def test_a_fault_that_passed_is_a_condition_of_its_log(tmp_path: Path) -> None:
+    passed = replace(BROKEN, sources=(replace(BROKEN.sources[0], offset_s=900.0),))
+    model = replace(diagnosed(), vessel_effects=(FOULED,), conditions=(Conditions("trial", HERE, (WINDY, passed)),))
+    path = save(model, tmp_path).path
+    again = load_file(path)
+    assert again.conditions == model.conditions
+    assert again.conditions[0].effects[1].offset_in(HERE) == 900.0
+    assert again.conditions_of("cd" * 32) == ()
+    # A file of before effects could end has no such key.
+    data = json.loads(path.read_text(encoding="utf-8"))
+    del data["conditions"][0]["effects"][0]["found_in"][0]["offset_s"]
+    path.write_text(json.dumps(data), encoding="utf-8")
+    assert load_file(path).conditions == model.conditions
 
 
 def test_what_began_in_one_log_lasts_in_the_others() -> None:

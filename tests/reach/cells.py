@@ -26,6 +26,8 @@ UNSTEADY = ("gusts", "waves")
 """Effects that pairs leave out: they are what is laid over a concealed effect."""
 NEEDS = {"gusts": ("wind",)}
 """What has to be there for an effect to act on: gusts about a calm push with the square of their speed only."""
+SPANS = {"later": "from the middle", "until": "until the middle", "while": "for a part of the trial"}
+"""When an effect acts that can begin and end, and the same for people."""
 NOT_BOTH = (frozenset({"time_delay", "thruster_lag"}),)
 """Pairs that no log of these paths can tell apart."""
 
@@ -88,20 +90,21 @@ def _of_place(place: Place) -> list[Cell]:
             "single",
             place.name,
             effect.title,
-            partial(_effects, place, name, "single", [*NEEDS.get(name, ()), name], 0),
+            partial(_effects, place, name, "single", [*NEEDS.get(name, ()), name], ""),
         )
         for name, effect in effects().items()
     ]
     onsets = [
         Cell(
-            f"{name} later",
+            f"{name} {span}",
             "onset",
             place.name,
-            f"{effect.title}, from the middle",
-            partial(_effects, place, f"{name} later", "onset", [name], 1),
+            f"{effect.title}, {words}",
+            partial(_effects, place, f"{name} {span}", "onset", [name], span),
         )
         for name, effect in effects().items()
-        if effect.onset
+        for span, words in SPANS.items()
+        if effect.onset and (usual or span == "later")
     ]
     if not usual:
         return [*clean, *singles, *onsets]
@@ -152,12 +155,12 @@ def _gaps(place: Place, number: int, rng: np.random.Generator) -> Draw:
 
 
 def _effects(
-    place: Place, cell: str, kind: str, names: Sequence[str], late: int, number: int, rng: np.random.Generator
+    place: Place, cell: str, kind: str, names: Sequence[str], span: str, number: int, rng: np.random.Generator
 ) -> Draw | None:
-    """Return a trial with effects, of which the first `late` begin in the middle."""
+    """Return a trial with effects, all of which act in a span of `SPANS`, or all along where that is empty."""
     truths, tables = [], {}
-    for index, name in enumerate(names):
-        made = drawn(effects()[name], place, rng, late=index < late)
+    for name in names:
+        made = drawn(effects()[name], place, rng, span=span)
         if made is None:
             return None
         truths.append(made[0])
@@ -171,7 +174,7 @@ def _several(place: Place, kind: str, count: int, number: int, rng: np.random.Ge
         chosen = [names[k] for k in rng.choice(len(names), count, replace=False)]
         if any(both <= set(chosen) for both in NOT_BOTH):
             continue
-        made = _effects(place, kind, kind, chosen, 0, number, rng)
+        made = _effects(place, kind, kind, chosen, "", number, rng)
         if made is None:
             continue
         try:
@@ -186,7 +189,7 @@ def _weather(place: Place, cell: str, sea: bool, number: int, rng: np.random.Gen
     names = [name for name in effects() if name not in UNSTEADY]
     made = None
     while made is None:
-        made = _effects(place, cell, "concealed", [names[int(rng.integers(len(names)))]], 0, number, rng)
+        made = _effects(place, cell, "concealed", [names[int(rng.integers(len(names)))]], "", number, rng)
     wind = {"gust_std_mps": 0.6 if sea else 1.0, "gust_time_s": 8.0}
     waves = {
         "significant_height_m": 0.1,

@@ -11,7 +11,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.errors import FerryIdError
-from tests.reach.places import Place
+from tests.reach.places import Place, stretch
 
 USUAL = (0.7, 1.5)
 """How far a parameter is from neutral, in its `size`, where nothing else is said: of either sign, where both are possible."""
@@ -35,18 +35,21 @@ GROWN = ("fouling",)
 FEW = {"hull_parameters": 2}
 """Effects of so many parameters that only some of them, drawn at random, are off."""
 MIDDLE = (0.3, 0.7)
-"""When an effect begins that does not act all along, as a share of the trial."""
+"""When an effect begins or ends that does not act all along, as a share of the trial."""
+PART = (0.2, 0.4)
+"""For how long one acts that does both, as a share of the trial."""
 TRIES = 40
 
 
 @dataclass(frozen=True)
 class Truth:
-    """An effect that is in the log: its parameters by name, and its onset [s], None where it acts all along."""
+    """An effect that is in the log: its parameters by name, and its onset and offset [s], None where it has none."""
 
     effect: str
     instance: str | None
     values: Mapping[str, float]
     onset_s: float | None = None
+    offset_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ def groups(parameters: Sequence[Parameter]) -> list[tuple[str, ...]]:
 
 
 def drawn(
-    effect: Effect, place: Place, rng: np.random.Generator, *, late: bool = False
+    effect: Effect, place: Place, rng: np.random.Generator, *, span: str = ""
 ) -> tuple[Truth, dict[str, Any]] | None:
     """Return an effect of moderate size and the tables that conceal it; None where the place cannot have it.
 
@@ -114,8 +117,8 @@ def drawn(
         Where.
     rng
         Draws size, sign, direction and instance.
-    late
-        True: it begins in the middle of the trial.
+    span
+        ``later``: it begins in the middle of the trial; ``until``: it ends there; ``while``: it acts for a part of it.
     """
     profile = place.profile
     if effect.id in place.without:
@@ -127,17 +130,24 @@ def drawn(
     for _ in range(TRIES):
         instance = instances[int(rng.integers(len(instances)))]
         values = _values(effect, parameters, place, rng)
-        onset_s = round(float(rng.uniform(*MIDDLE)) * place.duration_s, 1) if late else None
+        times = _times(place, rng, span)
         if any(not one.low <= values[one.name] <= one.high for one in parameters):
             continue
-        told = values if onset_s is None else {**values, "onset": onset_s}
-        tables = effect.scenario(told, instance)
+        tables = effect.scenario({**values, **times}, instance)
         try:
             place.scenario(tables)
         except FerryIdError:
             continue
-        return Truth(effect.id, instance, values, onset_s), tables
+        return Truth(effect.id, instance, values, times.get("onset"), times.get("offset")), tables
     return None
+
+
+def _times(place: Place, rng: np.random.Generator, span: str) -> dict[str, float]:
+    if span == "while":
+        first, last = stretch(place, rng, *PART)
+        return {"onset": first, "offset": last}
+    end = {"later": "onset", "until": "offset"}
+    return {end[span]: round(float(rng.uniform(*MIDDLE)) * place.duration_s, 1)} if span else {}
 
 
 def _values(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.vessel.profile import Actuator, Profile
-from tests.reach.places import Place
+from tests.reach.places import Place, stretch
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,6 @@ def _direction(rng: np.random.Generator, low: float, high: float) -> tuple[float
     return round(length * cos(angle), 3), round(length * sin(angle), 3)
 
 
-def _stretch(place: Place, rng: np.random.Generator, low: float, high: float) -> tuple[float, float]:
-    """Return the first and last second of a stretch whose share of the trial lies between two limits."""
-    seconds = rng.uniform(low, high) * place.duration_s
-    first = rng.uniform(0.15 * place.duration_s, 0.85 * place.duration_s - seconds)
-    return round(float(first), 1), round(float(first + seconds), 1)
-
-
 def turning_current(place: Place, rng: np.random.Generator) -> dict[str, Any]:
     """Return a current that turns right round."""
     north, east = _direction(rng, 0.1, 0.2)
@@ -66,7 +59,7 @@ def turning_current(place: Place, rng: np.random.Generator) -> dict[str, Any]:
 def squall(place: Place, rng: np.random.Generator) -> dict[str, Any]:
     """Return a wind that comes and goes within minutes."""
     north, east = _direction(rng, 3.0, 5.0)
-    first, last = _stretch(place, rng, 0.12, 0.25)
+    first, last = stretch(place, rng, 0.12, 0.25)
     rows = [(0.0, 0.0), (first, 0.0), (first + 15.0, 1.0), (last - 15.0, 1.0), (last, 0.0)]
     text = "time,north,east\n" + "".join(f"{t:.1f},{share * north:.3f},{share * east:.3f}\n" for t, share in rows)
     return {"environment": {"wind": {"series": "wind.csv"}}, "csv": text}
@@ -98,24 +91,9 @@ def boat_wakes(place: Place, rng: np.random.Generator) -> dict[str, Any]:
     return {"environment": {"wakes": wakes}}
 
 
-def passing_fault(place: Place, rng: np.random.Generator) -> dict[str, Any]:
-    """Return a thruster that is weak for some minutes."""
-    first, last = _stretch(place, rng, 0.15, 0.3)
-    names = [actuator.name for actuator in place.profile.actuators]
-    fault = {"thruster": names[int(rng.integers(len(names)))], "factor": round(float(rng.uniform(0.4, 0.7)), 3)}
-    return {"thrusters": {"faults": [{**fault, "from_s": first, "until_s": last}]}}
-
-
-def passengers_leave(place: Place, rng: np.random.Generator) -> dict[str, Any]:
-    """Return a load that is aboard in the first part of the trial only."""
-    mass = round(float(rng.uniform(0.12, 0.25)) * place.profile.hull.mass_kg, 1)
-    until = round(float(rng.uniform(0.4, 0.7)) * place.duration_s, 1)
-    return {"payload": [{"mass_kg": mass, "x_m": round(float(rng.uniform(-1.0, 1.0)), 2), "until_s": until}]}
-
-
 def moored_for_a_while(place: Place, rng: np.random.Generator) -> dict[str, Any]:
     """Return a spring that holds the vessel for some minutes."""
-    first, last = _stretch(place, rng, 0.2, 0.35)
+    first, last = stretch(place, rng, 0.2, 0.35)
     stiff = 0.004 * place.profile.hull.mass_kg
     north, east = _direction(rng, 5.0, 15.0)
     spring = {"north_m": north, "east_m": east, "from_s": first, "until_s": last}
@@ -171,8 +149,6 @@ OUTSIDE = (
     Outside("turning current", "a current that turns right round", turning_current, ("current",)),
     Outside("squall", "a wind of a few minutes", squall, ("wind", "gusts")),
     Outside("veering wind", "a wind that turns by half a circle", veering_wind, ("wind", "gusts")),
-    Outside("passing fault", "a thruster weak for a few minutes", passing_fault, ("thruster_gain",)),
-    Outside("passengers leave", "a load that leaves in the middle", passengers_leave, ("payload",)),
     Outside("moored for a while", "a mooring of a few minutes", moored_for_a_while, ("mooring",)),
     Outside(
         "no cross damping",

@@ -128,6 +128,13 @@ def hull_errors(rng: np.random.Generator) -> dict[str, float]:
     return {name: round(1.0 + HULL_ERROR * sign, 6) for name, sign in zip(HULL, signs, strict=True)}
 
 
+def stretch(place: Place, rng: np.random.Generator, low: float, high: float) -> tuple[float, float]:
+    """Return the first and last second of a stretch whose share of the trial lies between two limits."""
+    seconds = rng.uniform(low, high) * place.duration_s
+    first = rng.uniform(0.15 * place.duration_s, 0.85 * place.duration_s - seconds)
+    return round(float(first), 1), round(float(first + seconds), 1)
+
+
 def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
     """Return two nested tables as one: lists are joined, factors on the true hull multiplied."""
     result = dict(one)

@@ -47,7 +47,7 @@ def run(draw: Draw) -> dict[str, Any]:
                 key: one[key]
                 for key in ("effect", "instance", "probability", "parameters", "improvement", "unresolved_with")
             }
-            | {"onset": one["where"]["onset"], "rivals": one["rivals"][:2]}
+            | {"onset": one["where"]["onset"], "offset": one["where"]["offset"], "rivals": one["rivals"][:2]}
             for one in told["findings"]
         ],
         "notes": told["notes"],

@@ -72,7 +72,7 @@ class Score:
     reaches
         How far the truth is from each parameter that was found, in parts of the way to the end of its 95 % interval there.
     onsets_s
-        Errors of onsets [s], infinite where none was found.
+        Errors of onsets and offsets [s], infinite where none was found.
     onset_held
         Onsets whose 95 % interval holds the truth.
     seconds
@@ -158,10 +158,13 @@ def score(lines: Iterable[Line]) -> Score:
             errors += more
             widths += wide
             reaches += apart
-            if truth["onset_s"] is not None:
-                onsets.append(abs(told["onset"] - truth["onset_s"]) if told["onset"] is not None else float("inf"))
-                interval = told["parameters"].get("onset")
-                onset_held.append(interval is not None and interval["low"] <= truth["onset_s"] <= interval["high"])
+            for end in ("onset", "offset"):
+                when = truth.get(f"{end}_s")
+                if when is None:
+                    continue
+                onsets.append(abs(told[end] - when) if told[end] is not None else float("inf"))
+                interval = told["parameters"].get(end)
+                onset_held.append(interval is not None and interval["low"] <= when <= interval["high"])
     n = len(lines)
     return Score(
         n,

@@ -236,6 +236,9 @@ def test_a_finding_is_told_in_numbers() -> None:
         "It acts throughout, and shows in sway (60 %), yaw (30 %) and surge (10 %); clearest at headings 150-210 deg."
     )
     assert where(gain()) == "It began at 312 s, and shows in surge (70 %) and yaw (26 %)."
+    passed = replace(gain(), offset_s=500.0, intervals=((312.0, 500.0),))
+    assert where(passed).startswith("It began at 312 s and ended at 500 s, and shows")
+    assert where(replace(passed, onset_s=None)).startswith("It ended at 500 s, and shows")
     assert trust(wind()) == (
         "Probability above 0.99. With it, the squared force error on data that it was not fitted to falls by 41 % in surge, "
         "90 % in sway and 95 % in yaw."
@@ -353,6 +356,9 @@ def test_figures_carry_units_and_only_what_there_is() -> None:
     assert "heading [deg]" in drawings["finding-1-evidence"]
     assert ">onset</text>" in drawings["finding-2-time"]
     assert ">onset</text>" not in drawings["finding-1-time"]
+    passed = replace(diagnosis("explained"), findings=(replace(gain(), offset_s=500.0),))
+    assert ">offset</text>" in render((passed,), "trial")[1]["finding-1-time"]
+    assert ">offset</text>" not in drawings["finding-2-time"]
     bare = replace(diagnosis("explained"), findings=(replace(wind(), evidence={}, labels={}),), evidence={})
     assert set(render((bare,), "trial")[1]) == {"free-run-errors"}
     assert render((diagnosis("explained"),), "trial") == explained()

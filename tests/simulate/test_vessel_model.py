@@ -84,6 +84,12 @@ def test_the_conditions_of_a_log_prevail_when_asked_for() -> None:
     assert (held.wind.north_mps, held.wind.east_mps) == (-4.0, 3.0)
     assert (held.payload[0].mass_kg, held.payload[0].from_s) == (200.0, 20.0)
     assert held.thrusters.faults[0].from_s == 30.0
+    left = replace(aboard, sources=(replace(aboard.sources[0], offset_s=45.0),))
+    gone = sailed_by(
+        parse_scenario(TRIAL, "t"), replace(model, conditions=(Conditions("trial", HERE, (left,)),)), "trial"
+    )
+    assert (gone.scenario.payload[0].from_s, gone.scenario.payload[0].until_s) == (20.0, 45.0)
+    assert held.payload[0].until_s > held.duration_s
     with pytest.raises(FerryIdError, match=r'conditions of "trail" are not in the model.*Did you mean "trial"'):
         sailed_by(parse_scenario(TRIAL, "t"), model, "trail")
     twice = replace(model, conditions=(Conditions("trial", HERE, (WINDY, WINDY)),))

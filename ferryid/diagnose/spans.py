@@ -1,0 +1,182 @@
+"""When an effect acts: all beginnings and ends at once, in one linearisation, and the best of them sharpened by fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil, inf, log
+
+import numpy as np
+
+from ferryid.diagnose.hypothesis import MOVED, Fit, Near, Suspect, Trial, effect_slopes, fit, imagined, near
+from ferryid.effects.picture import Picture, as_measured
+from ferryid.vessel.profile import Floats
+
+FEWEST_PARTS, LONGEST_S = 24, 60.0
+"""Parts into which a log is cut at least, and how long one may be [s]: an effect begins and ends between two of them."""
+PROMISING = 3
+"""Spans that are handed on to be fitted."""
+NEARBY_S, FINEST_S = 8.0, 0.2
+"""Steps [s] with which a time is searched for nearby, from the first down to the last."""
+GLANCE = 3
+"""Steps of a fit by which spans are compared."""
+
+
+def price(trial: Trial, suspect: Suspect) -> float:
+    """Return the logarithm of how many spans a suspect's was chosen from."""
+    return len(suspect.times) * log(len(trial.windows.starts))
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A fit, linearised.
+
+    Attributes
+    ----------
+    picture
+        That the fit has of the log.
+    left
+        What it leaves, whitened, shape (w,).
+    slopes
+        Its derivatives by hull and effects, shape (w, k).
+    inverse
+        Of their cross-products and the prior, shape (k, k).
+    """
+
+    picture: Picture
+    left: Floats
+    slopes: Floats
+    inverse: Floats
+
+
+def ground_of(trial: Trial, made: Fit, begin: Near) -> Ground:
+    """Return a fit linearised; `begin` is `ferryid.diagnose.hypothesis.near` of it."""
+    picture = imagined(trial.plain, made)
+    slopes = np.column_stack([begin.by_hull, effect_slopes(trial, made)])
+    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
+    return Ground(picture, trial.white(picture), slopes, np.asarray(inverse, dtype=np.float64))
+
+
+def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
+    """Return a suspect in the few spans, other than the whole log, in which it promises most beside a fit.
+
+    The log is cut into parts; what a suspect adds in a part is linear in its parameters there, and what it adds in a span is
+    the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
+    """
+    edges = _edges(trial)
+    parts = len(edges) - 1
+    G, g = _cross_products(trial, ground, suspect, edges)
+    a, b = np.triu_indices(parts + 1, 1)
+    whole = (a == 0) & (b == parts)
+    a, b = a[~whole], b[~whole]
+    gain = _gains(G, g, a, b, suspect)
+    gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(trial.windows.starts))
+    found: list[tuple[int, int]] = []
+    for k in np.argsort(-gain).tolist():
+        if gain[k] <= 0.0 or len(found) == PROMISING:
+            break
+        # A neighbour tells nothing new.
+        if all(max(abs(int(a[k]) - i), abs(int(b[k]) - j)) > 1 for i, j in found):
+            found.append((int(a[k]), int(b[k])))
+    return [
+        replace(suspect, onset_s=float(edges[i]) if i > 0 else 0.0, offset_s=float(edges[j]) if j < parts else inf)
+        for i, j in found
+    ]
+
+
+def part_s(trial: Trial) -> float:
+    """Return how long a part of the log is [s]."""
+    edges = _edges(trial)
+    return float(edges[1] - edges[0])
+
+
+def _edges(trial: Trial) -> Floats:
+    times = trial.windows.middle_s
+    first, last = float(times[0]), float(times[-1])
+    return np.linspace(first, last, 1 + max(FEWEST_PARTS, ceil((last - first) / LONGEST_S)))
+
+
+def _cross_products(trial: Trial, ground: Ground, suspect: Suspect, edges: Floats) -> tuple[Floats, Floats]:
+    """Return cross-products of what a suspect adds in every part, shape (parts, p, parts, p), and of it with what is left."""
+    steps, start = trial.steps, suspect.start
+    part = np.clip(np.searchsorted(edges, steps.middle_s, side="right") - 1, 0, len(edges) - 2)
+    own = part[:, None, None] == np.arange(len(edges) - 1)
+    there = as_measured(suspect.effect.apply(ground.picture, start, suspect.instance))
+    columns = []
+    for k, one in enumerate(suspect.parameters):
+        moved = start.copy()
+        moved[k] += MOVED * one.size
+        change = as_measured(suspect.effect.apply(ground.picture, moved, suspect.instance)) - there
+        columns.append(steps.mean(steps.along(change))[:, :, None] / MOVED * own)
+    p = len(columns)
+    C = trial.sieve.white(np.stack(columns, axis=3).reshape(len(steps.starts), -1, (len(edges) - 1) * p))
+    shared = ground.slopes.T @ C
+    G = C.T @ C - shared.T @ ground.inverse @ shared
+    return G.reshape(len(edges) - 1, p, len(edges) - 1, p), (C.T @ ground.left).reshape(-1, p)
+
+
+def _gains(G: Floats, g: Floats, a: Floats, b: Floats, suspect: Suspect) -> Floats:
+    """Return the gain in evidence of a suspect in the parts from a up to b, shape (spans,)."""
+    parts, p = g.shape
+    sums = np.zeros((parts + 1, p, parts + 1, p))
+    sums[1:, :, 1:] = G.cumsum(axis=0).cumsum(axis=2)
+    A = sums[b, :, b] - sums[a, :, b] - sums[b, :, a] + sums[a, :, a] + np.eye(p)
+    total = np.concatenate([np.zeros((1, p)), g.cumsum(axis=0)])
+    slope = total[b] - total[a]
+    low, high = (
+        np.array([(end - one.neutral) / one.size for one, end in zip(suspect.parameters, ends, strict=True)])
+        for ends in ([one.low for one in suspect.parameters], [one.high for one in suspect.parameters])
+    )
+    z = np.clip(-np.linalg.solve(A, slope[:, :, None])[:, :, 0], low, high)
+    gained = -np.sum(slope * z, axis=1) - 0.5 * np.einsum("si,sij,sj->s", z, A, z)
+    return np.asarray(gained - 0.5 * np.linalg.slogdet(A)[1])
+
+
+def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, finest_s: float = FINEST_S) -> Fit:
+    """Return a fit with the ends of one suspect's span where they are likeliest nearby.
+
+    Parameters
+    ----------
+    trial
+        The log.
+    made
+        Fit of it.
+    index
+        Of the suspect.
+    begin
+        Where each fit begins.
+    step_s, finest_s
+        First step [s], which is halved where neither side is better, and the one to stop at.
+    """
+    times = trial.windows.middle_s
+    best, step = made, step_s
+    while step > finest_s:
+        before = best.suspects[index]
+        for end in before.times:
+            middle = getattr(best.suspects[index], end)
+            for time in (middle - step, middle + step):
+                moved = best.suspects[index].moved(end, time)
+                within = max(moved.onset_s, float(times[0])) + finest_s < min(moved.offset_s, float(times[-1]))
+                if not within or not times[0] < time < times[-1]:
+                    continue
+                tried = fit(trial, swapped(best.suspects, index, moved), best.values, steps=GLANCE, begin=begin)
+                best = max(best, tried, key=lambda one: one.evidence)
+        step *= 0.5 if best.suspects[index] == before else 1.0
+    return best
+
+
+def timed(trial: Trial, made: Fit) -> Fit:
+    """Return a fit with every span where it is likeliest nearby: noise that is less now may show it better."""
+    for i, suspect in enumerate(made.suspects):
+        if not suspect.times:
+            continue
+        begin = near(trial, made)
+        at = fit(trial, made.suspects, made.values, steps=GLANCE, begin=begin)
+        best = sharpened(trial, at, i, begin, NEARBY_S)
+        made = fit(trial, best.suspects, best.values, begin=begin)
+    return made
+
+
+def swapped(suspects: Sequence[Suspect], index: int, other: Suspect) -> list[Suspect]:
+    """Return the suspects with another in the place of one."""
+    return [other if k == index else one for k, one in enumerate(suspects)]

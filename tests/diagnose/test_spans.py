@@ -1,0 +1,112 @@
+"""When an effect acts: the scan finds the span of a push that can be worked out, and searches find what ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.hypothesis import Suspect, Trial, fit, near
+from ferryid.diagnose.search import search, suspects_of
+from ferryid.diagnose.spans import ground_of, part_s, price, promising, sharpened
+from tests.diagnose.test_hypothesis import PUSH, trial
+from tests.diagnose.trials import sailed, trial_on
+
+TWELVE = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "twelve-corner" }
+controller = { delta = 0.7, sigma = 0.7 }
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+"""
+
+
+def pushed(force: float, first_s: float, last_s: float) -> Trial:
+    """The trial of a vessel at rest that a force was said to push, but for some time only."""
+    case = trial(force)
+    t = case.plain.scene.t
+    missing = (t < first_s) | (t >= last_s)
+    away = case.plain.external + np.array([force, 0.0, 0.0]) * missing[:, None]
+    # What is not there pushes the other way in the picture: measured and pictured differ within the span only.
+    return replace(case, plain=replace(case.plain, external=away))
+
+
+@pytest.mark.parametrize(("first_s", "last_s"), [(0.0, inf), (100.0, inf), (0.0, 180.0), (90.0, 170.0)])
+def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: float) -> None:
+    case = pushed(240.0, first_s, last_s)
+    bare = fit(case, ())
+    begin = near(case, bare)
+    whole = fit(case, [PUSH]).evidence
+    spans = promising(case, ground_of(case, bare, begin), PUSH)
+    gains = [fit(case, [one]).evidence - price(case, one) - whole for one in spans]
+    if (first_s, last_s) == (0.0, inf):
+        assert max(gains, default=-1.0) < 0.0
+        return
+    best, wide = spans[0], part_s(case)
+    assert gains[0] == max(gains)
+    assert gains[0] > 0.0
+    assert best.onset_s == pytest.approx(first_s, abs=wide)
+    assert best.offset_s == pytest.approx(last_s, abs=wide)
+    sharp = sharpened(case, fit(case, [best]), 0, begin, 0.5 * wide).suspects[0]
+    # It is some ten times as strong as what else pushes, which forgets itself in 8 s.
+    assert sharp.onset_s == pytest.approx(first_s, abs=2.0)
+    assert sharp.offset_s == pytest.approx(last_s, abs=2.0)
+
+
+def test_where_nothing_pushes_no_span_is_promising() -> None:
+    case = trial(0.0)
+    bare = fit(case, ())
+    assert promising(case, ground_of(case, bare, near(case, bare)), PUSH) == []
+
+
+def test_the_gain_of_a_span_is_that_of_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+
+    def spy(gains: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+        def told(G: np.ndarray, g: np.ndarray, a: np.ndarray, b: np.ndarray, suspect: Suspect) -> np.ndarray:
+            found = gains(G, g, a, b, suspect)
+            seen.append((a, b, found.copy()))
+            return found
+
+        return told
+
+    from ferryid.diagnose import spans as module
+
+    monkeypatch.setattr(module, "_gains", spy(module._gains))
+    case = pushed(20.0, 90.0, 170.0)
+    bare = fit(case, ())
+    promising(case, ground_of(case, bare, near(case, bare)), PUSH)
+    a, b, gains = seen[0]
+    edges = case.windows.middle_s[0] + part_s(case) * np.arange(b.max() + 1)
+    for k in range(0, len(a), 29):
+        span = replace(PUSH, onset_s=edges[a[k]] if a[k] else 0.0, offset_s=edges[b[k]] if b[k] < b.max() else inf)
+        # The push is linear, so that the two differ by the step that an edge lies in alone.
+        exact = fit(case, [span]).evidence - bare.evidence
+        assert gains[k] == pytest.approx(exact, abs=0.1 + 0.15 * abs(exact))
+
+
+def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None:
+    load = "[[payload]]\nmass_kg = 300\nx_m = 0.6\nuntil_s = 400\n"
+    case = trial_on(sailed(tmp_path, "leaves", TWELVE + load, 5))
+    known = [one for one in suspects_of(case.plain.scene)[0] if one.effect.onset]
+    found = search(case, lambda stage: None, known=known).fit
+    assert [one.key for one in found.suspects] == [("payload", None)]
+    (one,) = found.suspects
+    assert one.onset_s == 0.0
+    assert one.offset_s == pytest.approx(400.0, abs=5.0)
+    assert found.values[0] == pytest.approx([300.0, 0.6], rel=0.1)
+
+
+def test_a_fault_that_passes_is_found_with_both_its_ends(tmp_path: Path) -> None:
+    fault = '[[thrusters.faults]]\nthruster = "thruster2"\nfactor = 0.55\nfrom_s = 260\nuntil_s = 400\n'
+    case = trial_on(sailed(tmp_path, "passes", TWELVE + fault, 6))
+    known = [one for one in suspects_of(case.plain.scene)[0] if one.effect.onset]
+    found = search(case, lambda stage: None, known=known).fit
+    assert [one.key for one in found.suspects] == [("thruster_gain", "thruster2")]
+    (one,) = found.suspects
+    assert (one.onset_s, one.offset_s) == (pytest.approx(260.0, abs=5.0), pytest.approx(400.0, abs=5.0))
+    assert found.values[0] == pytest.approx([0.55], abs=0.03)
