@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 
@@ -97,12 +97,22 @@ def learnt(
             )
             # A fault that passed within the log is no property that others have.
             lasts = suspect.effect.vessel and source.offset_s is None
-            stored.append((lasts, _stored(suspect, kept.values[i], kept.told_errors(i), source)))
+            untold = suspect.effect.untold(trial.plain.scene, kept.values[i])
+            errors = [
+                nan if one.name in untold else error
+                for one, error in zip(suspect.parameters, kept.told_errors(i).tolist(), strict=True)
+            ]
+            stored.append((lasts, _stored(suspect, kept.values[i], errors, source)))
     for state in states:
         suspect = state.suspect
         if suspect.key in told and told[suspect.key].sure:
             source = Source(motion.log, recording.sha256, told[suspect.key].probability)
-            found = {name: Quantity(one.value, one.low, one.high, one.unit) for name, one in state.estimates.items()}
+            found = {
+                name: Quantity(one.value, one.low, one.high, one.unit)
+                if name in told[suspect.key].parameters
+                else Quantity(one.value, nan, nan, one.unit)
+                for name, one in state.estimates.items()
+            }
             stored.append((False, StoredEffect(*suspect.key, found, (source,))))
     rows = motion.valid
     return Learnt(
@@ -124,10 +134,12 @@ def learnt(
     )
 
 
-def _stored(suspect: Suspect, values: Floats, errors: Floats, source: Source) -> StoredEffect:
+def _stored(suspect: Suspect, values: Floats, errors: Sequence[float], source: Source) -> StoredEffect:
+    """Return an effect with its intervals, which are unknown (NaN) where the errors are."""
     parameters = {
+        # With the limit second, what is unknown stays so.
         one.name: Quantity(value, max(value - 1.96 * error, one.low), min(value + 1.96 * error, one.high), one.unit)
-        for one, value, error in zip(suspect.parameters, values.tolist(), errors.tolist(), strict=True)
+        for one, value, error in zip(suspect.parameters, values.tolist(), errors, strict=True)
     }
     return StoredEffect(suspect.effect.id, suspect.instance, parameters, (source,))
 

@@ -97,6 +97,8 @@ class Effect:
         (n, 3). What ends leaves the vessel as fast as it is.
     says
         One sentence on a finding, from its values by name and its instance.
+    in_part
+        True where that sentence can be said of some of the values alone, those that a log tells.
     scenario
         What has to stand in a scenario file for the effect to act, from its values by name: nested tables as in TOML.
     vessel
@@ -137,6 +139,7 @@ class Effect:
     choose: Callable[[Picture, Floats, Residual], Choice] | None = None
     least: float = 0.0
     untold: Callable[[Scene, Floats], frozenset[str]] = lambda scene, p: frozenset()
+    in_part: bool = False
     idle: float = 0.0
     bends_hull: bool = False
     of_sensor: bool = False

@@ -162,5 +162,6 @@ EFFECT = Effect(
     cannot=cannot,
     choose=choose,
     untold=untold,
+    in_part=True,
     bends_hull=True,
 )

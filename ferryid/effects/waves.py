@@ -78,4 +78,4 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     }
 
 
-EFFECT = Effect("waves", "Waves", parameters_of, apply, says, scenario, unsteady=unsteady)
+EFFECT = Effect("waves", "Waves", parameters_of, apply, says, scenario, in_part=True, unsteady=unsteady)

@@ -90,8 +90,12 @@ class StoredEffect:
         return effects()[self.effect].act(picture, p, self.instance, *span)
 
     def says(self) -> str:
-        """Return the effect as a sentence."""
-        return effects()[self.effect].says(self.values, self.instance)
+        """Return the effect as a sentence, without parameters of which no log told anything."""
+        effect = effects()[self.effect]
+        told = {
+            name: one.value for name, one in self.parameters.items() if math.isfinite(one.low) or not effect.in_part
+        }
+        return effect.says(told, self.instance)
 
 
 @dataclass(frozen=True)

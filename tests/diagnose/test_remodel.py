@@ -424,3 +424,12 @@ def test_nothing_is_left_to_find_in_a_log_of_the_model(model: Model, folder: Pat
     assert with_model.learnt is None
     entry = judged(model, str(log), folder / "out")["logs"][0]
     assert entry["per_axis"]["surge"] < 0.9
+
+
+def test_sides_of_a_shallow_place_that_a_log_does_not_tell_have_no_interval(folder: Path) -> None:
+    log = sailed(folder, "shallow", TWELVE, 6, "[environment.shallow]\nnorth_m = [7.5, 60.0]\ndamping_factor = 2.0\n")
+    found, trial = taught(log, "shallow_water")
+    (stored,) = found.conditions
+    untold = effects()["shallow_water"].untold(trial.plain.scene, np.array(list(stored.values.values())))
+    assert untold
+    assert {name for name, one in stored.parameters.items() if not np.isfinite(one.low)} == untold

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from importlib.resources import files
+from math import nan
 from pathlib import Path
 
 import jsonschema
@@ -193,6 +194,21 @@ def test_a_fault_that_passed_is_a_condition_of_its_log(tmp_path: Path) -> None:
     del data["conditions"][0]["effects"][0]["found_in"][0]["offset_s"]
     path.write_text(json.dumps(data), encoding="utf-8")
     assert load_file(path).conditions == model.conditions
+
+
+def test_what_a_log_did_not_tell_is_not_said_of_the_model_either(tmp_path: Path) -> None:
+    sides = {"south": -900.0, "north": 4.0, "west": -900.0, "east": 900.0}
+    known = stored("shallow_water", factor=1.6, **sides)
+    untold = {
+        name: replace(one, low=nan, high=nan) if name in ("south", "west", "east") else one
+        for name, one in known.parameters.items()
+    }
+    shallow = replace(known, parameters=untold)
+    path = save(replace(diagnosed(), conditions=(Conditions("trial", HERE, (shallow,)),)), tmp_path).path
+    again = load_file(path).conditions[0].effects[0]
+    assert again.values == known.values, "it acts with what was fitted"
+    assert again.says() == "Damping is 1.60 times as large up to 4 m north, as over shallow ground."
+    assert "-900" in known.says()
 
 
 def test_what_began_in_one_log_lasts_in_the_others() -> None:
