@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.diagnose.hypothesis import Fit, Near, Suspect, Trial, fit, imagined, near, settled, without
 from ferryid.diagnose.parallel import over
 from ferryid.diagnose.spans import GLANCE, NEARBY_S, Ground, ground_of, part_s, price, promising, sharpened, timed
-from ferryid.diagnose.unsteady import State, disturbed
+from ferryid.diagnose.unsteady import WORTH, State, disturbed
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
@@ -103,21 +103,37 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         suspects = list(known)
     steady = [suspect for suspect in suspects if suspect.effect.unsteady is None]
     shaken = [suspect for suspect in suspects if suspect.effect.unsteady is not None]
-    base, calm = fit(trial, ()), trial.plain
-    trial, chosen, rounds = _selected(trial, base, steady, progress)
-    chosen = pruned(trial, chosen)
+    calm = trial.plain
+    chosen, rounds = fit(trial, ()), list[Round]()
     states: tuple[State, ...] = ()
-    if shaken:
-        progress("looking for gusts and waves")
-        trial, states = disturbed(trial, chosen, shaken, calm)
-    if states:
-        # What stood in for them falls, and what they hid may show.
-        stood = [one.key for one in chosen.suspects]
-        chosen = pruned(trial, fit(trial, chosen.suspects, chosen.values))
-        trial, chosen, more = _selected(trial, chosen, steady, progress)
-        rounds += more
-        if [one.key for one in chosen.suspects] != stood:
-            trial, states = disturbed(trial, chosen, shaken, calm, states)
+    while True:
+        taken = {suspect.key for suspect in chosen.suspects}
+        left = [suspect for suspect in steady if suspect.key not in taken]
+        progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
+        found = _weighed(trial, chosen, left)
+        rounds.append(_round(found))
+        good = [one for one in found if one.gain > ODDS and not _void(trial, one.fit)]
+        best = good[0] if good and len(taken) < MOST else None
+        if best is None:
+            chosen = pruned(trial, chosen)
+        if shaken and not states:
+            progress("looking for gusts and waves")
+            beside, gain = _beside(trial, chosen, found, shaken)
+            # What explains more is taken first.
+            least = max(WORTH, (0.0 if best is None else best.gain) - gain)
+            rough, found_states = disturbed(trial, beside, shaken, calm, least)
+            # What would stand in for them falls, and what they hid may show.
+            kept = pruned(rough, fit(rough, beside.suspects, beside.values)) if found_states else chosen
+            if found_states and _has_what_they_shake(kept, found_states):
+                stood = {one.key for one in beside.suspects}
+                trial, chosen, states = rough, kept, found_states
+                continue
+        if best is None:
+            break
+        trial = trial.with_noise_of(best.fit)
+        chosen = timed(trial, fit(trial, best.fit.suspects, best.fit.values))
+    if states and {one.key for one in chosen.suspects} != stood:
+        trial, states = disturbed(trial, chosen, shaken, calm, near=states)
         chosen = pruned(trial, fit(trial, chosen.suspects, chosen.values))
     return Search(trial, fit(trial, ()), chosen, tuple(rounds), untested, states)
 
@@ -128,29 +144,32 @@ def rejudged(trial: Trial, made: Fit) -> Fit:
     return fit(fair, made.suspects, made.values, begin=near(fair, made))
 
 
-def _selected(
-    trial: Trial, chosen: Fit, suspects: Sequence[Suspect], progress: Callable[[str], None]
-) -> tuple[Trial, Fit, list[Round]]:
-    """Select effects one after the other beside those chosen already."""
-    rounds = []
-    while True:
-        taken = {suspect.key for suspect in chosen.suspects}
-        left = [suspect for suspect in suspects if suspect.key not in taken]
-        progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
-        current = fit(trial, chosen.suspects, chosen.values)
-        begin = near(trial, current)
-        ground = ground_of(trial, current, begin)
-        found = over(partial(_best, trial, current, begin, ground), left)
-        found.sort(key=lambda one: -one.gain)
-        fair = over(partial(_fairly, trial), found[:REJUDGED])
-        found = sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
-        done = _round(found)
-        rounds.append(done)
-        good = [one for one in found if one.gain > ODDS and not _void(trial, one.fit)]
-        if not good or len(taken) == MOST:
-            return trial, chosen, rounds
-        trial = trial.with_noise_of(good[0].fit)
-        chosen = timed(trial, fit(trial, good[0].fit.suspects, good[0].fit.values))
+def _has_what_they_shake(made: Fit, states: Sequence[State]) -> bool:
+    there = {"", *(suspect.effect.id for suspect in made.suspects)}
+    return all(state.suspect.effect.about in there for state in states)
+
+
+def _beside(trial: Trial, chosen: Fit, found: Sequence[Candidate], shaken: Sequence[Suspect]) -> tuple[Fit, float]:
+    """Return the fit beside which disturbances are looked for, and its evidence over what is chosen.
+
+    What one of them comes and goes about, a wind's gusts, hides it and is hidden by it: the two are judged together.
+    """
+    about = {suspect.effect.about for suspect in shaken}
+    for one in found:
+        if one.suspect.effect.id in about:
+            return fit(trial, one.fit.suspects, one.fit.values), one.gain
+    return chosen, 0.0
+
+
+def _weighed(trial: Trial, chosen: Fit, suspects: Sequence[Suspect]) -> list[Candidate]:
+    """Return what each suspect adds to those chosen already, the best first."""
+    current = fit(trial, chosen.suspects, chosen.values)
+    begin = near(trial, current)
+    ground = ground_of(trial, current, begin)
+    found = over(partial(_best, trial, current, begin, ground), suspects)
+    found.sort(key=lambda one: -one.gain)
+    fair = over(partial(_fairly, trial), found[:REJUDGED])
+    return sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
 
 
 def _fairly(trial: Trial, one: Candidate) -> Candidate:

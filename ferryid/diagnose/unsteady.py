@@ -52,7 +52,13 @@ class State:
 
 
 def disturbed(
-    trial: Trial, made: Fit, suspects: Sequence[Suspect], calm: Picture, near: Sequence[State] = ()
+    trial: Trial,
+    made: Fit,
+    suspects: Sequence[Suspect],
+    calm: Picture,
+    least: float = WORTH,
+    *,
+    near: Sequence[State] = (),
 ) -> tuple[Trial, tuple[State, ...]]:
     """Return the trial with the disturbances in its filter that what a fit leaves speaks for, and these.
 
@@ -68,6 +74,8 @@ def disturbed(
         Disturbances that the scene can show.
     calm
         The plain picture without any of them.
+    least
+        Evidence that the first of them must show: what else explains as much is looked at before it.
     near
         What they were beside another fit: where the search begins.
     """
@@ -80,6 +88,7 @@ def disturbed(
     states: list[State] = []
     left = list(suspects)
     while left:
+        worth = WORTH if states else least
         tried = []
         for suspect in left:
             effect = suspect.effect
@@ -94,7 +103,7 @@ def disturbed(
             begin = max(places, key=lambda one: _glance(steps, gaps, noise, processes(one), picture))
             price = 0.5 * len(begin) * log(len(steps.starts))
             told, values, widths, after = learn_with(
-                steps, gaps, noise, processes, begin, picture, best + price + WORTH
+                steps, gaps, noise, processes, begin, picture, best + price + worth
             )
             gain = after - best - price
             if _seen(suspect, values, widths, stride_s(steps)):
@@ -102,7 +111,7 @@ def disturbed(
         if not tried:
             break
         gain, told, state, after = max(tried, key=lambda one: one[0])
-        if gain < WORTH:
+        if gain < worth:
             break
         noise, best = told, after
         states.append(state)

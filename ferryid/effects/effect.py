@@ -120,6 +120,8 @@ class Effect:
     unsteady
         ``unsteady(picture, p)`` returns what comes and goes by chance, from positive parameters; none where the picture has
         nothing for it to act on. Such an effect changes no picture: it is a state of the filter.
+    about
+        Id of the effect about which an unsteady one comes and goes, and beside which it is looked for.
     regressor
         ``regressor(picture, p, instance, axis)`` returns label with unit and values, shape (n,), of the quantity on which the
         force that is left over on that axis gives the effect away: the figure that would convince a sceptic.
@@ -144,6 +146,7 @@ class Effect:
     bends_hull: bool = False
     of_sensor: bool = False
     unsteady: Callable[[Picture, Floats], tuple[Process, ...]] | None = None
+    about: str = ""
     regressor: Callable[[Picture, Floats, str | None, str], tuple[str, Floats]] | None = None
 
     @property
