@@ -41,6 +41,11 @@ class Folds:
     training: tuple[Windows, ...]
 
 
+def block_s(windows: Windows) -> float:
+    """Return how long a block is that is held out [s], in a log that is long enough."""
+    return BLOCK_WINDOWS * len(windows.weight) * windows.scene.step_s
+
+
 def folds_of(windows: Windows) -> Folds | None:
     """Cut windows into blocks and deal them to folds; None where there are fewer than `FEWEST_BLOCKS`.
 

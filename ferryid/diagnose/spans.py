@@ -7,10 +7,14 @@ from dataclasses import dataclass, replace
 from math import ceil, inf, log
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ferryid.diagnose.folds import block_s
 from ferryid.diagnose.hypothesis import MOVED, Fit, Near, Suspect, Trial, effect_slopes, fit, imagined, near
 from ferryid.effects.picture import Picture, as_measured
 from ferryid.vessel.profile import Floats
+
+Ints = NDArray[np.int64]
 
 FEWEST_PARTS, LONGEST_S = 24, 60.0
 """Parts into which a log is cut at least, and how long one may be [s]: an effect begins and ends between two of them."""
@@ -67,8 +71,8 @@ def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
     parts = len(edges) - 1
     G, g = _cross_products(trial, ground, suspect, edges)
     a, b = np.triu_indices(parts + 1, 1)
-    whole = (a == 0) & (b == parts)
-    a, b = a[~whole], b[~whole]
+    span = (b - a < parts) & (edges[b] - edges[a] >= shortest_s(trial))
+    a, b = a[span], b[span]
     gain = _gains(G, g, a, b, suspect)
     gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(trial.windows.starts))
     found: list[tuple[int, int]] = []
@@ -88,6 +92,11 @@ def part_s(trial: Trial) -> float:
     """Return how long a part of the log is [s]."""
     edges = _edges(trial)
     return float(edges[1] - edges[0])
+
+
+def shortest_s(trial: Trial) -> float:
+    """Return how long a span is at least [s]: what fits into one block is never judged by a fit that has seen some of it."""
+    return block_s(trial.windows)
 
 
 def _edges(trial: Trial) -> Floats:
@@ -115,7 +124,7 @@ def _cross_products(trial: Trial, ground: Ground, suspect: Suspect, edges: Float
     return G.reshape(len(edges) - 1, p, len(edges) - 1, p), (C.T @ ground.left).reshape(-1, p)
 
 
-def _gains(G: Floats, g: Floats, a: Floats, b: Floats, suspect: Suspect) -> Floats:
+def _gains(G: Floats, g: Floats, a: Ints, b: Ints, suspect: Suspect) -> Floats:
     """Return the gain in evidence of a suspect in the parts from a up to b, shape (spans,)."""
     parts, p = g.shape
     sums = np.zeros((parts + 1, p, parts + 1, p))
@@ -142,7 +151,7 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
     made
         Fit of it.
     index
-        Of the suspect.
+        Of the suspect; its span stays as long as `shortest_s` at least.
     begin
         Where each fit begins.
     step_s, finest_s
@@ -156,8 +165,8 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
             middle = getattr(best.suspects[index], end)
             for time in (middle - step, middle + step):
                 moved = best.suspects[index].moved(end, time)
-                within = max(moved.onset_s, float(times[0])) + finest_s < min(moved.offset_s, float(times[-1]))
-                if not within or not times[0] < time < times[-1]:
+                lasts_s = min(moved.offset_s, float(times[-1])) - max(moved.onset_s, float(times[0]))
+                if lasts_s < shortest_s(trial) or not times[0] < time < times[-1]:
                     continue
                 tried = fit(trial, swapped(best.suspects, index, moved), best.values, steps=GLANCE, begin=begin)
                 best = max(best, tried, key=lambda one: one.evidence)
