@@ -149,7 +149,8 @@ def _one(
     progress("looking for what has no name")
     unknown = unknown_of(trial, kept, scene)
     progress("locating")
-    forces = forces_of(trial, stands, scene)
+    forces, hints = forces_of(trial, stands, scene)
+    notes += hints
     if model is None and common is None and not profile.hull.has_model:
         forces = [hinted(one) for one in forces]
         notes.append(

@@ -38,6 +38,8 @@ PLAIN = 8.0
 """Logarithm of a likelihood ratio that needs no bootstrap to be believed."""
 MATCHED = 0.7
 """Share of an improvement as of which a placebo is said to match it, whatever the interval of the difference."""
+CLAIMED = 1.0 / 3.0
+"""Share of a finding's improvement that an axis must have for the finding to claim it; one of three has as much."""
 SAME = 1e-6
 """A placebo that differs less than this from its effect, as a share of it, is none."""
 
@@ -109,6 +111,8 @@ class Proof:
         True where it improves held-out data, and beyond its placebos, none of which comes to `MATCHED` of it; or, of what
         the hull can imitate only by being off in all its coefficients together, where it improves them over the hull as it
         is in the model.
+    free_runs
+        By adding it to the others.
     """
 
     suspect: Suspect
@@ -116,6 +120,23 @@ class Proof:
     placebos: Mapping[str, float]
     beaten: float
     holds: bool
+    free_runs: FreeRuns
+
+    def shows(self, shares: Floats) -> bool:
+        """Tell whether it improves, with an interval that excludes none, force or free run on an axis that it claims.
+
+        The score adds up what every channel gains, in errors that the noise's autoregression weighs: a little on all of them
+        makes a likelihood on none of which anything is seen to improve.
+
+        Parameters
+        ----------
+        shares
+            Of the axes in the improvement, shape (3,).
+        """
+        claimed = shares >= CLAIMED if shares.any() else np.ones(3, dtype=np.bool_)
+        # Position and speed belong to surge and sway, heading and yaw rate to yaw.
+        runs = np.any(self.free_runs.low > 0.0, axis=0).reshape(2, 2).any(axis=0)[[0, 0, 1]]
+        return bool((claimed & ((self.improvement.low > 0.0) | runs)).any())
 
 
 @dataclass(frozen=True)
@@ -254,14 +275,14 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
     if not holds and _hull_strains(trial, found, rest, start):
         rigid = replace(trial, hull_spread=np.zeros_like(trial.hull_spread))
         stiff = held_out(rigid, folds, rest, start)
-        made = improvement(trial, folds, stiff, full)
+        without, made = stiff, improvement(trial, folds, stiff, full)
         # The same force late, or on a mirrored heading, has to be worse there too.
         own = held_out(rigid, folds, found.suspects, found.values)
         gains, by_name = _gains(trial, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
         beaten = _beaten(picks, gains, by_name)
         scores = {name: float(one.sum()) for name, one in by_name.items()}
         holds = made.score_low > 0.0 and beaten > 0.0 and not _matched(made.score, scores)
-    return Proof(suspect, made, scores, beaten, holds)
+    return Proof(suspect, made, scores, beaten, holds, free_runs(trial, folds, without.fits, full.fits))
 
 
 def _matched(score: float, placebos: Mapping[str, float]) -> bool:

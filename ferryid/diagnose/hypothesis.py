@@ -63,6 +63,11 @@ class Suspect:
         return self.effect.id, self.instance
 
     @property
+    def title(self) -> str:
+        """The effect's title, with the thruster that it is one of."""
+        return self.effect.title + ("" if self.instance is None else f" of {self.instance}")
+
+    @property
     def start(self) -> Floats:
         """Parameters with which a search begins."""
         return np.array([one.neutral if one.start is None else one.start for one in self.parameters])

@@ -71,9 +71,7 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
         fallen, why = _fallen(trial, kept, proof)
         if fallen is None:
             return Judged(kept, proof, standings, tuple(told))
-        one = kept.suspects[fallen]
-        where = "" if one.instance is None else f" of {one.instance}"
-        told.append(f"{one.effect.title}{where} was suspected, but {why}: it is no finding.")
+        told.append(f"{kept.suspects[fallen].title} was suspected, but {why}: it is no finding.")
         kept = pruned(trial, without(trial, kept, fallen))
         tried.add(_keys(kept))
     return Judged(kept, None, (), tuple(told))

@@ -25,9 +25,12 @@ TIME_STEP, TIME_FIT = 0.125, 3
 SHOWN_RIVALS = 3
 
 
-def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
-    """Return the findings of forces, that which removes most of the error first."""
-    made = []
+def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding], tuple[str, ...]]:
+    """Return the findings of forces, that which removes most of the error first, and why some are hints only.
+
+    What makes held-out stretches likelier, yet is not seen to improve force or free run on an axis that it claims, is a hint.
+    """
+    made, told = [], []
     kept, proof = stands.fit, stands.proof
     for i, (suspect, standing) in enumerate(zip(kept.suspects, stands.standings, strict=True)):
         others = [j for j in range(len(kept.suspects)) if j != i]
@@ -46,11 +49,18 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
         named = zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True)
         values = {name: value for name, value in named if name in estimates}
         improved = None if proof is None else proof.proofs[i].improvement
+        unseen = proof is not None and not proof.proofs[i].shows(place.shares)
+        if unseen:
+            told.append(
+                f"{suspect.title} makes held-out stretches likelier, but on the axes that it "
+                "claims neither the squared force error nor the free run improves by an interval that excludes none: "
+                "it is a hint."
+            )
         made.append(
             Finding(
                 effect=suspect.effect.id,
                 instance=suspect.instance,
-                probability=standing.probability,
+                probability=min(standing.probability, HINT) if unseen else standing.probability,
                 parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
                 intervals=_intervals(trial, estimates),
@@ -66,7 +76,7 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> list[Finding]:
                 **columns_of(trial, place, regressor_of(suspect, imagined(trial.plain, bare), kept.values[i], place)),
             )
         )
-    return sorted(made, key=lambda one: -sum(one.improvement.values()))
+    return sorted(made, key=lambda one: -sum(one.improvement.values())), tuple(told)
 
 
 def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[str, Estimate]:

@@ -30,9 +30,13 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
 
 
 def says(values: Values, instance: str | None) -> str:
-    """Return the finding as a sentence."""
-    word = "later" if values["seconds"] > 0.0 else "earlier"
-    return f"The navigation's data are {abs(values['seconds']):.2f} s {word} than the actuators'."
+    """Return the finding as a sentence; no physics moves a vessel before it is pushed, but late clocks seem to."""
+    if values["seconds"] > 0.0:
+        return f"The navigation's data are {values['seconds']:.2f} s later than the actuators'."
+    return (
+        f"The actuators' data are {-values['seconds']:.2f} s later than the navigation's: the motion comes before its force, "
+        "which a clock can make of it, or a force that the model lacks, but no delay of the thrusters."
+    )
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

@@ -1,0 +1,82 @@
+"""How findings are told: what improves nothing that it claims is a hint, whatever its likelihood."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.evidence import Proof, evidence
+from ferryid.diagnose.hypothesis import Trial, fit
+from ferryid.diagnose.judged import Judged
+from ferryid.diagnose.named import forces_of
+from ferryid.diagnose.result import HINT
+from ferryid.diagnose.rivals import Standing
+from ferryid.effects import effects
+from tests.diagnose.test_evidence import WIND, sailed, suspect, trial_on
+
+
+@pytest.fixture(scope="module")
+def windy() -> tuple[Trial, Judged]:
+    trial = trial_on(sailed(480.0, WIND))
+    found = fit(trial, [suspect("wind")])
+    trial = trial.with_noise_of(found)
+    return trial, Judged(found, evidence(trial, found), (Standing((), 0.999),), ())
+
+
+def with_lows(stands: Judged, forces: list[float], runs: list[float]) -> Judged:
+    """Return the same with other lower ends: of the force error by axis, and of position, heading, speed and yaw rate."""
+    assert stands.proof is not None
+    (proof,) = stands.proof.proofs
+    low = np.broadcast_to(runs, proof.free_runs.low.shape)
+    other = replace(
+        proof,
+        improvement=replace(proof.improvement, low=np.array(forces)),
+        free_runs=replace(proof.free_runs, low=low),
+    )
+    return replace(stands, proof=replace(stands.proof, proofs=(other,)))
+
+
+def test_a_wind_that_blew_is_told_for_sure(windy: tuple[Trial, Judged]) -> None:
+    trial, stands = windy
+    (finding,), told = forces_of(trial, stands, trial.windows.scene)
+    assert finding.sure
+    assert told == ()
+
+
+def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[Trial, Judged]) -> None:
+    trial, stands = windy
+    (finding,), told = forces_of(trial, with_lows(stands, [-0.1] * 3, [np.nan, -0.1, -0.1, -0.1]), trial.windows.scene)
+    assert finding.probability == HINT
+    assert told == (
+        "Steady wind makes held-out stretches likelier, but on the axes that it claims neither the squared force error nor "
+        "the free run improves by an interval that excludes none: it is a hint.",
+    )
+
+
+@pytest.mark.parametrize(
+    ("shares", "forces", "runs", "shows"),
+    [
+        ([0.0, 0.1, 0.9], [0.1, 0.1, -0.2], [0.1, -0.1, 0.1, -0.1], False),
+        ([0.0, 0.1, 0.9], [-0.1, -0.1, 0.02], [-0.1, -0.1, -0.1, -0.1], True),
+        ([0.0, 0.1, 0.9], [-0.1, -0.1, -0.2], [-0.1, -0.1, -0.1, 0.01], True),
+        ([0.0, 0.6, 0.4], [-0.1, 0.05, -0.2], [-0.1, -0.1, -0.1, -0.1], True),
+        ([0.9, 0.1, 0.0], [-0.1, -0.1, -0.2], [-0.1, -0.1, 0.01, -0.1], True),
+        ([0.9, 0.1, 0.0], [-0.1, 0.2, 0.2], [-0.1, 0.1, -0.1, 0.1], False),
+        ([0.0, 0.0, 0.0], [-0.1, -0.1, 0.2], [-0.1, -0.1, -0.1, -0.1], True),
+    ],
+)
+def test_only_an_axis_that_is_claimed_shows_a_finding(
+    windy: tuple[Trial, Judged], shares: list[float], forces: list[float], runs: list[float], shows: bool
+) -> None:
+    stands = with_lows(windy[1], forces, runs)
+    assert stands.proof is not None
+    proof: Proof = stands.proof.proofs[0]
+    assert proof.shows(np.array(shares)) is shows
+
+
+def test_a_motion_before_its_force_is_a_clocks() -> None:
+    says = effects()["time_delay"].says
+    assert says({"seconds": 0.2}, None) == "The navigation's data are 0.20 s later than the actuators'."
+    assert says({"seconds": -0.09}, None).startswith("The actuators' data are 0.09 s later than the navigation's: ")
