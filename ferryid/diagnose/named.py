@@ -28,7 +28,8 @@ SHOWN_RIVALS = 3
 def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding], tuple[str, ...]]:
     """Return the findings of forces, that which removes most of the error first, and why some are hints only.
 
-    What makes held-out stretches likelier, yet is not seen to improve force or free run on an axis that it claims, is a hint.
+    What makes held-out stretches a little likelier, yet is not seen to improve force or free run on an axis that it claims, is
+    a hint.
     """
     made, told = [], []
     kept, proof = stands.fit, stands.proof
@@ -52,7 +53,7 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
         unseen = proof is not None and not proof.proofs[i].shows(place.shares)
         if unseen:
             told.append(
-                f"{suspect.title} makes held-out stretches likelier, but on the axes that it "
+                f"{suspect.title} makes held-out stretches a little likelier, but on the axes that it "
                 "claims neither the squared force error nor the free run improves by an interval that excludes none: "
                 "it is a hint."
             )

@@ -25,14 +25,14 @@ def windy() -> tuple[Trial, Judged]:
     return trial, Judged(found, evidence(trial, found), (Standing((), 0.999),), ())
 
 
-def with_lows(stands: Judged, forces: list[float], runs: list[float]) -> Judged:
-    """Return the same with other lower ends: of the force error by axis, and of position, heading, speed and yaw rate."""
+def with_lows(stands: Judged, forces: list[float], runs: list[float], score: float = 20.0) -> Judged:
+    """Return the same with another score and lower ends: of force by axis, and of position, heading, speed and yaw rate."""
     assert stands.proof is not None
     (proof,) = stands.proof.proofs
     low = np.broadcast_to(runs, proof.free_runs.low.shape)
     other = replace(
         proof,
-        improvement=replace(proof.improvement, low=np.array(forces)),
+        improvement=replace(proof.improvement, low=np.array(forces), score=score),
         free_runs=replace(proof.free_runs, low=low),
     )
     return replace(stands, proof=replace(stands.proof, proofs=(other,)))
@@ -50,8 +50,8 @@ def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[T
     (finding,), told = forces_of(trial, with_lows(stands, [-0.1] * 3, [np.nan, -0.1, -0.1, -0.1]), trial.windows.scene)
     assert finding.probability == HINT
     assert told == (
-        "Steady wind makes held-out stretches likelier, but on the axes that it claims neither the squared force error nor "
-        "the free run improves by an interval that excludes none: it is a hint.",
+        "Steady wind makes held-out stretches a little likelier, but on the axes that it claims neither the squared force "
+        "error nor the free run improves by an interval that excludes none: it is a hint.",
     )
 
 
@@ -74,6 +74,12 @@ def test_only_an_axis_that_is_claimed_shows_a_finding(
     assert stands.proof is not None
     proof: Proof = stands.proof.proofs[0]
     assert proof.shows(np.array(shares)) is shows
+
+
+def test_a_strong_likelihood_needs_no_more(windy: tuple[Trial, Judged]) -> None:
+    stands = with_lows(windy[1], [-0.1] * 3, [-0.1] * 4, score=45.0)
+    assert stands.proof is not None
+    assert stands.proof.proofs[0].shows(np.ones(3) / 3.0)
 
 
 def test_a_motion_before_its_force_is_a_clocks() -> None:
