@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +23,16 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.evidence import Evidence, Improvement, force_errors
 from ferryid.diagnose.free_runs import FreeRuns
-from ferryid.diagnose.hypothesis import Fit, Trial, fit, imagined, trial_of
-from ferryid.diagnose.judged import judged
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
+from ferryid.diagnose.judged import Judged, judged
 from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import locate
 from ferryid.diagnose.named import doubted, forces_of, hinted, merely_hinted
 from ferryid.diagnose.noisy import drowned_axes, says_drowned
 from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
-from ferryid.diagnose.search import search, suspects_of
+from ferryid.diagnose.search import Search, search, suspects_of
+from ferryid.diagnose.shared_laws import Heard, heard
 from ferryid.diagnose.testable import advice, powers, tells, unexcited
 from ferryid.diagnose.together import Together, together
 from ferryid.diagnose.unknown import unknown_of
@@ -97,10 +99,40 @@ def diagnose(
         )
     common = together(logs, profile, out, withhold=withhold, verify=verify, progress=progress) if shared else None
     simulated = None if against is None else learn(against, profile, out, verify=verify, progress=progress)
-    return tuple(_one(path, profile, out, model, simulated, common, withhold, verify, progress) for path in logs)
+    begun: Iterable[_Begun] = (
+        _begun(path, profile, out, model, simulated, common, withhold, verify, progress) for path in logs
+    )
+    laws: Mapping[str, Heard] = {}
+    if common is not None:
+        begun = tuple(begun)
+        progress("looking for laws that hold in all logs")
+        laws = heard({one.path: (one.found.trial, one.stands.fit) for one in begun if isinstance(one, _Examined)})
+    return tuple(
+        one if isinstance(one, Diagnosis) else _ended(one, laws.get(one.path), model, simulated, common, progress)
+        for one in begun
+    )
 
 
-def _one(
+@dataclass(frozen=True)
+class _Examined:
+    """A log of which everything with a name was found, with what is needed to tell the rest."""
+
+    path: str
+    scene: Scene
+    survey: Survey
+    sensors: tuple[SensorFinding, ...]
+    notes: list[str]
+    compared: dict[str, Any]
+    steady: list[Suspect]
+    found: Search
+    stands: Judged
+
+
+_Begun = Diagnosis | _Examined
+"""A diagnosis, of a log too short for more than its sensors, or what is to become one."""
+
+
+def _begun(
     path: str,
     profile: Profile,
     out: Path | None,
@@ -110,19 +142,18 @@ def _one(
     withhold: Sequence[str],
     verify: bool,
     progress: Callable[[str], None],
-) -> Diagnosis:
+) -> _Begun:
     scene, survey = scene_of(path, profile, out, withhold=withhold, verify=verify, progress=progress)
     progress("checking the sensors against each other")
     sensors, scene = examine(scene)
     seen = windows(scene, *window_lengths(profile))
-    name = survey.motion.log
     notes = [*survey.doubts, *_of_actuators(survey, profile)]
     if len(seen.starts) < FEWEST_WINDOWS:
         notes.append(
             f"Only {len(seen.starts)} stretches of {window_lengths(profile)[0]:.0f} s without a gap: too little to tell. "
             "Record at least ten minutes that excite every axis."
         )
-        return Diagnosis(name, profile.name, "not_testable", _of_sensors(sensors), {}, {}, tuple(notes))
+        return Diagnosis(survey.motion.log, profile.name, "not_testable", _of_sensors(sensors), {}, {}, tuple(notes))
     if simulated is None:
         plain, spread = plain_picture(seen.scene, profile, model, survey.recording.sha256)
         library = suspects_of(seen.scene)[0]
@@ -138,16 +169,26 @@ def _one(
         compared = plain_against(simulated, path_errors)
         sensors, told = differing_sensors(simulated, sensors, scene)
         notes += [compared["says"], *told]
-    trial = trial_of(seen, plain, spread)
-    found = search(trial, progress, known=library)
-    trial = found.trial
+    found = search(trial_of(seen, plain, spread), progress, known=library)
     steady = [suspect for suspect in library if suspect.effect.unsteady is None]
-    stands = judged(trial, found.fit, steady, progress)
-    kept, proof = stands.fit, stands.proof
+    stands = judged(found.trial, found.fit, steady, progress)
     notes += stands.told
+    return _Examined(path, scene, survey, tuple(sensors), notes, compared, steady, found, stands)
+
+
+def _ended(
+    log: _Examined,
+    laws: Heard | None,
+    model: Model | None,
+    simulated: Simulated | None,
+    common: Together | None,
+    progress: Callable[[str], None],
+) -> Diagnosis:
+    scene, survey, stands, found, notes = log.scene, log.survey, log.stands, log.found, list(log.notes)
+    profile, trial, kept, proof = scene.profile, found.trial, stands.fit, stands.proof
     base = fit(trial, ())
     progress("looking for what has no name")
-    unknown = unknown_of(trial, kept, scene)
+    unknown = unknown_of(trial, kept, scene, laws)
     progress("locating")
     forces, hints = forces_of(trial, stands, scene)
     notes += hints
@@ -165,8 +206,8 @@ def _one(
     if drowned := drowned_axes(trial):
         notes.append(says_drowned(drowned))
         named, nameless = ([merely_hinted(one) for one in every] for every in (named, nameless))
-    findings = [*_of_sensors(sensors), *named]
-    chances, still = powers(trial, kept, steady), unexcited(trial)
+    findings = [*_of_sensors(log.sensors), *named]
+    chances, still = powers(trial, kept, log.steady), unexcited(trial)
     notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
     notes += advice(chances, still)
     if unknown.unsteady or found.states:
@@ -177,7 +218,7 @@ def _one(
     findings += nameless
     before, after = _scores(trial, base, kept, proof)
     return Diagnosis(
-        name,
+        survey.motion.log,
         profile.name,
         verdict,
         tuple(findings),
@@ -187,7 +228,7 @@ def _one(
         evidence=_leftover(trial, base, kept),
         located=locate(trial, base, kept, scene) if kept.suspects else unknown.left,
         withheld=withheld_beside(survey.hidden, scene, findings),
-        against=compared,
+        against=log.compared,
         # A simulation's hull is not the vessel's, and the lift of a common one is in no model file.
         learnt=learnt(trial, kept, found.states, findings, survey) if simulated is None and common is None else None,
     )

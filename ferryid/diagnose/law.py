@@ -62,6 +62,8 @@ class Law:
         What the law improves on held-out windows.
     gain, chance
         What its first term gained in log-likelihood, and what the best of all terms gains on placebos.
+    values, errors
+        Coefficients and their standard deviations as they are told.
     """
 
     terms: tuple[Term, ...]
@@ -70,10 +72,12 @@ class Law:
     held_out: Improvement
     gain: float
     chance: float
+    values: Floats
+    errors: Floats
 
 
 @dataclass(frozen=True)
-class _Lines:
+class Lines:
     """The gaps and their derivatives about a fit.
 
     Attributes
@@ -84,12 +88,15 @@ class _Lines:
         Derivatives by hull and effects in sizes, shape (J, c, p), and where these are now, in sizes from what is believed (p,).
     terms
         Derivatives by the terms' coefficients, each of unit root mean square, shape (J, c, k).
+    sizes
+        Their root mean squares before they were made so, shape (k,).
     """
 
     gaps: Floats
     known: Floats
     centre: Floats
     terms: Floats
+    sizes: Floats
 
 
 def law_of(trial: Trial, kept: Fit, folds: Folds) -> Law | None:
@@ -109,7 +116,7 @@ def law_of(trial: Trial, kept: Fit, folds: Folds) -> Law | None:
     made, seen = kept, trial
     gains: list[tuple[float, float]] = []
     while len(chosen) < MOST_TERMS:
-        lines = _lines(seen, made, terms)
+        lines = lines_of(seen, made, terms)
         best, real, chance = _best(seen, seen.noise, lines, folds)
         if real < GAIN or real <= chance:
             best, real, chance = _best(seen, _noise_of_the_rest(seen, lines), lines, folds, plain=True)
@@ -134,7 +141,9 @@ def law_of(trial: Trial, kept: Fit, folds: Folds) -> Law | None:
     before = held_out(seen, folds, kept.suspects, kept.values)
     after = held_out(seen, folds, made.suspects, made.values)
     better = improvement(seen, folds, before, after)
-    return Law(tuple(chosen), made, seen, better, *gains[0]) if better.score_low > 0.0 else None
+    if better.score_low <= 0.0:
+        return None
+    return Law(tuple(chosen), made, seen, better, *gains[0], made.values[-1], made.told_errors(len(kept.suspects)))
 
 
 def suspect_of(trial: Trial, kept: Fit, terms: Sequence[Term]) -> Suspect:
@@ -183,7 +192,7 @@ def _void(trial: Trial, made: Fit) -> bool:
     return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
 
 
-def _best(trial: Trial, noise: Noise, lines: _Lines, folds: Folds, *, plain: bool = False) -> tuple[int, float, float]:
+def _best(trial: Trial, noise: Noise, lines: Lines, folds: Folds, *, plain: bool = False) -> tuple[int, float, float]:
     """Return which term gains most beside a fit, how much, and how much the best gains on placebos.
 
     Placebos made of a force that stands plainly above the noise are forces as well, and shifted a constant one is itself: there
@@ -208,7 +217,8 @@ def _best(trial: Trial, noise: Noise, lines: _Lines, folds: Folds, *, plain: boo
     return best, float(most[0]), chance
 
 
-def _lines(trial: Trial, made: Fit, terms: Sequence[Term]) -> _Lines:
+def lines_of(trial: Trial, made: Fit, terms: Sequence[Term]) -> Lines:
+    """Return a fit's gaps and what they change by with hull, effects and the coefficients of terms."""
     seen = trial.windows
     picture = imagined(trial.plain, made)
     base = seen.gap(picture)
@@ -225,14 +235,14 @@ def _lines(trial: Trial, made: Fit, terms: Sequence[Term]) -> _Lines:
             values[i][j] += step * parameter.size
             known.append((seen.gap(imagined(trial.plain, replace(made, values=tuple(values)))) - base) / step)
             centre.append((float(made.values[i][j]) - parameter.neutral) / parameter.size)
-    pushes = []
-    for term in terms:
-        change = seen.gap(replace(picture, external=picture.external + term.force(picture))) - base
-        pushes.append(change / max(float(np.sqrt(np.mean(change**2))), 1e-12))
-    return _Lines(base, np.stack(known, axis=-1), np.array(centre), np.stack(pushes, axis=-1))
+    pushes = np.stack(
+        [seen.gap(replace(picture, external=picture.external + term.force(picture))) - base for term in terms], axis=-1
+    )
+    sizes = np.maximum(np.sqrt(np.mean(pushes**2, axis=(0, 1))), 1e-12)
+    return Lines(base, np.stack(known, axis=-1), np.array(centre), pushes / sizes, sizes)
 
 
-def _noise_of_the_rest(trial: Trial, lines: _Lines) -> Noise:
+def _noise_of_the_rest(trial: Trial, lines: Lines) -> Noise:
     """Return the noise that all terms together leave.
 
     A force that is there most of the time is in the errors' autoregression as well, which then takes it for noise. What

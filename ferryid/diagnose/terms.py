@@ -42,6 +42,16 @@ class Term:
     force: Callable[[Picture], Floats]
 
     @property
+    def key(self) -> tuple[str, str]:
+        """What it acts on and its quantity, the same in all logs."""
+        return self.on, self.name
+
+    @property
+    def of_vessel(self) -> bool:
+        """True where motion and thrust alone decide it; heading and place belong to the water that a log was recorded in."""
+        return self.on not in ("north", "east") and not self.name.startswith(("cos", "sin"))
+
+    @property
     def coefficient_unit(self) -> str:
         """Unit of the coefficient."""
         return (

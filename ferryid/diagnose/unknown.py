@@ -18,8 +18,9 @@ from ferryid.diagnose.hypothesis import Fit, Trial, fit, imagined
 from ferryid.diagnose.law import Law, law_of
 from ferryid.diagnose.locate import Location, locate
 from ferryid.diagnose.profiles import TELLS
-from ferryid.diagnose.result import AXES, Estimate, Finding, LawTerm
+from ferryid.diagnose.result import AXES, HINT, Estimate, Finding, LawTerm
 from ferryid.diagnose.search import ODDS
+from ferryid.diagnose.shared_laws import Heard
 from ferryid.diagnose.shown import columns_of
 from ferryid.diagnose.terms import FORCE, Term
 from ferryid.effects.picture import Picture, Scene
@@ -44,7 +45,7 @@ class Unknown:
     unsteady: bool
 
 
-def unknown_of(trial: Trial, kept: Fit, scene: Scene) -> Unknown:
+def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None) -> Unknown:
     """Return what is left of a log beside what was named.
 
     Parameters
@@ -55,13 +56,19 @@ def unknown_of(trial: Trial, kept: Fit, scene: Scene) -> Unknown:
         Hull and named effects.
     scene
         The log's scene at its full rate.
+    heard
+        What the vessel's other logs say; None where there are none.
     """
     findings = []
     folds = folds_of(trial.windows)
-    law = None if folds is None else law_of(trial, kept, folds)
-    after, seen = (kept, trial) if law is None else (law.fit, law.trial)
-    if law is not None:
-        findings.append(_lawful(law, kept, scene))
+    after, seen = kept, trial
+    if folds is not None and heard is not None and (common := heard.common(trial, kept, folds)) is not None:
+        findings.append(_lawful(common, after, scene, f"that holds in all {heard.able} logs that can show it"))
+        after, seen = common.fit, common.trial
+    if folds is not None and (law := law_of(seen, after, folds)) is not None:
+        own = _lawful(law, after, scene, "that was seen in this log only")
+        findings.append(own if heard is None else _of_one(own, *heard.of_others(law)))
+        after, seen = law.fit, law.trial
     left = locate(seen, after, after, scene)
     # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
     known = bool(trial.filter.processes)
@@ -104,7 +111,14 @@ def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
     return with_law - with_effect > ODDS and with_both - with_law < ODDS
 
 
-def _lawful(law: Law, kept: Fit, scene: Scene) -> Finding:
+def _of_one(finding: Finding, others: int, able: int, hold: int) -> Finding:
+    """Return a law that is one log's alone as a hint, with what the vessel's other logs say of it."""
+    shown = f", and {hold or 'none'} {'does' if hold < 2 else 'do'}" if able else ""
+    told = f"Of {others} other log{'s' if others > 1 else ''} {able or 'none'} could show it at this size{shown}."
+    return replace(finding, probability=min(finding.probability, HINT), says=f"{finding.says} {told}")
+
+
+def _lawful(law: Law, kept: Fit, scene: Scene, whose: str) -> Finding:
     trial = law.trial
     # The hull stays as it is with the law: refitted without, it would bend to it on axes where it does not act.
     before = replace(law.fit, suspects=law.fit.suspects[:-1], values=law.fit.values[:-1])
@@ -112,9 +126,7 @@ def _lawful(law: Law, kept: Fit, scene: Scene) -> Finding:
     picture = imagined(trial.plain, before)
     terms = [
         _told(term, picture, trial, float(value), float(error))
-        for term, value, error in zip(
-            law.terms, law.fit.values[-1], law.fit.told_errors(len(kept.suspects)), strict=True
-        )
+        for term, value, error in zip(law.terms, law.values, law.errors, strict=True)
     ]
     first = law.terms[0]
     size = "" if first.name == "1" else f"{first.name} [{first.unit}]" if first.unit else first.name
@@ -135,7 +147,7 @@ def _lawful(law: Law, kept: Fit, scene: Scene) -> Finding:
         rivals=(),
         unresolved_with=(),
         separating_manoeuvre=None,
-        says=f"A force acts that has no name here, but a law: {told}.",
+        says=f"A force acts that has no name here, but a law {whose}: {told}.",
         band_hz=_band(place.bands, place.shares, [band.before - band.after for band in place.bands]),
         law=tuple(terms),
         **columns_of(trial, place, regressor),

@@ -44,6 +44,16 @@ def test_no_environment_is_named_in_a_towing_tank(run: str, shared_data: Locate)
     assert any("no hull model" in note for note in found.notes)
 
 
+def test_zigzags_of_one_tanker_show_one_law_and_no_log_has_its_own(shared_data: Locate) -> None:
+    logs = [str(shared_data(f"kvlcc2/HSVA_CPMC_KVLCC2_Z_{run}.dat")) for run in ("10_05", "20_10_S", "30_05", "35_05")]
+    every = diagnose(logs, load_profile("kvlcc2-model"), None, shared=True, progress=quiet)
+    laws = {tuple((term.on, term.quantity) for term in one.law) for made in every for one in made.findings if one.sure}
+    # Nothing with a name is sure; the law is the same wherever it is told.
+    assert len(laws) == 1
+    assert () not in laws
+    assert all("holds in all" in one.says for made in every for one in made.findings if one.sure)
+
+
 @pytest.mark.parametrize(
     ("bag", "seconds"), [("exp52_v_2016-02-11-11-14-28", 30.0), ("exp39_1_2016-02-11-10-47-10", 4.0)]
 )
