@@ -39,6 +39,7 @@ from ferryid.diagnose.unknown import unknown_of
 from ferryid.diagnose.unsteady import unsteady_of
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.diagnose.withheld import withheld as withheld_beside
+from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.vessel.profile import Profile

@@ -11,7 +11,6 @@ import numpy as np
 
 from ferryid.diagnose.filter import Filter, Sieve, excerpt, learn, sieve_of
 from ferryid.diagnose.noise import Noise, noise_of
-from ferryid.diagnose.parallel import over
 from ferryid.diagnose.weak import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.picture import Picture
@@ -27,6 +26,8 @@ ANEW = 4
 """Steps after which the derivatives by the hull's coefficients are taken anew."""
 ENOUGH = 1e-2
 """Gain in cost of a step that is worth another."""
+MOVED = 0.1
+"""Move of a coefficient of the hull by which a slope is found, in its spread."""
 DAMPINGS = (0.0, 0.3, 3.0, 30.0, 300.0)
 MOVED = 1e-2
 """Move of a parameter, in its size, by which a slope is found."""
@@ -160,17 +161,11 @@ class Trial:
 
         Coefficients that cannot move have none.
         """
-        base = self.steps.gap(picture)
         free = np.flatnonzero(self.hull_spread)
-
-        def slope(k: int) -> Floats:
-            hull = picture.hull.copy()
-            hull[k] += 0.1 * self.hull_spread[k]
-            return (self.steps.gap(replace(picture, hull=hull)) - base) / 0.1
-
-        every = np.zeros((base.size, len(self.hull_spread)))
+        every = np.zeros((self.steps.measured[:, self.steps.channels].size, len(self.hull_spread)))
         if free.size:
-            every[:, free] = self.sieve.white(np.stack(over(slope, free.tolist()), axis=2))
+            moves = MOVED * self.hull_spread[free]
+            every[:, free] = self.sieve.white(self.steps.hull_changes(picture, free, moves) / MOVED)
         return every
 
     def white(self, picture: Picture) -> Floats:

@@ -19,7 +19,9 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Picture, Scene, as_measured
+from ferryid.compiled import compiled
+from ferryid.effects.balance import Places, to_ground
+from ferryid.effects.picture import Picture, Scene, as_measured, hull_changes
 from ferryid.vessel.profile import Floats
 
 CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
@@ -66,22 +68,29 @@ class Windows:
         """Return the picture's acceleration less the measured one in every window, shape (J, channels)."""
         rates = as_measured(picture)
         if self.channels[0]:
-            u, v, r = self.scene.nu.T
-            rates = np.column_stack([rates[:, 0] - r * v, rates[:, 1] + r * u, rates[:, 2]])
+            rates = rates + self.scene.turning
         return self.mean(self.along(rates)) - self.measured[:, self.channels]
 
     def along(self, rates: Floats) -> Floats:
         """Return accelerations along the vessel's axes as those along the channels, shape (n, 3) each."""
         if not self.channels[0]:
             return rates
-        c, s = self.scene.pointing
-        ahead, across, turning = rates.T
-        return np.column_stack([c * ahead - s * across, s * ahead + c * across, turning])
+        turned = rates[:, :, None].copy()
+        to_ground(turned, *self.scene.pointing)
+        return turned[:, :, 0]
+
+    def hull_changes(self, picture: Picture, places: Places, moves: Floats) -> Floats:
+        """Return by how much `gap` changes if coefficients of the hull move one by one, shape (J, channels, q).
+
+        `places` and `moves` as in `ferryid.effects.picture.hull_changes`.
+        """
+        changes = hull_changes(picture, places, moves)
+        if self.channels[0]:
+            to_ground(changes, *self.scene.pointing)
+        return self.mean(changes)
 
 
 STEPS_A_WINDOW = 20
-SHORT = 12
-"""Rows of a weight that are faster added up one by one."""
 FEWEST_STEPS = 10
 """Steps below which a stretch tells nothing."""
 FORCES_HZ = 5.0
@@ -165,13 +174,20 @@ def _weights(m: int, step_s: float) -> tuple[Floats, Floats, Floats]:
 
 
 def _means(values: Floats, weight: Floats, starts: NDArray[np.int64], step_s: float) -> Floats:
-    if len(weight) <= SHORT:
-        total = np.zeros((len(starts), *values.shape[1:]))
-        for i in np.flatnonzero(weight).tolist():
-            total += (weight[i] * step_s) * values[starts + i]
-        return total
-    view = np.lib.stride_tricks.sliding_window_view(values, len(weight), axis=0)[starts]
-    return np.asarray(view @ weight) * step_s
+    flat = np.ascontiguousarray(values, dtype=np.float64).reshape(len(values), -1)
+    return weighed(flat, weight * step_s, starts).reshape(len(starts), *values.shape[1:])
+
+
+@compiled
+def weighed(values: Floats, weight: Floats, starts: Places) -> Floats:
+    """Return the sum of m rows times a weight, shape (m,), from every start on: shape (J, c), of values with c columns."""
+    out = np.zeros((starts.shape[0], values.shape[1]))
+    for j in range(starts.shape[0]):
+        for i in range(weight.shape[0]):
+            if weight[i] != 0.0:
+                for q in range(values.shape[1]):
+                    out[j, q] += weight[i] * values[starts[j] + i, q]
+    return out
 
 
 def _thinned(scene: Scene, every: int) -> Scene:

@@ -9,12 +9,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, inf, sin
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.vessel.frames import to_body
+from ferryid.effects.balance import Places, accelerations, from_antenna, required, slopes
 from ferryid.vessel.profile import Floats, Profile
 from ferryid.vessel.wind import wind_force
 
@@ -34,6 +33,7 @@ UNITS = (
     *("kg/m", "kg", "kg", "kg·m"),
 )
 """Units of `COEFFICIENTS`, radians left out."""
+_NO_FLOW, _NO_LOAD, _NO_FACTOR = np.empty((0, 2)), np.empty((0, 3)), np.empty(0)
 
 
 @dataclass(frozen=True)
@@ -95,17 +95,18 @@ class Scene:
         return np.cos(self.psi), np.sin(self.psi)
 
     @cached_property
+    def turning(self) -> Floats:
+        """Acceleration of a vessel whose velocities along its own axes stay as they are [m/s²], shape (n, 3)."""
+        u, v, r = self.nu.T
+        return np.column_stack([-r * v, r * u, np.zeros_like(r)])
+
+    @cached_property
     def air_load(self) -> Floats:
         """Load of the wind that was measured, of still air where none was [N, N, N·m], shape (n, 3)."""
         areas = self.profile.wind
         if areas is None:
             return np.zeros((len(self.t), 3))
         return wind_force(areas, np.zeros((len(self.t), 2)) if self.wind is None else self.wind, self.psi, self.nu)
-
-    @cached_property
-    def regressors(self) -> tuple[Floats, Floats, Floats]:
-        """Damping regressors over ground; see `damping_regressors`."""
-        return damping_regressors(self.nu)
 
 
 @dataclass(frozen=True)
@@ -156,18 +157,6 @@ class Picture:
     antenna: tuple[float, float] = (0.0, 0.0)
 
 
-def damping_regressors(nu: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the products that the coefficients of `SURGE`, `SWAY` and `YAW` multiply, shapes (n, 3), (n, 7), (n, 7)."""
-    u, v, r = np.ascontiguousarray(nu.T)
-    av, ar = np.abs(v), np.abs(r)
-    vv, rv, vr, rr = av * v, ar * v, av * r, ar * r
-    return (
-        np.column_stack([u, np.abs(u) * u, u * u * u]),
-        np.column_stack([v, vv, rv, v * v * v, r, vr, rr]),
-        np.column_stack([v, vv, rv, r, vr, rr, r * r * r]),
-    )
-
-
 def hull_of(profile: Profile) -> Floats:
     """Return the coefficients of a profile's hull in the order of `COEFFICIENTS`, zero where unknown."""
     M, D = profile.hull.M, profile.hull.D
@@ -180,21 +169,15 @@ def named(hull: Floats) -> Mapping[str, float]:
     return dict(zip(COEFFICIENTS, hull.tolist(), strict=True))
 
 
-def total(parts: Floats) -> Floats:
-    """Return the sum over actuators, shape (n, 3), of forces of shape (n, k, 3); NumPy's own is slow along a short axis."""
-    force = parts[:, 0].copy()
-    for k in range(1, parts.shape[1]):
-        force += parts[:, k]
-    return force
-
-
 def body_current(picture: Picture) -> tuple[Floats, Floats]:
     """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n,) each."""
     flow, scene = picture.flow, picture.scene
     if flow is None:
         still = np.zeros(len(scene.t))
         return still, still
-    return to_body(flow[:, 0], flow[:, 1], scene.psi)
+    cosine, sine = scene.pointing
+    north, east = flow.T
+    return cosine * north + sine * east, cosine * east - sine * north
 
 
 def acceleration(picture: Picture) -> Floats:
@@ -203,11 +186,24 @@ def acceleration(picture: Picture) -> Floats:
     ``M nu_dot = tau + external - C(nu_r) nu_r - D(nu_r) nu_r``, with ``[r v_c, -r u_c, 0]`` added for the water that the body
     frame turns through; Fossen (2021), section 10.3.
     """
-    (m11, m22, m23, m32, m33), rest, turning = _balance(picture)
-    X, Y, N = (total(picture.parts) + rest).T
-    det = m22 * m33 - m23 * m32
-    rates = np.column_stack([X / m11, (m33 * Y - m23 * N) / det, (m22 * N - m32 * Y) / det])
-    return rates if turning is None else rates + turning
+    scene = picture.scene
+    parts = np.ascontiguousarray(picture.parts)
+    return accelerations(np.ascontiguousarray(scene.nu), picture.hull, parts, *_forces(picture))
+
+
+def hull_changes(picture: Picture, places: Places, moves: Floats) -> Floats:
+    """Return by how much `as_measured` changes if coefficients of the hull move one by one, shape (n, 3, q).
+
+    Parameters
+    ----------
+    picture
+        n rows.
+    places, moves
+        Which of `COEFFICIENTS` move, and by how much, shape (q,) each.
+    """
+    parts = np.ascontiguousarray(picture.parts)
+    changes = slopes(places, moves, np.ascontiguousarray(picture.scene.nu), picture.hull, parts, *_forces(picture))
+    return _from_antenna(picture, changes)
 
 
 def corrected(picture: Picture, scene: Scene) -> Picture:
@@ -221,12 +217,13 @@ def corrected(picture: Picture, scene: Scene) -> Picture:
 def as_measured(picture: Picture) -> Floats:
     """Return `acceleration` as the navigation would measure it: that of its antenna, along its own axes, shape (n, 3)."""
     rates = acceleration(picture)
-    x, y = picture.antenna
-    if x != 0.0 or y != 0.0:
-        rates = rates + rates[:, 2:] * np.array([-y, x, 0.0])
-    if picture.turned != 0.0:
-        c, s = cos(picture.turned), sin(picture.turned)
-        rates = rates @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return _from_antenna(picture, rates[:, :, None])[:, :, 0]
+
+
+def _from_antenna(picture: Picture, rates: Floats) -> Floats:
+    """Turn accelerations, shape (n, 3, q), into those that the navigation measures, in place."""
+    if picture.antenna != (0.0, 0.0) or picture.turned != 0.0:
+        from_antenna(rates, *picture.antenna, cos(picture.turned), sin(picture.turned))
     return rates
 
 
@@ -242,37 +239,22 @@ def required_force(picture: Picture, nu_dot: Floats) -> Floats:
     nu_dot
         Shape (n, 3) [m/s², m/s², rad/s²].
     """
-    (m11, m22, m23, m32, m33), rest, turning = _balance(picture)
-    u_dot, v_dot, r_dot = (nu_dot if turning is None else nu_dot - turning).T
-    return np.column_stack([m11 * u_dot, m22 * v_dot + m23 * r_dot, m32 * v_dot + m33 * r_dot]) - rest
+    nu = np.ascontiguousarray(picture.scene.nu)
+    return required(np.ascontiguousarray(nu_dot), nu, picture.hull, *_forces(picture))
 
 
-def _balance(picture: Picture) -> tuple[tuple[Any, ...], Floats, Floats | None]:
-    """Return the mass matrix's entries, all forces but the actuators', and the acceleration of turning water."""
-    scene, hull = picture.scene, picture.hull
-    m11, m22, m23, m32, m33 = hull[:5]
-    turning = None
-    if picture.flow is None:
-        nu, (X_D, Y_D, N_D) = scene.nu, scene.regressors
-    else:
-        u_c, v_c = body_current(picture)
-        nu = scene.nu - np.column_stack([u_c, v_c, np.zeros_like(u_c)])
-        X_D, Y_D, N_D = damping_regressors(nu)
-        r = scene.nu[:, 2]
-        turning = np.column_stack([r * v_c, -r * u_c, np.zeros_like(r)])
-    u, v, r = nu.T
-    Y_uv, Y_ur, N_uv, N_ur = hull[22:]
-    Y_L, N_L = u * (Y_uv * v + Y_ur * r), u * (N_uv * v + N_ur * r)
-    D = np.column_stack([X_D @ hull[5:8], Y_D @ hull[8:15] + Y_L, N_D @ hull[15:22] + N_L])
-    if picture.damping_factor is not None:
-        D = D * picture.damping_factor[:, None]
-    if picture.load is not None:
-        m, mx, mxx = picture.load.T
-        m11, m22, m33 = m11 + m, m22 + m, m33 + mxx
-        m23, m32 = m23 + mx, m32 + mx
-    c13, c23 = -m22 * v - 0.5 * (m23 + m32) * r, m11 * u
-    C = np.column_stack([c13 * r, c23 * r, -c13 * u - c23 * v])
-    return (m11, m22, m23, m32, m33), picture.external + D - C, turning
+def _forces(picture: Picture) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return external forces, flow along the vessel's axes, load, and factor on damping, for `ferryid.effects.balance`."""
+    n = len(picture.scene.t)
+    flow = _NO_FLOW if picture.flow is None else np.column_stack(body_current(picture))
+    load = _NO_LOAD if picture.load is None else picture.load
+    factor = _NO_FACTOR if picture.damping_factor is None else picture.damping_factor
+    # Compiled code does not look where an array ends.
+    lengths = {len(one) for one in (picture.external, flow, load, factor) if len(one)}
+    if lengths - {n} or picture.scene.nu.shape != (n, 3) or picture.parts.shape[::2] != (n, 3):
+        raise ValueError(f"a picture of {n} rows has parts of other lengths: {sorted(lengths)}")
+    external, flow, load, factor = map(np.ascontiguousarray, (picture.external, flow, load, factor))
+    return external, flow, load, factor
 
 
 def between(
