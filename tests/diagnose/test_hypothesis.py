@@ -108,6 +108,24 @@ def test_evidence_weighs_filters_against_each_other() -> None:
     np.testing.assert_allclose(np.array(told) - told[0], np.array(known) - known[0], atol=0.1)
 
 
+def test_slopes_by_the_hull_are_those_of_whitened_gaps() -> None:
+    case = trial(60.0)
+    n = len(case.plain.scene.t)
+    moving = np.random.default_rng(1).normal(size=(n, 3)) * [1.0, 0.5, 0.2]
+    steps = replace(case.steps, scene=replace(case.plain.scene, nu=moving))
+    plain = replace(case.plain, scene=steps.scene, external=np.full((n, 3), 30.0))
+    spread = 0.12 * np.abs(plain.hull)
+    spread[6] = 0.0
+    case = replace(case, windows=replace(case.windows, scene=steps.scene), plain=plain, hull_spread=spread)
+    found = case.hull_slopes(plain)
+    assert not found[:, spread == 0.0].any()
+    for k in np.flatnonzero(spread):
+        hull = plain.hull.copy()
+        hull[k] += 0.1 * spread[k]
+        slope = (case.white(replace(plain, hull=hull)) - case.white(plain)) / 0.1
+        np.testing.assert_allclose(found[:, k], slope, rtol=0.0, atol=1e-6 * np.abs(slope).max())
+
+
 def test_limits_are_kept() -> None:
     narrow = replace(PUSH, parameters=(Parameter("force", "N", 50.0, -5.0, 5.0),))
     assert fit(trial(60.0), [narrow]).values[0] == 5.0

@@ -68,6 +68,23 @@ def test_a_current_leaves_no_gap_once_it_is_in_the_picture() -> None:
     assert np.abs(seen.gap(plain)).max() > 2e-3
 
 
+@pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
+def test_changes_with_the_hull_are_those_of_the_gap(placed: bool) -> None:
+    scene, _ = sailed(30.0)
+    if not placed:
+        scene = replace(scene, eta=np.column_stack([np.full((len(scene.t), 2), np.nan), scene.eta[:, 2]]))
+    seen = windows(scene, 8.0, 2.0)
+    plain = still_air(seen.scene)
+    places = np.flatnonzero(plain.hull)
+    moves = 0.1 * plain.hull[places]
+    found = seen.hull_changes(plain, places, moves)
+    for q, (place, move) in enumerate(zip(places, moves, strict=True)):
+        hull = plain.hull.copy()
+        hull[place] += move
+        moved = seen.gap(replace(plain, hull=hull)) - seen.gap(plain)
+        np.testing.assert_allclose(found[:, :, q], moved, rtol=0.0, atol=1e-9 * np.abs(moved).max())
+
+
 def test_windows_average_derivatives_of_polynomials_exactly() -> None:
     t = np.arange(0.0, 40.0, 0.05)
     eta = np.column_stack([0.5 * 0.3 * t**2, 7.0 + 0.0 * t, 0.02 * t])

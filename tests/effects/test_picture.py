@@ -17,6 +17,7 @@ from ferryid.effects.picture import (
     acceleration,
     as_measured,
     between,
+    hull_changes,
     hull_of,
     required_force,
 )
@@ -224,3 +225,34 @@ def test_gusts_raise_the_mean_load_as_an_average_over_many_does() -> None:
         scale = np.abs(average[:2]).max()
         np.testing.assert_allclose(found[row, :2], average[:2], atol=0.06 * scale)
         assert np.abs(calm[:2] - average[:2]).max() > 0.1 * scale
+
+
+@pytest.mark.parametrize("flow", [False, True])
+@pytest.mark.parametrize("load", [False, True])
+@pytest.mark.parametrize("damped", [False, True])
+def test_changes_with_the_hull_are_those_of_a_hull_that_is_moved(flow: bool, load: bool, damped: bool) -> None:
+    one = replace(picture(flow=flow, load=load, damped=damped), turned=0.3, antenna=(1.5, -0.8))
+    places = np.array([3, 0, 25, *range(4, 25)])
+    # Lift has coefficients that are zero.
+    moves = 0.05 * np.where(one.hull[places] != 0.0, one.hull[places], 200.0)
+    found = hull_changes(one, places, moves)
+    assert found.shape == (N, 3, len(places))
+    for q, (place, move) in enumerate(zip(places, moves, strict=True)):
+        hull = one.hull.copy()
+        hull[place] += move
+        moved = as_measured(replace(one, hull=hull)) - as_measured(one)
+        scale = np.abs(moved).max()
+        assert scale > 0.0
+        np.testing.assert_allclose(found[:, :, q], moved, rtol=0.0, atol=1e-9 * scale, err_msg=COEFFICIENTS[place])
+    # What moves the hull leaves it as it was.
+    np.testing.assert_array_equal(one.hull, hull_of(FERRY))
+
+
+def test_rows_that_do_not_belong_together_are_refused() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    short = replace(one, external=one.external[:-1])
+    for refused in (short, replace(one, load=np.ones((N - 1, 3))), replace(one, parts=one.parts[1:])):
+        with pytest.raises(ValueError, match="other lengths"):
+            acceleration(refused)
+    with pytest.raises(ValueError, match="other lengths"):
+        required_force(short, np.zeros((N, 3)))
