@@ -16,7 +16,7 @@ from math import cos, exp, pi, sin
 import numpy as np
 from scipy.optimize import minimize
 
-from ferryid.diagnose.kalman import DIFFUSE, errors, errors_alone, gains
+from ferryid.diagnose.kalman import DIFFUSE, costs_alone, errors, errors_alone, gains
 from ferryid.diagnose.parallel import over
 from ferryid.diagnose.weak import Windows
 from ferryid.effects.effect import Process
@@ -155,14 +155,9 @@ def learn(steps: Windows, gaps: Floats, near: Filter | None = None) -> Filter:
         series = [summed(gaps[a:b][:, own], steps) for a, b in steps.runs]
         size = scale[own].mean(keepdims=True)
 
-        def cost(z: Floats, series: list[Floats] = series, size: Floats = size) -> float:
-            total = 0.0
-            for part in series:
-                noise = np.exp(z).reshape(1, 5)
-                K, spread = _alone(size, noise, integrals, len(part), h)
-                left = errors_alone(K, spread, noise, integrals, h, part)[DIFFUSE:]
-                total += 0.5 * float(np.sum(left**2)) + part.shape[1] * float(np.log(spread[DIFFUSE:]).sum())
-            return total
+        def costs(z: Floats, series: list[Floats] = series, size: Floats = size) -> Floats:
+            every = [costs_alone(size, np.exp(z), integrals, h, part) for part in series]
+            return np.asarray(np.sum(every, axis=0))
 
         rough = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
         # The second difference of a position has six times the variance of its errors, the first of a velocity's twice.
@@ -174,10 +169,11 @@ def learn(steps: Windows, gaps: Floats, near: Filter | None = None) -> Filter:
         ]
         begin += [np.log(near.channels[own[0]])] if near else []
 
-        def searched(start: Floats, h: float = h, cost: Callable[[Floats], float] = cost) -> Floats:
-            return _least(cost, start, _bounds(start, h))
+        def searched(start: Floats, h: float = h, costs: Callable[[Floats], Floats] = costs) -> Floats:
+            return _least(costs, start, _bounds(start, h))
 
-        channels[own] = np.exp(min(over(searched, begin), key=cost))
+        ends = np.array(over(searched, begin))
+        channels[own] = np.exp(ends[np.argmin(costs(ends))])
     return Filter(channels)
 
 
@@ -231,13 +227,16 @@ def learn_with(
     def cost(z: Floats) -> float:
         return -likelihood(noise(z), steps, gaps, pushes)
 
+    def costs(every: Floats) -> Floats:
+        return np.array(over(cost, every))
+
     channels = np.log(alone.channels[first])
     begin = np.concatenate([channels.ravel(), np.log(start)])
     bounds = [pair for row in channels for pair in _bounds(row, h)]
     bounds += [(float(one) - 5.0, float(one) + 4.0) for one in np.log(start)]
-    z = _least(cost, begin, bounds, most=GLIMPSE)
+    z = _least(costs, begin, bounds, most=GLIMPSE)
     if -cost(z) > worth - SIGHT:
-        z = _least(cost, z, bounds)
+        z = _least(costs, z, bounds)
     best = cost(z)
     width = _widths(cost, z, len(start), best)
     return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
@@ -303,9 +302,13 @@ def summed(gaps: Floats, steps: Windows) -> Floats:
     return np.ascontiguousarray(np.cumsum(total, axis=0) * h if integrals_of(steps) == 2 else total)
 
 
-def _least(cost: Callable[[Floats], float], start: Floats, bounds: list[tuple[float, float]], most: int = 60) -> Floats:
+def _least(
+    costs: Callable[[Floats], Floats], start: Floats, bounds: list[tuple[float, float]], most: int = 60
+) -> Floats:
+    """Return the parameters, shape (k,), of least cost nearby; `costs` are those of several at once, of shape (p, k)."""
+
     def with_slope(z: Floats) -> tuple[float, Floats]:
-        here, *moved = over(cost, [z, *(z + SMALL * np.eye(len(z)))])
+        here, *moved = costs(z + SMALL * np.eye(len(z) + 1, len(z), -1)).tolist()
         return here, (np.array(moved) - here) / SMALL
 
     best = minimize(

@@ -266,3 +266,35 @@ def errors_alone(K: Floats, spread: Floats, noise: Floats, integrals: int, step_
             rate[m] = d * w + e * r
             push[m] = fade * u
     return out
+
+
+@compiled
+def costs_alone(scale: Floats, noises: Floats, integrals: int, step_s: float, series: Floats) -> Floats:
+    """Return minus the logarithm of the likelihood of a channel's series under each of several noises, but for a constant.
+
+    Parameters
+    ----------
+    scale, integrals, step_s
+        As given to `gains`.
+    noises
+        Each as given to it, shape (p, 5).
+    series
+        Positions or velocities, all with the same noise, shape (n, q).
+
+    Returns
+    -------
+    ndarray
+        Shape (p,).
+    """
+    n, q = series.shape
+    out = np.zeros(len(noises))
+    blocks, drive, columns = np.empty((0, 0)), np.empty((2, 0, 0)), np.empty((n, 1, 0))
+    for i in range(len(noises)):
+        noise = noises[i : i + 1]
+        K, spread = gains(scale, noise, integrals, blocks, drive, columns, step_s)
+        left = errors_alone(K, spread, noise, integrals, step_s, series)
+        for k in range(DIFFUSE, n):
+            out[i] += q * np.log(spread[k, 0])
+            for m in range(q):
+                out[i] += 0.5 * left[k, m] * left[k, m]
+    return out

@@ -12,7 +12,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from ferryid.diagnose.filter import EXCERPT, PIECES, Filter, _widths, excerpt, learn, likelihood, sieve_of, stride_s
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit
-from ferryid.diagnose.kalman import DIFFUSE, errors, errors_alone, gains
+from ferryid.diagnose.kalman import DIFFUSE, costs_alone, errors, errors_alone, gains
 from ferryid.diagnose.noise import ORDER, Noise
 from ferryid.diagnose.weak import Windows, steps_of, windows
 from ferryid.effects import effects
@@ -114,6 +114,21 @@ def test_one_channel_alone_has_the_innovations_of_its_dense_covariance(row: Floa
     D = contrasts(1, n, integrals)
     new = np.linalg.solve(np.linalg.cholesky(D @ (error + G @ push @ G.T) @ D.T), D @ series)
     np.testing.assert_allclose(left[DIFFUSE:], new[DIFFUSE - integrals :], atol=1e-4)
+
+
+@pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])
+def test_the_cost_of_a_noise_is_that_of_its_gains_and_errors(integrals: int) -> None:
+    n, h, scale = 80, 0.4, np.array([0.7])
+    series = 0.02 * np.cumsum(np.random.default_rng(6).standard_normal((n, 2)), axis=0)
+    noises = np.stack([TRUE[0], TRUE[2], OTHER[1]])
+    known = []
+    for row in noises[:, None]:
+        none, nothing = np.empty((0, 0)), np.empty((n, 1, 0))
+        K, spread = gains(scale, row, integrals, none, np.empty((2, 0, 0)), nothing, h)
+        left = errors_alone(K, spread, row, integrals, h, series)[DIFFUSE:]
+        known.append(0.5 * np.sum(left**2) + 2.0 * np.sum(np.log(spread[DIFFUSE:])))
+    assert np.ptp(known) > 10.0
+    np.testing.assert_allclose(costs_alone(scale, noises, integrals, h, series), known, rtol=1e-12)
 
 
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
