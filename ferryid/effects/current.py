@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.effects.compass import bearing
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats, Profile
@@ -33,7 +34,7 @@ def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     north, east = values["north"], values["east"]
     towards = degrees(atan2(east, north)) % 360.0
-    return f"A current of {hypot(north, east):.2f} m/s towards {towards:.0f} deg was left out."
+    return f"A current of {hypot(north, east):.2f} m/s set towards {bearing(towards)}."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

@@ -40,7 +40,7 @@ def cannot(scene: Scene) -> str:
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     parts = ", ".join(f"{axis} {100.0 * (values[axis] - 1.0):+.0f} %" for axis in ("surge", "sway", "yaw"))
-    return f"Damping at speed has changed ({parts}): the hull is fouled, or cleaner than the model."
+    return f"Damping at speed has changed ({parts}): the hull is fouled, or cleaner than the hull model."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

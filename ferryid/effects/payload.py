@@ -45,7 +45,7 @@ def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     word = "more" if values["mass"] > 0.0 else "less"
     place = f"{abs(values['x']):.1f} m {'forward' if values['x'] >= 0.0 else 'aft'} of midship"
-    return f"The vessel carried {abs(values['mass']):.0f} kg {word} than the model knows, {place}."
+    return f"The vessel carried {abs(values['mass']):.0f} kg {word} than the hull model allows for, {place}."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

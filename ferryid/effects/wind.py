@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.effects.compass import bearing
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats, Profile, WindAreas
@@ -55,10 +56,10 @@ def cannot(scene: Scene) -> str:
 
 
 def says(values: Values, instance: str | None) -> str:
-    """Return the finding as a sentence."""
+    """Return the finding as a sentence: where it blows from, as in weather reports, and where to, as in results."""
     north, east = values["north"], values["east"]
     towards = degrees(atan2(east, north)) % 360.0
-    return f"A steady wind of {hypot(north, east):.1f} m/s towards {towards:.0f} deg was left out."
+    return f"A steady wind of {hypot(north, east):.1f} m/s from {bearing(towards + 180.0)} blew towards {bearing(towards)}."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

@@ -1,0 +1,52 @@
+"""Directions in words, and the sentences that use them."""
+
+from __future__ import annotations
+
+import pytest
+
+from ferryid.effects import effects
+from ferryid.effects.compass import bearing, compass_point
+from ferryid.vessel import load_profile
+
+
+@pytest.mark.parametrize(
+    ("degrees", "word"),
+    [
+        (0.0, "north"),
+        (11.2, "north"),
+        (11.3, "north-north-east"),
+        (90.0, "east"),
+        (148.0, "south-south-east"),
+        (225.0, "south-west"),
+        (349.0, "north"),
+        (-45.0, "north-west"),
+        (500.0, "south-east"),
+    ],
+)
+def test_the_nearest_of_sixteen_points(degrees: float, word: str) -> None:
+    assert compass_point(degrees) == word
+
+
+def test_a_bearing_stays_below_a_full_circle() -> None:
+    assert bearing(359.7) == "0 deg (north)"
+    assert bearing(-0.4) == "0 deg (north)"
+
+
+def test_a_wind_is_told_by_where_it_blows_from_and_a_current_by_where_it_sets() -> None:
+    # The air goes to the north-west, so that the wind is a south-easterly one.
+    towards = {"north": 3.0, "east": -3.0}
+    assert effects()["wind"].says(towards, None) == (
+        "A steady wind of 4.2 m/s from 135 deg (south-east) blew towards 315 deg (north-west)."
+    )
+    assert effects()["current"].says(towards, None) == "A current of 4.24 m/s set towards 315 deg (north-west)."
+
+
+@pytest.mark.parametrize("name", sorted(effects()))
+def test_a_sentence_is_true_of_a_model_that_has_the_effect(name: str) -> None:
+    """The same sentence stands in the letter, in ``models``, ``compare`` and ``evaluate``."""
+    effect = effects()[name]
+    profile = load_profile("milliampere")
+    values = {one.name: one.neutral + one.size for one in effect.parameters_of(profile)}
+    says = effect.says(values, effect.instances(profile)[-1])
+    assert "left out" not in says
+    assert "than the model" not in says
