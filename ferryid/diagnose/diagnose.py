@@ -33,7 +33,7 @@ from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import Search, search, suspects_of
 from ferryid.diagnose.shared_laws import Heard, heard
-from ferryid.diagnose.testable import advice, powers, tells, unexcited
+from ferryid.diagnose.testable import advice, powers, says_untested, tells, unexcited
 from ferryid.diagnose.together import Together, together
 from ferryid.diagnose.unknown import unknown_of
 from ferryid.diagnose.unsteady import unsteady_of
@@ -209,7 +209,7 @@ def _ended(
         named, nameless = ([merely_hinted(one) for one in every] for every in (named, nameless))
     findings = [*_of_sensors(log.sensors), *named]
     chances, still = powers(trial, kept, log.steady), unexcited(trial)
-    notes += [f"{effect}: not tested, {reason}." for effect, reason in found.untested.items()]
+    notes += says_untested(found.untested)
     notes += advice(chances, still)
     if unknown.unsteady or found.states:
         findings = [doubted(one) for one in findings]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ferryid.diagnose.evidence import Evidence, evidence
@@ -10,9 +10,15 @@ from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, without
 from ferryid.diagnose.rivals import Standing, standing_of
 from ferryid.diagnose.search import pruned
 from ferryid.diagnose.unknown import impostors
+from ferryid.effects.wording import listed
 
 SWAPS = 6
 """Times that a rival takes a place: physics without a name here may send one effect after the other to stand in for it."""
+
+PLACEBO = (
+    "a placebo (the same force at other times, or on mirrored headings) does as well on stretches kept from the fit"
+)
+LAW = "an empirical law of the motion explains more in that place, and leaves nothing to explain"
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,7 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
     progress
         Called with the name of each stage.
     """
-    told: list[str] = []
+    fallen_by_reason: dict[str, list[str]] = {}
     tried = {_keys(found)}
     kept, swaps = found, 0
     while kept.suspects:
@@ -70,11 +76,20 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
         proof = evidence(trial, kept)
         fallen, why = _fallen(trial, kept, proof)
         if fallen is None:
-            return Judged(kept, proof, standings, tuple(told))
-        told.append(f"{kept.suspects[fallen].title} was suspected, but {why}: it is no finding.")
+            return Judged(kept, proof, standings, _told(fallen_by_reason))
+        fallen_by_reason.setdefault(why, []).append(kept.suspects[fallen].title)
         kept = pruned(trial, without(trial, kept, fallen))
         tried.add(_keys(kept))
-    return Judged(kept, None, (), tuple(told))
+    return Judged(kept, None, (), _told(fallen_by_reason))
+
+
+def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """Return a sentence for every reason; what is dropped twice for it, on the way, is named once."""
+    said = []
+    for why, titles in fallen_by_reason.items():
+        names = list(dict.fromkeys(titles))
+        said.append(f"{listed(names)} {'were' if len(names) > 1 else 'was'} suspected, but dropped: {why}.")
+    return tuple(said)
 
 
 def _keys(made: Fit) -> frozenset[tuple[str, str | None]]:
@@ -87,7 +102,7 @@ def _fallen(trial: Trial, kept: Fit, proof: Evidence | None) -> tuple[int | None
         fallen = [i for i, one in enumerate(proof.proofs) if not one.holds]
         if fallen:
             worst = min(fallen, key=lambda i: proof.proofs[i].beaten)
-            return worst, "does not improve held-out stretches beyond what a placebo does"
+            return worst, PLACEBO
     # Physics without a name here may look a little like an effect.
     idle = impostors(trial, kept)
-    return (idle[0], "a law in its place explains more and leaves it nothing") if idle else (None, "")
+    return (idle[0], LAW) if idle else (None, "")

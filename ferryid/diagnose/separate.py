@@ -1,12 +1,12 @@
-"""What to record so that two explanations come apart."""
+"""What to record so that an effect shows, and so that two explanations come apart."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 
 TURN = "a slow turn on the spot through all headings, then straight runs at several speeds both ways"
-STEPS = "steps of the thrusters' speed from rest, straight ahead and astern"
-SINGLE = "each thruster alone, ahead and astern, at several speeds"
+STEPS = "steps of the thrusters' speed and angle from rest"
+SINGLE = "each thruster alone, at several speeds and angles, ahead and astern"
 COAST = "coasting to a stop from full speed with the thrusters off, ahead and sideways"
 ELSEWHERE = "the same manoeuvres in deep water, or over the whole of the place and far from it"
 STRAIGHT = "long straight runs at constant speed on opposite courses"
@@ -70,14 +70,41 @@ PAIRS: tuple[tuple[frozenset[str], str], ...] = (
     (frozenset({"azimuth_offset"}), SINGLE),
 )
 
+TURNING = "a slow turn on the spot through all headings"
+SPEEDS = "straight runs at several constant speeds up to full speed, both ways, and turns at speed"
+SHOWS = {
+    "wind": TURNING,
+    "current": f"{TURNING}, and straight runs both ways",
+    "waves": "station keeping in that sea, at several headings",
+    "gusts": TURNING,
+    "payload": "hard accelerations and turns from rest",
+    "fouling": SPEEDS,
+    "thruster_gain": SINGLE,
+    "azimuth_offset": SINGLE,
+    "azimuth_resolution": SINGLE,
+    "thruster_lag": STEPS,
+    "time_delay": STEPS,
+    "thrust_inflow_loss": "the same thrust at rest and at several speeds",
+    "thruster_interaction": "thrust with each thruster's wake on the other one, and beside it",
+    "mooring": "station keeping at places far apart",
+    "shallow_water": "the same runs in deep and in shallow water",
+    "lever_arm": "turns on the spot both ways, at several rates",
+    "heading_bias": "straight runs ahead and astern at several headings",
+}
+"""What a log has to hold to show an effect by itself."""
+OTHERWISE = "a calibration run that excites every axis at many headings"
+
 
 def manoeuvre(effect: str, rivals: Collection[str]) -> str | None:
-    """Return what to record to tell an effect from its rivals; None where there is nothing to tell apart."""
+    """Return what to record to tell an effect from its rivals; None where there is nothing to tell apart.
+
+    A pair without a manoeuvre of its own is told apart by what shows the one and what shows the other.
+    """
     if not rivals:
         return None
+    known = dict(PAIRS)
+    told: list[str] = []
     for rival in rivals:
         pair = frozenset({effect, rival})
-        for known, text in PAIRS:
-            if pair == known:
-                return text
-    return "a calibration run that excites every axis at many headings, such as the 12-corner path"
+        told += [known[pair]] if pair in known else [SHOWS.get(one, OTHERWISE) for one in (effect, rival)]
+    return "; ".join(dict.fromkeys(told))

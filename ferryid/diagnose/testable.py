@@ -6,7 +6,7 @@ their own uncertainty goes; what then is left of it, in units of the noise, is w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import erf, sqrt
 
@@ -14,7 +14,10 @@ import numpy as np
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
 from ferryid.diagnose.search import ODDS
+from ferryid.diagnose.separate import OTHERWISE, SHOWS
+from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.wording import listed, titled
 from ferryid.vessel.profile import Floats
 
 SEEN = 0.5
@@ -34,33 +37,8 @@ EXCITES = {
     "sway": "moves sideways to both sides, from rest and back to rest",
     "yaw": "turns on the spot both ways, at several rates",
 }
-TURNING = "a slow turn on the spot through all headings"
-ALONE = "each thruster alone, at several speeds and angles, ahead and astern"
-STEPS = "steps of the thrusters' speed and angle from rest"
-SPEEDS = "straight runs at several constant speeds up to full speed, both ways, and turns at speed"
-SHOWS = {
-    "wind": TURNING,
-    "current": f"{TURNING}, and straight runs both ways",
-    "waves": "station keeping in that sea, at several headings",
-    "gusts": TURNING,
-    "payload": "hard accelerations and turns from rest",
-    "fouling": SPEEDS,
-    "thruster_gain": ALONE,
-    "azimuth_offset": ALONE,
-    "azimuth_resolution": ALONE,
-    "thruster_lag": STEPS,
-    "time_delay": STEPS,
-    "thrust_inflow_loss": "the same thrust at rest and at several speeds",
-    "thruster_interaction": "thrust with each thruster's wake on the other one, and beside it",
-    "mooring": "station keeping at places far apart",
-    "shallow_water": "the same runs in deep and in shallow water",
-    "lever_arm": "turns on the spot both ways, at several rates",
-    "heading_bias": "straight runs ahead and astern at several headings",
-}
-"""What a log has to hold to show an effect."""
 HULL = "hull_parameters"
 """What a log tells of the hull's coefficients is told by axis."""
-OTHERWISE = "a calibration run that excites every axis at many headings, such as the 12-corner path"
 
 
 @dataclass(frozen=True)
@@ -156,7 +134,7 @@ def tells(every: Sequence[Power], axes: Sequence[str]) -> bool:
 
 
 def advice(every: Sequence[Power], axes: Sequence[str]) -> list[str]:
-    """Return what the log could not show, and what to record next, in sentences."""
+    """Return what the log could not show, and what to record next, in sentences; each effect and manoeuvre once."""
     told = []
     if axes:
         what = " and ".join(axes)
@@ -164,17 +142,23 @@ def advice(every: Sequence[Power], axes: Sequence[str]) -> list[str]:
             f"The vessel was hardly moved in {what}: the log tells nothing of its hull there. "
             f"To excite {'it' if len(axes) == 1 else 'them'}, record {'; '.join(EXCITES[axis] for axis in axes)}."
         )
-    by_manoeuvre: dict[str, list[str]] = {}
+    by_manoeuvre: dict[str, dict[str, list[str]]] = {}
     for one in every:
         if one.chance < SEEN:
-            name = one.suspect.effect.title.lower() + (f" ({one.suspect.instance})" if one.suspect.instance else "")
-            by_manoeuvre.setdefault(SHOWS.get(one.suspect.effect.id, OTHERWISE), []).append(name)
+            known = by_manoeuvre.setdefault(SHOWS.get(one.suspect.effect.id, OTHERWISE), {})
+            known.setdefault(one.suspect.effect.title.lower(), []).extend(filter(None, [one.suspect.instance]))
     if by_manoeuvre:
-        names = ", ".join(name for names in by_manoeuvre.values() for name in names)
-        told.append(f"This log could not have shown, at their usual size: {names}.")
-        told.append(
-            "To show them, record "
-            + "; ".join(f"{manoeuvre} ({', '.join(names)})" for manoeuvre, names in by_manoeuvre.items())
-            + "."
-        )
+        parts = [
+            f"for {listed([titled(title, ', '.join(of)) for title, of in names.items()])}, record {manoeuvre}"
+            for manoeuvre, names in by_manoeuvre.items()
+        ]
+        told.append(f"This log would not have shown everything at its usual size. To make sure: {'; '.join(parts)}.")
     return told
+
+
+def says_untested(untested: Mapping[str, str]) -> list[str]:
+    """Return a sentence for every reason why effects, by id, could not be tested."""
+    by_reason: dict[str, list[str]] = {}
+    for effect, reason in untested.items():
+        by_reason.setdefault(reason, []).append(effects()[effect].title.lower())
+    return [f"Not tested: {listed(titles)}, since {reason}." for reason, titles in by_reason.items()]

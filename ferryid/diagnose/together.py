@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -40,9 +41,16 @@ class Together:
     def says(self, path: str) -> str:
         """Return a sentence on where the hull comes from that a log is diagnosed with."""
         others = len(self.members) - (path in self.place)
+        # Told as a ratio of standard deviations, which people have a feeling for; the hull's uncertainty is widened by it.
+        apart = sqrt(self.hull.disagreement)
+        agree = (
+            f"They disagree about it {apart:.1f} times as much as the noise in them explains, and it was taken to be uncertain "
+            "accordingly."
+            if apart > 1.0
+            else "They disagree about it by no more than the noise in them explains."
+        )
         return (
-            f"The hull is that of {others} other log{'s' if others > 1 else ''} of the vessel, lift included; they differ "
-            f"about it by {self.hull.disagreement:.1f} times the variance of their noise."
+            f"The hull is that of {others} other log{'s' if others > 1 else ''} of the vessel, lift included. {agree}"
         )
 
 

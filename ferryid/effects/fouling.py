@@ -34,7 +34,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
 
 def cannot(scene: Scene) -> str:
     """Say why the scene cannot show fouling."""
-    return "" if scene.profile.hull.has_model else "the profile has no damping that could have grown"
+    return "" if scene.profile.hull.has_model else "the profile has no hull model"
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -96,7 +96,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
 
 def cannot(scene: Scene) -> str:
     """Say why the scene cannot show a wrong hull model."""
-    return "" if scene.profile.hull.has_model else "the profile has no hull model that could be wrong"
+    return "" if scene.profile.hull.has_model else "the profile has no hull model"
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -115,7 +115,7 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
 def cannot(scene: Scene) -> str:
     """Say why the scene cannot show shallow water."""
     if not scene.profile.hull.has_model:
-        return "the profile has no damping that could be larger somewhere"
+        return "the profile has no hull model"
     return "" if np.isfinite(scene.eta[scene.usable, :2]).all() else "the log has no position"
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.compass import bearing
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.wording import bearing
 from ferryid.vessel.profile import Floats, Profile, WindAreas
 from ferryid.vessel.wind import wind_force
 

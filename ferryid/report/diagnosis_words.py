@@ -9,6 +9,7 @@ from typing import Any
 
 from ferryid.diagnose.result import AXES, NEAR, Diagnosis, Estimate, Finding
 from ferryid.effects import effects
+from ferryid.effects.wording import listed, titled
 
 EVERYWHERE = "all along"
 SPANS = 4
@@ -40,7 +41,7 @@ def title(effect: str, instance: str | None = None) -> str:
         return "Something without a name"
     known = effects().get(effect)
     name = known.title if known else effect.replace("_", " ").capitalize()
-    return f"{name} ({instance})" if instance else name
+    return titled(name, instance)
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -262,11 +263,6 @@ def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             {"name": f"{name} after {horizons[k]:g} s [{unit}]", "cells": [_cell(one), _cell(other), _ratio(ratio)]}
         )
     return rows
-
-
-def listed(parts: Sequence[str], word: str = "and") -> str:
-    """Return "a, b and c"."""
-    return f" {word} ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
 
 
 def _estimated(given: Mapping[str, Any]) -> Estimate:

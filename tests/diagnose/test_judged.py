@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near
-from ferryid.diagnose.judged import judged
+from ferryid.diagnose.judged import LAW, PLACEBO, _told, judged
 from ferryid.diagnose.search import search, suspects_of
 from tests.diagnose.trials import sailed, trial_on
 
@@ -74,4 +74,11 @@ def test_what_helps_no_held_out_stretch_falls_and_is_told(trial: Trial) -> None:
     told = judged(trial.with_noise_of(right), breeze, [], lambda stage: None)
     assert {one.key for one in told.fit.suspects} == {LOSS, FIRST}
     (sentence,) = told.told
-    assert sentence.startswith(f"{idle[0].effect.title} was suspected, but does not improve held-out stretches")
+    assert sentence == f"{idle[0].effect.title} was suspected, but dropped: {PLACEBO}."
+
+
+def test_what_fell_for_one_reason_is_one_sentence() -> None:
+    assert _told({LAW: ["Wind", "Current", "Wind"], PLACEBO: ["Payload"]}) == (
+        f"Wind and Current were suspected, but dropped: {LAW}.",
+        f"Payload was suspected, but dropped: {PLACEBO}.",
+    )

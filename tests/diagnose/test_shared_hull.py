@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from ferryid.diagnose.hypothesis import Suspect, fit, trial_of
 from ferryid.diagnose.scene import window_lengths
 from ferryid.diagnose.shared_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 from ferryid.diagnose.shared_hull import INDUCED, Member, SharedHull, fit_together
-from ferryid.diagnose.together import together
+from ferryid.diagnose.together import Together, together
 from ferryid.diagnose.weak import windows
 from ferryid.effects import effects
 from ferryid.effects.picture import Picture, hull_of
@@ -139,3 +141,14 @@ def test_a_common_hull_needs_two_logs() -> None:
 def test_a_common_hull_and_another_model_exclude_each_other() -> None:
     with pytest.raises(FerryIdError, match="--together"):
         diagnose(["a", "b"], FERRY, None, against="c", shared=True, progress=lambda stage: None)
+
+
+@pytest.mark.parametrize(
+    ("variances", "told"), [(9.0, "3.0 times as much as the noise"), (0.8, "by no more than the noise")]
+)
+def test_how_far_logs_disagree_is_told_as_people_think_of_it(variances: float, told: str) -> None:
+    hull = cast(SharedHull, SimpleNamespace(disagreement=variances))
+    says = Together(members(), hull, {"a": 0}).says("a")
+    assert says.startswith("The hull is that of 2 other logs of the vessel")
+    assert told in says
+    assert "variance" not in says

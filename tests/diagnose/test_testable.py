@@ -12,7 +12,7 @@ import pytest
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial
 from ferryid.diagnose.search import ODDS
-from ferryid.diagnose.testable import AXES, Power, advice, powers, tells, unexcited
+from ferryid.diagnose.testable import AXES, Power, advice, powers, says_untested, tells, unexcited
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, hull_of
@@ -119,3 +119,18 @@ def test_advice_names_axis_effect_and_manoeuvre() -> None:
     assert "turn on the spot" in told
     assert "current" not in told
     assert advice([Power(suspect("current"), 0.99)], ()) == []
+
+
+def test_advice_names_each_effect_and_manoeuvre_once() -> None:
+    ends: list[Any] = [Power(suspect("azimuth_offset", f"thruster{k}"), 0.1) for k in (1, 2)]
+    (told,) = advice([*ends, Power(suspect("fouling"), 0.2)], ())
+    assert told.count("for azimuth offset (thruster1, thruster2), record each thruster alone") == 1
+    assert told.count("azimuth offset") == told.count("fouling") == 1
+
+
+def test_what_was_not_tested_is_told_by_title_and_once_for_a_reason() -> None:
+    untested = {"wind": "there are no wind areas", "gusts": "there are no wind areas", "thruster_gain": "nothing turns"}
+    assert says_untested(untested) == [
+        "Not tested: steady wind and gusts, since there are no wind areas.",
+        "Not tested: thruster force, since nothing turns.",
+    ]

@@ -1,11 +1,11 @@
-"""Directions in words, and the sentences that use them."""
+"""Directions and lists in words, and the sentences that use them."""
 
 from __future__ import annotations
 
 import pytest
 
 from ferryid.effects import effects
-from ferryid.effects.compass import bearing, compass_point
+from ferryid.effects.wording import bearing, compass_point, listed
 from ferryid.vessel import load_profile
 
 
@@ -50,3 +50,8 @@ def test_a_sentence_is_true_of_a_model_that_has_the_effect(name: str) -> None:
     says = effect.says(values, effect.instances(profile)[-1])
     assert "left out" not in says
     assert "than the model" not in says
+
+
+def test_lists_read_like_prose() -> None:
+    assert [listed(list(parts)) for parts in ("", "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
+    assert listed(["a", "b"], "or") == "a or b"

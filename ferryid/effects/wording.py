@@ -1,6 +1,8 @@
-"""Directions in words."""
+"""How results are worded: directions and lists."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 WINDS = (
     *("north", "north-north-east", "north-east", "east-north-east"),
@@ -19,3 +21,13 @@ def compass_point(degrees: float) -> str:
 def bearing(degrees: float) -> str:
     """Return a direction in whole degrees of a circle and in words: ``148 deg (south-south-east)``."""
     return f"{round(degrees) % 360} deg ({compass_point(degrees)})"
+
+
+def titled(title: str, instance: str | None) -> str:
+    """Return a title with the thruster it is one of, if it is."""
+    return f"{title} ({instance})" if instance else title
+
+
+def listed(parts: Sequence[str], word: str = "and") -> str:
+    """Return "a, b and c"."""
+    return f" {word} ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
