@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
@@ -56,6 +57,6 @@ def command(
     )
     progress("writing the report")
     diagnoses = keep(diagnoses, profile, examined, out, name=name)
-    outcome = report(diagnoses, out)
+    outcome = report(diagnoses, out, ("ferryid", *sys.argv[1:]))
     progress("")
     emit(outcome.json, outcome.text, json)

@@ -29,7 +29,7 @@ from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import locate
 from ferryid.diagnose.named import doubted, forces_of, hinted, merely_hinted
 from ferryid.diagnose.noisy import drowned_axes, says_drowned
-from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding
+from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding, Moved
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import Search, search, suspects_of
 from ferryid.diagnose.shared_laws import Heard, heard
@@ -39,7 +39,7 @@ from ferryid.diagnose.unknown import unknown_of
 from ferryid.diagnose.unsteady import unsteady_of
 from ferryid.diagnose.weak import Windows, windows
 from ferryid.diagnose.withheld import withheld as withheld_beside
-from ferryid.effects.picture import Scene
+from ferryid.effects.picture import COEFFICIENTS, UNITS, Scene
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.vessel.profile import Profile
@@ -154,7 +154,16 @@ def _begun(
             f"Only {len(seen.starts)} stretches of {window_lengths(profile)[0]:.0f} s without a gap: too little to tell. "
             "Record at least ten minutes that excite every axis."
         )
-        return Diagnosis(survey.motion.log, profile.name, "not_testable", _of_sensors(sensors), {}, {}, tuple(notes))
+        return Diagnosis(
+            survey.motion.log,
+            profile.name,
+            "not_testable",
+            _of_sensors(sensors),
+            {},
+            {},
+            tuple(notes),
+            duration_s=_duration_s(scene),
+        )
     if simulated is None:
         plain, spread = plain_picture(seen.scene, profile, model, survey.recording.sha256)
         library = suspects_of(seen.scene)[0]
@@ -230,6 +239,8 @@ def _ended(
         located=locate(trial, base, kept, scene) if kept.suspects else unknown.left,
         withheld=withheld_beside(survey.hidden, scene, findings),
         against=log.compared,
+        moved=_moved(trial, kept) if kept.suspects else None,
+        duration_s=_duration_s(scene),
         # A simulation's hull is not the vessel's, and the lift of a common one is in no model file.
         learnt=learnt(trial, kept, found.states, findings, survey) if simulated is None and common is None else None,
     )
@@ -273,14 +284,16 @@ def _of_sensors(sensors: Sequence[SensorFinding]) -> tuple[Finding, ...]:
 
 
 def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple[dict[str, Any], dict[str, Any]]:
+    window_s = len(trial.windows.weight) * trial.windows.scene.step_s
     if proof is None:
         errors = force_errors(trial.windows, imagined(trial.plain, base), trial.plain)
         mse = dict(zip(AXES, np.mean(errors**2, axis=0).tolist(), strict=True))
-        return {"mse": mse, "rows": len(errors)}, {"mse": mse}
+        return {"mse": mse, "rows": len(errors), "window_s": window_s}, {"mse": mse}
     whole: Improvement = proof.whole
     before: dict[str, Any] = {
         "mse": dict(zip(AXES, whole.mse_before.tolist(), strict=True)),
         "rows": len(whole.before),
+        "window_s": window_s,
         "free_run": _free_run(proof.free_runs, proof.free_runs.before),
     }
     after: dict[str, Any] = {
@@ -292,6 +305,20 @@ def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple
         "free_run": _free_run(proof.free_runs, proof.free_runs.after),
     }
     return before, after
+
+
+def _moved(trial: Trial, kept: Fit) -> Moved | None:
+    """Return the hull's coefficient that the refit moved farthest; None where none could move."""
+    free = trial.hull_spread > 0.0
+    if not free.any():
+        return None
+    away = np.divide(kept.hull - trial.plain.hull, trial.hull_spread, out=np.zeros_like(kept.hull), where=free)
+    k = int(np.argmax(np.abs(away)))
+    return Moved(COEFFICIENTS[k], UNITS[k], float(trial.plain.hull[k]), float(kept.hull[k]), float(away[k]))
+
+
+def _duration_s(scene: Scene) -> float:
+    return float(scene.t[-1] - scene.t[0])
 
 
 def _free_run(runs: FreeRuns, errors: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, Any]:

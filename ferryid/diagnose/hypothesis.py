@@ -14,6 +14,7 @@ from ferryid.diagnose.noise import Noise, noise_of
 from ferryid.diagnose.weak import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.picture import Picture
+from ferryid.effects.wording import titled
 from ferryid.vessel.profile import Floats
 
 HULL_SPREAD = 0.12
@@ -66,7 +67,7 @@ class Suspect:
     @property
     def title(self) -> str:
         """The effect's title, with the thruster that it is one of."""
-        return self.effect.title + ("" if self.instance is None else f" of {self.instance}")
+        return titled(self.effect.title, self.instance)
 
     @property
     def start(self) -> Floats:

@@ -131,6 +131,27 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class Moved:
+    """The coefficient of the hull that a refit moved farthest.
+
+    Attributes
+    ----------
+    coefficient, unit
+        Of `ferryid.effects.picture.COEFFICIENTS`.
+    before, value
+        What was believed of it, and what came out.
+    deviations
+        The move in standard deviations of what was believed.
+    """
+
+    coefficient: str
+    unit: str
+    before: float
+    value: float
+    deviations: float
+
+
+@dataclass(frozen=True)
 class Withheld:
     """What the diagnosis found of a signal that it was not shown, beside what the sensor had measured.
 
@@ -162,6 +183,7 @@ class Diagnosis:
         - ``mse``: force error by axis [N² or N²m²];
         - ``free_run``: as `ferryid.identify.scores.free_run_plain` gives it, or empty;
         - ``rows`` (in `before`, optional): how many rows these are, so that several logs can be pooled;
+        - ``window_s`` (in `before`, optional): length of the windows that force is averaged over [s];
         - ``ratio`` (in `after`, optional): `after` over `before` of the force error by axis, each
           ``{"value", "low", "high"}`` with a 95 % interval from a block bootstrap;
         - ``free_run_ratio`` (in `after`, optional): the same for the root-mean-square errors of the free run, by
@@ -184,6 +206,10 @@ class Diagnosis:
         the hull of other logs.
     located
         Where and when the recording and the model differ.
+    moved
+        How far the hull went that was fitted together with the findings; None where there are none of forces.
+    duration_s
+        From the first to the last row of the log [s].
     """
 
     log: str
@@ -199,6 +225,8 @@ class Diagnosis:
     against: Mapping[str, Any] = field(default_factory=dict)
     learnt: Learnt | None = None
     located: Location | None = None
+    moved: Moved | None = None
+    duration_s: float | None = None
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -224,6 +252,8 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "model": diagnosis.model,
         **({"against": dict(diagnosis.against)} if diagnosis.against else {}),
         **({} if diagnosis.located is None else {"located": plain_location(diagnosis.located)}),
+        **({} if diagnosis.moved is None else {"hull_moved": vars(diagnosis.moved)}),
+        **({} if diagnosis.duration_s is None else {"duration_s": diagnosis.duration_s}),
     }
 
 

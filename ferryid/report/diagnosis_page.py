@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -21,10 +21,13 @@ TEXT_COLUMNS = 100
 UNITS = ("[N]", "[N]", "[N·m]")
 
 
-def render(diagnoses: Sequence[Diagnosis], title: str) -> tuple[str, dict[str, str]]:
-    """Return the page on one log or several, and its drawings (SVG) by name."""
+def render(
+    diagnoses: Sequence[Diagnosis], title: str, made: Mapping[str, str] | None = None
+) -> tuple[str, dict[str, str]]:
+    """Return the page on one log or several, and its drawings (SVG) by name; `made` are date, version and command."""
     several = len(diagnoses) > 1
-    logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS) for k, one in enumerate(diagnoses, 1)]
+    shared = diagnosis_words.notes_of_all(diagnoses)
+    logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS, shared) for k, one in enumerate(diagnoses, 1)]
     left = [one.log for one in diagnoses[MAX_LOGS:]]
     page = template("diagnosis.html").render(
         title=title,
@@ -32,6 +35,9 @@ def render(diagnoses: Sequence[Diagnosis], title: str) -> tuple[str, dict[str, s
         headline=diagnosis_words.summary(diagnoses),
         several=several,
         logs=logs,
+        sign=diagnosis_words.SIGN,
+        made=made,
+        shared_notes=shared,
         axes=list(zip(AXES, UNITS, strict=True)),
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
     )
@@ -50,6 +56,7 @@ def render(diagnoses: Sequence[Diagnosis], title: str) -> tuple[str, dict[str, s
 def as_text(diagnoses: Sequence[Diagnosis]) -> str:
     """Return the same for a terminal, short."""
     blocks = [diagnosis_words.summary(diagnoses)] if len(diagnoses) > 1 else []
+    shared = diagnosis_words.notes_of_all(diagnoses)
     for one in diagnoses:
         lines = [f"{one.log}: {diagnosis_words.headline(one)}"]
         for k, finding in enumerate(one.findings, 1):
@@ -59,17 +66,20 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
             lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]
             lines.append(f"{'':<44}" + "".join(f"{unit:>22}" for unit in UNITS))
             lines += [f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"]) for row in rows]
+            lines += diagnosis_words.about_errors(one)
         runs = diagnosis_words.free_run_rows(one)
         if runs:
-            names = ("without", "with", "with over without") if one.findings else ("error",)
+            names = ("without", "with", "with over without") if diagnosis_words.fitted(one) else ("error",)
             lines += ["", f"{'free run on held-out data':<44}" + "".join(f"{name:>22}" for name in names)]
             for row in runs:
                 lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
         hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
-        remarks = [*hidden, *(f"note: {note}" for note in one.notes)]
+        remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, shared))]
         lines += ["", *remarks] if remarks else []
         lines += ["", f"The model with the findings is {diagnosis_words.new_model(one)}"] if one.model else [""]
         blocks.append("\n".join(_folded(line) for line in lines))
+    if shared:
+        blocks.append("\n".join(_folded(f"note on all logs: {note}") for note in shared))
     return "\n\n".join(blocks)
 
 
@@ -99,7 +109,7 @@ def _folded(line: str) -> str:
     )
 
 
-def _log(diagnosis: Diagnosis, prefix: str, drawn: bool) -> dict[str, Any]:
+def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) -> dict[str, Any]:
     force_rows, free_run_rows = diagnosis_words.force_rows(diagnosis), diagnosis_words.free_run_rows(diagnosis)
     return {
         "name": diagnosis.log,
@@ -132,7 +142,11 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool) -> dict[str, Any]:
             }
             for one in diagnosis.withheld
         ],
-        "notes": diagnosis.notes,
+        "notes": diagnosis_words.notes_of(diagnosis, told),
+        "drawn": drawn and any(one.evidence for one in diagnosis.findings),
+        "fitted": diagnosis_words.fitted(diagnosis),
+        "about_errors": diagnosis_words.about_errors(diagnosis),
+        "about": diagnosis_words.about_log(diagnosis),
         "model": diagnosis_words.new_model(diagnosis),
     }
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from ferryid import __version__
 from ferryid.diagnose.result import AXES, SCHEMA, Diagnosis, to_json
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
@@ -55,8 +58,10 @@ def patient(vessel: str | None, model: str | None, out: Path) -> tuple[Profile, 
     return profile, loaded
 
 
-def report(diagnoses: Sequence[Diagnosis], out: Path) -> Outcome:
+def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = ()) -> Outcome:
     """Write page, figures and JSON to a folder of their own in ``reports``; a later diagnosis of the same logs replaces it.
+
+    `command` are the words that the diagnosis was asked for with; the page repeats them.
 
     Raises
     ------
@@ -67,7 +72,12 @@ def report(diagnoses: Sequence[Diagnosis], out: Path) -> Outcome:
     names = ", ".join(one.log for one in diagnoses[:2]) + (
         f" and {len(diagnoses) - 2} more" if len(diagnoses) > 2 else ""
     )
-    page, drawings = render(diagnoses, f"{diagnoses[0].vessel} · {names}")
+    made = {
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "version": __version__,
+        "command": shlex.join(command),
+    }
+    page, drawings = render(diagnoses, f"{diagnoses[0].vessel} · {names}", made)
     file = folder / "report.html"
     plain = {**finite(as_json(diagnoses)), "report": str(file)}
     with replacing(folder) as temporary:

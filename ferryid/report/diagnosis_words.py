@@ -9,6 +9,7 @@ from typing import Any
 
 from ferryid.diagnose.result import AXES, NEAR, Diagnosis, Estimate, Finding
 from ferryid.effects import effects
+from ferryid.effects.picture import COEFFICIENTS
 from ferryid.effects.wording import listed, titled
 
 EVERYWHERE = "all along"
@@ -27,6 +28,16 @@ UNSTEADY = frozenset({"gusts", "waves"})
 """Effects that are states of the filter, which has them all along."""
 ENDS_S = 10.0
 """What begins and ends this near to the ends of the log acts throughout."""
+SIGN = (
+    "What is left over is model minus measured, as a force along the vessel's axes: a push that the model lacks shows with its "
+    "sign turned round."
+)
+NAMES = {
+    "std": "standard deviation",
+    "force_std": "standard deviation of the force",
+    "moment_std": "standard deviation of the moment",
+}
+"""Parameters whose own names are no words."""
 FREE_RUN = (
     ("position_m", "position", "m", 1.0),
     ("heading_rad", "heading", "deg", 57.29577951308232),
@@ -57,8 +68,9 @@ def headline(diagnosis: Diagnosis) -> str:
     parts += [f"the sensors have faults, corrected here: {listed(sensors)}"] if sensors else []
     names = "; ".join(parts) + (f"; perhaps also {doubtful}" if doubtful else "")
     change = changed({axis: 1.0 - ratio.value for axis, ratio in ratio_of(diagnosis).items()})
-    told = f"; with {'them' if len(physics) > 1 else 'it'}, the squared force error on held-out data {change}"
-    more = told if change and physics else ""
+    them = "them" if len(physics) + len(every) - len(named) > 1 else "it"
+    told = f"; with {them}, the squared force error on held-out data {change}"
+    more = told if change and physics and fitted(diagnosis) else ""
     if diagnosis.verdict == "explained":
         return f"Explained: {names}{more}."
     if diagnosis.verdict == "partly_explained":
@@ -71,6 +83,12 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "not_testable":
         return f"Not testable: this log cannot show whether anything is missing from the {base}."
     return f"Matched: nothing that this log could show is missing from the {base}."
+
+
+def fitted(diagnosis: Diagnosis) -> bool:
+    """Return whether the errors with the findings are others than without: what has no name is not in them."""
+    after = diagnosis.after.get("mse", {})
+    return bool(diagnosis.findings) and bool(after) and after != diagnosis.before.get("mse", {})
 
 
 def changed(shares: Mapping[str, float]) -> str:
@@ -100,8 +118,11 @@ def ratio_of(diagnosis: Diagnosis) -> dict[str, Estimate]:
 
 def numbers(finding: Finding) -> str:
     """Return the parameters with intervals and units."""
-    parts = [f"{name.replace('_', ' ')} {estimate(one)}" for name, one in finding.parameters.items()]
-    return f"{_upper('; '.join(parts))} (95 % intervals)." if parts else ""
+    parts = [f"{_word(name)} {estimate(one)}" for name, one in finding.parameters.items()]
+    told = "; ".join(parts)
+    return (
+        f"{told if next(iter(finding.parameters)) in COEFFICIENTS else _upper(told)} (95 % intervals)." if parts else ""
+    )
 
 
 def estimate(one: Estimate) -> str:
@@ -150,7 +171,8 @@ def _throughout(finding: Finding) -> bool:
 def trust(finding: Finding) -> str:
     """Return the probability, and what the finding removes of the squared force error."""
     no_name = finding.effect == UNKNOWN
-    told = f"Probability {probability(finding.probability)}{' that it is no chance' if no_name else ''}."
+    of_what = " that it is no chance" if no_name else ", among the effects that were tried" if finding.rivals else ""
+    told = f"Probability {probability(finding.probability)}{of_what}."
     change = changed(finding.improvement)
     if not change:
         return told
@@ -174,9 +196,9 @@ def rivals(finding: Finding) -> list[str]:
     far = [_inline(title(one.effect, one.instance)) for one in shown if one not in near]
     if near:
         parts = [f"{_inline(title(one.effect, one.instance))} {_odds(one.delta_score)}" for one in near]
-        lines.append(f"In its place {'; '.join(parts)}.")
+        lines.append(f"Of the other effects that were tried in its place, {'; '.join(parts)}.")
     if far:
-        other = "Anything else" if near else "Anything in its place"
+        other = "Any other" if near else "Any other effect that was tried in its place"
         lines.append(f"{other} is less likely by a factor of more than a million: {listed(far, 'or')} would be next.")
     if finding.separating_manoeuvre:
         manoeuvre = finding.separating_manoeuvre.rstrip(".")
@@ -229,12 +251,14 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
 def force_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the rows of the table before and after: a name and a cell per axis."""
     rows = []
-    for name, part in (("without the findings", diagnosis.before), ("with the findings", diagnosis.after)):
+    both = fitted(diagnosis)
+    parts = (("without the findings", diagnosis.before), ("with the findings", diagnosis.after))
+    for name, part in parts if both else parts[:1]:
         mse = part.get("mse", {})
-        if mse and (part is diagnosis.before or diagnosis.findings):
-            label = f"root-mean-square error, {name}" if diagnosis.findings else "root-mean-square error"
+        if mse:
+            label = f"root-mean-square error, {name}" if both else "root-mean-square error"
             rows.append({"name": label, "cells": [_cell(mse.get(axis), root=True) for axis in AXES]})
-    if not diagnosis.findings:
+    if not both:
         return rows
     ratios = ratio_of(diagnosis)
     if ratios:
@@ -246,23 +270,72 @@ def force_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return rows
 
 
+def about_errors(diagnosis: Diagnosis) -> list[str]:
+    """Return what a reader of the table of force errors must know: what they are of, and what is not in them."""
+    lines = []
+    if diagnosis.findings:
+        unsteady = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect in UNSTEADY]
+        absent = [f"{listed(unsteady)} (forces that come and go by chance)"] if unsteady else []
+        absent += ["findings without a name"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []
+        if absent:
+            lines.append(f"Not in the errors with the findings: {listed(absent)}.")
+    if diagnosis.moved is not None:
+        one = diagnosis.moved
+        lines.append(
+            "The hull's coefficients were refitted too, by themselves for the errors without the findings and together with "
+            f"them for the others. There, {one.coefficient} moved farthest, from {one.before:.4g} to {one.value:.4g} "
+            f"{one.unit}: {abs(one.deviations):.2g} times the standard deviation of what was believed of it."
+        )
+    if "window_s" in diagnosis.before:
+        lines.append(
+            f"These errors are means over windows of {diagnosis.before['window_s']:.2g} s. Those of ferryid evaluate are of "
+            "single rows of smoothed data, so that the two differ."
+        )
+    return lines
+
+
 def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return free-run error before, after and their ratio, a row a quantity, at the horizon of the ratios or the last."""
+    """Return free-run error before, after and their ratio, a row a quantity, at the longest horizon that has data.
+
+    Where ratios with intervals are given, their horizon is the one. A quantity without data has no row.
+    """
     before, after = diagnosis.before.get("free_run", {}), diagnosis.after.get("free_run", {})
-    if not before.get("horizons_s"):
-        return []
+    horizons = list(before.get("horizons_s", ()))
     ratios = diagnosis.after.get("free_run_ratio", {})
-    horizons = list(before["horizons_s"])
-    k = horizons.index(ratios["horizon_s"]) if ratios.get("horizon_s") in horizons else len(horizons) - 1
     rows = []
     for key, name, unit, factor in FREE_RUN:
+        runs = [run[key] for run in (before, after) if run.get(key)]
+        known = [k for k in range(len(horizons)) if runs and all(isfinite(_number(run[k])) for run in runs)]
+        if not known:
+            continue
+        given = ratios.get(key) if ratios.get("horizon_s") in [horizons[k] for k in known] else None
+        k = horizons.index(ratios["horizon_s"]) if given else known[-1]
         one, other = (_number(run[key][k]) * factor if run.get(key) else float("nan") for run in (before, after))
-        given = ratios.get(key)
         ratio = _estimated(given) if given else _bare(other / one if one > 0.0 else float("nan"))
         rows.append(
             {"name": f"{name} after {horizons[k]:g} s [{unit}]", "cells": [_cell(one), _cell(other), _ratio(ratio)]}
         )
     return rows
+
+
+def notes_of_all(diagnoses: Sequence[Diagnosis]) -> tuple[str, ...]:
+    """Return the notes that every one of several logs has."""
+    if len(diagnoses) < 2:
+        return ()
+    return tuple(note for note in dict.fromkeys(diagnoses[0].notes) if all(note in one.notes for one in diagnoses))
+
+
+def notes_of(diagnosis: Diagnosis, told: Sequence[str] = ()) -> list[str]:
+    """Return the notes of a log, each once, without those that were told of all logs."""
+    return [note for note in dict.fromkeys(diagnosis.notes) if note not in told]
+
+
+def about_log(diagnosis: Diagnosis) -> str:
+    """Return how long the log is."""
+    if diagnosis.duration_s is None:
+        return ""
+    minutes, seconds = divmod(round(diagnosis.duration_s), 60)
+    return f"The log lasts {minutes} min {seconds} s." if minutes else f"The log lasts {seconds} s."
 
 
 def _estimated(given: Mapping[str, Any]) -> Estimate:
@@ -278,6 +351,10 @@ def _odds(delta: float) -> str:
     if delta > -0.7:
         return "is as likely"
     return f"is {float(f'{exp(-delta):.2g}'):,.0f} times less likely".replace(",", " ")
+
+
+def _word(name: str) -> str:
+    return name if name in COEFFICIENTS else NAMES.get(name, name.replace("_", " "))
 
 
 def _inline(name: str) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from ferryid.diagnose.diagnose import diagnose
+from ferryid.diagnose.hypothesis import HULL_SPREAD
 from ferryid.diagnose.named import hinted
 from ferryid.diagnose.result import Diagnosis, Finding
 from ferryid.simulate import load_scenario, simulate, write_log
@@ -36,6 +37,11 @@ def test_a_thruster_that_gives_up_half_way_and_a_breeze(tmp_path: Path) -> None:
     assert min(fault.probability, wind.probability) > 0.95
     assert fault.improvement["yaw"] > 0.8
     assert result.after["mse"]["yaw"] < 0.2 * result.before["mse"]["yaw"]
+    moved = result.moved
+    assert moved is not None
+    # The profile's hull is the true one, so that no coefficient has reason to go beyond what chance lets it.
+    assert 0.0 < abs(moved.deviations) < 3.0
+    assert moved.value - moved.before == pytest.approx(moved.deviations * HULL_SPREAD * abs(moved.before))
 
 
 def test_gusts_make_a_delay_doubtful(tmp_path: Path) -> None:
@@ -80,3 +86,6 @@ def test_a_calm_log_matches(tmp_path: Path) -> None:
     result = diagnosed("twelve-corner-calm", tmp_path)
     assert result.verdict == "matched"
     assert result.findings == ()
+    assert result.moved is None
+    assert result.duration_s == pytest.approx(load_scenario("twelve-corner-calm").duration_s, abs=2.0)
+    assert result.before["window_s"] == pytest.approx(8.0)

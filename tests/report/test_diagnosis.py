@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import cache
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -15,16 +16,30 @@ import jsonschema
 import numpy as np
 import pytest
 
+from ferryid import __version__
 from ferryid.diagnose.bands import Band
 from ferryid.diagnose.locate import Location
 from ferryid.diagnose.profiles import profile_of
-from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, LawTerm, Rival, Withheld
+from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, LawTerm, Moved, Rival, Withheld
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.report.diagnosis_figures import binned
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import patient, report
-from ferryid.report.diagnosis_words import changed, estimate, headline, numbers, overall, ratio_of, rivals, trust, where
+from ferryid.report.diagnosis_words import (
+    about_errors,
+    changed,
+    estimate,
+    force_rows,
+    free_run_rows,
+    headline,
+    numbers,
+    overall,
+    ratio_of,
+    rivals,
+    trust,
+    where,
+)
 
 T = np.arange(0.0, 720.0, 2.0)
 
@@ -240,8 +255,8 @@ def test_a_finding_is_told_in_numbers() -> None:
     assert where(passed).startswith("It began at 312 s and ended at 500 s, and shows")
     assert where(replace(passed, onset_s=None)).startswith("It ended at 500 s, and shows")
     assert trust(wind()) == (
-        "Probability above 0.99. With it, the squared force error on data that it was not fitted to falls by 41 % in surge, "
-        "90 % in sway and 95 % in yaw."
+        "Probability above 0.99, among the effects that were tried. With it, the squared force error on data that it was not "
+        "fitted to falls by 41 % in surge, 90 % in sway and 95 % in yaw."
     )
     assert trust(gain()) == (
         "Probability 0.93. With it, the squared force error on the very data that it was fitted to falls by 60 % in surge "
@@ -259,10 +274,14 @@ def test_rivals_are_told_by_how_much_less_likely_they_are() -> None:
     told = rivals(wind())
     assert told[0] == "This log cannot tell it from current."
     # exp(4) is 54.6; exp(310) is 10 to the 134.6, which nobody needs to know.
-    assert told[1] == "In its place heading bias is 55 times less likely."
-    assert told[2] == "Anything else is less likely by a factor of more than a million: current would be next."
+    assert told[1] == "Of the other effects that were tried in its place, heading bias is 55 times less likely."
+    assert told[2] == "Any other is less likely by a factor of more than a million: current would be next."
     assert told[3] == "To tell them apart, record this: a slow turn on the spot through all headings."
     assert rivals(gain()) == []
+    far = rivals(replace(wind(), rivals=(Rival("current", None, -310.0),), unresolved_with=()))
+    assert far[0] == (
+        "Any other effect that was tried in its place is less likely by a factor of more than a million: current would be next."
+    )
 
 
 def test_where_is_told_by_what_is_known_of_it() -> None:
@@ -334,6 +353,109 @@ def test_tables_hold_roots_ratios_and_placebos() -> None:
         assert f"<td>{cell}</td>" in page
     # The free run at the horizon that has an interval, 20 s: 2 m without and 0.6 m with.
     assert "position after 20 s [m]</td><td>2</td><td>0.6</td><td>0.30 (0.25 to 0.37)" in page
+
+
+def nothing(horizons: int) -> list[None]:
+    return [None] * horizons
+
+
+def test_free_run_is_told_at_the_longest_horizon_that_has_data() -> None:
+    before, after = run(1.0), run(0.3)
+    # Positions end after 10 s, there are no headings at all, and of the yaw rate one of the two runs ends early.
+    before["position_m"][2:] = after["position_m"][2:] = nothing(2)
+    before["heading_rad"] = after["heading_rad"] = nothing(4)
+    after["yaw_rate_radps"][3:] = nothing(1)
+    one = replace(
+        diagnosis("explained"),
+        before={**diagnosis("explained").before, "free_run": before},
+        after={"mse": by_axis(100.0, 360.0, 45.0), "free_run": after},
+    )
+    assert [row["name"] for row in free_run_rows(one)] == [
+        "position after 10 s [m]",
+        "speed after 30 s [m/s]",
+        "yaw rate after 20 s [deg/s]",
+    ]
+    assert free_run_rows(one)[0]["cells"] == ["1", "0.3", "0.30"]
+    blind = {**before, **{key: nothing(4) for key in ("position_m", "speed_mps", "yaw_rate_radps")}}
+    assert free_run_rows(replace(one, before={"mse": {}, "free_run": blind})) == []
+
+
+def test_the_table_says_what_its_errors_are_of_and_what_is_not_in_them() -> None:
+    moved = Moved("Y_v", "kg/s", -200.0, -230.0, -1.25)
+    gusts = replace(nameless(), effect="gusts")
+    one = replace(
+        diagnosis("partly_explained"),
+        findings=(wind(), gusts, nameless()),
+        before={**diagnosis("partly_explained").before, "window_s": 8.0},
+        moved=moved,
+    )
+    absent, hull, windows = about_errors(one)
+    assert (
+        absent
+        == "Not in the errors with the findings: gusts (forces that come and go by chance) and findings without a name."
+    )
+    assert "Y_v moved farthest, from -200 to -230 kg/s: 1.2 times the standard deviation" in hull
+    assert "windows of 8 s" in windows
+    assert "ferryid evaluate" in windows
+    page, text = unbroken(render((one,), "trial")[0]), unbroken(as_text((one,)))
+    for line in (absent, hull, windows):
+        assert line.replace("'", "&#39;") in page
+        assert line in text
+    assert about_errors(replace(diagnosis("explained"), before={})) == []
+
+
+def test_errors_that_no_finding_changes_are_told_once() -> None:
+    same = {"mse": by_axis(400.0, 3600.0, 900.0)}
+    alone = replace(diagnosis("explained"), findings=(nameless(),), before=same, after=same, verdict="unexplained")
+    (row,) = force_rows(alone)
+    assert row["name"] == "root-mean-square error"
+    waves = replace(alone, findings=(replace(nameless(), effect="waves"),), verdict="explained")
+    assert headline(waves) == "Explained: the model left out waves."
+
+
+def test_the_sign_of_what_is_left_over_is_told_once_where_it_is_drawn() -> None:
+    for verdict in ("explained", "matched"):
+        assert unbroken(render((diagnosis(verdict),), "trial")[0]).count("model minus measured") == 1
+    assert "model minus measured" not in render((diagnosis("not_testable"),), "trial")[0]
+
+
+def test_the_page_says_when_how_and_by_what_it_was_made(tmp_path: Path) -> None:
+    one = replace(diagnosis("explained"), duration_s=719.6)
+    outcome = report((one,), tmp_path, ("ferryid", "diagnose", "a log.csv"))
+    page = outcome.report.read_text(encoding="utf-8")
+    assert f"{datetime.now(UTC):%Y-%m-%d}" in page
+    assert f"ferryid {__version__}." in page
+    assert "The log lasts 12 min 0 s." in page
+    assert "ferryid diagnose &#39;a log.csv&#39;" in page
+    assert outcome.json["duration_s"] == 719.6
+    conforms(outcome.json)
+
+
+def test_a_note_is_told_once() -> None:
+    twice = replace(diagnosis("explained"), notes=("The same.", "Another.", "The same."))
+    for told in (render((twice,), "trial")[0], as_text((twice,))):
+        assert told.count("The same.") == 1
+    other = replace(diagnosis("matched"), notes=("The same.",))
+    for told in (render((twice, other), "trials")[0], as_text((twice, other))):
+        assert told.count("The same.") == 1
+        assert told.count("Another.") == 1
+
+
+def test_parameters_are_told_in_words_and_symbols_stay_symbols() -> None:
+    one = Estimate(0.8, 0.7, 0.9, "m/s")
+    assert numbers(replace(wind(), parameters={"std": one})).startswith("Standard deviation 0.80 m/s")
+    assert numbers(replace(wind(), parameters={"m11": one})).startswith("m11 0.80 m/s")
+
+
+def test_how_far_the_hull_went_is_in_the_json(tmp_path: Path) -> None:
+    moved = Moved("Y_v", "kg/s", -200.0, -230.0, -1.25)
+    outcome = report((replace(diagnosis("explained"), moved=moved),), tmp_path)
+    conforms(outcome.json)
+    assert outcome.json["hull_moved"] == vars(moved)
+
+
+def unbroken(text: str) -> str:
+    return re.sub(r"\s+", " ", text)
 
 
 def test_terminal_text_holds_the_same() -> None:
