@@ -69,11 +69,8 @@ def bands_of(trial: Trial, pictures: Sequence[Picture], scene: Scene | None) -> 
 
     The weight of a window of length T passes frequencies up to about 1/T; the power of each is that of the filtered error.
     """
-    full = trial.windows.scene if scene is None else scene
-    length_s = len(trial.windows.weight) * trial.windows.scene.step_s / FINE
-    step_s = trial.windows.scene.step_s
-    short = windows(full, max(length_s, 8.0 * step_s), step_s)
-    spectra = [_spectrum(short, force_errors(short, picture, trial.plain)) for picture in pictures]
+    short = fine_windows(trial, trial.windows.scene if scene is None else scene)
+    spectra = [spectrum_of(short, force_errors(short, picture, trial.plain)) for picture in pictures]
     if not spectra[0][0].size:
         return ()
     frequency = spectra[0][0]
@@ -86,15 +83,19 @@ def bands_of(trial: Trial, pictures: Sequence[Picture], scene: Scene | None) -> 
     return tuple(bands)
 
 
+def fine_windows(trial: Trial, scene: Scene) -> Windows:
+    """Return windows of the scene that are short enough to show what is fast."""
+    step_s = trial.windows.scene.step_s
+    return windows(scene, max(len(trial.windows.weight) * step_s / FINE, 8.0 * step_s), step_s)
+
+
 def bursts_of(trial: Trial, picture: Picture, scene: Scene) -> Burst | None:
     """Return the most telling band in which the power of the force error comes and goes; None where there are no bands.
 
     The power of blocks is compared with an even one, as that of noise would be: of a band of width B, a block of length T holds
     2 B T independent values, of which the mean square's logarithm has a known variance.
     """
-    step_s = trial.windows.scene.step_s
-    length_s = len(trial.windows.weight) * step_s / FINE
-    short = windows(scene, max(length_s, 8.0 * step_s), step_s)
+    short = fine_windows(trial, scene)
     errors = force_errors(short, picture, trial.plain)
     found = []
     for low, high in pairwise(BURST_HZ):
@@ -150,7 +151,7 @@ def _passed(values: Floats, low_hz: float, high_hz: float, step_s: float) -> Flo
     return np.asarray(np.fft.irfft(spectrum, n, axis=0))
 
 
-def _spectrum(short: Windows, errors: Floats) -> tuple[Floats, Floats]:
+def spectrum_of(short: Windows, errors: Floats) -> tuple[Floats, Floats]:
     """Return frequencies [Hz] and power of each, shapes (f,) and (f, 3), from stretches of equal length, half overlapping."""
     longest = max((b - a for a, b in short.runs), default=0)
     size = min(longest, 512)

@@ -208,7 +208,7 @@ def _ended(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
             f"stand in for what a hull model would explain. Take them as hints, of probability {HINT:g} at most."
         )
-    shaken = unsteady_of(trial, found.states)
+    shaken = unsteady_of(trial, kept, found.states, scene)
     if model is None and not profile.hull.has_model:
         # Its own motion, too, is only guessed at: what shakes it may be its measurement.
         shaken = tuple(hinted(one) for one in shaken)

@@ -88,6 +88,9 @@ class Finding:
         - ``explained``: what the finding adds, in the same unit; where it holds, `before` follows it and `after` does not;
         - ``regressor``, optional: the quantity that gives it away (heading for a wind, squared speed for fouling);
           `explained` takes its place where there is none.
+
+        Of what comes and goes by chance, one row a frequency: ``frequency`` [Hz], ascending; ``before``, the power spectrum of
+        what is left over on the axis on which it acts most; ``explained``, the one that it has by its parameters.
     band_hz
         Frequencies that hold most of it [Hz], where that is told.
     law

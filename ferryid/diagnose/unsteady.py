@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.diagnose.bands import fine_windows, spectrum_of
+from ferryid.diagnose.evidence import force_errors
 from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood, stride_s
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
 from ferryid.diagnose.result import AXES, Estimate, Finding
@@ -27,6 +30,9 @@ WIDEST = 9.0
 """Standard deviation of a logarithm beyond which nothing is known."""
 VAGUE = 0.5
 """A disturbance whose parameters are known no better than within this factor (as a logarithm) was not seen."""
+
+PASSED = 1e-2
+"""Share of the power that windows must let through for a frequency to be shown."""
 
 
 @dataclass(frozen=True)
@@ -158,19 +164,70 @@ def _sizes(suspect: Suspect) -> Floats:
     return np.array([parameter.size for parameter in suspect.parameters])
 
 
-def unsteady_of(trial: Trial, states: Sequence[State]) -> tuple[Finding, ...]:
-    """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over."""
-    seen = trial.windows.scene
-    return tuple(_finding(seen, trial, state) for state in states)
+def unsteady_of(trial: Trial, made: Fit, states: Sequence[State], scene: Scene) -> tuple[Finding, ...]:
+    """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over.
+
+    Parameters
+    ----------
+    trial
+        With the disturbances in its filter.
+    made
+        What else was found.
+    states
+        The disturbances.
+    scene
+        The log's scene at its full rate.
+    """
+    short = fine_windows(trial, scene)
+    frequency, power = spectrum_of(short, force_errors(short, imagined(trial.plain, made), trial.plain))
+    return tuple(_finding(trial, state, short, frequency, power) for state in states)
 
 
-def _finding(scene: Scene, trial: Trial, state: State) -> Finding:
+def density(process: Process, frequency_hz: Floats) -> Floats:
+    """Return the one-sided power spectral density of a disturbance's amplitude [1/Hz], shape (f,).
+
+    The Fourier transform of its covariance, ``std² exp(-|t| / T) cos(2 pi f t)``: a peak at f and its mirror image at -f.
+    """
+    T, peak = process.time_constant_s, process.frequency_hz
+    sides = [1.0 / (1.0 + (2.0 * np.pi * (frequency_hz + side * peak) * T) ** 2) for side in (-1.0, 1.0)]
+    return np.asarray(2.0 * process.std**2 * T * (sides[0] + sides[1]))
+
+
+def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[Process], axis: int) -> dict[str, Any]:
+    """Return `evidence` and `labels` of a disturbance: the spectrum of what is left over, and its own by its parameters."""
+    if frequency.size < 2:
+        return {}
+    step_s = short.scene.step_s
+    turns = np.exp(-2j * np.pi * np.outer(frequency, step_s * np.arange(len(short.weight))))
+    passed = np.abs(turns @ short.weight * step_s) ** 2
+    # A mean is no part of what comes and goes, and what the windows stop tells nothing.
+    seen = (frequency > 0.0) & (passed > PASSED)
+    pushed = sum(
+        (np.mean(one.force[:, axis] ** 2) * density(one, frequency) for one in pushes), np.zeros_like(frequency)
+    )
+    kind, unit = ("moment", "(N·m)²/Hz") if axis == 2 else ("force", "N²/Hz")
+    return {
+        "evidence": {
+            "frequency": frequency[seen],
+            "before": (power[:, axis] / frequency[1])[seen],
+            "explained": (passed * pushed)[seen],
+        },
+        "labels": {
+            "residual": f"{AXES[axis]} {kind} left over [{unit}]",
+            "regressor": "frequency [Hz]",
+        },
+    }
+
+
+def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spectrum: Floats) -> Finding:
+    scene = trial.windows.scene
     suspect = state.suspect
     assert suspect.effect.unsteady is not None
     known = {one.name for one, width in zip(suspect.parameters, state.widths, strict=True) if width < VAGUE}
     parameters = {name: one for name, one in state.estimates.items() if name in known}
     picture = trial.filter.picture or trial.plain
-    pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in suspect.effect.unsteady(picture, state.values)]
+    pushes = suspect.effect.unsteady(picture, state.values)
+    pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in pushes]
     # Newtons and newton metres compare as what they do to the vessel.
     arm = np.array([1.0, 1.0, np.sqrt(picture.hull[0] / picture.hull[4])])
     power = np.sum(pushed, axis=0) * arm**2
@@ -190,4 +247,5 @@ def _finding(scene: Scene, trial: Trial, state: State) -> Finding:
         unresolved_with=(),
         separating_manoeuvre=None,
         says=suspect.effect.says(values, None),
+        **_columns(short, frequency, spectrum, pushes, int(np.argmax(power))),
     )

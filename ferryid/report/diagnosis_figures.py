@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from ferryid.diagnose.profiles import Profiled
 from ferryid.diagnose.result import AXES, Diagnosis, Finding
 from ferryid.report.figures import (
     BASE,
@@ -21,7 +24,6 @@ from ferryid.report.figures import (
     UNITS,
     Floats,
     canvas,
-    grid_of,
     legend_above,
     plain_log,
     svg_text,
@@ -33,10 +35,14 @@ PROFILES = 4
 OUTER = 0.01
 OFTEN = 0.1
 VISITS = 3
-"""Visits to a bin that an interval of its mean takes."""
+"""Visits to a bin, or pieces of them, that an interval of its mean takes."""
+PIECE = 8
+"""Windows of a piece of a visit: two of their lengths, as four overlap."""
 BINS = 10
 """Bins of a profile, of equal width between all but the outermost values."""
-WITHOUT, WITH, FOUND = "without the finding", "with it", "what it adds"
+WITHOUT, WITH, FOUND = "without the finding", "with it", "what it explains"
+DEPTH = 1e-4
+"""Least power that is drawn, over the greatest."""
 
 
 def drawable(finding: Finding) -> bool:
@@ -47,6 +53,29 @@ def drawable(finding: Finding) -> bool:
 def compared(finding: Finding) -> bool:
     """Return whether it can be drawn what a finding adds, and not only what is left over."""
     return drawable(finding) and len(finding.evidence.get("after", ())) > 1
+
+
+def spectral(finding: Finding) -> bool:
+    """Return whether the evidence is a spectrum: that of what comes and goes by chance."""
+    return all(len(finding.evidence.get(name, ())) > 1 for name in ("frequency", "before", "explained"))
+
+
+def in_frequency(finding: Finding) -> str:
+    """Draw the power spectrum of what was left over, and the one that a disturbance has by its parameters."""
+    evidence = finding.evidence
+    with mpl.rc_context(STYLE):
+        figure, (ax,) = canvas(1, 3.4)
+        ax.plot(evidence["frequency"], evidence["before"], color=BASE, label="left over")
+        ax.plot(evidence["frequency"], evidence["explained"], color=MEASURED, linewidth=1.5, label=FOUND)
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        top = float(max(np.max(evidence["before"]), np.max(evidence["explained"])))
+        ax.set_ylim(top * DEPTH, 3.0 * top)
+        ax.set_xlabel(finding.labels.get("regressor", "frequency [Hz]"))
+        ax.set_ylabel(finding.labels.get("residual", "left over"))
+        plain_log(ax, x=True, y=True)
+        legend_above(figure, ax, 2)
+        return svg_text(figure)
 
 
 def in_time(finding: Finding) -> str:
@@ -83,11 +112,11 @@ def on_regressor(finding: Finding) -> str:
     with mpl.rc_context(STYLE):
         figure, (ax,) = canvas(1, 3.2)
         for name, colour, label in (("before", BASE, WITHOUT), ("after", NEW, WITH)):
-            ax.plot(x, seen[name], ".", color=colour, markersize=2.0, alpha=0.25, rasterized=True)
+            ax.plot(x, seen[name], ".", color=colour, markersize=2.5, alpha=0.3, rasterized=True)
             _profile(ax, x, seen[name], colour, label)
         if "explained" in seen:
-            places, means, _ = binned(x, seen["explained"])
-            ax.plot(places, means, color=MEASURED, linewidth=1.5, label=FOUND)
+            found = binned(x, seen["explained"])
+            ax.plot(found.place, found.mean, color=MEASURED, linewidth=1.5, label=FOUND, marker=".", markersize=3.0)
         ax.set_ylim(*_reach(x, seen))
         unit = "".join(residual.partition("[")[1:])
         ax.set_xlabel(f"{FOUND} {unit}" if own else finding.labels.get("regressor", "regressor"))
@@ -138,74 +167,110 @@ def _reach(x: Floats, seen: Mapping[str, Floats]) -> tuple[float, float]:
     ends = [np.quantile(seen[name], [OFTEN, 1.0 - OFTEN]) for name in ("before", "after")]
     for name in ("before", "after", "explained"):
         if name in seen:
-            _, means, halves = binned(x, seen[name])
-            known = np.nan_to_num(halves)
-            ends.append(np.array([np.min(means - known), np.max(means + known)]))
+            bins = binned(x, seen[name])
+            half = np.nan_to_num(bins.half)
+            if np.isfinite(bins.mean).any():
+                ends.append(np.array([np.nanmin(bins.mean - half), np.nanmax(bins.mean + half)]))
     low, high = float(np.min(ends)), float(np.max(ends))
     room = 0.1 * max(high - low, 1e-9)
     return low - room, high + room
 
 
-def binned(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return middle, mean, and half the 95 % interval of the mean of `y` in bins of `x` of equal width.
+@dataclass(frozen=True)
+class Bins:
+    """Means in bins.
+
+    Attributes
+    ----------
+    place
+        Median of what is sorted by, shape (b,).
+    mean, half
+        Mean, and half its 95 % interval, shape (b,); NaN where there is too little to tell how certain the mean is.
+    often
+        True where the interval comes from separate visits, and not from the pieces of one or two; shape (b,).
+    """
+
+    place: Floats
+    mean: Floats
+    half: Floats
+    often: NDArray[np.bool_]
+
+
+def binned(x: Floats, y: Floats) -> Bins:
+    """Return means of `y` in bins of `x` of equal width, and how certain they are.
 
     Neighbouring windows overlap and are no independent evidence: the interval comes from the scatter of the means of the
-    separate visits to a bin, and is NaN where there were fewer than `VISITS`.
+    separate visits to a bin. One or two visits are cut into pieces of `PIECE` windows, which know less of each other.
     """
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
     if not x.size:
-        return np.empty(0), np.empty(0), np.empty(0)
+        nothing: Floats = np.empty(0)
+        return Bins(nothing, nothing, nothing, np.empty(0, dtype=np.bool_))
     first, last = np.quantile(x, [OUTER, 1.0 - OUTER]).tolist()
     edges = np.unique(np.linspace(first, last, BINS + 1))
     index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
     visit = np.cumsum(np.concatenate([[0], np.diff(index) != 0]))
-    rows: list[tuple[float, float, float]] = []
+    count = max(len(edges) - 1, 1)
+    place, mean, half = np.full((3, count), np.nan)
+    often = np.zeros(count, dtype=np.bool_)
     for k in np.unique(index):
         inside = index == k
-        _, which = np.unique(visit[inside], return_inverse=True)
-        counts = np.bincount(which)
-        means = np.bincount(which, weights=y[inside]) / counts
-        mean, n = float(y[inside].mean()), len(means)
-        half = float("nan")
-        if n >= VISITS:
-            weight = counts / counts.sum()
-            half = float(stdtrit(n - 1, 0.975) * np.sqrt(np.sum(weight**2 * (means - mean) ** 2) * n / (n - 1)))
-        rows.append((float(np.median(x[inside])), mean, half))
-    places, means, halves = np.array(rows).T
-    return places, means, halves
+        which = visit[inside]
+        often[k] = len(np.unique(which)) >= VISITS
+        parts = which if often[k] else np.cumsum(_piece_begins(which), dtype=np.int64)
+        place[k] = np.median(x[inside])
+        mean[k], half[k] = _mean_of(y[inside], parts)
+    return Bins(place, mean, half, often)
+
+
+def _piece_begins(visit: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return where a piece of at least `PIECE` rows begins, shape (m,); what is left at the end of a visit joins the last."""
+    begins = np.zeros(len(visit), dtype=np.bool_)
+    for one in np.unique(visit):
+        rows = np.flatnonzero(visit == one)
+        begins[rows[: max(len(rows) - PIECE + 1, 1) : PIECE]] = True
+    return begins
+
+
+def _mean_of(y: Floats, part: NDArray[np.int64]) -> tuple[float, float]:
+    """Return a mean and half its 95 % interval from the scatter between parts; NaN where there are fewer than `VISITS`."""
+    _, which = np.unique(part, return_inverse=True)
+    counts = np.bincount(which)
+    n = len(counts)
+    if n < VISITS:
+        return float("nan"), float("nan")
+    means = np.bincount(which, weights=y) / counts
+    mean, weight = float(y.mean()), counts / counts.sum()
+    return mean, float(stdtrit(n - 1, 0.975) * np.sqrt(np.sum(weight**2 * (means - mean) ** 2) * n / (n - 1)))
 
 
 def _profile(ax: Axes, x: Floats, y: Floats, colour: str, label: str) -> None:
-    places, means, halves = binned(x, y)
-    known = np.isfinite(halves)
-    ax.errorbar(places[known], means[known], halves[known], fmt="none", ecolor=colour, elinewidth=1.0, capsize=2)
-    ax.plot(places, means, "o-", color=colour, markersize=3.5, label=label)
+    """Draw means with their intervals; lines join those of separate visits, hollow marks are those of one or two."""
+    bins = binned(x, y)
+    ax.errorbar(bins.place, bins.mean, bins.half, fmt="none", ecolor=colour, elinewidth=1.0, capsize=2)
+    ax.plot(bins.place, np.where(bins.often, bins.mean, np.nan), "o-", color=colour, markersize=4.0, label=label)
+    once = ~bins.often
+    ax.plot(
+        bins.place[once], bins.mean[once], "o", color=colour, label="_once", markerfacecolor="white", markersize=4.5
+    )
 
 
-def in_regimes(diagnosis: Diagnosis) -> str:
-    """Draw mean squares over that of the noise by where the vessel was and what it did: the most telling profiles."""
-    assert diagnosis.located is not None
-    chosen = diagnosis.located.profiles[:PROFILES]
+def in_regime(diagnosis: Diagnosis, one: Profiled) -> str:
+    """Draw mean squares over that of the noise by where the vessel was or what it did, axis by axis."""
+    edges = np.append(one.low, one.high[-1])
+    # Nothing is told, not even of noise, where there are too few windows.
+    noise = np.where(np.isfinite(one.excess).all(axis=1), one.error, np.nan)
+    noise = np.append(noise, noise[-1])
     with mpl.rc_context(STYLE):
-        figure, grid = grid_of(len(chosen), 3, 1.55 * len(chosen) + 0.6)
-        for row, one in zip(grid, chosen, strict=True):
-            edges = np.append(one.low, one.high[-1])
-            for j, ax in enumerate(row):
-                noise = np.append(one.error, one.error[-1])
-                ax.fill_between(
-                    edges, 1.0 / (1.0 + 2.0 * noise), 1.0 + 2.0 * noise, step="post", color=SHADE, linewidth=0
-                )
-                for values, colour, label in ((one.excess, BASE, "before"), (one.left, NEW, "after")):
-                    if label == "before" or diagnosis.findings:
-                        ax.stairs(values[:, j] + 1.0, edges, baseline=None, color=colour, linewidth=1.4, label=label)
-                ax.set_yscale("log")
-                ax.set_xlabel(f"{one.name} [{one.unit}]", labelpad=1.0)
-                _few_labels(ax)
-        for j, ax in enumerate(grid[0]):
-            ax.set_title(AXES[j], fontsize=10)
+        figure, axes = canvas(3, 4.6)
+        for j, ax in enumerate(axes):
+            ax.fill_between(edges, 1.0 / (1.0 + 2.0 * noise), 1.0 + 2.0 * noise, step="post", color=SHADE, linewidth=0)
+            _steps(ax, diagnosis, edges, {"before": one.excess[:, j] + 1.0, "after": one.left[:, j] + 1.0})
+            ax.set_ylabel(AXES[j])
+        axes[-1].set_xlabel(f"{one.name} [{one.unit}]")
         if diagnosis.findings:
-            legend_above(figure, grid[0][0], 2)
+            legend_above(figure, axes[0], 2)
         return svg_text(figure)
 
 
@@ -217,25 +282,25 @@ def in_bands(diagnosis: Diagnosis) -> str:
     # A logarithmic axis has no place for zero.
     edges[0] = 0.5 * edges[1] if edges[0] == 0.0 else edges[0]
     with mpl.rc_context(STYLE):
-        figure, grid = grid_of(1, 3, 2.4)
-        for j, ax in enumerate(grid[0]):
-            for label, colour in (("before", BASE), ("after", NEW)):
-                if label == "before" or diagnosis.findings:
-                    power = np.sqrt([getattr(band, label)[j] for band in bands])
-                    ax.stairs(power, edges, baseline=None, color=colour, linewidth=1.4, label=label)
+        figure, axes = canvas(3, 4.6)
+        for j, ax in enumerate(axes):
+            power = {name: np.sqrt([getattr(band, name)[j] for band in bands]) for name in ("before", "after")}
+            _steps(ax, diagnosis, edges, power)
             ax.set_xscale("log")
-            ax.set_yscale("log")
-            ax.set_title(f"{AXES[j]} [{UNITS[j]}]", fontsize=10)
-            ax.set_xlabel("frequency [Hz]", labelpad=1.0)
             plain_log(ax, x=True, y=False)
-            _few_labels(ax)
+            ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
+        axes[-1].set_xlabel("frequency [Hz]")
         if diagnosis.findings:
-            legend_above(figure, grid[0][0], 2)
+            legend_above(figure, axes[0], 2)
         return svg_text(figure)
 
 
-def _few_labels(ax: Axes) -> None:
-    """Label a logarithmic axis that may span less than a decade."""
+def _steps(ax: Axes, diagnosis: Diagnosis, edges: Floats, values: Mapping[str, Floats]) -> None:
+    """Draw steps before and after on a logarithmic axis that may span less than a decade."""
+    for name, colour in (("before", BASE), ("after", NEW)):
+        if name == "before" or diagnosis.findings:
+            ax.stairs(values[name], edges, baseline=None, color=colour, linewidth=1.6, label=name)
+    ax.set_yscale("log")
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=5))
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.yaxis.set_minor_locator(NullLocator())
@@ -252,15 +317,15 @@ def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
     if located is None:
         for column, label in (("heading", "heading [deg]"), ("speed", "speed [m/s]")):
             if column in evidence:
-                caption = f"Mean of the same force against {column}, with 95 % intervals from separate visits.{both}"
+                caption = f"Mean of the same force against {column}, with 95 % intervals.{both}"
                 shown.append((f"by-{column}", by_regime(diagnosis, column, label), caption))
         return shown
-    if located.profiles:
+    for k, one in enumerate(located.profiles[:PROFILES], 1):
         caption = (
-            "Its mean square over that of the noise that remains, where the vessel was and by what it did; shaded: what "
-            f"noise alone would give.{both}"
+            f"Its mean square by {one.name}, over that of the noise that remains; shaded: what noise alone would give. Bins "
+            f"with too few windows to tell are left out.{both}"
         )
-        shown.append(("regimes", in_regimes(diagnosis), caption))
+        shown.append((f"regime-{k}", in_regime(diagnosis, one), caption))
     if located.bands:
         caption = f"Its root mean square in bands of frequency, by windows short enough to show them.{both}"
         shown.append(("bands", in_bands(diagnosis), caption))

@@ -161,8 +161,10 @@ def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
             {
                 "file": f"{file}-evidence",
                 "svg": diagnosis_figures.on_regressor(finding),
-                "caption": f"What is left over{since}, against {against}. Points: windows of the recording; marks: their means "
-                "with 95 % intervals. Where the finding holds, orange follows the black line, and blue is flat.",
+                "caption": f"What is left over{since}, against {against}. Points: windows of the recording. Marks: their means "
+                "with 95 % intervals (Student's t times the standard error) from separate visits; hollow: from parts of one or "
+                "two visits, which know less; none where there are too few windows for either. Where the finding holds, orange "
+                "follows the black line, and blue is flat at zero.",
             }
         )
     if drawn and diagnosis_figures.drawable(finding):
@@ -170,6 +172,16 @@ def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
             "The same over time; shaded: when it acts." if shown else "What is left over; shaded: when it acts most."
         )
         shown.append({"file": f"{file}-time", "svg": diagnosis_figures.in_time(finding), "caption": caption})
+    if drawn and diagnosis_figures.spectral(finding):
+        shown.append(
+            {
+                "file": f"{file}-spectrum",
+                "svg": diagnosis_figures.in_frequency(finding),
+                "caption": "Power spectrum of what is left over with the other findings, on the axis on which it acts most. "
+                "Black: the spectrum of a disturbance of the strength and duration that were found, averaged over windows like "
+                "the rest. Where the finding holds, orange follows black wherever black is high; elsewhere orange is noise.",
+            }
+        )
     return {
         "title": diagnosis_words.title(finding.effect, finding.instance),
         "says": finding.says,

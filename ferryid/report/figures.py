@@ -68,16 +68,6 @@ def canvas(rows: int, height: float, *, top: float = 0.35) -> tuple[Figure, list
     return figure, list(axes[:, 0])
 
 
-def grid_of(rows: int, columns: int, height: float) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure of small panels with axes of their own, and space for a title and a legend above them."""
-    figure = _figure(height, top=0.5, left=0.5, between=(0.28, 0.55))
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for ax in grid.flat:
-        ax.tick_params(labelsize=8)
-        ax.xaxis.label.set_size(9)
-    return figure, [list(row) for row in grid]
-
-
 def legend_above(figure: Figure, ax: Axes, columns: int, title: str = "") -> None:
     """Put one legend for the whole figure along its upper edge."""
     handles, labels = ax.get_legend_handles_labels()

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ferryid.diagnose.hypothesis import trial_of
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import Search, search, suspects_of
-from ferryid.diagnose.unsteady import State
+from ferryid.diagnose.unsteady import State, density, unsteady_of
 from ferryid.diagnose.weak import windows
+from ferryid.effects.effect import Process
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Floats
 
 FERRY = load_profile("milliampere")
 BASE = """
@@ -44,6 +48,24 @@ def values_of(state: State) -> dict[str, float]:
     return dict(zip([one.name for one in state.suspect.parameters], state.values.tolist(), strict=True))
 
 
+def spectrum_in(result: Search) -> Mapping[str, Floats]:
+    """Return the figure of the only disturbance."""
+    (finding,) = unsteady_of(result.trial, result.fit, result.states, result.trial.windows.scene)
+    assert (np.diff(finding.evidence["frequency"]) > 0.0).all()
+    return finding.evidence
+
+
+@pytest.mark.parametrize("frequency_hz", [0.0, 0.4])
+def test_the_spectrum_of_a_disturbance_is_the_transform_of_its_covariance(frequency_hz: float) -> None:
+    process = Process(np.zeros((1, 3)), 0.8, 3.0, frequency_hz)
+    t = np.linspace(0.0, 60.0, 60001)
+    covariance = 0.8**2 * np.exp(-t / 3.0) * np.cos(2.0 * np.pi * frequency_hz * t)
+    at = np.array([0.01, 0.1, 0.4, 0.7])
+    # One-sided: four times the cosine transform over positive times.
+    expected = [4.0 * np.trapezoid(covariance * np.cos(2.0 * np.pi * f * t), t) for f in at]
+    np.testing.assert_allclose(density(process, at), expected, rtol=1e-3)
+
+
 @pytest.mark.parametrize("seed", [5, 6])
 def test_gusts_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     gusts = f"environment = {{ wind = {{ {WIND}, gust_std_mps = {TRUE_GUST}, gust_time_s = 8.0 }} }}\n"
@@ -51,6 +73,10 @@ def test_gusts_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     assert [one.suspect.effect.id for one in result.states] == ["gusts"]
     assert abs(values_of(result.states[0])["std"] / TRUE_GUST - 1.0) < 0.25
     assert [one.effect.id for one in result.fit.suspects] == ["wind"]
+    evidence = spectrum_in(result)
+    slow = evidence["frequency"] < 0.1
+    assert 0.5 < float(np.median(evidence["before"][slow] / evidence["explained"][slow])) < 3.0
+    assert evidence["before"][slow].min() > 3.0 * np.median(evidence["before"][evidence["frequency"] > 0.5])
 
 
 @pytest.mark.parametrize("seed", [5, 6])
@@ -60,6 +86,10 @@ def test_waves_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     assert [one.suspect.effect.id for one in result.states] == ["waves"]
     assert abs(values_of(result.states[0])["peak_frequency"] / TRUE_HZ - 1.0) < 0.3
     assert not {one.effect.id for one in result.fit.suspects} & {"time_delay", "thruster_lag"}
+    evidence = spectrum_in(result)
+    for name in ("before", "explained"):
+        assert abs(evidence["frequency"][np.argmax(evidence[name])] / TRUE_HZ - 1.0) < 0.3
+    assert 0.2 < evidence["before"].max() / evidence["explained"].max() < 3.0
 
 
 @pytest.mark.parametrize("seed", [5, 6])

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -23,7 +24,7 @@ from ferryid.diagnose.profiles import profile_of
 from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, LawTerm, Moved, Rival, Withheld
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.report.diagnosis_figures import binned
+from ferryid.report.diagnosis_figures import _profile, binned
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import patient, report
 from ferryid.report.diagnosis_words import (
@@ -40,6 +41,7 @@ from ferryid.report.diagnosis_words import (
     trust,
     where,
 )
+from ferryid.report.figures import STYLE, canvas
 
 T = np.arange(0.0, 720.0, 2.0)
 
@@ -350,9 +352,20 @@ def test_ratio_comes_from_the_errors_where_none_is_given() -> None:
 def test_tables_hold_roots_ratios_and_placebos() -> None:
     page = re.sub(r"<svg.*?</svg>", "", explained()[0], flags=re.DOTALL)
     for cell in ("20", "60", "30", "0.25 (0.21 to 0.30)", "0.10 (0.06 to 0.15)", "1.01", "0.99", "1.02"):
-        assert f"<td>{cell}</td>" in page
+        assert re.search(rf"<td data-of=\"[^\"]+\">{re.escape(cell)}</td>", page), cell
     # The free run at the horizon that has an interval, 20 s: 2 m without and 0.6 m with.
-    assert "position after 20 s [m]</td><td>2</td><td>0.6</td><td>0.30 (0.25 to 0.37)" in page
+    of = [f'<td data-of="{name}">' for name in ("without", "with", "with over without")]
+    assert f"position after 20 s [m]</td>{of[0]}2</td>{of[1]}0.6</td>{of[2]}0.30 (0.25 to 0.37)" in page
+
+
+def test_tables_fold_where_a_page_is_narrow() -> None:
+    """Every cell says by itself what it is of, as there is no heading above it on a telephone."""
+    page = render((diagnosis("explained"), diagnosis("matched")), "trials")[0]
+    assert "@media (max-width: 600px)" in page
+    tables = re.findall(r'<table class="fold">(.*?)</table>', page, re.DOTALL)
+    assert len(tables) == page.count("<table") == 6
+    for row in "".join(tables).split("<tr>"):
+        assert all("data-of=" in cell for cell in re.findall(r"<td[^>]*>", row)[1:])
 
 
 def nothing(horizons: int) -> list[None]:
@@ -454,6 +467,29 @@ def test_how_far_the_hull_went_is_in_the_json(tmp_path: Path) -> None:
     assert outcome.json["hull_moved"] == vars(moved)
 
 
+def gusts() -> Finding:
+    """Return gusts of a force by their spectrum, as a diagnosis gives it."""
+    frequency = np.linspace(0.01, 1.0, 100)
+    explained = 1e4 / (1.0 + (20.0 * frequency) ** 2)
+    return replace(
+        nameless(),
+        effect="gusts",
+        says="The wind was gusty.",
+        evidence={"frequency": frequency, "before": explained + 50.0, "explained": explained},
+        labels={"residual": "sway force left over [N²/Hz]", "regressor": "frequency [Hz]"},
+    )
+
+
+def test_what_comes_and_goes_is_shown_by_its_spectrum() -> None:
+    one = replace(diagnosis("explained"), findings=(wind(), gusts()))
+    page, drawings = render((one,), "trial")
+    assert {name for name in drawings if name.startswith("finding-2")} == {"finding-2-spectrum"}
+    drawing = drawings["finding-2-spectrum"]
+    for label in ("frequency [Hz]", "sway force left over [N²/Hz]", "left over", "what it explains"):
+        assert f">{label}</text>" in drawing
+    assert "orange follows black" in unbroken(page)
+
+
 def unbroken(text: str) -> str:
     return re.sub(r"\s+", " ", text)
 
@@ -519,15 +555,54 @@ def test_bins_hold_the_mean_and_an_interval_that_knows_what_is_independent() -> 
     rng = np.random.default_rng(0)
     x = np.tile(np.linspace(0.0, 1.0, 200), 30)
     offset = np.repeat(rng.standard_normal(30), 200)
-    places, means, halves = binned(x, 5.0 * x + offset)
-    truth = 5.0 * places
-    assert len(places) == 10
-    assert np.mean(np.abs(means - truth) <= halves) == 1.0
+    bins = binned(x, 5.0 * x + offset)
+    truth = 5.0 * bins.place
+    assert len(bins.place) == 10
+    assert bins.often.all()
+    assert np.mean(np.abs(bins.mean - truth) <= bins.half) == 1.0
     # Student's t of 29 degrees of freedom, 97.5 %, from the tables: 2.045.
     expected = 2.045 * np.std(offset[::200], ddof=1) / np.sqrt(30)
-    np.testing.assert_allclose(halves, expected, rtol=0.05)
-    once = binned(np.linspace(0.0, 1.0, 50), np.zeros(50))[2]
-    assert np.isnan(once).all()
+    np.testing.assert_allclose(bins.half, expected, rtol=0.05)
+
+
+def test_bins_with_too_few_windows_are_no_means() -> None:
+    once = binned(np.linspace(0.0, 1.0, 50), np.zeros(50))
+    assert np.isnan(once.mean).all()
+    assert np.isnan(once.half).all()
+    assert not once.often.any()
+
+
+def test_a_bin_of_one_long_visit_has_an_interval_from_its_pieces() -> None:
+    """Forty windows in each of ten places, each visited once: five pieces of eight windows."""
+    rng = np.random.default_rng(1)
+    y = np.repeat(rng.standard_normal(50), 8)
+    bins = binned(np.repeat(np.arange(10.0), 40), y)
+    assert not bins.often.any()
+    # Student's t of 4 degrees of freedom, 97.5 %, from the tables: 2.776.
+    pieces = y[::8].reshape(10, 5)
+    np.testing.assert_allclose(bins.half, 2.776 * np.std(pieces, axis=1, ddof=1) / np.sqrt(5), rtol=1e-3)
+    np.testing.assert_allclose(bins.mean, pieces.mean(axis=1))
+
+
+def test_only_means_of_separate_visits_are_joined_by_lines() -> None:
+    """A place that was visited often, one that was visited once for long, and between them a few stray windows."""
+    x = np.concatenate([np.tile([0.0] * 5 + [10.0] * 5, 6), [5.0, 5.0], np.full(40, 20.0)])
+    finding = replace(
+        wind(),
+        evidence={"t": np.arange(x.size, dtype=float), "before": x + 1.0, "after": np.ones(x.size), "regressor": x},
+    )
+    drawn: list[tuple[str, Any]] = []
+    with mpl.rc_context(STYLE):
+        (ax,) = canvas(1, 3.0)[1]
+        _profile(ax, x, finding.evidence["before"], "black", "all")
+        drawn = [
+            (line.get_linestyle(), line.get_ydata()) for line in ax.get_lines() if line.get_label() in ("all", "_once")
+        ]
+    joined = next(values for style, values in drawn if style == "-")
+    alone = next(values for style, values in drawn if style == "None")
+    assert sorted(joined[np.isfinite(joined)]) == [1.0, 11.0]
+    assert 6.0 not in alone
+    assert 21.0 in alone
 
 
 def test_whose_log_it_is_must_be_known(tmp_path: Path) -> None:
@@ -572,8 +647,12 @@ def test_where_the_whole_log_differs_is_drawn_and_in_the_json(tmp_path: Path) ->
     }
     assert outcome.json["findings"][0]["where"]["band_hz"] == [0.1, 0.2]
     drawings = render((one,), "trial")[1]
-    assert {"left-over", "regimes", "bands"} <= set(drawings)
-    assert "heading [deg]" in drawings["regimes"]
+    assert {"left-over", "regime-1", "bands"} <= set(drawings)
+    assert "heading [deg]" in drawings["regime-1"]
+    # Small print is what nobody reads on a telephone.
+    sizes = [float(size) for size in re.findall(r"font-size: ([\d.]+)px", drawings["regime-1"] + drawings["bands"])]
+    assert sizes
+    assert min(sizes) >= 10.0
     assert "frequency [Hz]" in drawings["bands"]
     assert "by-heading" not in drawings
 
