@@ -40,6 +40,8 @@ PIECE = 8
 """Windows of a piece of a visit: two of their lengths, as four overlap."""
 BINS = 10
 """Bins of a profile, of equal width between all but the outermost values."""
+LEVELS = (0.45, 2.2)
+"""What an axis of mean squares over those of noise shows at least."""
 WITHOUT, WITH, FOUND = "without the finding", "with it", "what it explains"
 DEPTH = 1e-4
 """Least power that is drawn, over the greatest."""
@@ -260,13 +262,15 @@ def in_regime(diagnosis: Diagnosis, one: Profiled) -> str:
     """Draw mean squares over that of the noise by where the vessel was or what it did, axis by axis."""
     edges = np.append(one.low, one.high[-1])
     # Nothing is told, not even of noise, where there are too few windows.
-    noise = np.where(np.isfinite(one.excess).all(axis=1), one.error, np.nan)
-    noise = np.append(noise, noise[-1])
+    noise = 2.0 * np.where(np.isfinite(one.excess).all(axis=1), one.error, np.nan)
     with mpl.rc_context(STYLE):
         figure, axes = canvas(3, 4.6)
         for j, ax in enumerate(axes):
-            ax.fill_between(edges, 1.0 / (1.0 + 2.0 * noise), 1.0 + 2.0 * noise, step="post", color=SHADE, linewidth=0)
+            ax.stairs(1.0 + noise, edges, baseline=1.0 / (1.0 + noise), fill=True, color=SHADE, linewidth=0)
             _steps(ax, diagnosis, edges, {"before": one.excess[:, j] + 1.0, "after": one.left[:, j] + 1.0})
+            # At least two numbers stand beside the axis.
+            low, high = ax.get_ylim()
+            ax.set_ylim(min(low, LEVELS[0]), max(high, LEVELS[1]))
             ax.set_ylabel(AXES[j])
         axes[-1].set_xlabel(f"{one.name} [{one.unit}]")
         if diagnosis.findings:

@@ -283,8 +283,8 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
         one = diagnosis.moved
         lines.append(
             "The hull's coefficients were refitted too, by themselves for the errors without the findings and together with "
-            f"them for the others. There, {one.coefficient} moved farthest, from {one.before:.4g} to {one.value:.4g} "
-            f"{one.unit}: {abs(one.deviations):.2g} times the standard deviation of what was believed of it."
+            f"them for the others. There, the coefficient {one.coefficient} moved farthest, from {one.before:.4g} to "
+            f"{one.value:.4g} {one.unit}: {abs(one.deviations):.2g} times the standard deviation of what was believed of it."
         )
     if "window_s" in diagnosis.before:
         lines.append(

@@ -81,6 +81,18 @@ def calm() -> Trial:
     return trial_on(sailed(480.0, np.zeros(2)))
 
 
+def test_what_is_left_over_is_model_minus_measured(windy: Trial) -> None:
+    """A wind that the model does not know pushes the vessel; what is left over is that push with its sign turned round."""
+    seen, plain = windy.windows, windy.plain
+    assert FERRY.wind is not None
+    scene = seen.scene
+    push = wind_force(FERRY.wind, np.broadcast_to(WIND, (len(scene.t), 2)), scene.psi, scene.nu) - plain.external
+    left = force_errors(seen, plain, plain)
+    for axis in range(3):
+        slope = np.polyfit(seen.mean(push)[:, axis], left[:, axis], 1)[0]
+        assert slope == pytest.approx(-1.0, abs=0.2), axis
+
+
 def test_training_and_held_out_windows_share_no_row(windy: Trial) -> None:
     folds = folds_of(windy.windows)
     assert folds is not None

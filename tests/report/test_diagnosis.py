@@ -24,7 +24,7 @@ from ferryid.diagnose.profiles import profile_of
 from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, LawTerm, Moved, Rival, Withheld
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.report.diagnosis_figures import _profile, binned
+from ferryid.report.diagnosis_figures import _profile, binned, in_regime
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import patient, report
 from ferryid.report.diagnosis_words import (
@@ -407,7 +407,7 @@ def test_the_table_says_what_its_errors_are_of_and_what_is_not_in_them() -> None
         absent
         == "Not in the errors with the findings: gusts (forces that come and go by chance) and findings without a name."
     )
-    assert "Y_v moved farthest, from -200 to -230 kg/s: 1.2 times the standard deviation" in hull
+    assert "the coefficient Y_v moved farthest, from -200 to -230 kg/s: 1.2 times the standard deviation" in hull
     assert "windows of 8 s" in windows
     assert "ferryid evaluate" in windows
     page, text = unbroken(render((one,), "trial")[0]), unbroken(as_text((one,)))
@@ -655,6 +655,20 @@ def test_where_the_whole_log_differs_is_drawn_and_in_the_json(tmp_path: Path) ->
     assert min(sizes) >= 10.0
     assert "frequency [Hz]" in drawings["bands"]
     assert "by-heading" not in drawings
+
+
+def test_where_too_few_windows_tell_not_even_noise_is_shaded() -> None:
+    """Headings from 90 to 270 deg were never sailed: of twelve bins the six in the middle have no shade."""
+    calm = np.random.default_rng(8).standard_normal((T.size, 3))
+    half = (T * 1.3) % 180.0
+    heading = np.where(half < 90.0, half, half + 180.0)
+    drawing = in_regime(
+        diagnosis("explained"), profile_of("heading", "deg", heading, np.linspace(0.0, 360.0, 13), calm, calm, calm)
+    )
+    shades = re.findall(r'<path d="([^"]+)" clip-path="[^"]+" style="fill: #e8eef4', drawing)
+    across = np.array([float(x) for shade in shades for x in re.findall(r"[ML] ([\d.]+) ", shade)])
+    turned = 360.0 * (across - across.min()) / np.ptp(across)
+    assert {round(one) for one in turned} == {0, 30, 60, 90, 270, 300, 330, 360}
 
 
 def test_a_law_is_in_the_json(tmp_path: Path) -> None:
