@@ -288,8 +288,8 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
         )
     if "window_s" in diagnosis.before:
         lines.append(
-            f"These errors are means over windows of {diagnosis.before['window_s']:.2g} s. Those of ferryid evaluate are of "
-            "single rows of smoothed data, so that the two differ."
+            f"These errors are means over windows of {diagnosis.before['window_s']:.2g} s, in which what is faster cancels. "
+            "Those of ferryid evaluate are of single rows of smoothed data, and larger as a rule."
         )
     return lines
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, combinations_with_replacement
 
 import pytest
 
@@ -32,7 +32,7 @@ def test_nothing_to_tell_apart_needs_no_manoeuvre() -> None:
     assert manoeuvre("wind", []) is None
 
 
-@pytest.mark.parametrize(("one", "other"), list(combinations(sorted(effects()), 2)))
+@pytest.mark.parametrize(("one", "other"), list(combinations_with_replacement(sorted(effects()), 2)))
 def test_every_pair_has_a_manoeuvre_that_names_what_to_do(one: str, other: str) -> None:
     """A pair that nobody thought of is told apart by what shows the one and what shows the other."""
     text = manoeuvre(one, [other])
