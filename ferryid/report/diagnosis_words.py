@@ -33,6 +33,8 @@ SIGN = (
     "sign turned round."
 )
 NAMES = {
+    "seconds": "delay",
+    "per_mps": "loss by the speed of the inflow",
     "std": "standard deviation",
     "force_std": "standard deviation of the force",
     "moment_std": "standard deviation of the moment",

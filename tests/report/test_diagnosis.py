@@ -22,6 +22,8 @@ from ferryid.diagnose.bands import Band
 from ferryid.diagnose.locate import Location
 from ferryid.diagnose.profiles import profile_of
 from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, LawTerm, Moved, Rival, Withheld
+from ferryid.effects import effects
+from ferryid.effects.picture import COEFFICIENTS
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.report.diagnosis_figures import _profile, binned, in_regime
@@ -42,6 +44,7 @@ from ferryid.report.diagnosis_words import (
     where,
 )
 from ferryid.report.figures import STYLE, canvas
+from ferryid.vessel import load_profile
 
 T = np.arange(0.0, 720.0, 2.0)
 
@@ -458,6 +461,15 @@ def test_parameters_are_told_in_words_and_symbols_stay_symbols() -> None:
     one = Estimate(0.8, 0.7, 0.9, "m/s")
     assert numbers(replace(wind(), parameters={"std": one})).startswith("Standard deviation 0.80 m/s")
     assert numbers(replace(wind(), parameters={"m11": one})).startswith("m11 0.80 m/s")
+
+
+@pytest.mark.parametrize("name", sorted(effects()))
+def test_no_parameter_is_told_by_a_name_that_is_no_word(name: str) -> None:
+    for parameter in effects()[name].parameters_of(load_profile("milliampere")):
+        told = numbers(replace(wind(), parameters={parameter.name: Estimate(0.8, 0.7, 0.9, parameter.unit)}))
+        words = set(re.findall(r"\w+", told))
+        assert not words & {"std", "Std", "per", "Per", "mps", "seconds", "Seconds"}
+        assert parameter.name in COEFFICIENTS or "_" not in told
 
 
 def test_how_far_the_hull_went_is_in_the_json(tmp_path: Path) -> None:
