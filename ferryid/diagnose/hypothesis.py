@@ -103,6 +103,11 @@ class Fit:
     hull: Floats
     evidence: float
 
+    @property
+    def keys(self) -> frozenset[tuple[str, str | None]]:
+        """Effects and instances."""
+        return frozenset(suspect.key for suspect in self.suspects)
+
     def errors(self, index: int) -> Floats:
         """Return the posterior's standard deviations of one suspect's parameters."""
         first = sum(len(values) for values in self.values[:index])

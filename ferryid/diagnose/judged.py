@@ -58,17 +58,17 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
         Called with the name of each stage.
     """
     fallen_by_reason: dict[str, list[str]] = {}
-    tried = {_keys(found)}
+    tried = {found.keys}
     kept, swaps = found, 0
     while kept.suspects:
         progress("weighing rivals")
         standings = tuple(standing_of(trial, kept, i, library) for i in range(len(kept.suspects)))
         better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
-        better = [one for one in better if _keys(one.fit) not in tried]
+        better = [one for one in better if one.fit.keys not in tried]
         if better and swaps < SWAPS:
             # What was selected first may be less likely beside what was selected later than another in its place.
             best = max(better, key=lambda one: one.gain)
-            tried.add(_keys(best.fit))
+            tried.add(best.fit.keys)
             swaps += 1
             kept = pruned(trial, best.fit)
             continue
@@ -79,7 +79,7 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
             return Judged(kept, proof, standings, _told(fallen_by_reason))
         fallen_by_reason.setdefault(why, []).append(kept.suspects[fallen].title)
         kept = pruned(trial, without(trial, kept, fallen))
-        tried.add(_keys(kept))
+        tried.add(kept.keys)
     return Judged(kept, None, (), _told(fallen_by_reason))
 
 
@@ -90,10 +90,6 @@ def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
         names = list(dict.fromkeys(titles))
         said.append(f"{listed(names)} {'were' if len(names) > 1 else 'was'} suspected, but dropped: {why}.")
     return tuple(said)
-
-
-def _keys(made: Fit) -> frozenset[tuple[str, str | None]]:
-    return frozenset(suspect.key for suspect in made.suspects)
 
 
 def _fallen(trial: Trial, kept: Fit, proof: Evidence | None) -> tuple[int | None, str]:

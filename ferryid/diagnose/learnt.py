@@ -109,7 +109,7 @@ def learnt(
             source = Source(motion.log, recording.sha256, told[suspect.key].probability)
             found = {
                 name: Quantity(one.value, one.low, one.high, one.unit)
-                if name in told[suspect.key].parameters
+                if name in state.known
                 else Quantity(one.value, nan, nan, one.unit)
                 for name, one in state.estimates.items()
             }

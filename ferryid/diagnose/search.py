@@ -106,6 +106,8 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
     calm = trial.plain
     chosen, rounds = fit(trial, ()), list[Round]()
     states: tuple[State, ...] = ()
+    stood: frozenset[tuple[str, str | None]] | None = None
+    calm_beside: frozenset[tuple[str, str | None]] | None = None
     while True:
         taken = {suspect.key for suspect in chosen.suspects}
         left = [suspect for suspect in steady if suspect.key not in taken]
@@ -116,23 +118,24 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         best = good[0] if good and len(taken) < MOST else None
         if best is None:
             chosen = pruned(trial, chosen)
-        if shaken and not states:
+        beside, gain = _beside(trial, chosen, found, shaken)
+        if shaken and not states and beside.keys != calm_beside:
             progress("looking for gusts and waves")
-            beside, gain = _beside(trial, chosen, found, shaken)
             # What explains more is taken first.
             least = max(WORTH, (0.0 if best is None else best.gain) - gain)
             rough, found_states = disturbed(trial, beside, shaken, calm, least)
             # What would stand in for them falls, and what they hid may show.
             kept = pruned(rough, fit(rough, beside.suspects, beside.values)) if found_states else chosen
             if found_states and _has_what_they_shake(kept, found_states):
-                stood = {one.key for one in beside.suspects}
+                stood = beside.keys
                 trial, chosen, states = rough, kept, found_states
                 continue
+            calm_beside = beside.keys if least <= WORTH else calm_beside
         if best is None:
             break
         trial = trial.with_noise_of(best.fit)
         chosen = timed(trial, fit(trial, best.fit.suspects, best.fit.values))
-    if states and {one.key for one in chosen.suspects} != stood:
+    if states and chosen.keys != stood:
         trial, states = disturbed(trial, chosen, shaken, calm, near=states)
         chosen = pruned(trial, fit(trial, chosen.suspects, chosen.values))
     return Search(trial, fit(trial, ()), chosen, tuple(rounds), untested, states)

@@ -45,6 +45,12 @@ class State:
     gain: float
 
     @property
+    def known(self) -> frozenset[str]:
+        """Names of the parameters that the log tells."""
+        named = zip(self.suspect.parameters, self.widths.tolist(), strict=True)
+        return frozenset(one.name for one, width in named if width < VAGUE)
+
+    @property
     def estimates(self) -> dict[str, Estimate]:
         """Parameters with their 95 % intervals, which are even in the logarithm."""
         away = np.exp(1.96 * np.minimum(self.widths, WIDEST))
@@ -223,8 +229,7 @@ def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spec
     scene = trial.windows.scene
     suspect = state.suspect
     assert suspect.effect.unsteady is not None
-    known = {one.name for one, width in zip(suspect.parameters, state.widths, strict=True) if width < VAGUE}
-    parameters = {name: one for name, one in state.estimates.items() if name in known}
+    parameters = {name: one for name, one in state.estimates.items() if name in state.known}
     picture = trial.filter.picture or trial.plain
     pushes = suspect.effect.unsteady(picture, state.values)
     pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in pushes]
