@@ -23,11 +23,12 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.evidence import Evidence, Improvement, force_errors
 from ferryid.diagnose.free_runs import FreeRuns
+from ferryid.diagnose.hints import beside_gusts, beside_more, hint, on_a_guessed_hull
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
 from ferryid.diagnose.judged import Judged, judged
 from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import locate
-from ferryid.diagnose.named import doubted, forces_of, hinted, merely_hinted
+from ferryid.diagnose.named import forces_of
 from ferryid.diagnose.noisy import drowned_axes, says_drowned
 from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding, Moved
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
@@ -202,8 +203,11 @@ def _ended(
     progress("locating")
     forces, hints = forces_of(trial, stands, scene)
     notes += hints
+    if unknown.slow:
+        forces, told = beside_more(forces)
+        notes += told
     if model is None and common is None and not profile.hull.has_model:
-        forces = [hinted(one) for one in forces]
+        forces = [on_a_guessed_hull(one) for one in forces]
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
             f"stand in for what a hull model would explain. Take them as hints, of probability {HINT:g} at most."
@@ -211,17 +215,17 @@ def _ended(
     shaken = unsteady_of(trial, kept, found.states, scene)
     if model is None and not profile.hull.has_model:
         # Its own motion, too, is only guessed at: what shakes it may be its measurement.
-        shaken = tuple(hinted(one) for one in shaken)
+        shaken = tuple(on_a_guessed_hull(one) for one in shaken)
     named, nameless = [*forces, *shaken], list(unknown.findings)
     if drowned := drowned_axes(trial):
         notes.append(says_drowned(drowned))
-        named, nameless = ([merely_hinted(one) for one in every] for every in (named, nameless))
+        named, nameless = ([hint(one) for one in every] for every in (named, nameless))
     findings = [*_of_sensors(log.sensors), *named]
     chances, still = powers(trial, kept, log.steady), unexcited(trial)
     notes += says_untested(found.untested)
     notes += advice(chances, still)
     if unknown.unsteady or found.states:
-        findings = [doubted(one) for one in findings]
+        findings = [beside_gusts(one) for one in findings]
     sure = [one for one in findings if one.sure]
     more = bool(nameless) or len(sure) < len(findings)
     verdict = _verdict(bool(sure), more, tells(chances, still))

@@ -16,8 +16,6 @@ from ferryid.diagnose.shown import columns_of, regressor_of
 from ferryid.diagnose.spans import swapped
 from ferryid.effects.picture import Scene
 
-OUT_OF_STEP = ("time_delay", "thruster_lag")
-"""Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
 TIME_DROP = 50.0
 """Fall of the logarithm of the evidence as of which no time farther away comes into question; smaller dips may lie between."""
 TIME_STEP, TIME_FIT = 0.125, 3
@@ -148,33 +146,3 @@ def _intervals(trial: Trial, estimates: Mapping[str, Estimate]) -> tuple[tuple[f
     t = trial.windows.scene.t
     begun, ended = _value(estimates, "onset"), _value(estimates, "offset")
     return ((max(begun or 0.0, float(t[0])), float(t[-1]) if ended is None else min(ended, float(t[-1]))),)
-
-
-def hinted(finding: Finding) -> Finding:
-    """Return a finding of a force as it stands where the hull is known from nothing but the log that shows it."""
-    return replace(
-        finding,
-        probability=min(finding.probability, HINT),
-        unresolved_with=tuple(dict.fromkeys((*finding.unresolved_with, "hull_parameters"))),
-        separating_manoeuvre="a log in calm air and still water, to fit a hull model first",
-    )
-
-
-def merely_hinted(finding: Finding) -> Finding:
-    """Return a finding of a force as it stands where the velocity's noise drowns what it rests on."""
-    return replace(finding, probability=min(finding.probability, HINT))
-
-
-def doubted(finding: Finding) -> Finding:
-    """Return a finding as it stands beside something unsteady that nobody measured.
-
-    A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
-    """
-    if finding.effect not in OUT_OF_STEP:
-        return finding
-    return replace(
-        finding,
-        probability=min(finding.probability, HINT),
-        unresolved_with=(*finding.unresolved_with, "gusts"),
-        separating_manoeuvre="the same manoeuvres in calm air",
-    )

@@ -38,11 +38,24 @@ BURSTS = 5.0
 
 @dataclass(frozen=True)
 class Unknown:
-    """Findings without a name; what the errors that remain beside all findings look like; whether they come and go."""
+    """What is left beside all that has a name.
+
+    Attributes
+    ----------
+    findings
+        Without a name.
+    left
+        What the errors look like.
+    unsteady
+        True where they come and go.
+    slow
+        True where one of the findings is more than a hint and as slow as forces of the library are: no bursts.
+    """
 
     findings: tuple[Finding, ...]
     left: Location
     unsteady: bool
+    slow: bool
 
 
 def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None) -> Unknown:
@@ -73,13 +86,15 @@ def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None
     # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
     known = bool(trial.filter.processes)
     uneven = bool(left.profiles) and left.profiles[0].statistic >= TELLS
+    bursts: list[Finding] = []
     burst = bursts_of(seen, imagined(seen.plain, after), scene)
     if burst is not None and burst.deviations >= BURSTS:
         uneven = True
-        findings += [] if known else [_in_bursts(burst)]
+        bursts = [] if known else [_in_bursts(burst)]
     elif uneven and not known:
         findings.append(_unsteady(seen, left))
-    return Unknown(tuple(findings), left, uneven)
+    slow = any(one.sure for one in findings)
+    return Unknown((*findings, *bursts), left, uneven, slow)
 
 
 def impostors(trial: Trial, kept: Fit) -> tuple[int, ...]:

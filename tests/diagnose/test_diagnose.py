@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.hypothesis import HULL_SPREAD
-from ferryid.diagnose.named import hinted
-from ferryid.diagnose.result import Diagnosis, Finding
+from ferryid.diagnose.result import Diagnosis
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 
@@ -55,31 +53,6 @@ def test_gusts_make_a_delay_doubtful(tmp_path: Path) -> None:
         if one.effect in ("time_delay", "thruster_lag"):
             assert one.probability <= 0.5
             assert "gusts" in one.unresolved_with
-
-
-def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull() -> None:
-    wind = Finding(
-        effect="wind",
-        instance=None,
-        probability=0.99,
-        parameters={},
-        axes={},
-        intervals=(),
-        onset_s=None,
-        regime="",
-        improvement={"sway": 0.4},
-        held_out=True,
-        rivals=(),
-        unresolved_with=("current",),
-        separating_manoeuvre="a slow turn",
-        says="Wind.",
-    )
-    hint = hinted(wind)
-    assert hint.probability == 0.5
-    assert hint.unresolved_with == ("current", "hull_parameters")
-    assert "to fit a hull model first" in str(hint.separating_manoeuvre)
-    assert hinted(replace(wind, probability=0.2)).probability == 0.2
-    assert hinted(hint) == hint
 
 
 def test_a_calm_log_matches(tmp_path: Path) -> None:

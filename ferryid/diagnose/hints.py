@@ -1,0 +1,56 @@
+"""What makes of a finding a hint, which names nothing: reasons to doubt it that lie beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ferryid.diagnose.result import HINT, Finding
+from ferryid.effects import effects
+from ferryid.effects.wording import listed, titled
+
+OUT_OF_STEP = ("time_delay", "thruster_lag")
+"""Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
+MOST_OF_IT = 0.5
+"""Share of the squared error on an axis that a finding removes there, so that what is left is less than it explains."""
+
+
+def hint(finding: Finding, *unresolved: str, manoeuvre: str | None = None) -> Finding:
+    """Return a finding as a hint, with what it cannot be told from, and what to record to tell."""
+    return replace(
+        finding,
+        probability=min(finding.probability, HINT),
+        unresolved_with=tuple(dict.fromkeys((*finding.unresolved_with, *unresolved))),
+        separating_manoeuvre=manoeuvre or finding.separating_manoeuvre,
+    )
+
+
+def on_a_guessed_hull(finding: Finding) -> Finding:
+    """Return a finding of a force as it stands where the hull is known from nothing but the log that shows it."""
+    return hint(finding, "hull_parameters", manoeuvre="a log in calm air and still water, to fit a hull model first")
+
+
+def beside_gusts(finding: Finding) -> Finding:
+    """Return a finding as it stands beside something unsteady that nobody measured.
+
+    A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
+    """
+    if finding.effect not in OUT_OF_STEP:
+        return finding
+    return hint(finding, "gusts", manoeuvre="the same manoeuvres in calm air")
+
+
+def beside_more(findings: Sequence[Finding]) -> tuple[list[Finding], tuple[str, ...]]:
+    """Return findings of forces as they stand beside a force without a name that is left, and what is to be told.
+
+    What explains less than is left may be no more than its stand-in.
+    """
+    small = [one for one in findings if one.sure and one.improvement and max(one.improvement.values()) < MOST_OF_IT]
+    if not small:
+        return list(findings), ()
+    names = listed(list(dict.fromkeys(titled(effects()[one.effect].title, one.instance) for one in small)))
+    note = (
+        f"A force without a name is left, and on no axis does any of these remove half of the squared error: {names}. "
+        f"They may stand in for it; take them as hints, of probability {HINT:g} at most."
+    )
+    return [hint(one) if one in small else one for one in findings], (note,)

@@ -1,0 +1,63 @@
+"""Reasons that make a hint of a finding, one by one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from ferryid.diagnose.hints import beside_gusts, beside_more, on_a_guessed_hull
+from ferryid.diagnose.result import Finding
+
+
+def found(effect: str, **improvement: float) -> Finding:
+    """A finding that is sure, and removes so much of the squared error on some axes."""
+    return Finding(
+        effect=effect,
+        instance="thruster1" if effect == "thruster_gain" else None,
+        probability=0.99,
+        parameters={},
+        axes={},
+        intervals=(),
+        onset_s=None,
+        regime="",
+        improvement=improvement,
+        held_out=True,
+        rivals=(),
+        unresolved_with=("current",),
+        separating_manoeuvre="a slow turn",
+        says="",
+    )
+
+
+def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull() -> None:
+    wind = found("wind", sway=0.4)
+    hint = on_a_guessed_hull(wind)
+    assert hint.probability == 0.5
+    assert hint.unresolved_with == ("current", "hull_parameters")
+    assert "to fit a hull model first" in str(hint.separating_manoeuvre)
+    assert on_a_guessed_hull(replace(wind, probability=0.2)).probability == 0.2
+    assert on_a_guessed_hull(hint) == hint
+
+
+@pytest.mark.parametrize(("effect", "sure"), [("thruster_lag", False), ("time_delay", False), ("payload", True)])
+def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str, sure: bool) -> None:
+    one = beside_gusts(found(effect, yaw=0.8))
+    assert one.sure == sure
+    assert ("gusts" in one.unresolved_with) != sure
+
+
+def test_what_explains_less_than_is_left_without_a_name_is_a_hint() -> None:
+    several = [found("wind", surge=0.1, sway=0.62), found("thruster_gain", surge=0.0, sway=0.02, yaw=0.14)]
+    findings, notes = beside_more(several)
+    assert [one.sure for one in findings] == [True, False]
+    assert findings[1].separating_manoeuvre == "a slow turn"
+    (note,) = notes
+    assert "Thruster force (thruster1)" in note
+    assert "wind" not in note
+
+
+def test_what_was_judged_by_no_force_is_left_alone() -> None:
+    # Gusts are states of the filter, and remove nothing of the error.
+    assert beside_more([found("gusts")]) == ([found("gusts")], ())
+    assert beside_more([found("wind", sway=0.6)])[1] == ()
