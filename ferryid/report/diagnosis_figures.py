@@ -88,8 +88,9 @@ def in_time(finding: Finding) -> str:
         figure, (ax,) = canvas(1, 3.2)
         for first, last in finding.intervals:
             ax.axvspan(first, last, color=SHADE, linewidth=0)
-        for name, time in finding.ends:
-            ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--" if name == "onset" else ":", label=name)
+        label = " and ".join(name for name, _ in finding.ends)
+        for k, (_, time) in enumerate(finding.ends):
+            ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--", label=label if k == 0 else None)
         ax.plot(*envelope(t, evidence["before"]), color=BASE, label=WITHOUT if "after" in evidence else "left over")
         if "after" in evidence:
             ax.plot(*envelope(t, evidence["after"]), color=NEW, label=WITH)
@@ -137,8 +138,8 @@ def left_over(diagnosis: Diagnosis) -> str:
                 if name in evidence and (name == "before" or diagnosis.findings):
                     ax.plot(*envelope(evidence["t"], evidence[name][:, j]), color=colour, label=label)
             for finding in diagnosis.findings:
-                for name, time in finding.ends:
-                    ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--" if name == "onset" else ":")
+                for _, time in finding.ends:
+                    ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--")
             ax.axhline(0.0, color="#888888", linewidth=0.7)
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")
