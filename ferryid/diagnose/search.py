@@ -25,6 +25,9 @@ REJUDGED = 5
 """Candidates whose evidence is weighed under the noise that each leaves itself."""
 MOST = 4
 """Effects looked for at once."""
+CLEAR = 100.0
+"""Logarithm of the evidence as of which an effect is taken before gusts and waves are looked for: they look like nothing so
+clear."""
 VOID = 0.02
 """An effect whose acceleration is less than this share of the measured one, by every channel's root mean square, is void."""
 
@@ -119,7 +122,8 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         if best is None:
             chosen = pruned(trial, chosen)
         beside, gain = _beside(trial, chosen, found, shaken)
-        if shaken and not states and beside.keys != calm_beside:
+        clear = best is not None and best.gain > CLEAR
+        if shaken and not states and not clear and beside.keys != calm_beside:
             progress("looking for gusts and waves")
             # What explains more is taken first.
             least = max(WORTH, (0.0 if best is None else best.gain) - gain)
