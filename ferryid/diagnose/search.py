@@ -209,10 +209,10 @@ def _best(trial: Trial, current: Fit, begin: Near, ground: Ground, suspect: Susp
     if not best.suspect.times or best.gain < 0.5 * ODDS:
         return best
     index = len(current.suspects)
-    coarse = sharpened(trial, best.fit, index, begin, 0.5 * part_s(trial), NEARBY_S)
+    step = 0.5 * part_s(trial, suspect)
+    coarse = sharpened(trial, best.fit, index, begin, step, NEARBY_S)
     kicked = tried(replace(coarse.suspects[-1], effect=suspect.effect), coarse.values[-1])
-    fine = sharpened(trial, kicked.fit, index, begin, NEARBY_S)
-    return candidate(fine)
+    return candidate(sharpened(trial, kicked.fit, index, begin, min(step, NEARBY_S)))
 
 
 def _round(found: Sequence[Candidate]) -> Round:

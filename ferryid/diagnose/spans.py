@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil, inf, log
+from math import inf, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,11 @@ from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
 
-FEWEST_PARTS, LONGEST_S = 24, 60.0
-"""Parts into which a log is cut at least, and how long one may be [s]: an effect begins and ends between two of them."""
+PART_S, FEWEST_PARTS = 8.0, 24
+"""Length of the parts into which a log is cut [s], and how many there are at least: an effect begins and ends between two of
+them. In a calm log seconds matter: what acts too long or too short by them leaves a push that nothing explains."""
+MOST_NUMBERS = 1e7
+"""Numbers that a scan holds at once; parts are longer in long logs."""
 PROMISING = 3
 """Spans that are handed on to be fitted."""
 NEARBY_S, FINEST_S = 8.0, 0.2
@@ -67,7 +70,7 @@ def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
     The log is cut into parts; what a suspect adds in a part is linear in its parameters there, and what it adds in a span is
     the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
     """
-    edges = _edges(trial)
+    edges = _edges(trial, suspect)
     parts = len(edges) - 1
     G, g = _cross_products(trial, ground, suspect, edges)
     a, b = np.triu_indices(parts + 1, 1)
@@ -88,9 +91,9 @@ def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
     ]
 
 
-def part_s(trial: Trial) -> float:
+def part_s(trial: Trial, suspect: Suspect) -> float:
     """Return how long a part of the log is [s]."""
-    edges = _edges(trial)
+    edges = _edges(trial, suspect)
     return float(edges[1] - edges[0])
 
 
@@ -99,10 +102,12 @@ def shortest_s(trial: Trial) -> float:
     return block_s(trial.windows)
 
 
-def _edges(trial: Trial) -> Floats:
-    times = trial.windows.middle_s
+def _edges(trial: Trial, suspect: Suspect) -> Floats:
+    times, steps = trial.windows.middle_s, trial.steps
     first, last = float(times[0]), float(times[-1])
-    return np.linspace(first, last, 1 + max(FEWEST_PARTS, ceil((last - first) / LONGEST_S)))
+    most = MOST_NUMBERS / (steps.measured.shape[0] * steps.channels.sum() * len(suspect.parameters))
+    parts = max(FEWEST_PARTS, int(min((last - first) / PART_S, most)))
+    return np.linspace(first, last, parts + 1)
 
 
 def _cross_products(trial: Trial, ground: Ground, suspect: Suspect, edges: Floats) -> tuple[Floats, Floats]:

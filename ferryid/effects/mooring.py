@@ -1,4 +1,4 @@
-"""Mooring: a spring from the vessel to a point, with a stiffness of its own along north and east."""
+"""Mooring: a spring from the vessel to a point, with a stiffness of its own along north and east: a line, or a quay touched."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Floats, Profile
@@ -17,8 +17,9 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return stiffness and place; a spring of moderate size swings the vessel in a minute or two."""
     stiff = profile.hull.mass_kg * 0.004
     return (
-        Parameter("stiffness_north", "N/m", stiff, 0.0, 1e3 * stiff),
-        Parameter("stiffness_east", "N/m", stiff, 0.0, 1e3 * stiff),
+        # Without a spring its place has no meaning.
+        Parameter("stiffness_north", "N/m", stiff, 0.0, 1e3 * stiff, start=0.3 * stiff),
+        Parameter("stiffness_east", "N/m", stiff, 0.0, 1e3 * stiff, start=0.3 * stiff),
         Parameter("north", "m", 20.0, -1e4, 1e4),
         Parameter("east", "m", 20.0, -1e4, 1e4),
     )
@@ -52,6 +53,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
         "east_m": values["east"],
         "stiffness_north_Npm": values["stiffness_north"],
         "stiffness_east_Npm": values["stiffness_east"],
+        **span(values),
     }
     return {"environment": {"mooring": spring}}
 
@@ -65,4 +67,6 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
     return "place from the mooring, ahead [m]", ahead
 
 
-EFFECT = Effect("mooring", "Mooring", parameters_of, apply, says, scenario, cannot=cannot, regressor=regressor)
+EFFECT = Effect(
+    "mooring", "Mooring", parameters_of, apply, says, scenario, cannot=cannot, onset=True, regressor=regressor
+)

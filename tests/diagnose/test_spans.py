@@ -46,7 +46,7 @@ def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: fl
     if (first_s, last_s) == (0.0, inf):
         assert max(gains, default=-1.0) < 0.0
         return
-    best, wide = spans[0], part_s(case)
+    best, wide = spans[0], part_s(case, PUSH)
     assert gains[0] == max(gains)
     assert gains[0] > 0.0
     assert best.onset_s == pytest.approx(first_s, abs=wide)
@@ -81,7 +81,7 @@ def test_the_gain_of_a_span_is_that_of_its_fit(monkeypatch: pytest.MonkeyPatch) 
     bare = fit(case, ())
     promising(case, ground_of(case, bare, near(case, bare)), PUSH)
     a, b, gains = seen[0]
-    edges = case.windows.middle_s[0] + part_s(case) * np.arange(b.max() + 1)
+    edges = case.windows.middle_s[0] + part_s(case, PUSH) * np.arange(b.max() + 1)
     for k in range(0, len(a), 29):
         span = replace(PUSH, onset_s=edges[a[k]] if a[k] else 0.0, offset_s=edges[b[k]] if b[k] < b.max() else inf)
         # The push is linear, so that the two differ by the step that an edge lies in alone.

@@ -91,16 +91,6 @@ def boat_wakes(place: Place, rng: np.random.Generator) -> dict[str, Any]:
     return {"environment": {"wakes": wakes}}
 
 
-def moored_for_a_while(place: Place, rng: np.random.Generator) -> dict[str, Any]:
-    """Return a spring that holds the vessel for some minutes."""
-    first, last = stretch(place, rng, 0.2, 0.35)
-    stiff = 0.004 * place.profile.hull.mass_kg
-    north, east = _direction(rng, 5.0, 15.0)
-    spring = {"north_m": north, "east_m": east, "from_s": first, "until_s": last}
-    k = {f"stiffness_{axis}_Npm": round(float(rng.uniform(0.8, 1.6)) * stiff, 3) for axis in ("north", "east")}
-    return {"environment": {"mooring": {**spring, **k}}}
-
-
 def gusts(place: Place, rng: np.random.Generator) -> dict[str, Any]:
     """Return a gusty wind without a mean."""
     return {"environment": {"wind": {"gust_std_mps": round(float(rng.uniform(1.2, 2.0)), 3), "gust_time_s": 8.0}}}
@@ -149,7 +139,6 @@ OUTSIDE = (
     Outside("turning current", "a current that turns right round", turning_current, ("current",)),
     Outside("squall", "a wind of a few minutes", squall, ("wind", "gusts")),
     Outside("veering wind", "a wind that turns by half a circle", veering_wind, ("wind", "gusts")),
-    Outside("moored for a while", "a mooring of a few minutes", moored_for_a_while, ("mooring",)),
     Outside(
         "no cross damping",
         "a model whose sway and yaw do not damp each other",
