@@ -30,8 +30,8 @@ ENOUGH = 1e-2
 MOVED = 0.1
 """Move of a coefficient of the hull by which a slope is found, in its spread."""
 DAMPINGS = (0.0, 0.3, 3.0, 30.0, 300.0)
-MOVED = 1e-2
-"""Move of a parameter, in its size, by which a slope is found."""
+NUDGE = 1e-2
+"""Move of an effect's parameter, in its size, by which a slope is found."""
 TRUST = 4.0
 """Longest Gauss-Newton step, in sizes of a parameter."""
 
@@ -263,7 +263,7 @@ def fit(
         J[:, :h] = by_hull
         for k in np.flatnonzero(size > HELD).tolist():
             moved = z.copy()
-            d = MOVED if z[h + k] + MOVED <= high[k] else -MOVED
+            d = NUDGE if z[h + k] + NUDGE <= high[k] else -NUDGE
             moved[h + k] += d
             J[:, h + k] = (white(moved) - w) / d
         A = J.T @ J + np.eye(h + q)
@@ -302,7 +302,7 @@ def effect_slopes(trial: Trial, kept: Fit) -> Floats:
     columns = []
     for i, suspect in enumerate(kept.suspects):
         for k, one in enumerate(suspect.parameters):
-            d = MOVED if kept.values[i][k] + MOVED * one.size <= one.high else -MOVED
+            d = NUDGE if kept.values[i][k] + NUDGE * one.size <= one.high else -NUDGE
             moved = kept.values[i].copy()
             moved[k] += d * one.size
             changed = (*kept.values[:i], moved, *kept.values[i + 1 :])

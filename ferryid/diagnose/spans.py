@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.folds import block_s
-from ferryid.diagnose.hypothesis import MOVED, Fit, Near, Suspect, Trial, effect_slopes, fit, imagined, near
+from ferryid.diagnose.hypothesis import NUDGE, Fit, Near, Suspect, Trial, effect_slopes, fit, imagined, near
 from ferryid.effects.picture import Picture, as_measured
 from ferryid.vessel.profile import Floats
 
@@ -119,9 +119,9 @@ def _cross_products(trial: Trial, ground: Ground, suspect: Suspect, edges: Float
     columns = []
     for k, one in enumerate(suspect.parameters):
         moved = start.copy()
-        moved[k] += MOVED * one.size
+        moved[k] += NUDGE * one.size
         change = as_measured(suspect.effect.apply(ground.picture, moved, suspect.instance)) - there
-        columns.append(steps.mean(steps.along(change))[:, :, None] / MOVED * own)
+        columns.append(steps.mean(steps.along(change))[:, :, None] / NUDGE * own)
     p = len(columns)
     C = trial.sieve.white(np.stack(columns, axis=3).reshape(len(steps.starts), -1, (len(edges) - 1) * p))
     shared = ground.slopes.T @ C
