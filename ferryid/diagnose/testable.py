@@ -7,12 +7,12 @@ their own uncertainty goes; what then is left of it, in units of the noise, is w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import erf, sqrt
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
+from ferryid.diagnose.hypothesis import NUDGE, Fit, Suspect, Trial, effect_slopes, imagined
 from ferryid.diagnose.search import ODDS
 from ferryid.diagnose.separate import OTHERWISE, SHOWS
 from ferryid.effects import effects
@@ -24,7 +24,6 @@ SEEN = 0.5
 """An effect of usual size that a log would show with less than this chance counts as one that it could not show."""
 LEARNT = 0.5
 """An axis is excited if some combination of its coefficients is known to this share of what was known before the log."""
-MOVED = 1e-2
 """Step of derivatives, in sizes of a parameter."""
 
 AXES = {
@@ -66,7 +65,7 @@ def powers(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> tuple[Power, 
     """
     picture = imagined(trial.plain, kept)
     before = trial.white(picture)
-    nuisance = np.column_stack([trial.by_hull, *_derivatives(trial, kept, before)])
+    nuisance = np.column_stack([trial.by_hull, effect_slopes(trial, kept)])
     inner = nuisance.T @ nuisance + np.eye(nuisance.shape[1])
 
     def apart(columns: Floats) -> Floats:
@@ -86,7 +85,7 @@ def powers(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> tuple[Power, 
                 # Of what comes and goes by chance a picture holds no force: it is found in the noise, and not here.
                 break
             columns = [
-                (trial.white(suspect.act(picture, usual + MOVED * step)) - there) / MOVED for step in np.diag(size)
+                (trial.white(suspect.act(picture, usual + NUDGE * step)) - there) / NUDGE for step in np.diag(size)
             ]
             information = np.column_stack(columns).T @ apart(np.column_stack(columns))
             strength = float(change @ change)
@@ -105,16 +104,6 @@ def _usual(suspect: Suspect) -> list[Floats]:
     low, high = (np.array([getattr(one, end) for one in suspect.parameters]) for end in ("low", "high"))
     signs = [np.ones(len(size)), np.where(np.arange(len(size)) % 2 == 0, -1.0, 1.0)]
     return [np.clip(neutral + sign * size, low, high) for sign in signs]
-
-
-def _derivatives(trial: Trial, kept: Fit, before: Floats) -> list[Floats]:
-    columns = []
-    for k, suspect in enumerate(kept.suspects):
-        for i, parameter in enumerate(suspect.parameters):
-            values = [one.copy() for one in kept.values]
-            values[k][i] += MOVED * parameter.size
-            columns.append((trial.white(imagined(trial.plain, replace(kept, values=tuple(values)))) - before) / MOVED)
-    return columns
 
 
 def unexcited(trial: Trial) -> tuple[str, ...]:
