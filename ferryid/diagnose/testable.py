@@ -24,7 +24,6 @@ SEEN = 0.5
 """An effect of usual size that a log would show with less than this chance counts as one that it could not show."""
 LEARNT = 0.5
 """An axis is excited if some combination of its coefficients is known to this share of what was known before the log."""
-"""Step of derivatives, in sizes of a parameter."""
 
 AXES = {
     axis: tuple(k for k, name in enumerate(COEFFICIENTS) if name.startswith(begins))
