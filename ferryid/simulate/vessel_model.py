@@ -101,7 +101,8 @@ def _conditions(model: Model, log: str) -> Conditions:
             "Fix: name one of the logs that ferryid models lists conditions of"
         )
     several = [one.key for one in known[log].effects]
-    twice = [effect for effect, _ in several if sum(effect == other for other, _ in several) > 1]
+    # Two thrusters may both have failed for a while; a scenario has one fault of each.
+    twice = [key[0] for key in several if several.count(key) > 1]
     if twice:
         raise FerryIdError(
             f"{model.label}: a scenario has one {effects()[twice[0]].title.lower()}, found two of it for {log}, found one "

@@ -92,6 +92,16 @@ def test_the_conditions_of_a_log_prevail_when_asked_for() -> None:
     assert held.payload[0].until_s > held.duration_s
     with pytest.raises(FerryIdError, match=r'conditions of "trail" are not in the model.*Did you mean "trial"'):
         sailed_by(parse_scenario(TRIAL, "t"), model, "trail")
+    passed = [
+        replace(BROKEN, instance=name, sources=(replace(BROKEN.sources[0], sha256=HERE, onset_s=a, offset_s=b),))
+        for name, a, b in (("thruster1", 10.0, 30.0), ("thruster2", 35.0, 50.0))
+    ]
+    both = sailed_by(
+        parse_scenario(TRIAL, "t"), hull_alone(conditions=(Conditions("trial", HERE, tuple(passed)),)), "trial"
+    ).scenario.thrusters.faults
+    assert [(one.thruster, one.from_s, one.until_s) for one in both] == [
+        ("thruster1", 10.0, 30.0), ("thruster2", 35.0, 50.0),
+    ]  # fmt: skip
     twice = replace(model, conditions=(Conditions("trial", HERE, (WINDY, WINDY)),))
     with pytest.raises(FerryIdError, match="one steady wind, found two"):
         sailed_by(parse_scenario(TRIAL, "t"), twice, "trial")
