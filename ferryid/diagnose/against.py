@@ -285,7 +285,14 @@ def _relative(suspect: Suspect, carried: Sequence[Condition], index: int, bare: 
         ]
         return f"{name} differs: {'; '.join(parts)}."
 
-    effect = replace(suspect.effect, apply=apply, says=says)
+    def kick(picture: Picture, p: Floats) -> Floats:
+        # What the simulation has aboard already gives none.
+        assert suspect.effect.kick is not None
+        return suspect.effect.kick(picture, p) - suspect.effect.kick(picture, own.values)
+
+    # Where the simulation has it for a while, no other span of it can be told, and its own has its own kick.
+    kicks = suspect.effect.kick is not None and not own.suspect.times
+    effect = replace(suspect.effect, apply=apply, says=says, kick=kick if kicks else None)
     parameters = tuple(replace(one, neutral=neutral[one.name]) for one in suspect.parameters)
     return Suspect(effect, suspect.instance, parameters)
 
