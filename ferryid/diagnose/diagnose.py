@@ -28,7 +28,7 @@ from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, tria
 from ferryid.diagnose.judged import Judged, judged
 from ferryid.diagnose.learnt import learnt
 from ferryid.diagnose.locate import locate
-from ferryid.diagnose.named import forces_of
+from ferryid.diagnose.named import forces_of, removed
 from ferryid.diagnose.noisy import drowned_axes, says_drowned
 from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding, Moved
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
@@ -204,7 +204,7 @@ def _ended(
     forces, hints = forces_of(trial, stands, scene)
     notes += hints
     if unknown.slow:
-        forces, told = beside_more(forces)
+        forces, told = beside_more(forces, removed(trial, stands))
         notes += told
     if model is None and common is None and not profile.hull.has_model:
         forces = [on_a_guessed_hull(one) for one in forces]

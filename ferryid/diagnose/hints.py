@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ferryid.diagnose.result import HINT, Finding
@@ -12,7 +12,7 @@ from ferryid.effects.wording import listed, titled
 OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
 MOST_OF_IT = 0.5
-"""Share of the squared error on an axis that a finding removes there, so that what is left is less than it explains."""
+"""Share of the squared error on an axis that a finding removes there while it acts, so that less is left than it explains."""
 
 
 def hint(finding: Finding, *unresolved: str, manoeuvre: str | None = None) -> Finding:
@@ -40,17 +40,26 @@ def beside_gusts(finding: Finding) -> Finding:
     return hint(finding, "gusts", manoeuvre="the same manoeuvres in calm air")
 
 
-def beside_more(findings: Sequence[Finding]) -> tuple[list[Finding], tuple[str, ...]]:
+def beside_more(
+    findings: Sequence[Finding], removed: Mapping[tuple[str, str | None], float]
+) -> tuple[list[Finding], tuple[str, ...]]:
     """Return findings of forces as they stand beside a force without a name that is left, and what is to be told.
 
     What explains less than is left may be no more than its stand-in.
+
+    Parameters
+    ----------
+    findings
+        Of forces.
+    removed
+        Share of the held-out squared error that they remove while they act, by effect and instance, as far as it was judged.
     """
-    small = [one for one in findings if one.sure and one.improvement and max(one.improvement.values()) < MOST_OF_IT]
+    small = [one for one in findings if one.sure and removed.get((one.effect, one.instance), 1.0) < MOST_OF_IT]
     if not small:
         return list(findings), ()
     names = listed(list(dict.fromkeys(titled(effects()[one.effect].title, one.instance) for one in small)))
     note = (
-        f"A force without a name is left, and on no axis does any of these remove half of the squared error: {names}. "
-        f"They may stand in for it; take them as hints, of probability {HINT:g} at most."
+        "A force without a name is left, and on no axis does any of these remove half of the squared error while it acts: "
+        f"{names}. They may stand in for it; take them as hints, of probability {HINT:g} at most."
     )
     return [hint(one) if one in small else one for one in findings], (note,)

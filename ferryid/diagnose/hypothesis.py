@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, isfinite
+from math import inf, isfinite, log
 
 import numpy as np
 
@@ -94,7 +94,8 @@ class Fit:
     hull
         The hull's coefficients, shape (26,).
     evidence
-        Logarithm of the evidence (Laplace) over that of a hypothesis whose parameters are all zero wide.
+        Logarithm of the evidence (Laplace) over that of a hypothesis whose parameters are all zero wide, less that of how many
+        windows each onset and offset was chosen from.
     """
 
     suspects: tuple[Suspect, ...]
@@ -290,7 +291,7 @@ def fit(
             by_hull, fresh = trial.hull_slopes(picture_of(z)), True
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - trial.sieve.log_scale
-    evidence -= sum(suspect.doubt for suspect in suspects)
+    evidence -= sum(suspect.doubt + len(suspect.times) * log(len(trial.windows.starts)) for suspect in suspects)
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
     hull = trial.plain.hull + trial.hull_spread * z[:h]
     return Fit(tuple(suspects), values, covariance, hull, evidence)

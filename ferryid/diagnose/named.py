@@ -7,19 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, near
+from ferryid.diagnose.folds import block_s
+from ferryid.diagnose.hypothesis import WIDER, Fit, Suspect, Trial, fit, imagined, near
 from ferryid.diagnose.judged import Judged
 from ferryid.diagnose.locate import locate
 from ferryid.diagnose.result import AXES, HINT, NEAR, Estimate, Finding, Rival
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shown import columns_of, regressor_of
-from ferryid.diagnose.spans import swapped
+from ferryid.diagnose.spans import lasts_s, swapped
 from ferryid.effects.picture import Scene
 
 TIME_DROP = 50.0
 """Fall of the logarithm of the evidence as of which no time farther away comes into question; smaller dips may lie between."""
 TIME_STEP, TIME_FIT = 0.125, 3
 """Step between times that are weighed, in lengths of a window, and steps of the fit for each."""
+TIME_NEAR, TIME_FINE_S = 10.0, 0.2
+"""Fall of the logarithm of the evidence up to which times are weighed in fine steps, and these [s]: the forces' own."""
 SHOWN_RIVALS = 3
 
 
@@ -55,11 +58,17 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
                 "claims neither the squared force error nor the free run improves by an interval that excludes none: "
                 "it is a hint."
             )
+        brief = bool(suspect.times) and lasts_s(trial, suspect) < block_s(trial.windows)
+        if brief:
+            told.append(
+                f"{suspect.title} acts for {lasts_s(trial, suspect):.0f} s only: no fit that had not seen all of it could be "
+                "judged on it, so that it is a hint."
+            )
         made.append(
             Finding(
                 effect=suspect.effect.id,
                 instance=suspect.instance,
-                probability=min(standing.probability, HINT) if unseen else standing.probability,
+                probability=min(standing.probability, HINT) if unseen or brief else standing.probability,
                 parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
                 intervals=_intervals(trial, estimates),
@@ -76,6 +85,16 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
             )
         )
     return sorted(made, key=lambda one: -sum(one.improvement.values())), tuple(told)
+
+
+def removed(trial: Trial, stands: Judged) -> dict[tuple[str, str | None], float]:
+    """Return how much of the held-out squared force error each suspect removes while it acts, on the axis where it is most."""
+    times, shares = trial.windows.middle_s, {}
+    for proof in () if stands.proof is None else stands.proof.proofs:
+        acts = (times >= proof.suspect.onset_s) & (times < proof.suspect.offset_s)
+        before, after = (np.sum(one[acts] ** 2, axis=0) for one in (proof.improvement.before, proof.improvement.after))
+        shares[proof.suspect.key] = float(np.max(1.0 - after / np.where(before > 0.0, before, np.inf)))
+    return shares
 
 
 def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[str, Estimate]:
@@ -133,11 +152,21 @@ def _time(trial: Trial, kept: Fit, index: int, end: str) -> Estimate:
             if tried[time] < max(tried.values()) - TIME_DROP:
                 break
             time += side * step
+    # About the likeliest it changes within a step.
+    top = max(tried.values())
+    for time in [time for time, evidence in tried.items() if evidence > top - TIME_NEAR]:
+        for near_by in (
+            time + TIME_FINE_S * np.arange(-round(step / TIME_FINE_S), round(step / TIME_FINE_S) + 1)
+        ).tolist():
+            if first < near_by < last and min(abs(near_by - other) for other in tried) > 0.5 * TIME_FINE_S:
+                tried[near_by] = evidence_at(near_by)
     moments = np.array(sorted(tried))
-    weights = np.exp(np.array([tried[time] for time in moments.tolist()]) - max(tried.values()))
-    # Each moment stands for the step about it.
+    # Each moment stands for the time about it; the posterior is as much wider as that of other parameters.
+    edges = np.concatenate([moments[:1], 0.5 * (moments[1:] + moments[:-1]), moments[-1:]])
+    edges[[0, -1]] += np.array([-0.5, 0.5]) * TIME_FINE_S
+    log_weights = np.array([tried[time] for time in moments.tolist()]) / WIDER**2
+    weights = np.exp(log_weights - log_weights.max()) * np.diff(edges)
     shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
-    edges = np.concatenate([moments - 0.5 * step, moments[-1:] + 0.5 * step])
     low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
     return Estimate(middle, max(low, 0.0), high, "s")
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ferryid.diagnose.hypothesis import Fit, Near, Suspect, Trial, fit, imagined, near, settled, without
 from ferryid.diagnose.parallel import over
-from ferryid.diagnose.spans import GLANCE, NEARBY_S, Ground, ground_of, part_s, price, promising, sharpened, timed
+from ferryid.diagnose.spans import GLANCE, NEARBY_S, Ground, ground_of, part_s, promising, sharpened, timed
 from ferryid.diagnose.unsteady import WORTH, State, disturbed
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
@@ -142,6 +142,8 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
     if states and chosen.keys != stood:
         trial, states = disturbed(trial, chosen, shaken, calm, near=states)
         chosen = pruned(trial, fit(trial, chosen.suspects, chosen.values))
+    if states:
+        chosen = timed(trial, chosen)
     return Search(trial, fit(trial, ()), chosen, tuple(rounds), untested, states)
 
 
@@ -188,7 +190,7 @@ def _best(trial: Trial, current: Fit, begin: Near, ground: Ground, suspect: Susp
     """Return a suspect's best fit beside the current ones, over all spans where it can begin or end."""
 
     def candidate(made: Fit) -> Candidate:
-        gain = made.evidence - current.evidence - price(trial, made.suspects[-1])
+        gain = made.evidence - current.evidence
         return Candidate(made.suspects[-1], made, gain)
 
     def tried(one: Suspect, values: Floats | None = None) -> Candidate:
@@ -199,20 +201,21 @@ def _best(trial: Trial, current: Fit, begin: Near, ground: Ground, suspect: Susp
         return candidate(made)
 
     suspect = settled(trial, current, suspect)
-    best = tried(suspect)
+    whole = tried(suspect)
     if not suspect.effect.onset:
-        return best
+        return whole
     # The kick of an onset shows within seconds of it only; what is changed from then on leads there.
     smooth = replace(suspect, effect=replace(suspect.effect, kick=None))
-    spans = promising(trial, ground, smooth)
-    best = max([best, *(tried(one) for one in spans)], key=lambda one: one.gain)
-    if not best.suspect.times or best.gain < 0.5 * ODDS:
-        return best
+    spans = [tried(one) for one in promising(trial, ground, smooth)]
+    best = max([whole, *spans], key=lambda one: one.gain)
+    if best is whole or best.gain < 0.5 * ODDS:
+        return whole
     index = len(current.suspects)
     step = 0.5 * part_s(trial, suspect)
     coarse = sharpened(trial, best.fit, index, begin, step, NEARBY_S)
     kicked = tried(replace(coarse.suspects[-1], effect=suspect.effect), coarse.values[-1])
-    return candidate(sharpened(trial, kicked.fit, index, begin, min(step, NEARBY_S)))
+    fine = candidate(sharpened(trial, kicked.fit, index, begin, min(step, NEARBY_S)))
+    return max(whole, fine, key=lambda one: one.gain)
 
 
 def _round(found: Sequence[Candidate]) -> Round:

@@ -9,8 +9,8 @@ from math import inf, log
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.folds import block_s
-from ferryid.diagnose.hypothesis import NUDGE, Fit, Near, Suspect, Trial, effect_slopes, fit, imagined, near
+from ferryid.diagnose.filter import stride_s
+from ferryid.diagnose.hypothesis import NUDGE, Fit, Near, Suspect, Trial, effect_slopes, fit, imagined, near, without
 from ferryid.effects.picture import Picture, as_measured
 from ferryid.vessel.profile import Floats
 
@@ -27,11 +27,6 @@ NEARBY_S, FINEST_S = 8.0, 0.2
 """Steps [s] with which a time is searched for nearby, from the first down to the last."""
 GLANCE = 3
 """Steps of a fit by which spans are compared."""
-
-
-def price(trial: Trial, suspect: Suspect) -> float:
-    """Return the logarithm of how many spans a suspect's was chosen from."""
-    return len(suspect.times) * log(len(trial.windows.starts))
 
 
 @dataclass(frozen=True)
@@ -74,8 +69,8 @@ def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
     parts = len(edges) - 1
     G, g = _cross_products(trial, ground, suspect, edges)
     a, b = np.triu_indices(parts + 1, 1)
-    span = (b - a < parts) & (edges[b] - edges[a] >= shortest_s(trial))
-    a, b = a[span], b[span]
+    part = (a > 0) | (b < parts)
+    a, b = a[part], b[part]
     gain = _gains(G, g, a, b, suspect)
     gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(trial.windows.starts))
     found: list[tuple[int, int]] = []
@@ -93,21 +88,21 @@ def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
 
 def part_s(trial: Trial, suspect: Suspect) -> float:
     """Return how long a part of the log is [s]."""
-    edges = _edges(trial, suspect)
-    return float(edges[1] - edges[0])
+    return float(np.median(np.diff(_edges(trial, suspect))))
 
 
-def shortest_s(trial: Trial) -> float:
-    """Return how long a span is at least [s]: what fits into one block is never judged by a fit that has seen some of it."""
-    return block_s(trial.windows)
+def lasts_s(trial: Trial, suspect: Suspect) -> float:
+    """Return for how many seconds of data a suspect acts."""
+    times = trial.steps.middle_s
+    return float(np.count_nonzero((times >= suspect.onset_s) & (times < suspect.offset_s))) * stride_s(trial.steps)
 
 
 def _edges(trial: Trial, suspect: Suspect) -> Floats:
-    times, steps = trial.windows.middle_s, trial.steps
-    first, last = float(times[0]), float(times[-1])
-    most = MOST_NUMBERS / (steps.measured.shape[0] * steps.channels.sum() * len(suspect.parameters))
-    parts = max(FEWEST_PARTS, int(min((last - first) / PART_S, most)))
-    return np.linspace(first, last, parts + 1)
+    """Return where the log is cut [s], into parts of as many steps each: in a gap nothing begins or ends."""
+    times = trial.steps.middle_s
+    most = MOST_NUMBERS / (len(times) * trial.steps.channels.sum() * len(suspect.parameters))
+    parts = max(FEWEST_PARTS, int(min(len(times) * stride_s(trial.steps) / PART_S, most)))
+    return np.interp(np.linspace(0.0, len(times) - 1.0, parts + 1), np.arange(len(times)), times)
 
 
 def _cross_products(trial: Trial, ground: Ground, suspect: Suspect, edges: Floats) -> tuple[Floats, Floats]:
@@ -156,7 +151,7 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
     made
         Fit of it.
     index
-        Of the suspect; its span stays as long as `shortest_s` at least.
+        Of the suspect; its span stays as long as `PART_S` at least.
     begin
         Where each fit begins.
     step_s, finest_s
@@ -170,8 +165,7 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
             middle = getattr(best.suspects[index], end)
             for time in (middle - step, middle + step):
                 moved = best.suspects[index].moved(end, time)
-                lasts_s = min(moved.offset_s, float(times[-1])) - max(moved.onset_s, float(times[0]))
-                if lasts_s < shortest_s(trial) or not times[0] < time < times[-1]:
+                if lasts_s(trial, moved) < PART_S or not times[0] < time < times[-1]:
                     continue
                 tried = fit(trial, swapped(best.suspects, index, moved), best.values, steps=GLANCE, begin=begin)
                 best = max(best, tried, key=lambda one: one.evidence)
@@ -180,14 +174,18 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
 
 
 def timed(trial: Trial, made: Fit) -> Fit:
-    """Return a fit with every span where it is likeliest nearby: noise that is less now may show it better."""
+    """Return a fit with every span where it is likeliest: noise that is less now may show it better, and elsewhere."""
     for i, suspect in enumerate(made.suspects):
         if not suspect.times:
             continue
-        begin = near(trial, made)
-        at = fit(trial, made.suspects, made.values, steps=GLANCE, begin=begin)
-        best = sharpened(trial, at, i, begin, NEARBY_S)
-        made = fit(trial, best.suspects, best.values, begin=begin)
+        bare, begin = without(trial, made, i), near(trial, made)
+        ground = ground_of(trial, bare, near(trial, bare))
+        spans = [suspect, *promising(trial, ground, suspect)]
+        tried = [fit(trial, swapped(made.suspects, i, one), made.values, steps=GLANCE, begin=begin) for one in spans]
+        best = max(tried, key=lambda one: one.evidence)
+        step = max(NEARBY_S, 0.5 * part_s(trial, suspect))
+        sharp = sharpened(trial, best, i, begin, step)
+        made = fit(trial, sharp.suspects, sharp.values, begin=begin)
     return made
 
 

@@ -25,7 +25,9 @@ def test_only_the_difference_to_the_simulations_load_comes_aboard() -> None:
     payload = effects()["payload"]
     own = Suspect(payload, None, payload.parameters_of(ferry))
     hull = hull_of(ferry)
-    simulated = Simulated("s", scene, hull, 0.1 * np.abs(hull), (Condition(own, np.array([300.0, 0.0]), np.zeros(2)),), ())
+    simulated = Simulated(
+        "s", scene, hull, 0.1 * np.abs(hull), (Condition(own, np.array([300.0, 0.0]), np.zeros(2)),), ()
+    )
     base, _ = base_picture(simulated, scene)
     late = replace(next(one for one in differing(simulated, scene) if one.effect.id == "payload"), onset_s=100.0)
     for mass, taken in ((300.0, 0.0), (400.0, -100.0)):

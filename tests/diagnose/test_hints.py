@@ -48,8 +48,8 @@ def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str
 
 
 def test_what_explains_less_than_is_left_without_a_name_is_a_hint() -> None:
-    several = [found("wind", surge=0.1, sway=0.62), found("thruster_gain", surge=0.0, sway=0.02, yaw=0.14)]
-    findings, notes = beside_more(several)
+    several = [found("wind", sway=0.1), found("thruster_gain", yaw=0.14)]
+    findings, notes = beside_more(several, {("wind", None): 0.62, ("thruster_gain", "thruster1"): 0.14})
     assert [one.sure for one in findings] == [True, False]
     assert findings[1].separating_manoeuvre == "a slow turn"
     (note,) = notes
@@ -59,5 +59,5 @@ def test_what_explains_less_than_is_left_without_a_name_is_a_hint() -> None:
 
 def test_what_was_judged_by_no_force_is_left_alone() -> None:
     # Gusts are states of the filter, and remove nothing of the error.
-    assert beside_more([found("gusts")]) == ([found("gusts")], ())
-    assert beside_more([found("wind", sway=0.6)])[1] == ()
+    assert beside_more([found("gusts")], {}) == ([found("gusts")], ())
+    assert beside_more([found("wind", sway=0.1)], {("wind", None): 0.6})[1] == ()

@@ -12,7 +12,8 @@ import pytest
 
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit, near
 from ferryid.diagnose.search import search, suspects_of
-from ferryid.diagnose.spans import ground_of, part_s, price, promising, sharpened
+from ferryid.diagnose.spans import ground_of, lasts_s, part_s, promising, sharpened
+from ferryid.diagnose.weak import windows
 from tests.diagnose.test_hypothesis import PUSH, trial
 from tests.diagnose.trials import sailed, trial_on
 
@@ -42,7 +43,7 @@ def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: fl
     begin = near(case, bare)
     whole = fit(case, [PUSH]).evidence
     spans = promising(case, ground_of(case, bare, begin), PUSH)
-    gains = [fit(case, [one]).evidence - price(case, one) - whole for one in spans]
+    gains = [fit(case, [one]).evidence - whole for one in spans]
     if (first_s, last_s) == (0.0, inf):
         assert max(gains, default=-1.0) < 0.0
         return
@@ -81,12 +82,29 @@ def test_the_gain_of_a_span_is_that_of_its_fit(monkeypatch: pytest.MonkeyPatch) 
     bare = fit(case, ())
     promising(case, ground_of(case, bare, near(case, bare)), PUSH)
     a, b, gains = seen[0]
-    edges = case.windows.middle_s[0] + part_s(case, PUSH) * np.arange(b.max() + 1)
+    edges = module._edges(case, PUSH)
     for k in range(0, len(a), 29):
         span = replace(PUSH, onset_s=edges[a[k]] if a[k] else 0.0, offset_s=edges[b[k]] if b[k] < b.max() else inf)
         # The push is linear, so that the two differ by the step that an edge lies in alone.
-        exact = fit(case, [span]).evidence - bare.evidence
+        exact = fit(case, [span]).evidence - bare.evidence + len(span.times) * np.log(len(case.windows.starts))
         assert gains[k] == pytest.approx(exact, abs=0.1 + 0.15 * abs(exact))
+
+
+def test_in_a_gap_nothing_begins_or_ends() -> None:
+    case = trial(0.0)
+    t = case.plain.scene.t
+    seen = windows(replace(case.plain.scene, usable=(t < 100.0) | (t >= 200.0)), 8.0, 2.0)
+    # At rest in the log, pushed back in the picture.
+    pushed_back = np.outer((t >= 60.0) & (t < 240.0), [-240.0, 0.0, 0.0])
+    gappy = replace(case, windows=seen, plain=replace(case.plain, scene=seen.scene, external=pushed_back))
+    bare = fit(gappy, ())
+    spans = promising(gappy, ground_of(gappy, bare, near(gappy, bare)), PUSH)
+    assert spans
+    assert (spans[0].onset_s, spans[0].offset_s) == (pytest.approx(60.0, abs=10.0), pytest.approx(240.0, abs=10.0))
+    # Of the 180 s of the push 100 s are missing, and half a window at each side of the gap.
+    assert lasts_s(gappy, replace(PUSH, onset_s=60.0, offset_s=240.0)) == pytest.approx(80.0, abs=9.0)
+    ends = [end for one in spans for end in (one.onset_s, one.offset_s)]
+    assert not [end for end in ends if 101.0 < end < 199.0]
 
 
 def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None:
