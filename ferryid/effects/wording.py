@@ -28,6 +28,12 @@ def titled(title: str, instance: str | None) -> str:
     return f"{title} ({instance})" if instance else title
 
 
+def timed(onset_s: float | None, offset_s: float | None) -> str:
+    """Return "began at 259 s and ended at 400 s", as far as it did; empty where it acted all along."""
+    ends = (("began", onset_s), ("ended", offset_s))
+    return listed([f"{did} at {time:.0f} s" for did, time in ends if time is not None])
+
+
 def listed(parts: Sequence[str], word: str = "and") -> str:
     """Return "a, b and c"."""
     return f" {word} ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)

@@ -109,7 +109,7 @@ def render_model(model: Model) -> str:
     for stored in model.vessel_effects:
         lines += ["", f"vessel: {stored.says()}", f"  found in {', '.join(one.log for one in stored.sources)}"]
     for known in model.conditions:
-        lines += ["", f"only in {known.log}:", *(f"  {stored.says()}" for stored in known.effects)]
+        lines += ["", f"only in {known.log}:", *(f"  {stored.says(known.sha256)}" for stored in known.effects)]
     return "\n".join(lines)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from ferryid.identify.model import AXES, Model
 from ferryid.identify.predict import Prediction, imagine, predict
 from ferryid.identify.scores import force_scores, free_run_plain, outside_ranges, usable
 from ferryid.identify.settings import check_window
+from ferryid.identify.stored_effect import StoredEffect
 from ferryid.signals.prepare import prepare
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
@@ -100,7 +101,7 @@ def evaluate(
                     "base": free_run_plain(old.free_run(rows)),
                     "model": free_run_plain(new.free_run(rows)),
                 },
-                **({"effects": _applied(new)} if model.diagnosed else {}),
+                **({"effects": _applied(new, prepared.recording.sha256)} if model.diagnosed else {}),
                 "outside": outside,
                 "warnings": _warnings(prepared.recording.sha256, model, outside, motion.payload is not None),
                 "data_quality": prepared.quality,
@@ -122,13 +123,15 @@ def evaluate(
     }
 
 
-def _applied(found: Prediction) -> dict[str, Any]:
+def _applied(found: Prediction, sha256: str) -> dict[str, Any]:
     """Return the effects that act on a log, and why others do not."""
+
+    def told(several: Iterable[StoredEffect]) -> list[dict[str, Any]]:
+        return [{"effect": one.effect, "instance": one.instance, "says": one.says(sha256)} for one in several]
+
     return {
-        "vessel": [{"effect": one.effect, "instance": one.instance, "says": one.says()} for one in found.vessel],
-        "conditions": [
-            {"effect": one.effect, "instance": one.instance, "says": one.says()} for one in found.conditions
-        ],
+        "vessel": told(found.vessel),
+        "conditions": told(found.conditions),
         "left_out": list(found.idle),
     }
 

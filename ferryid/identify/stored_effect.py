@@ -14,6 +14,7 @@ import numpy as np
 
 from ferryid.effects import Effect, effects
 from ferryid.effects.picture import COEFFICIENTS, LIFT, UNITS, Picture
+from ferryid.effects.wording import timed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.vessel.profile import Profile
 
@@ -89,13 +90,15 @@ class StoredEffect:
         span = self.onset_in(sha256), self.offset_in(sha256)
         return effects()[self.effect].act(picture, p, self.instance, *span)
 
-    def says(self) -> str:
-        """Return the effect as a sentence, without parameters of which no log told anything."""
+    def says(self, sha256: str = "") -> str:
+        """Return the effect as a sentence, without parameters of which no log told anything; of one log, with its times."""
         effect = effects()[self.effect]
         told = {
             name: one.value for name, one in self.parameters.items() if math.isfinite(one.low) or not effect.in_part
         }
-        return effect.says(told, self.instance)
+        onset_s, offset_s = self.onset_in(sha256), self.offset_in(sha256)
+        when = timed(onset_s if onset_s > 0.0 else None, offset_s if math.isfinite(offset_s) else None)
+        return effect.says(told, self.instance) + (f" It {when}." if when else "")
 
 
 @dataclass(frozen=True)

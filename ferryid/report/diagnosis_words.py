@@ -10,7 +10,7 @@ from typing import Any
 from ferryid.diagnose.result import AXES, NEAR, Diagnosis, Estimate, Finding
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS
-from ferryid.effects.wording import listed, titled
+from ferryid.effects.wording import listed, timed, titled
 
 EVERYWHERE = "all along"
 SPANS = 4
@@ -141,8 +141,7 @@ def estimate(one: Estimate) -> str:
 def where(finding: Finding) -> str:
     """Return since when a finding acts, and where it shows."""
     if finding.ends and len(finding.intervals) < 2:
-        did = {"onset": "began", "offset": "ended"}
-        told = f"It {listed([f'{did[name]} at {time:.0f} s' for name, time in finding.ends])}"
+        told = f"It {timed(finding.onset_s, finding.offset_s)}"
     elif len(finding.intervals) > 1:
         spans = [f"{first:.0f} to {last:.0f} s" for first, last in finding.intervals[:SPANS]]
         more = " and later" if len(finding.intervals) > SPANS else ""

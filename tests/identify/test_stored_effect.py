@@ -188,6 +188,8 @@ def test_a_fault_that_passed_is_a_condition_of_its_log(tmp_path: Path) -> None:
     again = load_file(path)
     assert again.conditions == model.conditions
     assert again.conditions[0].effects[1].offset_in(HERE) == 900.0
+    assert again.conditions[0].effects[1].says(HERE).endswith(" It began at 720 s and ended at 900 s.")
+    assert "began" not in again.conditions[0].effects[1].says()
     assert again.conditions_of("cd" * 32) == ()
     # A file of before effects could end has no such key.
     data = json.loads(path.read_text(encoding="utf-8"))
