@@ -234,11 +234,22 @@ def learn_with(
     begin = np.concatenate([channels.ravel(), np.log(start)])
     bounds = [pair for row in channels for pair in _bounds(row, h)]
     bounds += [(float(one) - 5.0, float(one) + 4.0) for one in np.log(start)]
-    z = _least(costs, begin, bounds, most=GLIMPSE)
+    # What gives way to a disturbance first is the size of each channel's own coloured error and push.
+    some = [5 * group + size for group in range(len(first)) for size in (1, 3)]
+    some += range(len(begin) - len(start), len(begin))
+
+    def costs_of_some(every: Floats) -> Floats:
+        full = np.repeat(begin[None], len(every), axis=0)
+        full[:, some] = every
+        return costs(full)
+
+    z = begin.copy()
+    z[some] = _least(costs_of_some, begin[some], [bounds[k] for k in some], most=GLIMPSE)
     if -cost(z) > worth - SIGHT:
         z = _least(costs, z, bounds)
     best = cost(z)
-    width = _widths(cost, z, len(start), best)
+    # What is not worth it need not be known.
+    width = _widths(cost, z, len(start), best) if -best > worth else np.full(len(start), np.inf)
     return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
 
 
