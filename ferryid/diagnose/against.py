@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from ferryid.diagnose.result import Estimate
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import search, suspects_of
 from ferryid.diagnose.weak import windows
+from ferryid.diagnose.withheld import aboard
 from ferryid.effects import effects
 from ferryid.effects.effect import Values
 from ferryid.effects.picture import Picture, Scene
@@ -176,14 +177,20 @@ def _size(measured: Floats) -> Floats:
 
 
 def _measured(scene: Scene) -> tuple[Condition, ...]:
-    """Return the conditions that a simulation records, by their means, for a recording that lacks their sensors."""
+    """Return the conditions that a simulation records, by their means, for a recording that lacks their sensors.
+
+    Of a payload it is the mean while it was aboard.
+    """
     found = []
     for name, values in (("wind", scene.wind), ("current", scene.current), ("payload", scene.payload)):
         if values is None:
             continue
         effect = effects()[name]
-        mean = np.asarray(values[scene.usable].mean(axis=0))
-        suspect = Suspect(effect, None, effect.parameters_of(scene.profile))
+        suspect, rows = Suspect(effect, None, effect.parameters_of(scene.profile)), scene.usable
+        if name == "payload":
+            rows, ends = aboard(scene.t, values, rows)
+            suspect = replace(suspect, onset_s=ends.get("onset", 0.0), offset_s=ends.get("offset", inf))
+        mean = np.asarray(values[rows].mean(axis=0))
         found.append(Condition(suspect, mean, np.zeros_like(mean)))
     return tuple(found)
 

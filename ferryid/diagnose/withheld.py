@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ferryid.diagnose.result import Estimate, Finding, Withheld
 from ferryid.effects import effects
@@ -37,9 +38,8 @@ def _beside(signal: str, values: Floats, scene: Scene, findings: Sequence[Findin
     rows = scene.usable[: len(values)] & np.isfinite(values).all(axis=1)
     measured: dict[str, float] = {}
     if signal == "payload":
-        aboard = rows & (values[:, 0] > ABOARD * np.max(values[rows, 0], initial=0.0))
-        measured = _ends(t[rows], t[aboard])
-        rows, names, when = aboard if aboard.any() else rows, ("mass", "x"), "while it was aboard"
+        rows, measured = aboard(t, values, rows)
+        names, when = ("mass", "x"), "while it was aboard"
     else:
         names, when = ("north", "east"), "on average"
     measured = {**dict(zip(names, np.mean(values[rows], axis=0).tolist(), strict=True)), **measured}
@@ -55,14 +55,24 @@ def _beside(signal: str, values: Floats, scene: Scene, findings: Sequence[Findin
     return Withheld(signal, found, measured, says)
 
 
-def _ends(t: Floats, aboard: Floats) -> dict[str, float]:
-    """Return when a load came aboard and left [s], if it did so within the log."""
-    made = {}
-    if aboard.size and aboard[0] > t[0]:
-        made["onset"] = float(aboard[0])
-    if aboard.size and aboard[-1] < t[-1]:
-        made["offset"] = float(aboard[-1])
-    return made
+def aboard(t: Floats, payload: Floats, rows: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], dict[str, float]]:
+    """Return the rows in which a load is aboard, all where there is none, and its ``onset`` and ``offset`` within the log [s].
+
+    Parameters
+    ----------
+    t
+        Times [s], shape (n,).
+    payload
+        Mass [kg] and place [m], shape (n, 2).
+    rows
+        Those in which it was measured, shape (n,).
+    """
+    on = rows & (payload[:, 0] > ABOARD * np.max(payload[rows, 0], initial=0.0))
+    if not on.any():
+        return rows, {}
+    first, last = float(t[on][0]), float(t[on][-1])
+    ends = {} if first <= t[rows][0] else {"onset": first}
+    return on, ends if last >= t[rows][-1] else {**ends, "offset": last}
 
 
 def _says(name: str, value: float, units: Mapping[str, str]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ferryid.diagnose import against
 from ferryid.diagnose.against import Paths, Simulated, base_picture, differing, learn, paths
 from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.hypothesis import trial_of
@@ -161,3 +162,13 @@ def test_a_simulation_of_another_vessel_is_refused(folder: Path) -> None:
 def test_model_and_simulation_exclude_each_other(windy: str) -> None:
     with pytest.raises(FerryIdError, match="both --model and --against"):
         diagnose([windy], FERRY, None, model=object(), against=windy, progress=quietly)  # type: ignore[arg-type]
+
+
+def test_a_load_that_a_simulation_records_for_a_part_of_it_is_aboard_for_that_part() -> None:
+    t = np.arange(0.0, 100.0)
+    zero, usable = np.zeros((len(t), 3)), np.ones(len(t), dtype=bool)
+    load = np.where(((t >= 30.0) & (t < 80.0))[:, None], [300.0, 0.5], 0.0)
+    scene = Scene(FERRY, t, zero, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), usable, payload=load)
+    (one,) = against._measured(scene)
+    assert one.values == pytest.approx([300.0, 0.5])
+    assert (one.suspect.onset_s, one.suspect.offset_s) == (30.0, 79.0)
