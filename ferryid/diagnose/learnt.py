@@ -9,7 +9,7 @@ from math import isfinite, nan
 import numpy as np
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, effect_slopes, fit
-from ferryid.diagnose.result import Finding
+from ferryid.diagnose.result import Estimate, Finding
 from ferryid.diagnose.scene import Survey
 from ferryid.diagnose.unsteady import State
 from ferryid.effects.picture import COEFFICIENTS
@@ -102,7 +102,7 @@ def learnt(
                 nan if one.name in untold else error
                 for one, error in zip(suspect.parameters, kept.told_errors(i).tolist(), strict=True)
             ]
-            stored.append((lasts, _stored(suspect, kept.values[i], errors, source)))
+            stored.append((lasts, _stored(suspect, kept.values[i], errors, finding.parameters, source)))
     for state in states:
         suspect = state.suspect
         if suspect.key in told and told[suspect.key].sure:
@@ -134,13 +134,17 @@ def learnt(
     )
 
 
-def _stored(suspect: Suspect, values: Floats, errors: Sequence[float], source: Source) -> StoredEffect:
-    """Return an effect with its intervals, which are unknown (NaN) where the errors are."""
-    parameters = {
+def _stored(
+    suspect: Suspect, values: Floats, errors: Sequence[float], told: Mapping[str, Estimate], source: Source
+) -> StoredEffect:
+    """Return an effect with its intervals: those that were told, or of these errors, unknown (NaN) where they are."""
+    parameters = {}
+    for one, value, error in zip(suspect.parameters, values.tolist(), errors, strict=True):
         # With the limit second, what is unknown stays so.
-        one.name: Quantity(value, max(value - 1.96 * error, one.low), min(value + 1.96 * error, one.high), one.unit)
-        for one, value, error in zip(suspect.parameters, values.tolist(), errors, strict=True)
-    }
+        low, high = max(value - 1.96 * error, one.low), min(value + 1.96 * error, one.high)
+        if one.name in told:
+            low, high = min(told[one.name].low, value), max(told[one.name].high, value)
+        parameters[one.name] = Quantity(value, low, high, one.unit)
     return StoredEffect(suspect.effect.id, suspect.instance, parameters, (source,))
 
 

@@ -12,6 +12,7 @@ from ferryid.diagnose.hypothesis import WIDER, Fit, Suspect, Trial, fit, imagine
 from ferryid.diagnose.judged import Judged
 from ferryid.diagnose.locate import locate
 from ferryid.diagnose.result import AXES, HINT, NEAR, Estimate, Finding, Rival
+from ferryid.diagnose.ridge import intervals
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shown import columns_of, regressor_of
 from ferryid.diagnose.spans import lasts_s, swapped
@@ -101,8 +102,11 @@ def _estimates(trial: Trial, suspect: Suspect, kept: Fit, index: int) -> dict[st
     error = kept.told_errors(index)
     estimates = {}
     untold = suspect.effect.untold(trial.plain.scene, kept.values[index])
+    followed = intervals(trial, kept, index) if suspect.effect.ridge and not suspect.times else {}
     for parameter, value, spread in zip(suspect.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
         low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
+        if parameter.name in followed:
+            low, high = min(followed[parameter.name][0], value), max(followed[parameter.name][1], value)
         least = suspect.effect.least
         if parameter.name in untold:
             continue

@@ -115,6 +115,9 @@ class Effect:
         An effect all of whose parameters are nearer to neutral than this is void: the hull may be as much off anyway.
     bends_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
+    ridge
+        Parameter that others trade with, along which the posterior of an effect that acts all along is followed; empty where
+        its curvature tells all.
     of_sensor
         True where it corrects what was measured: such effects act first, as the others act on what is true.
     unsteady
@@ -144,6 +147,7 @@ class Effect:
     in_part: bool = False
     idle: float = 0.0
     bends_hull: bool = False
+    ridge: str = ""
     of_sensor: bool = False
     unsteady: Callable[[Picture, Floats], tuple[Process, ...]] | None = None
     about: str = ""

@@ -74,4 +74,5 @@ EFFECT = Effect(
     kick=kick,
     regressor=regressor,
     bends_hull=True,
+    ridge="mass",
 )
