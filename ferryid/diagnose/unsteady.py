@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
 from typing import Any
@@ -14,7 +14,7 @@ from ferryid.diagnose.bands import fine_windows, spectrum_of
 from ferryid.diagnose.evidence import force_errors
 from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood, stride_s
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
-from ferryid.diagnose.result import AXES, Estimate, Finding
+from ferryid.diagnose.result import AXES, HINT, Estimate, Finding
 from ferryid.diagnose.weak import Windows
 from ferryid.effects.effect import Process
 from ferryid.effects.picture import Picture, Scene
@@ -28,6 +28,9 @@ FASTEST = 0.4
 """Highest frequency that is believed, in steps of the filter; half of one is aliased."""
 WIDEST = 9.0
 """Standard deviation of a logarithm beyond which nothing is known."""
+LACKING = 0.3
+"""A disturbance of which the velocities show less than this share of the power is a hint."""
+UNSEEN = " The velocities do not show it: it may be an error of the positions."
 VAGUE = 0.5
 """A disturbance whose parameters are known no better than within this factor (as a logarithm) was not seen."""
 
@@ -237,10 +240,13 @@ def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spec
     arm = np.array([1.0, 1.0, np.sqrt(picture.hull[0] / picture.hull[4])])
     power = np.sum(pushed, axis=0) * arm**2
     values = {name: one.value for name, one in parameters.items()}
+    shown = _columns(short, frequency, spectrum, pushes, int(np.argmax(power)))
+    probability = 1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0)))
+    unseen = bool(shown) and _unseen(shown["evidence"])
     return Finding(
         effect=suspect.effect.id,
         instance=None,
-        probability=1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0))),
+        probability=min(probability, HINT) if unseen else probability,
         parameters=parameters,
         axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
         intervals=((float(scene.t[0]), float(scene.t[-1])),),
@@ -251,6 +257,15 @@ def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spec
         rivals=(),
         unresolved_with=(),
         separating_manoeuvre=None,
-        says=suspect.effect.says(values, None),
-        **_columns(short, frequency, spectrum, pushes, int(np.argmax(power))),
+        says=suspect.effect.says(values, None) + (UNSEEN if unseen else ""),
+        **shown,
     )
+
+
+def _unseen(evidence: Mapping[str, Floats]) -> bool:
+    """Tell whether the velocities lack most of what a disturbance does where it is strongest.
+
+    It was found in positions, whose errors in a narrow band look like a force; a force moves velocities as well.
+    """
+    strong = evidence["explained"] >= 0.5 * evidence["explained"].max()
+    return float(evidence["before"][strong].sum()) < LACKING * float(evidence["explained"][strong].sum())

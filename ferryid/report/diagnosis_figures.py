@@ -88,9 +88,8 @@ def in_time(finding: Finding) -> str:
         figure, (ax,) = canvas(1, 3.2)
         for first, last in finding.intervals:
             ax.axvspan(first, last, color=SHADE, linewidth=0)
-        label = " and ".join(name for name, _ in finding.ends)
         for k, (_, time) in enumerate(finding.ends):
-            ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--", label=label if k == 0 else None)
+            ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--", label="its ends" if k == 0 else None)
         ax.plot(*envelope(t, evidence["before"]), color=BASE, label=WITHOUT if "after" in evidence else "left over")
         if "after" in evidence:
             ax.plot(*envelope(t, evidence["after"]), color=NEW, label=WITH)

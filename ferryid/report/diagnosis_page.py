@@ -60,7 +60,7 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
     for one in diagnoses:
         lines = [f"{one.log}: {diagnosis_words.headline(one)}"]
         for k, finding in enumerate(one.findings, 1):
-            lines += ["", f"{k}. {finding.says}", *(f"   {line}" for line in _lines(finding))]
+            lines += ["", f"{k}. {diagnosis_words.said(finding)}", *(f"   {line}" for line in _lines(finding))]
         rows = diagnosis_words.force_rows(one)
         if rows:
             lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]
@@ -135,7 +135,7 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) ->
                     {
                         "name": name.replace("_", " "),
                         "found": diagnosis_words.estimate(value),
-                        "measured": f"{one.measured[name]:.3g}" if name in one.measured else "–",
+                        "measured": diagnosis_words.measured(one.measured.get(name), value.unit),
                     }
                     for name, value in one.found.items()
                 ],
@@ -179,12 +179,12 @@ def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
                 "svg": diagnosis_figures.in_frequency(finding),
                 "caption": "Power spectrum of what is left over with the other findings, on the axis on which it acts most. "
                 "Black: the spectrum of a disturbance of the strength and duration that were found, averaged over windows like "
-                "the rest. Where the finding holds, orange follows black wherever black is high; elsewhere orange is noise.",
+                "the rest. Where the finding holds, orange is nowhere far below black; far above it there is more.",
             }
         )
     return {
         "title": diagnosis_words.title(finding.effect, finding.instance),
-        "says": finding.says,
+        "says": diagnosis_words.said(finding),
         "lines": [
             line
             for line in (

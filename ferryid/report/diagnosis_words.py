@@ -13,6 +13,8 @@ from ferryid.effects.picture import COEFFICIENTS
 from ferryid.effects.wording import listed, timed, titled
 
 EVERYWHERE = "all along"
+INCREDIBLE = 3.0
+"""Standard deviations as of which a coefficient of the hull has moved farther than is credible."""
 SPANS = 4
 """Intervals that are told."""
 RIVALS = 3
@@ -38,6 +40,8 @@ NAMES = {
     "std": "standard deviation",
     "force_std": "standard deviation of the force",
     "moment_std": "standard deviation of the moment",
+    "onset": "it began at",
+    "offset": "it ended at",
 }
 """Parameters whose own names are no words."""
 FREE_RUN = (
@@ -118,6 +122,11 @@ def ratio_of(diagnosis: Diagnosis) -> dict[str, Estimate]:
     }
 
 
+def said(finding: Finding) -> str:
+    """Return the sentence of a finding; a hint's begins with "Perhaps"."""
+    return finding.says if finding.sure else f"Perhaps: {finding.says}"
+
+
 def numbers(finding: Finding) -> str:
     """Return the parameters with intervals and units."""
     parts = [f"{_word(name)} {estimate(one)}" for name, one in finding.parameters.items()]
@@ -138,10 +147,17 @@ def estimate(one: Estimate) -> str:
     return f"{value} ({one.low:.{digits}f} to {one.high:.{digits}f})"
 
 
+def measured(value: float | None, unit: str) -> str:
+    """Return what a sensor measured, with its unit."""
+    return "–" if value is None else f"{value:.4g}{'' if unit in ('-', '') else f' {unit}'}"
+
+
 def where(finding: Finding) -> str:
     """Return since when a finding acts, and where it shows."""
     if finding.ends and len(finding.intervals) < 2:
-        told = f"It {timed(finding.onset_s, finding.offset_s)}"
+        # With intervals, these stand among the numbers already.
+        known = all(name in finding.parameters for name, _ in finding.ends)
+        told = "" if known else f"It {timed(finding.onset_s, finding.offset_s)}"
     elif len(finding.intervals) > 1:
         spans = [f"{first:.0f} to {last:.0f} s" for first, last in finding.intervals[:SPANS]]
         more = " and later" if len(finding.intervals) > SPANS else ""
@@ -154,11 +170,12 @@ def where(finding: Finding) -> str:
     shares = sorted(finding.axes.items(), key=lambda pair: -pair[1])
     shown = [f"{axis} ({_percent(share)})" for axis, share in shares if share >= 0.05]
     if shown:
-        told += f", and shows in {listed(shown)}"
+        told += f"{', and' if told else 'It'} shows in {listed(shown)}"
     if finding.band_hz is not None:
         told += f", mostly between {finding.band_hz[0]:g} and {finding.band_hz[1]:g} Hz"
-    regime = "" if finding.regime == EVERYWHERE else finding.regime
-    return f"{told}; clearest at {regime}." if regime else f"{told}."
+    # Where the vessel was while something passed is no property of it.
+    regime = "" if finding.regime == EVERYWHERE or finding.ends else finding.regime
+    return f"{told}; clearest at {regime}." if regime else f"{told}." if told else ""
 
 
 def _throughout(finding: Finding) -> bool:
@@ -276,16 +293,19 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
     lines = []
     if diagnosis.findings:
         unsteady = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect in UNSTEADY]
-        absent = [f"{listed(unsteady)} (forces that come and go by chance)"] if unsteady else []
-        absent += ["findings without a name"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []
+        absent = [
+            *unsteady,
+            *(["what has no name"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []),
+        ]
         if absent:
-            lines.append(f"Not in the errors with the findings: {listed(absent)}.")
+            lines.append(f"{_upper(listed(absent))}: not subtracted from these errors, and left in both rows.")
     if diagnosis.moved is not None:
         one = diagnosis.moved
         lines.append(
             "The hull's coefficients were refitted too, by themselves for the errors without the findings and together with "
             f"them for the others. There, the coefficient {one.coefficient} moved farthest, from {one.before:.4g} to "
-            f"{one.value:.4g} {one.unit}: {abs(one.deviations):.2g} times the standard deviation of what was believed of it."
+            f"{one.value:.4g} {one.unit}: {abs(one.deviations):.2g} standard deviations of what was believed of it before"
+            f"{', farther than is credible' if abs(one.deviations) > INCREDIBLE else ''}."
         )
     if "window_s" in diagnosis.before:
         lines.append(
@@ -314,7 +334,7 @@ def free_run_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         one, other = (_number(run[key][k]) * factor if run.get(key) else float("nan") for run in (before, after))
         ratio = _estimated(given) if given else _bare(other / one if one > 0.0 else float("nan"))
         rows.append(
-            {"name": f"{name} after {horizons[k]:g} s [{unit}]", "cells": [_cell(one), _cell(other), _ratio(ratio)]}
+            {"name": f"{name} after {horizons[k]:.3g} s [{unit}]", "cells": [_cell(one), _cell(other), _ratio(ratio)]}
         )
     return rows
 

@@ -11,7 +11,7 @@ import pytest
 from ferryid.diagnose.hypothesis import trial_of
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import Search, search, suspects_of
-from ferryid.diagnose.unsteady import State, density, unsteady_of
+from ferryid.diagnose.unsteady import State, _unseen, density, unsteady_of
 from ferryid.diagnose.weak import windows
 from ferryid.effects.effect import Process
 from ferryid.simulate import parse_scenario, simulate, write_log
@@ -98,3 +98,12 @@ def test_where_nothing_comes_and_goes_there_are_no_states(wind: str, seed: int, 
     result = found_in(wind, seed, tmp_path)
     assert result.states == ()
     assert [one.effect.id for one in result.fit.suspects] == (["wind"] if wind else [])
+
+
+@pytest.mark.parametrize(("share", "unseen"), [(1.0, False), (30.0, False), (0.5, False), (0.05, True)])
+def test_what_the_velocities_lack_is_unseen(share: float, unseen: bool) -> None:
+    # A peak; far from it something else is stronger, which counts for nothing.
+    frequency = np.linspace(0.05, 1.0, 96)
+    peak = np.exp(-(((frequency - 0.45) / 0.02) ** 2))
+    evidence = {"frequency": frequency, "explained": peak, "before": share * peak + 1.0 * (frequency < 0.2)}
+    assert _unseen(evidence) == unseen

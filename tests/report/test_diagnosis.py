@@ -40,6 +40,7 @@ from ferryid.report.diagnosis_words import (
     overall,
     ratio_of,
     rivals,
+    said,
     trust,
     where,
 )
@@ -255,10 +256,13 @@ def test_a_finding_is_told_in_numbers() -> None:
     assert where(wind()) == (
         "It acts throughout, and shows in sway (60 %), yaw (30 %) and surge (10 %); clearest at headings 150-210 deg."
     )
-    assert where(gain()) == "It began at 312 s, and shows in surge (70 %) and yaw (26 %)."
+    assert where(gain()) == "It shows in surge (70 %) and yaw (26 %)."
+    assert "; it began at 312.0 s (308.5 to 315.1)" in numbers(gain())
     passed = replace(gain(), offset_s=500.0, intervals=((312.0, 500.0),))
     assert where(passed).startswith("It began at 312 s and ended at 500 s, and shows")
     assert where(replace(passed, onset_s=None)).startswith("It ended at 500 s, and shows")
+    assert said(replace(wind(), probability=0.4)).startswith("Perhaps: ")
+    assert said(wind()) == wind().says
     assert trust(wind()) == (
         "Probability above 0.99, among the effects that were tried. With it, the squared force error on data that it was not "
         "fitted to falls by 41 % in surge, 90 % in sway and 95 % in yaw."
@@ -406,11 +410,11 @@ def test_the_table_says_what_its_errors_are_of_and_what_is_not_in_them() -> None
         moved=moved,
     )
     absent, hull, windows = about_errors(one)
+    assert absent == "Gusts and what has no name: not subtracted from these errors, and left in both rows."
     assert (
-        absent
-        == "Not in the errors with the findings: gusts (forces that come and go by chance) and findings without a name."
+        "the coefficient Y_v moved farthest, from -200 to -230 kg/s: 1.2 standard deviations of what was believed"
+        in hull
     )
-    assert "the coefficient Y_v moved farthest, from -200 to -230 kg/s: 1.2 times the standard deviation" in hull
     assert "windows of 8 s" in windows
     assert "ferryid evaluate" in windows
     page, text = unbroken(render((one,), "trial")[0]), unbroken(as_text((one,)))
@@ -499,7 +503,7 @@ def test_what_comes_and_goes_is_shown_by_its_spectrum() -> None:
     drawing = drawings["finding-2-spectrum"]
     for label in ("frequency [Hz]", "sway force left over [N²/Hz]", "left over", "what it explains"):
         assert f">{label}</text>" in drawing
-    assert "orange follows black" in unbroken(page)
+    assert "orange is nowhere far below black" in unbroken(page)
 
 
 def unbroken(text: str) -> str:
@@ -524,10 +528,10 @@ def test_figures_carry_units_and_only_what_there_is() -> None:
     drawings = explained()[1]
     assert "sway force left over [N]" in drawings["finding-1-evidence"]
     assert "heading [deg]" in drawings["finding-1-evidence"]
-    assert ">onset</text>" in drawings["finding-2-time"]
-    assert ">onset</text>" not in drawings["finding-1-time"]
+    assert ">its ends</text>" in drawings["finding-2-time"]
+    assert ">its ends</text>" not in drawings["finding-1-time"]
     passed = replace(diagnosis("explained"), findings=(replace(gain(), offset_s=500.0),))
-    assert ">onset and offset</text>" in render((passed,), "trial")[1]["finding-1-time"]
+    assert ">its ends</text>" in render((passed,), "trial")[1]["finding-1-time"]
     bare = replace(diagnosis("explained"), findings=(replace(wind(), evidence={}, labels={}),), evidence={})
     assert set(render((bare,), "trial")[1]) == {"free-run-errors"}
     assert render((diagnosis("explained"),), "trial") == explained()
