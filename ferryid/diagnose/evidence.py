@@ -43,8 +43,8 @@ STRONG = 5.0 * PLAIN
 their means over the log."""
 CLAIMED = 1.0 / 3.0
 """Share of a finding's improvement that an axis must have for the finding to claim it; one of three has as much."""
-SAME = 1e-6
-"""A placebo that differs less than this from its effect, as a share of it, is none."""
+SAME = 0.3
+"""A placebo whose force differs by less than this from its effect's, as a share of it in the root mean square, is none."""
 
 
 @dataclass(frozen=True)
@@ -247,8 +247,9 @@ def placebos(trial: Trial, suspect: Suspect, values: Floats) -> dict[str, Suspec
     mirrored = _mirrored(suspect)
     true = suspect.act(trial.plain, values)
     wrong = mirrored.act(trial.plain, values)
-    size = np.abs(as_measured(true) - as_measured(trial.plain)).max()
-    if np.abs(as_measured(true) - as_measured(wrong)).max() > SAME * size:
+    size = np.linalg.norm(as_measured(true) - as_measured(trial.plain))
+    # On a heading near north or south the mirrored force is the same: it would test nothing.
+    if np.linalg.norm(as_measured(true) - as_measured(wrong)) > SAME * size:
         made[HEADING] = mirrored
     return made
 

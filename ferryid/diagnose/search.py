@@ -207,15 +207,16 @@ def _best(trial: Trial, current: Fit, begin: Near, ground: Ground, suspect: Susp
     # The kick of an onset shows within seconds of it only; what is changed from then on leads there.
     smooth = replace(suspect, effect=replace(suspect.effect, kick=None))
     spans = [tried(one) for one in promising(trial, ground, smooth)]
-    best = max([whole, *spans], key=lambda one: one.gain)
-    if best is whole or best.gain < 0.5 * ODDS:
-        return whole
-    index = len(current.suspects)
-    step = 0.5 * part_s(trial, suspect)
-    coarse = sharpened(trial, best.fit, index, begin, step, NEARBY_S)
-    kicked = tried(replace(coarse.suspects[-1], effect=suspect.effect), coarse.values[-1])
-    fine = candidate(sharpened(trial, kicked.fit, index, begin, min(step, NEARBY_S)))
-    return max(whole, fine, key=lambda one: one.gain)
+    index, step = len(current.suspects), 0.5 * part_s(trial, suspect)
+
+    def refined(one: Candidate) -> Candidate:
+        coarse = sharpened(trial, one.fit, index, begin, step, NEARBY_S)
+        kicked = tried(replace(coarse.suspects[-1], effect=suspect.effect), coarse.values[-1])
+        return candidate(sharpened(trial, kicked.fit, index, begin, min(step, NEARBY_S)))
+
+    # Seconds matter: which of them is best shows when each has its own.
+    good = [one for one in spans if one.gain > max(whole.gain, 0.5 * ODDS)]
+    return max([whole, *(refined(one) for one in good)], key=lambda one: one.gain)
 
 
 def _round(found: Sequence[Candidate]) -> Round:
