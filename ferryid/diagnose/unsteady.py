@@ -141,11 +141,12 @@ def disturbed(
 def _seen(suspect: Suspect, values: Floats, widths: Floats, step_s: float) -> bool:
     """Tell whether a disturbance is known: how fast it is, how strong on one axis at least, and its moment if it has one.
 
-    A position's error in a narrow band looks like a force along it, but turns nothing; and what is faster than the filter's
-    steps was not seen by it.
+    A position's error in a narrow band looks like a force along it, but turns nothing; what is faster than the filter's steps
+    was not seen by it; and waves slower than any sea are none.
     """
     band = np.array([parameter.unit == "Hz" for parameter in suspect.parameters])
-    if (values[band] * step_s > FASTEST).any():
+    possible = all(one.low <= value <= one.high for one, value in zip(suspect.parameters, values.tolist(), strict=True))
+    if not possible or (values[band] * step_s > FASTEST).any():
         return False
     strength = _strengths(suspect)
     turning = np.array([parameter.unit == "N·m" for parameter in suspect.parameters])

@@ -18,6 +18,8 @@ from ferryid.vessel.profile import Floats, Profile
 USUAL_HZ = 0.35
 """Usual frequency of the waves that a vessel of `USUAL_M` feels most; longer ones feel longer waves."""
 USUAL_M = 5.0
+SLOWEST = 0.25
+"""Slowest waves, as a share of that frequency: they are sixteen times as long, and what is slower is no sea."""
 
 
 def _length(profile: Profile) -> float:
@@ -31,7 +33,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     frequency = USUAL_HZ * sqrt(USUAL_M / length)
     force = 0.03 * profile.hull.mass_kg
     return (
-        Parameter("peak_frequency", "Hz", frequency, 0.02, 3.0),
+        Parameter("peak_frequency", "Hz", frequency, SLOWEST * frequency, 3.0),
         Parameter("force_std", "N", force, 0.0, 100.0 * force),
         Parameter("moment_std", "N·m", 0.2 * force * length, 0.0, 20.0 * force * length),
         Parameter("time_constant", "s", 2.0 / frequency, 0.1, 300.0),

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import trial_of
+from ferryid.diagnose.hypothesis import Suspect, trial_of
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import Search, search, suspects_of
-from ferryid.diagnose.unsteady import State, _unseen, density, unsteady_of
+from ferryid.diagnose.unsteady import State, _seen, _unseen, density, unsteady_of
 from ferryid.diagnose.weak import windows
+from ferryid.effects import effects
 from ferryid.effects.effect import Process
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
@@ -107,3 +108,11 @@ def test_what_the_velocities_lack_is_unseen(share: float, unseen: bool) -> None:
     peak = np.exp(-(((frequency - 0.45) / 0.02) ** 2))
     evidence = {"frequency": frequency, "explained": peak, "before": share * peak + 1.0 * (frequency < 0.2)}
     assert _unseen(evidence) == unseen
+
+
+def test_waves_slower_than_any_sea_are_none() -> None:
+    ferry = load_profile("milliampere")
+    waves = Suspect(effects()["waves"], None, effects()["waves"].parameters_of(ferry))
+    values, widths = np.array([0.45, 60.0, 100.0, 6.0]), np.full(4, 0.1)
+    assert _seen(waves, values, widths, 0.4)
+    assert not _seen(waves, np.array([0.044, *values[1:]]), widths, 0.4)
