@@ -23,7 +23,7 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.evidence import Evidence, Improvement, force_errors
 from ferryid.diagnose.free_runs import FreeRuns
-from ferryid.diagnose.hints import beside_gusts, beside_more, hint, on_a_guessed_hull
+from ferryid.diagnose.hints import about_nothing, beside_gusts, beside_more, hint, on_a_guessed_hull
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, trial_of
 from ferryid.diagnose.judged import Judged, judged
 from ferryid.diagnose.learnt import learnt
@@ -212,10 +212,10 @@ def _ended(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
             f"stand in for what a hull model would explain. Take them as hints, of probability {HINT:g} at most."
         )
-    shaken = unsteady_of(trial, kept, found.states, scene)
+    shaken = about_nothing(unsteady_of(trial, kept, found.states, scene), forces)
     if model is None and not profile.hull.has_model:
         # Its own motion, too, is only guessed at: what shakes it may be its measurement.
-        shaken = tuple(on_a_guessed_hull(one) for one in shaken)
+        shaken = [on_a_guessed_hull(one) for one in shaken]
     named, nameless = [*forces, *shaken], list(unknown.findings)
     if drowned := drowned_axes(trial):
         notes.append(says_drowned(drowned))

@@ -40,6 +40,12 @@ def beside_gusts(finding: Finding) -> Finding:
     return hint(finding, "gusts", manoeuvre="the same manoeuvres in calm air")
 
 
+def about_nothing(shaken: Sequence[Finding], forces: Sequence[Finding]) -> list[Finding]:
+    """Return what comes and goes by chance: gusts about a wind that is not told are a hint."""
+    told = {"", *(one.effect for one in forces if one.sure)}
+    return [one if effects()[one.effect].about in told else hint(one) for one in shaken]
+
+
 def beside_more(
     findings: Sequence[Finding], removed: Mapping[tuple[str, str | None], float]
 ) -> tuple[list[Finding], tuple[str, ...]]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from ferryid.diagnose.hints import beside_gusts, beside_more, on_a_guessed_hull
+from ferryid.diagnose.hints import about_nothing, beside_gusts, beside_more, on_a_guessed_hull
 from ferryid.diagnose.result import Finding
 
 
@@ -55,6 +55,13 @@ def test_what_explains_less_than_is_left_without_a_name_is_a_hint() -> None:
     (note,) = notes
     assert "Thruster force (thruster1)" in note
     assert "wind" not in note
+
+
+def test_gusts_about_a_wind_that_is_not_told_are_a_hint() -> None:
+    both = [found("gusts"), found("waves")]
+    assert [one.sure for one in about_nothing(both, [found("wind", sway=0.6)])] == [True, True]
+    assert [one.sure for one in about_nothing(both, [replace(found("wind"), probability=0.4)])] == [False, True]
+    assert [one.sure for one in about_nothing(both, [])] == [False, True]
 
 
 def test_what_was_judged_by_no_force_is_left_alone() -> None:
