@@ -172,7 +172,9 @@ def _time(trial: Trial, kept: Fit, index: int, end: str) -> Estimate:
     weights = np.exp(log_weights - log_weights.max()) * np.diff(edges)
     shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
     low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
-    return Estimate(middle, max(low, 0.0), high, "s")
+    # Forces have a value a row: within one, nothing is known of when they change.
+    row_s = trial.windows.scene.step_s
+    return Estimate(middle, max(low - row_s, 0.0), high + row_s, "s")
 
 
 def _intervals(trial: Trial, estimates: Mapping[str, Estimate]) -> tuple[tuple[float, float], ...]:
