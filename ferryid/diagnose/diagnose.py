@@ -227,7 +227,8 @@ def _ended(
     if unknown.unsteady or found.states:
         findings = [beside_gusts(one) for one in findings]
     sure = [one for one in findings if one.sure]
-    more = bool(nameless) or len(sure) < len(findings)
+    # What was suspected on strong evidence and fell to a placebo or a law has a cause, known or not.
+    more = bool(nameless) or bool(stands.told) or len(sure) < len(findings)
     verdict = _verdict(bool(sure), more, tells(chances, still))
     findings += nameless
     before, after = _scores(trial, base, kept, proof)

@@ -9,7 +9,7 @@ import pytest
 from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.hypothesis import HULL_SPREAD
 from ferryid.diagnose.result import Diagnosis
-from ferryid.simulate import load_scenario, simulate, write_log
+from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 
 
@@ -62,3 +62,20 @@ def test_a_calm_log_matches(tmp_path: Path) -> None:
     assert result.moved is None
     assert result.duration_s == pytest.approx(load_scenario("twelve-corner-calm").duration_s, abs=2.0)
     assert result.before["window_s"] == pytest.approx(8.0)
+
+
+def test_a_squall_that_no_steady_wind_explains_is_not_matched(tmp_path: Path) -> None:
+    rows = [(0.0, 0.0), (412.0, 0.0), (427.0, 1.0), (552.0, 1.0), (567.0, 0.0)]
+    text = "time,north,east\n" + "".join(f"{t:.1f},{3.4 * share:.3f},{-1.6 * share:.3f}\n" for t, share in rows)
+    (tmp_path / "wind.csv").write_text(text, encoding="utf-8")
+    scenario = (
+        'schema = "ferryid.scenario/1"\nvessel = "milliampere"\npath = { kind = "twelve-corner" }\n'
+        'controller = { delta = 0.7, sigma = 0.7 }\nenvironment = { wind = { series = "wind.csv" } }\n'
+        "true_hull = { m11 = 0.9, m22 = 1.1, m33 = 0.9, X_u = 1.1, Y_v = 0.9 }\n"
+        "sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }\n"
+    )
+    log = tmp_path / "squall.mcap"
+    write_log(simulate(parse_scenario(scenario, "squall", tmp_path), 3), log)
+    result = diagnose([str(log)], load_profile("milliampere"), None, progress=lambda stage: None)[0]
+    assert result.verdict in ("unexplained", "partly_explained")
+    assert not [one for one in result.findings if one.sure and one.effect not in ("wind", "gusts", "unknown")]
