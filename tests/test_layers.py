@@ -25,6 +25,7 @@ ORDER = (
     "simulate",
     "report",
     "reproduce",
+    "prove",
     "cli",
 )
 HOMES = {
@@ -36,6 +37,8 @@ HOMES = {
     "google": ("ingest",),
     "lz4": ("ingest", "simulate"),
     "zstandard": ("ingest", "simulate"),
+    "pysindy": ("prove",),
+    "distributed": ("prove",),
 }
 """Packages and the layers that may import them; the simulator writes logs, which is why it may know their formats."""
 
