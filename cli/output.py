@@ -33,3 +33,9 @@ def progress(stage: str) -> None:
     if sys.stderr.isatty():
         sys.stderr.write(f"\r\033[K{stage}")
         sys.stderr.flush()
+
+
+def tell(line: str) -> None:
+    """Print a line that is no result to standard error, above the present stage."""
+    progress("")
+    typer.echo(line, err=True)

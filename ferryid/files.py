@@ -148,8 +148,14 @@ def write_result(path: Path, text: str) -> None:
 
 
 @contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Keep other processes out of a folder's numbering while the block runs, where the system has file locks."""
+def alone(folder: Path, *, wait: bool = True) -> Iterator[None]:
+    """Keep other processes out of a folder's numbering while the block runs, where the system has file locks.
+
+    Raises
+    ------
+    FerryIdError
+        When the folder cannot be written, or another process is in it and `wait` is False.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = (folder / ".lock").open("w")
@@ -157,7 +163,12 @@ def alone(folder: Path) -> Iterator[None]:
         raise unwritable(folder, error) from error
     with lock:
         if fcntl is not None:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise FerryIdError(
+                    f"{folder}: another process is at work in it. Fix: wait for it, or choose another folder with --out"
+                ) from error
         yield
 
 

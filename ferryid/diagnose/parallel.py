@@ -13,6 +13,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _thread = local()
+_alone = False
 
 
 def over(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
@@ -32,7 +33,13 @@ def over(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
         return list(pool.map(inside, every))
 
 
+def keep_to_one_thread() -> None:
+    """Use one thread in this process from now on: others like it keep the other cores busy."""
+    global _alone
+    _alone = True
+
+
 def _cores() -> int:
-    if parent_process() is not None:
+    if _alone or parent_process() is not None:
         return 1
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,90 @@
+"""Finished work stays finished: a file of JSON lines, one a case, each there whole as soon as its case is done."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ferryid.files import finite, unwritable
+from ferryid.prove.spread import Spread
+
+T = TypeVar("T")
+
+
+def finished(path: Path) -> dict[str, Any]:
+    """Return the results in a file by the name of their case; lines that broke off count as not done."""
+    if not path.exists():
+        return {}
+    data = path.read_bytes()
+    whole = data[: data.rfind(b"\n") + 1]
+    if whole != data:
+        with path.open("r+b") as file:
+            file.truncate(len(whole))
+    results = {}
+    for text in whole.splitlines():
+        try:
+            line = json.loads(text)
+            results[line["name"]] = line["result"]
+        except (ValueError, TypeError, KeyError):  # what a crash of the machine left of it: to be done again
+            continue
+    return results
+
+
+def carry_out(
+    what: str,
+    path: Path,
+    work: Mapping[str, T],
+    function: Callable[[T], Any],
+    spread: Spread,
+    *,
+    progress: Callable[[str], None],
+    hidden: Callable[[Any], Any] = finite,
+) -> dict[str, Any]:
+    """Do what is left of some work, and return the results of all of it by name, in the order of the work.
+
+    Parameters
+    ----------
+    what
+        Name of the stage, for people.
+    path
+        JSON lines of this and earlier times.
+    work
+        What `function` is given, by the name of its case.
+    function
+        Returns plain data.
+    spread
+        What carries it out.
+    progress
+        Called with what is done and the time left.
+    hidden
+        What of a result is written; by default all of it.
+    """
+    done = {name: result for name, result in finished(path).items() if name in work}
+    left = [name for name in work if name not in done]
+    if left:
+        progress(f"{what}: {len(done)} of {len(work)}")
+        start = time.monotonic()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = path.open("a", encoding="utf-8")
+        except OSError as error:
+            raise unwritable(path, error) from error
+        with file:
+            for count, (number, result) in enumerate(spread.over(function, [work[name] for name in left]), 1):
+                done[left[number]] = written = hidden(result)
+                file.write(json.dumps({"name": left[number], "result": written}, allow_nan=False) + "\n")
+                file.flush()
+                seconds = (time.monotonic() - start) / count * (len(left) - count)
+                progress(f"{what}: {len(done)} of {len(work)}, {_time(seconds)} left")
+        progress("")
+    return {name: done[name] for name in work}
+
+
+def _time(seconds: float) -> str:
+    minutes = seconds / 60.0
+    return (
+        f"{seconds:.0f} s" if minutes < 2.0 else f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.1f} h"
+    )

@@ -1,0 +1,220 @@
+"""Work spread over processes of this machine or over a Dask cluster: a function, items, and results as they are ready.
+
+Function, items and results must be picklable. On a cluster the workers need the same ferryid, and see the same folders under
+the same paths where an item names some.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from multiprocessing import connection
+from typing import Any, Protocol, TypeVar
+
+from ferryid.errors import FerryIdError
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+MOST_PROCESSES = 64
+LOSSES = 3
+"""An item whose process died so often is given up."""
+ANSWER_S = 10.0
+"""How long a cluster may take to answer [s]."""
+
+
+class Spread(Protocol):
+    """Something that carries out work."""
+
+    def over(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R]]:
+        """Yield the number of each item and what the function makes of it, as they are ready.
+
+        An item whose process is lost is done again by another. What the function raises is raised here, and ends the work.
+
+        Raises
+        ------
+        FerryIdError
+            For an item that lost its process `LOSSES` times.
+        """
+        ...
+
+
+@contextmanager
+def spread(processes: int = 1, dask: str | None = None) -> Iterator[Spread]:
+    """Give something that carries out work; what still runs at the end of the block is ended.
+
+    Parameters
+    ----------
+    processes
+        How many of this machine; 1 works in this process.
+    dask
+        Address of a Dask scheduler, such as ``tcp://localhost:8786``, which is used instead of them.
+
+    Raises
+    ------
+    FerryIdError
+        For a number that is not possible, and a cluster that cannot be used.
+    """
+    if dask is not None:
+        with _quiet(), _cluster(dask) as client:
+            yield _Cluster(client)
+        return
+    if not 1 <= processes <= MOST_PROCESSES:
+        raise FerryIdError(f"--processes: {processes} is no number of processes. Fix: give 1 to {MOST_PROCESSES}")
+    if processes == 1:
+        yield _Here()
+        return
+    pool = _Pool(processes)
+    try:
+        yield pool
+    finally:
+        pool.end()
+
+
+class _Here:
+    def over(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R]]:
+        for number, item in enumerate(items):
+            yield number, function(item)
+
+
+class _Pool:
+    """Processes of this machine, started afresh: numba's and NumPy's threads do not survive a fork."""
+
+    def __init__(self, processes: int) -> None:
+        self._processes = processes
+        self._pool: ProcessPoolExecutor | None = None
+        self._workers: set[multiprocessing.process.BaseProcess] = set()
+
+    def over(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R]]:
+        waiting, losses = deque(range(len(items))), [0] * len(items)
+        running: dict[Future[R], tuple[int, ProcessPoolExecutor]] = {}
+        while waiting or running:
+            # No more than are worked on: with a process that dies, all are lost that were handed out.
+            while waiting and len(running) < self._processes:
+                future, pool = self._submit(function, items[waiting[0]])
+                running[future] = waiting.popleft(), pool
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                number, pool = running.pop(future)
+                try:
+                    result = future.result()
+                except BrokenProcessPool as error:
+                    if pool is self._pool:
+                        self.end()
+                    losses[number] += 1
+                    if losses[number] == LOSSES:
+                        raise FerryIdError(
+                            f"the process that worked on item {number + 1} of {len(items)} died {LOSSES} times. "
+                            "Fix: give fewer --processes, which need less memory together"
+                        ) from error
+                    waiting.append(number)
+                    continue
+                yield number, result
+
+    def _submit(self, function: Callable[[T], R], item: T) -> tuple[Future[R], ProcessPoolExecutor]:
+        before = set(multiprocessing.active_children())
+        try:
+            if self._pool is None:
+                context = multiprocessing.get_context("spawn")
+                self._pool = ProcessPoolExecutor(self._processes, mp_context=context, initializer=_begin)
+            return self._pool.submit(function, item), self._pool
+        except BrokenProcessPool:  # one died that had nothing to do
+            self.end()
+            return self._submit(function, item)
+        finally:
+            self._workers |= set(multiprocessing.active_children()) - before
+
+    def end(self) -> None:
+        """End all processes at once, whatever they are doing."""
+        pool, self._pool = self._pool, None
+        if pool is None:
+            return
+        pool.shutdown(wait=False, cancel_futures=True)
+        while self._workers:
+            self._workers.pop().terminate()
+        pool.shutdown(wait=True)
+
+
+def _begin() -> None:
+    """Leave interrupts to the process that started this one, and end with it, however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+
+    def end_with() -> None:
+        if parent is not None:
+            connection.wait([parent.sentinel])
+            os._exit(1)
+
+    threading.Thread(target=end_with, daemon=True).start()
+
+
+class _Cluster:
+    def __init__(self, client: Any) -> None:
+        self._client = client
+
+    def over(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R]]:
+        from distributed import CancelledError, KilledWorker, as_completed
+        from distributed.comm.core import CommClosedError
+
+        futures: dict[Any, int] = {}
+        try:
+            for number, item in enumerate(items):
+                futures[self._client.submit(function, item, pure=False)] = number
+            for future in as_completed(futures, loop=self._client.loop):  # type: ignore[no-untyped-call]
+                try:
+                    result = future.result()
+                except KilledWorker as error:
+                    raise FerryIdError(
+                        f"the workers that were given item {futures[future] + 1} of {len(items)} died, one after the other. "
+                        "Fix: give the cluster's workers more memory"
+                    ) from error
+                yield futures[future], result
+                future.release()
+        except (CancelledError, CommClosedError) as error:
+            raise FerryIdError(
+                "--dask: the scheduler is gone, or took the work back. Fix: start it again and go on"
+            ) from error
+        finally:
+            with suppress(Exception):  # a scheduler that is gone has nothing to cancel
+                self._client.cancel(list(futures))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Have nothing logged of what is said in one line."""
+    log = logging.getLogger("distributed")
+    level = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Any]:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise FerryIdError(
+            '--dask: the package distributed is not installed, which a cluster needs. Fix: pip install "ferryid[dask]"'
+        ) from error
+    try:
+        client: Any = Client(address, timeout=ANSWER_S, set_as_default=False)  # type: ignore[no-untyped-call]
+    except (OSError, TimeoutError, ValueError) as error:
+        reason = str(error).strip() or type(error).__name__
+        raise FerryIdError(
+            f"--dask {address}: no scheduler answers there within {ANSWER_S:.0f} s, {reason}. "
+            "Fix: start one with `dask scheduler`, and give the address that it prints"
+        ) from error
+    try:
+        yield client
+    finally:
+        client.close(timeout=ANSWER_S)

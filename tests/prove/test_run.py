@@ -1,0 +1,327 @@
+"""The proof as a whole: sealed before it diagnoses, opened afterwards, and taken up again wherever it was killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.prove import run as running
+from ferryid.prove.finished import carry_out, finished
+from ferryid.prove.run import prove, render_proof
+from ferryid.prove.seal import verified
+from ferryid.prove.spread import spread
+from ferryid.prove.tasks import Log, diagnosed
+from tests.prove.pretend import PARTS, TALLY, chatty, counted
+from tests.prove.work import ended, environment
+
+
+@pytest.fixture(autouse=True)
+def tally(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Count what is done."""
+    (tmp_path / "tally").touch()
+    monkeypatch.setenv(TALLY, str(tmp_path / "tally"))
+
+
+def proved(out: Path, parts: Any = PARTS, **options: Any) -> tuple[dict[str, Any], list[str]]:
+    told: list[str] = []
+    options = {"seed": 7, "runs": 4, "processes": 1, "progress": lambda stage: None, **options}
+    return prove(out, parts, tell=told.append, **options), told
+
+
+def lines(out: Path, stage: str) -> list[dict[str, Any]]:
+    (path,) = (out / "proof" / "lines").glob(f"{stage}*.jsonl")
+    return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+
+
+def conforms(result: dict[str, Any]) -> None:
+    schema = json.loads(files("ferryid.schemas").joinpath("prove.json").read_text("utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(result, schema)
+
+
+def test_from_the_draw_to_the_scores(tmp_path: Path) -> None:
+    out, stages = tmp_path / "out", []
+    result, told = proved(out, runs=6, processes=2, progress=stages.append)
+    conforms(result)
+    names = [f"{number:04d}" for number in range(6)]
+    assert result["counts"] == {"cases": 6, "diagnosed": 6, "refused": 0, "crashed": 0}
+    assert result["scores"]["verdicts"] == ["not_testable"] * 6
+    assert told[0].startswith("seed 7; if interrupted, go on with: ferryid prove --seed 7 --runs 6 --out ")
+    assert told[-1] == f"6 answers are sealed: {result['commitment']}"
+    assert [one["case"]["name"] for one in result["scores"]["of"]] == names
+    for one in result["scores"]["of"]:
+        north = one["case"]["truths"][0]["values"]["north"]
+        assert one["oracle"] == {"north": north, "log": True}
+        assert one["acted"] == {"wind": {"force": pytest.approx(0.1 + north)}}
+        if one["case"]["name"] == "0001":
+            assert one["second"] == {"error": "this one cannot be used. Fix: none"}
+        else:
+            assert one["second"]["log"].startswith(one["case"]["name"])
+    assert json.loads((out / "proof" / "result.json").read_text("utf-8")) == result
+    answers = verified(out / "proof")
+    assert [case["name"] for case in answers["cases"]] == names
+    assert answers["seed"] == 7
+    # The second logs are gone, what was diagnosed is kept, alone with its profile.
+    assert not (out / "proof" / "again").exists()
+    for one in result["scores"]["of"]:
+        there = {path.name for path in (out / "proof" / "logs" / one["case"]["name"]).iterdir()}
+        assert len(there) == 2
+        assert "vessel.toml" in there
+    assert any(stage.startswith("diagnosing: 6 of 6, 0 s left") for stage in stages)
+    assert stages[-1] == ""
+    assert "6 cases of seed 7: 6 diagnosed, 0 refused, 0 crashed" in render_proof(result)
+    # Nothing is left to do another time.
+    before = counted()
+    again, told = proved(out, runs=6)
+    assert again == result
+    assert "what is finished of this folder's proof is kept" in told
+    assert counted() == before
+
+
+def test_no_answer_is_on_disk_before_all_logs_are_diagnosed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: dict[str, bytes] = {}
+
+    def look(what: str, *rest: Any, **options: Any) -> Any:
+        if what == "diagnosing":
+            seen.update({str(path): path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()})
+        return carry_out(what, *rest, **options)
+
+    monkeypatch.setattr(running, "carry_out", look)
+    seed = 123_456_789_012
+    result, _ = proved(tmp_path / "out", seed=seed)
+    assert any(name.endswith("seal.json") for name in seen)
+    assert not any(name.endswith("answers.json") for name in seen)
+    truth = result["scores"]["of"][0]
+    words = [str(seed), str(truth["case"]["seed"]), str(truth["acted"]["wind"]["force"]), "north"]
+    ours = {name: data for name, data in seen.items() if "/logs/" not in name and not name.endswith("tally")}
+    assert len(ours) >= 4
+    for name, data in ours.items():
+        for word in words:
+            assert word.encode() not in data, f"{name} says {word}"
+    assert json.loads(seen[str(tmp_path / "out" / "proof" / "seal.json")])["commitment"] == result["commitment"]
+
+
+def test_on_a_cluster(tmp_path: Path, cluster: tuple[str, list[Any]]) -> None:
+    here = proved(tmp_path / "here", runs=3)[0]
+    there = proved(tmp_path / "there", runs=3, dask=cluster[0])[0]
+    conforms(there)
+    assert there["counts"] == here["counts"]
+    assert there["guard"] == here["guard"]
+    assert there["scores"]["verdicts"] == here["scores"]["verdicts"]
+
+
+def test_a_worker_that_cannot_serve_the_seal_is_said(tmp_path: Path) -> None:
+    (tmp_path / "logs" / "a").mkdir(parents=True)
+    (tmp_path / "logs" / "a" / "a.mcap").touch()
+    (tmp_path / "logs" / "a" / "vessel.toml").touch()
+    with pytest.raises(FerryIdError, match=r"other sources of ferryid .* than those of the seal \(older\)\. Fix: "):
+        diagnosed(Log(tmp_path, "older", "a", "a.mcap", "vessel.toml"))
+    with pytest.raises(FerryIdError, match=r"is not there for the process .* all workers of the cluster see"):
+        diagnosed(Log(tmp_path, "older", "b", "b.mcap", "vessel.toml"))
+
+
+def test_a_fresh_seed_each_time(tmp_path: Path) -> None:
+    seeds = [proved(tmp_path / name, seed=None, runs=0)[0]["seed"] for name in ("a", "b")]
+    assert seeds[0] != seeds[1]
+    assert max(seeds) < 2**48
+    with pytest.raises(FerryIdError, match=r"--seed: -1 is no seed\. Fix: "):
+        proved(tmp_path, seed=-1)
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from ferryid.prove.run import prove
+from tests.prove.pretend import PARTS
+if __name__ == "__main__":
+    prove(Path(sys.argv[1]), PARTS, seed=7, runs=24, processes=2, progress=lambda stage: None, tell=lambda line: None)
+"""
+
+
+@pytest.mark.parametrize("stage", ["written", "diagnosed", "second"])
+def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Path, stage: str) -> None:
+    out, script = tmp_path / "out", tmp_path / "script.py"
+    script.write_text(SCRIPT, encoding="utf-8")
+    folder = out / "proof" / "lines"
+
+    def done() -> list[Path]:
+        return [path for path in folder.glob(f"{stage}*.jsonl") if path.read_bytes().count(b"\n") >= 3]
+
+    with subprocess.Popen([sys.executable, script, out], env=environment()) as working:
+        deadline = time.monotonic() + 60.0
+        while not done():
+            assert working.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+        children = children_of(working.pid)
+        working.send_signal(signal.SIGKILL)
+    assert ended(children), "processes go on that nobody waits for"
+    (path,) = done()
+    before = {one: one.read_bytes() for one in folder.iterdir()}
+    finished_then = before[path].count(b"\n")
+    assert 3 <= finished_then < 24, "it was over before it was killed"
+    first = counted()
+    (out / "proof" / "logs" / ".0000.abc.part").mkdir()
+    with path.open("ab") as file:
+        file.write(b'{"name": "0023", "resu')
+
+    result, told = proved(out, runs=24, processes=2)
+    assert "what is finished of this folder's proof is kept" in told
+    assert result["counts"]["diagnosed"] == 24
+    for one, data in before.items():
+        assert one.read_bytes().startswith(data[: data.rfind(b"\n") + 1]), f"{one.name} was written again"
+    for name in ("written", "diagnosed", "oracle", "second"):
+        assert sorted(line["name"] for line in lines(out, name)) == [f"{number:04d}" for number in range(24)]
+    # At most what each of two processes was at when it was killed is done twice.
+    work = {"written": "generate {} False", "second": "second {}"}
+    if stage in work:
+        twice = [n for n in range(24) if counted().count(work[stage].format(f"{n:04d}")) > 1]
+        assert len(twice) <= 3
+        assert len(first) > finished_then - 1
+    assert not (out / "proof" / "scratch").exists()
+    assert not list((out / "proof" / "logs").glob(".*"))
+
+
+def children_of(pid: int) -> list[int]:
+    """Return the processes below one, of all generations."""
+    of: dict[int, list[int]] = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            text = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        of.setdefault(int(text[1]), []).append(int(path.parent.name))
+    found, left = [], [pid]
+    while left:
+        left = [child for one in left for child in of.get(one, [])]
+        found += left
+    return found
+
+
+def test_other_sources_or_another_seed_begin_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "out"
+    first, _ = proved(out)
+    (out / "proof" / "mine.txt").write_text("not ours", encoding="utf-8")
+    other, told = proved(out, seed=8)
+    assert any("of another seed, --runs or --only, is finished" in line for line in told)
+    assert other["commitment"] != first["commitment"]
+    assert other["counts"]["diagnosed"] == 4, (
+        "the process that served the folder before it was emptied cannot see it now"
+    )
+    fewer, _ = proved(out, seed=8, runs=3)
+    assert fewer["counts"]["cases"] == 3
+    assert sorted(path.name for path in (out / "proof" / "logs").iterdir()) == ["0000", "0001", "0002"]
+    data = json.loads((out / "proof" / "run.json").read_text("utf-8"))
+    (out / "proof" / "run.json").write_text(json.dumps({**data, "sources": "older"}), encoding="utf-8")
+    count = len(counted())
+    _, told = proved(out, seed=8, runs=3)
+    assert any("sources of ferryid have changed" in line for line in told)
+    assert len(counted()) > count
+    assert (out / "proof" / "mine.txt").exists()
+
+
+def test_a_proof_that_is_not_finished_is_not_thrown_away(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    proved(out)
+    (out / "proof" / "result.json").unlink()
+    with pytest.raises(FerryIdError, match="not finished"):
+        proved(out, seed=8)
+    with pytest.raises(FerryIdError, match="not finished"):
+        proved(out, runs=3)
+    count = len(counted())
+    proved(out)
+    assert len(counted()) == count, "with its own seed it goes on where it was"
+
+
+def test_other_judges_are_asked_again_without_another_diagnosis(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    proved(out)
+    kept = (out / "proof" / "lines" / "diagnosed.jsonl").read_bytes()
+    stamp = running.sources
+    monkeypatch.setattr(running, "sources", lambda *, judging=False: "other" if judging else stamp())
+    proved(out)
+    assert counted().count("oracle 0000") == 2
+    assert counted().count("generate 0000 False") == 1
+    assert (out / "proof" / "lines" / "diagnosed.jsonl").read_bytes() == kept
+
+
+def test_another_draw_than_the_sealed_one_is_refused(tmp_path: Path) -> None:
+    proved(tmp_path / "out", runs=2)
+    other = replace(PARTS, draw=lambda seed, runs, only: PARTS.draw(seed + 1, runs, only))
+    with pytest.raises(FerryIdError, match="what was sealed there is not what this seed draws"):
+        proved(tmp_path / "out", other, runs=2)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"), [("answers.sealed", "cannot be opened"), ("seal.json", "is not what was sealed")]
+)
+def test_what_was_tampered_with_is_refused(tmp_path: Path, name: str, reason: str) -> None:
+    out = tmp_path / "out"
+    proved(out, runs=2)
+    path = out / "proof" / name
+    if name == "seal.json":
+        public = json.loads(path.read_text("utf-8"))
+        path.write_text(json.dumps({**public, "commitment": "0" * 64}), encoding="utf-8")
+    else:
+        path.write_bytes(path.read_bytes()[:-1] + b"x")
+    with pytest.raises(FerryIdError, match=reason):
+        proved(out, runs=2)
+    (out / "proof" / "seal.json").unlink()
+    with pytest.raises(FerryIdError, match=r"seal\.json is gone"):
+        proved(out, runs=2)
+
+
+def test_a_log_that_somebody_removed_is_written_again(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    first, _ = proved(out, runs=3)
+    for path in (out / "proof" / "logs" / "0001").iterdir():
+        path.unlink()
+    (out / "proof" / "logs" / "0001").rmdir()
+    assert proved(out, runs=3)[0] == first
+    assert counted().count("generate 0001 False") == 2
+    assert counted().count("generate 0002 False") == 1
+
+
+def test_beside_a_log_lies_nothing_but_its_profile(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"may be its profile only, found truth\.json"):
+        proved(tmp_path / "out", replace(PARTS, generate=chatty))
+    assert not list((tmp_path / "out" / "proof" / "logs").iterdir())
+
+
+def test_two_at_once_do_not_share_a_folder(tmp_path: Path) -> None:
+    def once_more(trials: Any) -> Any:
+        raise AssertionError
+
+    def draw(*arguments: Any) -> Any:
+        with pytest.raises(FerryIdError, match="another process is at work in it"):
+            proved(tmp_path / "out")
+        return PARTS.draw(*arguments)
+
+    proved(tmp_path / "out", replace(PARTS, draw=draw), runs=0)
+
+
+def test_damaged_lines_are_done_again(tmp_path: Path) -> None:
+    path = tmp_path / "lines.jsonl"
+    path.write_bytes(b'{"name": "a", "result": 1}\n\x00\x00\n[]\n{"name": "b", "result": 2}\n{"name": "c", "re')
+    assert finished(path) == {"a": 1, "b": 2}
+    work = {"c": 3, "a": 1, "b": 2}
+    with spread() as workers:
+        done = carry_out("counting", path, work, lambda one: 10 * one, workers, progress=lambda stage: None)
+    assert done == {"c": 30, "a": 1, "b": 2}
+    assert list(done) == ["c", "a", "b"]
+    assert finished(path) == done
+    assert os.linesep.join(done)

@@ -1,0 +1,57 @@
+"""Work for other processes: it counts itself, and dies where it is told to."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def square(item: tuple[str, int, str]) -> tuple[int, int]:
+    """Return a square and the process that worked it out; each call leaves a line in the file of its number.
+
+    Parameters
+    ----------
+    item
+        Folder of the files, number, and what becomes of it: ``dies`` for good, ``dies once``, ``raises`` or ``sleeps``.
+    """
+    folder, number, fate = item
+    with (Path(folder) / str(number)).open("a") as file:
+        file.write(f"{os.getpid()}\n")
+    if fate == "dies" or (fate == "dies once" and calls(Path(folder), number) == 1):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if fate == "raises":
+        raise KeyError(f"number {number}")
+    time.sleep(60.0 if fate == "sleeps" else 0.05)
+    return number**2, os.getpid()
+
+
+def calls(folder: Path, number: int) -> int:
+    path = folder / str(number)
+    return len(path.read_text().splitlines()) if path.exists() else 0
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def ended(pids: list[int], seconds: float = 10.0) -> bool:
+    """Wait for processes to end."""
+    deadline = time.monotonic() + seconds
+    while any(map(alive, pids)):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def environment() -> dict[str, str]:
+    """Return this environment, for a process that is to find these tests."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT), *filter(None, sys.path)))}
