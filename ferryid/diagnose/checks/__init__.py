@@ -22,12 +22,11 @@ from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.smooth import odd_rows, steady_mean
-from ferryid.vessel.profile import Floats
 
 SPOILS = frozenset({"held_samples", "heading_wrap", "heading_bias", "velocity_scale", "yaw_rate_scale"})
 """Errors that spoil the velocity in products, which is made of position, heading and velocity; small shifts in time do not."""
 
-__all__ = ["Check", "SensorFinding", "checks", "examine"]
+__all__ = ["Check", "SensorFinding", "checks", "examine", "resteadied"]
 
 
 @cache
@@ -59,7 +58,7 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
             findings.append(finding)
             scene = finding.correct(scene)
     if SPOILS & {finding.effect for finding in findings}:
-        scene = replace(scene, nu=_steadied(scene))
+        scene = resteadied(scene)
     if says := opposed(scene):
         raise FerryIdError(
             f"{scene.profile.path}: force and motion contradict each other, so nothing can be learnt from them. {says} "
@@ -68,8 +67,8 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
     return tuple(findings), scene
 
 
-def _steadied(scene: Scene) -> Floats:
-    """Return the velocity that enters products anew, of what is corrected now."""
+def resteadied(scene: Scene) -> Scene:
+    """Return a scene whose velocity that enters products is made anew, of what is corrected now."""
     rate = 1.0 / scene.step_s
     eta = np.where(scene.usable[:, None], scene.eta, np.nan)
-    return steadied(steady_mean(scene.nu_raw, odd_rows(MEAN_S, rate)), scene.nu_raw, eta, rate)
+    return replace(scene, nu=steadied(steady_mean(scene.nu_raw, odd_rows(MEAN_S, rate)), scene.nu_raw, eta, rate))

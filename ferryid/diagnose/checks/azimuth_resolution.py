@@ -6,6 +6,7 @@ out over the seconds in which forces act: a step is worth a finding only where i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -65,6 +66,30 @@ def restored(angle: Floats, step_deg: float, step_s: float) -> Floats:
     return np.asarray((1.0 - back) * straight + back * level)
 
 
+def corrected(scene: Scene, steps_deg: Sequence[float]) -> Scene:
+    """Return a scene whose angles, and the directions of the forces, are what rounded ones most likely stand for.
+
+    Parameters
+    ----------
+    scene
+        As measured.
+    steps_deg
+        Step of each actuator's angle [deg], 0 for none.
+    """
+    parts, angles = scene.parts.copy(), scene.angles.copy()
+    for i, (one, actuator) in enumerate(zip(steps_deg, scene.profile.actuators, strict=True)):
+        if one == 0.0:
+            continue
+        angles[:, i] = restored(scene.angles[:, i], one, scene.step_s)
+        turn = angles[:, i] - scene.angles[:, i]
+        c, s = np.cos(turn), np.sin(turn)
+        X, Y = scene.parts[:, i, 0], scene.parts[:, i, 1]
+        x, y = actuator.position_m
+        parts[:, i, 0], parts[:, i, 1] = c * X - s * Y, s * X + c * Y
+        parts[:, i, 2] = x * parts[:, i, 1] - y * parts[:, i, 0]
+    return replace(scene, parts=parts, angles=angles)
+
+
 def find(scene: Scene) -> SensorFinding | None:
     """Return the step of the coarsest azimuth angle, where it matters to the direction of the force."""
     steps = [step_of(angle) for angle in scene.angles.T]
@@ -75,26 +100,12 @@ def find(scene: Scene) -> SensorFinding | None:
         return None
     k = int(np.argmax(steps))
 
-    def correct(seen: Scene) -> Scene:
-        parts, angles = seen.parts.copy(), seen.angles.copy()
-        for i, (one, actuator) in enumerate(zip(steps, seen.profile.actuators, strict=True)):
-            if one == 0.0:
-                continue
-            angles[:, i] = restored(seen.angles[:, i], one, seen.step_s)
-            turn = angles[:, i] - seen.angles[:, i]
-            c, s = np.cos(turn), np.sin(turn)
-            X, Y = seen.parts[:, i, 0], seen.parts[:, i, 1]
-            x, y = actuator.position_m
-            parts[:, i, 0], parts[:, i, 1] = c * X - s * Y, s * X + c * Y
-            parts[:, i, 2] = x * parts[:, i, 1] - y * parts[:, i, 0]
-        return replace(seen, parts=parts, angles=angles)
-
     return SensorFinding(
         "azimuth_resolution",
         {"step": Estimate(step, step, step, "deg")},
         f"The azimuth angles are read in steps of {step:g} deg: at any moment the force points {100.0 * error:.0f} % of itself "
         "to one side or the other.",
-        correct,
+        lambda seen: corrected(seen, steps),
         {"time_s": scene.t, "angle_deg": np.degrees(scene.angles[:, k])},
     )
 

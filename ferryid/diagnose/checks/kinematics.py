@@ -139,13 +139,21 @@ class _Same:
         return id(self.scene)
 
 
-def kinematics(scene: Scene) -> Kinematics | None:
-    """Compare positions and velocities; None where the scene has too little of them."""
-    return _compared(_Same(scene))
+def kinematics(scene: Scene, told: tuple[int, ...] = ()) -> Kinematics | None:
+    """Compare positions and velocities; None where the scene has too little of them.
+
+    Parameters
+    ----------
+    scene
+        From a log.
+    told
+        Parameters that are let in from the start, because it is known that they are off.
+    """
+    return _compared(_Same(scene), told)
 
 
 @lru_cache(maxsize=1)
-def _compared(same: _Same) -> Kinematics | None:
+def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
     scene = same.scene
     trial, both = spans(scene, np.hstack([scene.eta, scene.nu_raw[:, :2]]))
     if len(trial.starts) < 8:
@@ -157,6 +165,7 @@ def _compared(same: _Same) -> Kinematics | None:
     pulled = np.asarray(savgol_filter(eta[:, :2], m, 2, deriv=1, delta=trial.step_s, axis=0))
     data = _Data(trial, eta, velocity, pulled)
     p, active = _start(data)
+    active[list(told)] = True
     searched = _search(data, p, active)
     if searched is None:
         return None

@@ -7,7 +7,7 @@ but for a part that may grow with the rate: with that its whole length tells of 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,11 +27,40 @@ NEUTRAL, SIZE = np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.1, 2.0])
 """Factor, bias [rad/s] and delay [s] of a right gyro, and how large they may be."""
 
 
-def find(scene: Scene) -> SensorFinding | None:
-    """Return the factor of the yaw rate, measured over true.
+@dataclass(frozen=True)
+class Rates:
+    """The rate measured against that of the heading.
 
-    A bias and a delay of the gyro are solved for along with it. Noise of the heading makes the factor of a regression on the
-    heading too small, noise of the rate that of the other regression too large: the truth lies between.
+    Attributes
+    ----------
+    solution
+        Factor, bias [rad/s] and delay [s] of the gyro.
+    rival
+        The factor by the regression on the rate.
+    middle_s
+        Middle of the windows that were used [s], shape (J,).
+    heading, gyro
+        Rates by the heading and by the gyro [rad/s], shape (J,).
+    """
+
+    solution: Solution
+    rival: float
+    middle_s: Floats
+    heading: Floats
+    gyro: Floats
+
+    @property
+    def off(self) -> float:
+        """How far the factor is from 1 at least; 0 where the two regressions do not agree on which side."""
+        one, other = float(self.solution.values[0]) - 1.0, self.rival - 1.0
+        return min(abs(one), abs(other)) if one * other > 0.0 else 0.0
+
+
+def compared(scene: Scene) -> Rates | None:
+    """Compare the rates of heading and gyro; None where the scene has too little of them.
+
+    A bias and a delay of the gyro are solved for along with the factor. Noise of the heading makes the factor of a regression
+    on the heading too small, noise of the rate that of the other regression too large: the truth lies between.
     """
     trial, both = spans(scene, np.column_stack([scene.psi, scene.nu_raw[:, 2]]))
     if len(trial.starts) < 8:
@@ -51,22 +80,28 @@ def find(scene: Scene) -> SensorFinding | None:
     other = _step(Z, J, measured, trial)
     if solved is None or other is None:
         return None
-    off, rival = float(solved.values[0]) - 1.0, float(other.values[0]) - 1.0
-    if min(abs(off), abs(rival)) < LEAST or off * rival < 0.0 or not solved.certain(0, 1.0):
+    return Rates(solved, float(other.values[0]), trial.middle_s, rate, measured)
+
+
+def corrected(scene: Scene, factor: float) -> Scene:
+    """Return a scene whose yaw rate is divided by a factor."""
+    scale = np.array([1.0, 1.0, factor])
+    return replace(scene, nu_raw=scene.nu_raw / scale, nu=scene.nu / scale)
+
+
+def find(scene: Scene) -> SensorFinding | None:
+    """Return the factor of the yaw rate, measured over true."""
+    rates = compared(scene)
+    if rates is None or rates.off < LEAST or not rates.solution.certain(0, 1.0):
         return None
-    factor = solved.estimate(0, "-")
-    scale = np.array([1.0, 1.0, factor.value])
-
-    def correct(seen: Scene) -> Scene:
-        return replace(seen, nu_raw=seen.nu_raw / scale, nu=seen.nu / scale)
-
+    factor = rates.solution.estimate(0, "-")
     sign = " with its sign turned round," if factor.value < 0.0 else ""
     return SensorFinding(
         "yaw_rate_scale",
         {"factor": factor},
         f"The yaw rate measured is{sign} {abs(factor.value):.3f} times that of the heading.",
-        correct,
-        {"time_s": trial.middle_s, "heading_rate_radps": rate, "yaw_rate_radps": measured},
+        lambda seen: corrected(seen, factor.value),
+        {"time_s": rates.middle_s, "heading_rate_radps": rates.heading, "yaw_rate_radps": rates.gyro},
     )
 
 
