@@ -74,7 +74,7 @@ def remodelled(
         return None, ()
     vessel, notes = _properties(logs, profile)
     verdict, scores = _scores([one for one in diagnoses if one.learnt is not None], logs)
-    start = _blank(profile, name) if model is None else replace(model, name=name)
+    start = blank(profile, name) if model is None else replace(model, name=name)
     hull, covariance = _hull(logs)
     if model is not None and model.vessel_effects:
         # The picture that was refitted had these effects in it, which multiply coefficients and come on top again.
@@ -99,7 +99,7 @@ def remodelled(
     return made, notes
 
 
-def _blank(profile: Profile, name: str) -> Model:
+def blank(profile: Profile, name: str) -> Model:
     """Return a model without terms, which is the profile's hull."""
     nothing = np.zeros((0, 3))
     return Model(

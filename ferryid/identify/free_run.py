@@ -82,7 +82,7 @@ def free_run(
     blind = np.all(np.isnan(every[:, :, 0]), axis=0)
     rms[blind, 0] = np.nan
     note = f"{diverged} of {len(every)} runs diverged and are left out of the means" if diverged else ""
-    return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note)
+    return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note, diverged)
 
 
 def _masses(force: ForceModel, motion: Motion) -> Floats:

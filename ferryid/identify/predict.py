@@ -98,7 +98,7 @@ def imagine(model: Model, prepared: Prepared, profile: Profile, *, window_s: flo
             "found none in the log. Fix: map [signals.heading] in the profile, or use a log that has it"
         )
     known, sha256 = Pictured(model), prepared.recording.sha256
-    scene = _scene(track, motion, profile)
+    scene = smoothed_scene(track, motion, profile)
     right = known.righted(scene, sha256)
     if right is not scene:
         slope = central_difference(right.nu, motion.rate_hz)
@@ -110,8 +110,8 @@ def imagine(model: Model, prepared: Prepared, profile: Profile, *, window_s: flo
         measured = measure(track, profile)
         more = picture.parts.sum(axis=1) - scene.parts.sum(axis=1)
         tau = smooth_measured(replace(measured, tau=measured.tau + more), window_s, smoother).tau
-    seen = replace(motion, tau=tau + picture.external - plain.external, current=picture.flow, payload=_held(picture))
-    force = _force_of(known, picture.hull)
+    seen = replace(motion, tau=tau + picture.external - plain.external, current=picture.flow, payload=held_in(picture))
+    force = force_with(known, picture.hull)
     needed = force(seen.nu_dot, seen.nu, seen.eta[:, 2], seen.wind, seen.current, seen.payload)
     own = {id(one) for one in model.vessel_effects}
     return Prediction(
@@ -138,7 +138,7 @@ def _named(stored: Sequence[StoredEffect]) -> str:
     return told[:1].upper() + told[1:].lower()
 
 
-def _scene(track: Track, motion: Motion, profile: Profile) -> Scene:
+def smoothed_scene(track: Track, motion: Motion, profile: Profile) -> Scene:
     """Return a smoothed log as a scene, bridged where nothing was measured."""
     rows = motion.valid
     over_ground = motion.raw_nu
@@ -161,7 +161,7 @@ def _scene(track: Track, motion: Motion, profile: Profile) -> Scene:
     )
 
 
-def _held(picture: Picture) -> Floats | None:
+def held_in(picture: Picture) -> Floats | None:
     """Return load and factor on the damping on every row, shape (n, 4), where there is either."""
     if picture.load is None and picture.damping_factor is None:
         return None
@@ -170,7 +170,7 @@ def _held(picture: Picture) -> Floats | None:
     return np.column_stack([load, np.ones(n) if picture.damping_factor is None else picture.damping_factor])
 
 
-def _force_of(known: Pictured, hull: Floats) -> ForceModel:
+def force_with(known: Pictured, hull: Floats) -> ForceModel:
     """Return the force that a motion takes with this hull, and all that the model knows besides its effects."""
     profile = known.force.profile
 

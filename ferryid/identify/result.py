@@ -95,6 +95,8 @@ class FreeRun:
         ``{"t": (n,), "measured": (n, 3), "predicted": (n, 3)}`` of `nu` over one stretch, for a figure.
     note
         Why there is no prediction, or an empty string.
+    diverged
+        Number of runs that diverged, which the means leave out.
     """
 
     horizons_s: Floats
@@ -105,6 +107,7 @@ class FreeRun:
     starts: int
     example: Mapping[str, Floats]
     note: str = ""
+    diverged: int = 0
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,67 @@
+"""What a rival learns from a log: names of physics, and a prediction for any other log."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ferryid.identify.predict import Prediction
+from ferryid.signals.prepare import Prepared
+from ferryid.vessel.profile import Profile
+
+WINDOW_S = 1.0
+"""Smoothing window of every learner, the thesis's [s]."""
+SMOOTHER = "square"
+"""Its moving average."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """Physics that a rival names.
+
+    Attributes
+    ----------
+    effect, instance
+        Effect id and thruster; the label of the term where it has no such meaning.
+    removed
+        Share of the base model's squared residual that would come back without its terms, the others fitted again.
+    terms
+        Labels of its terms.
+    """
+
+    effect: str
+    instance: str | None
+    removed: float
+    terms: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {**asdict(self), "terms": list(self.terms)}
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What a rival made of one log.
+
+    Attributes
+    ----------
+    rival
+        Which one.
+    predict
+        What it expects of a log, the one that it learnt from or another.
+    names
+        The physics that it names, the one that removes most first; none where its terms have no meaning of their own.
+    coefficients
+        Of its terms by label, in the units of the terms.
+    """
+
+    rival: str
+    predict: Callable[[Prepared], Prediction]
+    names: tuple[Named, ...] = ()
+    coefficients: Mapping[str, float] = field(default_factory=dict)
+
+
+Learner = Callable[[str, Profile, Path], Learnt]
+"""``learn(log, profile, out)``: path of the log, the vessel, and the folder whose ``logs`` keep the ingested tables."""
