@@ -33,6 +33,7 @@ from ferryid.diagnose.noisy import drowned_axes, says_drowned
 from ferryid.diagnose.result import AXES, HINT, Diagnosis, Finding, Moved
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import Search, search, suspects_of
+from ferryid.diagnose.shared_findings import agreed
 from ferryid.diagnose.shared_laws import Heard, heard
 from ferryid.diagnose.testable import advice, powers, says_untested, tells, unexcited
 from ferryid.diagnose.together import Together, together
@@ -109,10 +110,11 @@ def diagnose(
         begun = tuple(begun)
         progress("looking for laws that hold in all logs")
         laws = heard({one.path: (one.found.trial, one.stands.fit) for one in begun if isinstance(one, _Examined)})
-    return tuple(
+    made = tuple(
         one if isinstance(one, Diagnosis) else _ended(one, laws.get(one.path), model, simulated, common, progress)
         for one in begun
     )
+    return made if common is None else agreed(made)
 
 
 @dataclass(frozen=True)
@@ -203,9 +205,9 @@ def _ended(
     progress("locating")
     forces, hints = forces_of(trial, stands, scene)
     notes += hints
-    if unknown.slow:
-        forces, told = beside_more(forces, removed(trial, stands))
-        notes += told
+    shares = removed(trial, stands)
+    forces, told = beside_more(forces, shares, unknown.holds)
+    notes += told
     if model is None and common is None and not profile.hull.has_model:
         forces = [on_a_guessed_hull(one) for one in forces]
         notes.append(
@@ -225,7 +227,7 @@ def _ended(
     notes += says_untested(found.untested)
     notes += advice(chances, still)
     if unknown.unsteady or found.states:
-        findings = [beside_gusts(one) for one in findings]
+        findings = [beside_gusts(one, shares) for one in findings]
     sure = [one for one in findings if one.sure]
     # What was suspected on strong evidence and fell to a placebo or a law has a cause, known or not.
     more = bool(nameless) or bool(stands.told) or len(sure) < len(findings)

@@ -13,6 +13,10 @@ OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
 MOST_OF_IT = 0.5
 """Share of the squared error on an axis that a finding removes there while it acts, so that less is left than it explains."""
+LEAST = 0.1
+"""The same share of a finding that is more than a stand-in, on an axis where nothing without a name acts."""
+Key = tuple[str, str | None]
+"""Effect and instance."""
 
 
 def hint(finding: Finding, *unresolved: str, manoeuvre: str | None = None) -> Finding:
@@ -30,12 +34,20 @@ def on_a_guessed_hull(finding: Finding) -> Finding:
     return hint(finding, "hull_parameters", manoeuvre="a log in calm air and still water, to fit a hull model first")
 
 
-def beside_gusts(finding: Finding) -> Finding:
+def beside_gusts(finding: Finding, removed: Mapping[Key, Mapping[str, float]]) -> Finding:
     """Return a finding as it stands beside something unsteady that nobody measured.
 
     A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
+    That explains little of what moves the vessel: what removes most of the error is no such thing.
+
+    Parameters
+    ----------
+    finding
+        Of a force or a sensor.
+    removed
+        Share of the held-out squared error that findings remove while they act, by effect and instance and by axis.
     """
-    if finding.effect not in OUT_OF_STEP:
+    if finding.effect not in OUT_OF_STEP or max(removed.get(finding.key, {}).values(), default=0.0) >= MOST_OF_IT:
         return finding
     return hint(finding, "gusts", manoeuvre="the same manoeuvres in calm air")
 
@@ -47,25 +59,37 @@ def about_nothing(shaken: Sequence[Finding], forces: Sequence[Finding]) -> list[
 
 
 def beside_more(
-    findings: Sequence[Finding], removed: Mapping[tuple[str, str | None], float]
+    findings: Sequence[Finding], removed: Mapping[Key, Mapping[str, float]], holds: Mapping[str, float]
 ) -> tuple[list[Finding], tuple[str, ...]]:
     """Return findings of forces as they stand beside a force without a name that is left, and what is to be told.
 
-    What explains less than is left may be no more than its stand-in.
+    What explains less than that force on every axis may be no more than its stand-in.
 
     Parameters
     ----------
     findings
         Of forces.
     removed
-        Share of the held-out squared error that they remove while they act, by effect and instance, as far as it was judged.
+        Share of the held-out squared error that they remove while they act, by effect and instance and by axis, as far as it
+        was judged.
+    holds
+        Share of the squared error that they leave which is the nameless force's, by axis; none where there is none.
     """
-    small = [one for one in findings if one.sure and removed.get((one.effect, one.instance), 1.0) < MOST_OF_IT]
+    if not holds:
+        return list(findings), ()
+
+    def stands(shares: Mapping[str, float]) -> bool:
+        # Of an error of one, r is removed and h (1 - r) the nameless force's: r is more from h / (1 + h) on.
+        return any(
+            share >= max(holds.get(axis, 0.0) / (1.0 + holds.get(axis, 0.0)), LEAST) for axis, share in shares.items()
+        )
+
+    small = [one for one in findings if one.sure and one.key in removed and not stands(removed[one.key])]
     if not small:
         return list(findings), ()
     names = listed(list(dict.fromkeys(titled(effects()[one.effect].title, one.instance) for one in small)))
     note = (
-        "A force without a name is left, and on no axis does any of these remove half of the squared error while it acts: "
+        "A force without a name is left, and on no axis does any of these explain more than it while it acts: "
         f"{names}. They may stand in for it; take them as hints, of probability {HINT:g} at most."
     )
     return [hint(one) if one in small else one for one in findings], (note,)

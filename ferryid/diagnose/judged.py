@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from ferryid.diagnose.coherent import tie_of
 from ferryid.diagnose.evidence import Evidence, evidence
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, without
 from ferryid.diagnose.rivals import Standing, standing_of
-from ferryid.diagnose.search import pruned
+from ferryid.diagnose.search import pruned, void
 from ferryid.diagnose.unknown import impostors
 from ferryid.effects.wording import listed
 
@@ -18,6 +19,7 @@ SWAPS = 6
 PLACEBO = (
     "a placebo (the same force at other times, or on mirrored headings) does as well on stretches kept from the fit"
 )
+TORN = "on an axis where it would have to act, most of it is missing"
 LAW = "an empirical law of the motion explains more in that place, and leaves nothing to explain"
 
 
@@ -77,7 +79,8 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
         fallen, why = _fallen(trial, kept, proof)
         if fallen is None:
             return Judged(kept, proof, standings, _told(fallen_by_reason))
-        fallen_by_reason.setdefault(why, []).append(kept.suspects[fallen].title)
+        if why:
+            fallen_by_reason.setdefault(why, []).append(kept.suspects[fallen].title)
         kept = pruned(trial, without(trial, kept, fallen))
         tried.add(kept.keys)
     return Judged(kept, None, (), _told(fallen_by_reason))
@@ -93,12 +96,19 @@ def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
 
 
 def _fallen(trial: Trial, kept: Fit, proof: Evidence | None) -> tuple[int | None, str]:
-    """Return the suspect that stands least, and why it falls; None where all stand."""
+    """Return the suspect that stands least, and why it falls, if that is worth telling; None where all stand."""
     if proof is not None:
         fallen = [i for i, one in enumerate(proof.proofs) if not one.holds]
         if fallen:
             worst = min(fallen, key=lambda i: proof.proofs[i].beaten)
             return worst, PLACEBO
+    # Beside what was found later, it may be hardly anything: nothing to tell, and no sign of another cause.
+    idle = [i for i in range(len(kept.suspects)) if void(trial, kept, i)]
+    if idle:
+        return idle[0], ""
+    torn = [i for i in range(len(kept.suspects)) if tie_of(trial, kept, i).torn]
+    if torn:
+        return torn[0], TORN
     # Physics without a name here may look a little like an effect.
-    idle = impostors(trial, kept)
-    return (idle[0], LAW) if idle else (None, "")
+    imitated = impostors(trial, kept)
+    return (imitated[0], LAW) if imitated else (None, "")

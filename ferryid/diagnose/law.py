@@ -42,6 +42,8 @@ PLAIN = 80.0
 """Log-likelihood that a term must gain where the noise is taken to be the least that any terms leave."""
 SURE = 3.0
 """Standard errors by which a coefficient must differ from zero when the others are there."""
+ALIKE = 0.9
+"""Cosine between what an effect and what a term do to a log as of which they say the same."""
 WIDE = 30.0
 """Limit of a coefficient, in usual ones."""
 
@@ -99,7 +101,7 @@ class Lines:
     sizes: Floats
 
 
-def law_of(trial: Trial, kept: Fit, folds: Folds) -> Law | None:
+def law_of(trial: Trial, kept: Fit, folds: Folds, unlike: Floats | None = None) -> Law | None:
     """Return a law for what a fit leaves; None where none holds.
 
     Parameters
@@ -110,8 +112,13 @@ def law_of(trial: Trial, kept: Fit, folds: Folds) -> Law | None:
         The fit: hull and effects.
     folds
         Of the trial's windows.
+    unlike
+        What an effect moves the gaps by, shape (J, c): no term that says the same, as a share of a thruster's force says what a
+        weak thruster does. Any will do where None.
     """
     terms = list(terms_of(trial.plain.scene))
+    if unlike is not None:
+        terms = _unlike(trial, kept, terms, unlike)
     chosen: list[Term] = []
     made, seen = kept, trial
     gains: list[tuple[float, float]] = []
@@ -144,6 +151,13 @@ def law_of(trial: Trial, kept: Fit, folds: Folds) -> Law | None:
     if better.score_low <= 0.0:
         return None
     return Law(tuple(chosen), made, seen, better, *gains[0], made.values[-1], made.told_errors(len(kept.suspects)))
+
+
+def _unlike(trial: Trial, kept: Fit, terms: Sequence[Term], moved: Floats) -> list[Term]:
+    pushes = lines_of(trial, kept, terms).terms
+    size = np.sqrt(np.sum(moved**2) * np.sum(pushes**2, axis=(0, 1)))
+    alike = np.abs(np.einsum("jc,jck->k", moved, pushes)) / np.maximum(size, 1e-12)
+    return [term for term, one in zip(terms, alike.tolist(), strict=True) if one < ALIKE]
 
 
 def suspect_of(trial: Trial, kept: Fit, terms: Sequence[Term]) -> Suspect:
@@ -222,6 +236,18 @@ def lines_of(trial: Trial, made: Fit, terms: Sequence[Term]) -> Lines:
     seen = trial.windows
     picture = imagined(trial.plain, made)
     base = seen.gap(picture)
+    known, centre = known_of(trial, made)
+    pushes = np.stack(
+        [seen.gap(replace(picture, external=picture.external + term.force(picture))) - base for term in terms], axis=-1
+    )
+    sizes = np.maximum(np.sqrt(np.mean(pushes**2, axis=(0, 1))), 1e-12)
+    return Lines(base, known, centre, pushes / sizes, sizes)
+
+
+def known_of(trial: Trial, made: Fit, *, but: int = -1) -> tuple[Floats, Floats]:
+    """Return a fit's `Lines.known` and `Lines.centre`, without the parameters of the suspect number `but`."""
+    seen = trial.windows
+    base = seen.gap(imagined(trial.plain, made))
     known, centre = [], []
     for k, spread in enumerate(trial.hull_spread):
         hull = made.hull.copy()
@@ -229,17 +255,13 @@ def lines_of(trial: Trial, made: Fit, terms: Sequence[Term]) -> Lines:
         known.append((seen.gap(imagined(trial.plain, replace(made, hull=hull))) - base) / 0.1)
         centre.append((made.hull[k] - trial.plain.hull[k]) / spread if spread > 0.0 else 0.0)
     for i, suspect in enumerate(made.suspects):
-        for j, parameter in enumerate(suspect.parameters):
+        for j, parameter in enumerate(suspect.parameters if i != but else ()):
             step = -0.01 if made.values[i][j] + 0.01 * parameter.size > parameter.high else 0.01
             values = [one.copy() for one in made.values]
             values[i][j] += step * parameter.size
             known.append((seen.gap(imagined(trial.plain, replace(made, values=tuple(values)))) - base) / step)
             centre.append((float(made.values[i][j]) - parameter.neutral) / parameter.size)
-    pushes = np.stack(
-        [seen.gap(replace(picture, external=picture.external + term.force(picture))) - base for term in terms], axis=-1
-    )
-    sizes = np.maximum(np.sqrt(np.mean(pushes**2, axis=(0, 1))), 1e-12)
-    return Lines(base, np.stack(known, axis=-1), np.array(centre), pushes / sizes, sizes)
+    return np.stack(known, axis=-1), np.array(centre)
 
 
 def _noise_of_the_rest(trial: Trial, lines: Lines) -> Noise:

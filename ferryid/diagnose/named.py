@@ -25,6 +25,8 @@ TIME_STEP, TIME_FIT = 0.125, 3
 TIME_NEAR, TIME_FINE_S = 10.0, 0.2
 """Fall of the logarithm of the evidence up to which times are weighed in fine steps, and these [s]: the forces' own."""
 SHOWN_RIVALS = 3
+HARM = 0.2
+"""Share by which the held-out squared error on an axis may grow with a finding by chance, and because the others move too."""
 
 
 def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding], tuple[str, ...]]:
@@ -35,6 +37,7 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
     """
     made, told = [], []
     kept, proof = stands.fit, stands.proof
+    harmed = removed(trial, stands)
     for i, (suspect, standing) in enumerate(zip(kept.suspects, stands.standings, strict=True)):
         others = [j for j in range(len(kept.suspects)) if j != i]
         rest = [kept.suspects[j] for j in others]
@@ -65,11 +68,19 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
                 f"{suspect.title} acts for {lasts_s(trial, suspect):.0f} s only: no fit that had not seen all of it could be "
                 "judged on it, so that it is a hint."
             )
+        shares = harmed.get(suspect.key, {})
+        worse = min(shares, key=lambda axis: shares[axis], default="")
+        harms = bool(worse) and shares[worse] < -HARM
+        if harms:
+            told.append(
+                f"{suspect.title} makes the held-out squared error in {worse} {-100.0 * shares[worse]:.0f} % larger while it "
+                "acts, and what is there makes no axis worse: it is a hint."
+            )
         made.append(
             Finding(
                 effect=suspect.effect.id,
                 instance=suspect.instance,
-                probability=min(standing.probability, HINT) if unseen or brief else standing.probability,
+                probability=min(standing.probability, HINT) if unseen or brief or harms else standing.probability,
                 parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
                 intervals=_intervals(trial, estimates),
@@ -88,13 +99,14 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
     return sorted(made, key=lambda one: -sum(one.improvement.values())), tuple(told)
 
 
-def removed(trial: Trial, stands: Judged) -> dict[tuple[str, str | None], float]:
-    """Return how much of the held-out squared force error each suspect removes while it acts, on the axis where it is most."""
+def removed(trial: Trial, stands: Judged) -> dict[tuple[str, str | None], dict[str, float]]:
+    """Return how much of the held-out squared force error each suspect removes while it acts, by axis."""
     times, shares = trial.windows.middle_s, {}
     for proof in () if stands.proof is None else stands.proof.proofs:
         acts = (times >= proof.suspect.onset_s) & (times < proof.suspect.offset_s)
         before, after = (np.sum(one[acts] ** 2, axis=0) for one in (proof.improvement.before, proof.improvement.after))
-        shares[proof.suspect.key] = float(np.max(1.0 - after / np.where(before > 0.0, before, np.inf)))
+        share = 1.0 - after / np.where(before > 0.0, before, np.inf)
+        shares[proof.suspect.key] = dict(zip(AXES, share.tolist(), strict=True))
     return shares
 
 

@@ -128,6 +128,11 @@ class Finding:
         )
 
     @property
+    def key(self) -> tuple[str, str | None]:
+        """Effect and instance."""
+        return self.effect, self.instance
+
+    @property
     def sure(self) -> bool:
         """True where it is more than a hint."""
         return self.probability > HINT

@@ -59,8 +59,9 @@ def intervals(trial: Trial, kept: Fit, index: int) -> dict[str, tuple[float, flo
     found = {top: held(top, kept)}
     for side in (-1.0, 1.0):
         value, step, last = top, first, found[top][1]
-        while own.low < value < own.high or value == top:
-            value = min(max(value + side * step, own.low), own.high)
+        # Until nothing lies beyond, or nothing that is likely; the likeliest may lie at the end of what is possible itself.
+        while (further := min(max(value + side * step, own.low), own.high)) != value:
+            value = further
             found[value] = held(value, last)
             if found[value][0] < max(evidence for evidence, _ in found.values()) - DROP * WIDER**2:
                 break

@@ -117,7 +117,7 @@ def search(trial: Trial, progress: Callable[[str], None], *, known: Sequence[Sus
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
         found = _weighed(trial, chosen, left)
         rounds.append(_round(found))
-        good = [one for one in found if one.gain > ODDS and not _void(trial, one.fit)]
+        good = [one for one in found if one.gain > ODDS and not void(trial, one.fit)]
         best = good[0] if good and len(taken) < MOST else None
         if best is None:
             chosen = pruned(trial, chosen)
@@ -227,13 +227,17 @@ def _round(found: Sequence[Candidate]) -> Round:
     return Round(tuple(found), tuple(weight / total for weight in weights), none / total)
 
 
-def _void(trial: Trial, made: Fit) -> bool:
-    """Tell whether the last effect of a fit moves the vessel too little to matter to anybody."""
-    last, seen = made.suspects[-1], trial.windows
-    away = [abs(value - one.neutral) for value, one in zip(made.values[-1].tolist(), last.parameters, strict=True)]
-    if max(away) < last.effect.idle:
+def void(trial: Trial, made: Fit, index: int = -1) -> bool:
+    """Tell whether an effect of a fit, the last one if not another, moves the vessel too little to matter to anybody."""
+    suspect, seen = made.suspects[index], trial.windows
+    named = zip(made.values[index].tolist(), suspect.parameters, strict=True)
+    away = [abs(value - one.neutral) for value, one in named if one.unit == suspect.parameters[0].unit]
+    if max(away) < suspect.effect.idle:
         return True
-    before = replace(made, suspects=made.suspects[:-1], values=made.values[:-1])
+    others = [k for k in range(len(made.suspects)) if k != index % len(made.suspects)]
+    before = replace(
+        made, suspects=tuple(made.suspects[k] for k in others), values=tuple(made.values[k] for k in others)
+    )
     moved = seen.gap(imagined(trial.plain, made)) - seen.gap(imagined(trial.plain, before))
     size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
     return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())

@@ -32,6 +32,8 @@ BAND_SHARE = 0.5
 """A band is told that holds this share of the power."""
 SPANS = 5
 """Intervals that are told."""
+FAST_HZ = 0.2
+"""Frequency above which no force of the library has most of its power: they change with motion, heading and thrust."""
 BURSTS = 5.0
 """Standard deviations from even as of which bursts are told."""
 
@@ -48,14 +50,15 @@ class Unknown:
         What the errors look like.
     unsteady
         True where they come and go.
-    slow
-        True where one of the findings is more than a hint and as slow as forces of the library are: no bursts.
+    holds
+        Share of the squared error left that is a force's, by axis, as far as that force is more than a hint and as slow as
+        those of the library are: no bursts, and not above `FAST_HZ`. Empty where there is none.
     """
 
     findings: tuple[Finding, ...]
     left: Location
     unsteady: bool
-    slow: bool
+    holds: dict[str, float]
 
 
 def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None) -> Unknown:
@@ -93,15 +96,19 @@ def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None
         bursts = [] if known else [_in_bursts(burst)]
     elif uneven and not known:
         findings.append(_unsteady(seen, left))
-    slow = any(one.sure for one in findings)
-    return Unknown((*findings, *bursts), left, uneven, slow)
+    slow = [one for one in findings if one.sure and (one.law or one.band_hz is None or one.band_hz[0] < FAST_HZ)]
+    # What no law describes may be all that is left; and of a law that all logs of a vessel have, there may be more.
+    described = heard is None and all(one.law for one in slow)
+    holds = {axis: max(one.improvement[axis] if described else 1.0 for one in slow) for axis in AXES} if slow else {}
+    return Unknown((*findings, *bursts), left, uneven, {axis: max(share, 0.0) for axis, share in holds.items()})
 
 
 def impostors(trial: Trial, kept: Fit) -> tuple[int, ...]:
     """Return which of the named effects a law of fewer means makes idle.
 
     Physics outside the library may look a little like an effect. If a law that is fitted in the effect's place explains more
-    than the effect, and leaves it nothing to explain, then the effect was named by mistake.
+    than the effect, and leaves it nothing to explain, then the effect was named by mistake. A law that says the same as the
+    effect in other words is no such law.
     """
     folds = folds_of(trial.windows)
     if folds is None:
@@ -113,7 +120,10 @@ def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
     others = [k for k in range(len(kept.suspects)) if k != index]
     rest, start = [kept.suspects[k] for k in others], [kept.values[k] for k in others]
     without = fit(trial, rest, start)
-    law = law_of(trial.with_noise_of(without), without, folds)
+    named = trial.windows.gap(imagined(trial.plain, kept))
+    bare = replace(kept, suspects=tuple(rest), values=tuple(start))
+    moved = named - trial.windows.gap(imagined(trial.plain, bare))
+    law = law_of(trial.with_noise_of(without), without, folds, unlike=moved)
     if law is None:
         return False
     told, coefficients = law.fit.suspects[-1], law.fit.values[-1]

@@ -112,7 +112,8 @@ class Effect:
     untold
         ``untold(scene, p)`` returns the names of parameters about which a log tells nothing, wherever they are fitted to be.
     idle
-        An effect all of whose parameters are nearer to neutral than this is void: the hull may be as much off anyway.
+        An effect whose parameters are all nearer to neutral than this is void: hull or instruments may be as much off anyway.
+        Those count that have the unit of the first; a place has no size.
     bends_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
     ridge

@@ -60,5 +60,7 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     of_sensor=True,
+    # Compasses are no better.
+    idle=0.5,
     regressor=regressor,
 )

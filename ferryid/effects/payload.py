@@ -1,4 +1,8 @@
-"""Payload: rigid mass aboard, which enters the vessel's own mass matrix; it may come aboard and leave during the log."""
+"""Payload: rigid mass aboard, which enters the vessel's own mass matrix; it may come aboard and leave during the log.
+
+A load sinks the hull, and a deeper hull is damped more. How much more is fitted beside the mass, as no drawing says, and not
+told: without it, what is only damping would seem to be missing thrust, and the mass too small.
+"""
 
 from __future__ import annotations
 
@@ -11,22 +15,46 @@ from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats, Profile
 
+WATERPLANE = 0.85
+"""Waterplane coefficient of a small workboat."""
+WATER = 1025.0
+"""Density of sea water [kg/m³]."""
+DEEPER = "damping_by_draught"
+"""Parameter of a hull whose size is known: growth of all damping over that of the draught."""
+
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return mass and place; both in proportion to the hull."""
     mass, length = profile.hull.mass_kg, profile.hull.length_m
     half = 0.5 * length if np.isfinite(length) else mass ** (1.0 / 3.0)
+    by_mass = _by_mass(profile)
     return (
         Parameter("mass", "kg", 0.15 * mass, 0.0, 2.0 * mass, start=0.05 * mass),
         Parameter("x", "m", 0.3 * half, -half, half),
+        *((Parameter(DEEPER, "-", 0.7, 0.0, 3.0, start=0.5),) if np.isfinite(by_mass) else ()),
     )
+
+
+def _by_mass(profile: Profile) -> float:
+    """Return the growth of the draught by a load, as a share of it [1/kg]; NaN for a hull of unknown size."""
+    hull = profile.hull
+    return 1.0 / (WATER * WATERPLANE * hull.length_m * hull.beam_m * hull.draught_m)
 
 
 def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     """Put the mass aboard."""
     m, x = float(p[0]), float(p[1])
     load = np.broadcast_to([m, m * x, m * x * x], (len(picture.scene.t), 3))
-    return replace(picture, load=load if picture.load is None else picture.load + load)
+    damping = picture.damping_factor
+    if len(p) > 2:
+        growth = 1.0 + float(p[2]) * m * _by_mass(picture.scene.profile)
+        damping = np.full(len(load), growth) if damping is None else damping * growth
+    return replace(picture, load=load if picture.load is None else picture.load + load, damping_factor=damping)
+
+
+def untold(scene: Scene, p: Floats) -> frozenset[str]:
+    """Return what is fitted so that the rest comes out right, and is of no interest itself."""
+    return frozenset({DEEPER})
 
 
 def kick(picture: Picture, p: Floats) -> Floats:
@@ -72,6 +100,7 @@ EFFECT = Effect(
     cannot=cannot,
     onset=True,
     kick=kick,
+    untold=untold,
     regressor=regressor,
     bends_hull=True,
     ridge="mass",

@@ -163,5 +163,6 @@ EFFECT = Effect(
     choose=choose,
     untold=untold,
     in_part=True,
+    idle=0.1,
     bends_hull=True,
 )

@@ -51,4 +51,4 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
     return f"change of the thrusters' {axis} {'moment [N·m/s]' if axis == 'yaw' else 'force [N/s]'}", rate
 
 
-EFFECT = Effect("time_delay", "Time delay", parameters_of, apply, says, scenario, regressor=regressor)
+EFFECT = Effect("time_delay", "Time delay", parameters_of, apply, says, scenario, idle=0.03, regressor=regressor)

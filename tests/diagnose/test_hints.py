@@ -42,19 +42,29 @@ def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull() -> None
 
 @pytest.mark.parametrize(("effect", "sure"), [("thruster_lag", False), ("time_delay", False), ("payload", True)])
 def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str, sure: bool) -> None:
-    one = beside_gusts(found(effect, yaw=0.8))
+    one = beside_gusts(found(effect, yaw=0.3), {(effect, None): {"surge": 0.1, "yaw": 0.3}})
     assert one.sure == sure
     assert ("gusts" in one.unresolved_with) != sure
+    # Of a sensor, nothing is removed.
+    assert beside_gusts(found(effect), {}).sure == sure
+    assert beside_gusts(found(effect, yaw=0.8), {(effect, None): {"surge": 0.1, "yaw": 0.8}}).sure
 
 
 def test_what_explains_less_than_is_left_without_a_name_is_a_hint() -> None:
     several = [found("wind", sway=0.1), found("thruster_gain", yaw=0.14)]
-    findings, notes = beside_more(several, {("wind", None): 0.62, ("thruster_gain", "thruster1"): 0.14})
+    removed = {("wind", None): {"surge": 0.0, "sway": 0.62}, ("thruster_gain", "thruster1"): {"sway": 0.0, "yaw": 0.14}}
+    everything = {"surge": 1.0, "sway": 1.0, "yaw": 1.0}
+    findings, notes = beside_more(several, removed, everything)
     assert [one.sure for one in findings] == [True, False]
     assert findings[1].separating_manoeuvre == "a slow turn"
     (note,) = notes
     assert "Thruster force (thruster1)" in note
     assert "wind" not in note
+    # Of what it leaves, a law is a tenth: it explains more. Nor is one its stand-in that acts elsewhere.
+    for law in ({"yaw": 0.1}, {"sway": 0.9, "yaw": 0.0}):
+        assert all(one.sure for one in beside_more(several, removed, law)[0])
+    assert not beside_more(several, removed, {"yaw": 0.2})[0][1].sure
+    assert beside_more(several, removed, {}) == (several, ())
 
 
 def test_gusts_about_a_wind_that_is_not_told_are_a_hint() -> None:
@@ -66,5 +76,5 @@ def test_gusts_about_a_wind_that_is_not_told_are_a_hint() -> None:
 
 def test_what_was_judged_by_no_force_is_left_alone() -> None:
     # Gusts are states of the filter, and remove nothing of the error.
-    assert beside_more([found("gusts")], {}) == ([found("gusts")], ())
-    assert beside_more([found("wind", sway=0.1)], {("wind", None): 0.6})[1] == ()
+    assert beside_more([found("gusts")], {}, {"sway": 1.0}) == ([found("gusts")], ())
+    assert beside_more([found("wind", sway=0.1)], {("wind", None): {"sway": 0.6}}, {"sway": 1.0})[1] == ()
