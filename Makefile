@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test demo picture bench real thesis reach fixtures wheel-check lint clean
+.PHONY: test demo picture bench real thesis proof reach fixtures wheel-check lint clean
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .
@@ -31,6 +31,16 @@ real: $(VENV)/installed
 # The thesis's trials, flown again: writes reports/thesis.md and its figures.
 thesis: $(VENV)/installed
 	$(BIN)/ferryid reproduce thesis --out reports --json reports/thesis.json
+
+# Conceals physics in trials of a plant of its own, seals the answers and diagnoses blind: writes reports/proof.md and its
+# figures. SEED=N draws other cases, RUNS=N more of them. It goes on where it was interrupted.
+SEED ?= 20261122
+RUNS ?= 1
+proof: $(VENV)/installed
+	$(BIN)/ferryid prove --seed $(SEED) --runs $(RUNS) --out $(DEMO) --json $(DEMO)/proof.json
+	cp $(DEMO)/proof/proof.md reports/proof.md
+	mkdir -p reports/proof && cp $(DEMO)/proof/proof/*.svg $(DEMO)/proof/answers.json $(DEMO)/proof/seal.json reports/proof/
+	cp $(DEMO)/proof.json reports/proof.json
 
 # Conceals physics in simulated logs and counts how often it is named: writes reports/diagnosis.md. Half an hour on two cores.
 reach: $(VENV)/installed
