@@ -32,6 +32,8 @@ HEADINGS: Mapping[str, str] = {
     "wrong base": "A base model with masses and damping at 40 %",
     "outside": "Outside the library",
 }
+PLACE = {cell.name: place for place, cell in enumerate(cells())}
+"""Of every cell, in the order of the report."""
 MOST_RATIO = 1.5
 """Ratio of the sizes named reliably, the diagnosis's over the oracle's, that is allowed."""
 COVERED = (0.93, 0.97)
@@ -73,11 +75,12 @@ def _target(what: str, share: Share, *, at_least: float = 0.0, at_most: float = 
 
 def figures(scores: Scores) -> dict[str, str]:
     """Return the page's figures by file name, as SVG text."""
-    drawn = {
-        "confusion.svg": confusion_matrix(scores.confusion.rows, scores.confusion.columns, scores.confusion.counts)
-    }
+    # In the order of the cells, whatever that of the cases.
+    told = sorted(zip(scores.confusion.rows, scores.confusion.counts, strict=True), key=lambda row: PLACE[row[0]])
+    rows, counts = [row for row, _ in told], [count for _, count in told]
+    drawn = {"confusion.svg": confusion_matrix(rows, scores.confusion.columns, counts)}
     if scores.detections:
-        drawn["detection.svg"] = detection_curves([_detected(one) for one in scores.detections])
+        drawn["detection.svg"] = detection_curves([_detected(one) for one in _ordered(scores.detections)])
     found = {one.effect: one.errors for one in scores.recoveries[1:] if one.errors}
     if found:
         drawn["errors.svg"] = parameter_errors(found, WITHIN)
@@ -85,13 +88,18 @@ def figures(scores: Scores) -> dict[str, str]:
 
 
 def _detected(one: Detection) -> Detected:
-    hiding = HIDINGS.get(one.cell)
+    hiding = HIDINGS[one.cell]
     return Detected(
         one.cell,
-        "" if hiding is None else hiding.unit,
+        hiding.unit,
+        (hiding.least / 1.3, 1.3 * hiding.most),
         _seen(one.sizes, one.blind_named, one.blind),
         None if one.oracle is None else _seen(one.oracle_sizes, one.oracle_named, one.oracle),
     )
+
+
+def _ordered(detections: Sequence[Detection]) -> list[Detection]:
+    return sorted(detections, key=lambda one: PLACE[one.cell])
 
 
 def _seen(sizes: Sequence[float], named: Sequence[bool], fitted: Curve) -> Seen:
@@ -143,7 +151,7 @@ def page(result: Mapping[str, Any], scores: Scores) -> str:
         "",
         "| effect | unit | named 19 times in 20 from | by the oracle from | ratio | |",
         "|---|---|--:|--:|--:|---|",
-        *(_detection(one) for one in scores.detections),
+        *(_detection(one) for one in _ordered(scores.detections)),
         "",
         "## What was found of what was concealed",
         "",
@@ -210,7 +218,7 @@ def _cells(scores: Scores) -> list[str]:
     titles = {cell.name: cell.title for cell in cells()}
     text = []
     for kind in KINDS:
-        some = [one for one in scores.cells if one.kind == kind]
+        some = sorted((one for one in scores.cells if one.kind == kind), key=lambda one: PLACE[one.cell])
         if not some:
             continue
         wrong = scores.false_names.get(kind)
@@ -230,8 +238,7 @@ def _cells(scores: Scores) -> list[str]:
 
 
 def _detection(one: Detection) -> str:
-    hiding = HIDINGS.get(one.cell)
-    unit = "" if hiding is None else hiding.unit
+    unit = HIDINGS[one.cell].unit
     ratio, note = "", ""
     if one.ratio is not None:
         value = "" if one.ratio.value is None else f"{one.ratio.value:.2g} "

@@ -10,6 +10,7 @@ from math import ceil
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from ferryid.report.figures import STYLE
@@ -32,10 +33,11 @@ class Seen:
 
 @dataclass(frozen=True)
 class Detected:
-    """Detection of one effect: by the diagnosis, and by the oracle or None."""
+    """Detection of one effect: by the diagnosis, and by the oracle or None; `limits` are the ends of its sizes."""
 
     title: str
     unit: str
+    limits: tuple[float, float]
     blind: Seen
     oracle: Seen | None
 
@@ -73,6 +75,11 @@ def detection_curves(found: Sequence[Detected]) -> str:
                 axes.plot(seen.x, seen.share, color=colour, linewidth=1.2)
             axes.axhline(0.95, color=GREY, linewidth=0.6)
             axes.set_xscale("log")
+            axes.set_xlim(*one.limits)
+            # A panel is too small for more than the powers of ten.
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0,), numticks=6))
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
             axes.set_ylim(-0.08, 1.08)
             axes.set_title(one.title, fontsize=8)
             axes.set_xlabel(one.unit, fontsize=7)
