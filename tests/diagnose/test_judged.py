@@ -82,3 +82,11 @@ def test_what_fell_for_one_reason_is_one_sentence() -> None:
         f"Wind and Current were suspected, but dropped: {LAW}.",
         f"Payload was suspected, but dropped: {PLACEBO}.",
     )
+
+
+def test_what_is_too_small_beside_the_others_is_dropped_without_a_word(trial: Trial) -> None:
+    three = fit(trial, of(trial, LOSS, FIRST, ("heading_bias", None)))
+    assert abs(three.values[2][0]) < 0.5, "a heading as good as a compass"
+    stands = judged(trial.with_noise_of(three), three, suspects(trial), lambda stage: None)
+    assert stands.fit.keys == {LOSS, FIRST}
+    assert stands.told == ()

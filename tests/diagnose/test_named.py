@@ -55,6 +55,29 @@ def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[T
     )
 
 
+@pytest.mark.parametrize(("grown", "sure"), [(1.2, False), (1.05, True)])
+def test_what_makes_an_axis_worse_is_a_hint(windy: tuple[Trial, Judged], grown: float, sure: bool) -> None:
+    """By 44 and by 10 % of the squared error in yaw, whatever it improves elsewhere."""
+    trial, stands = windy
+    assert stands.proof is not None
+    (proof,) = stands.proof.proofs
+    after = proof.improvement.after.copy()
+    after[:, 2] = grown * proof.improvement.before[:, 2]
+    other = replace(proof, improvement=replace(proof.improvement, after=after))
+    (finding,), told = forces_of(
+        trial, replace(stands, proof=replace(stands.proof, proofs=(other,))), trial.windows.scene
+    )
+    assert finding.sure == sure
+    assert told == (
+        ()
+        if sure
+        else (
+            "Steady wind makes the held-out squared error in yaw 44 % larger while it acts, and what is there makes no axis "
+            "worse: it is a hint.",
+        )
+    )
+
+
 @pytest.mark.parametrize(
     ("shares", "forces", "runs", "shows"),
     [

@@ -88,7 +88,10 @@ def test_a_law_comes_back(force: Floats, on: str, name: str, size: float) -> Non
     assert law.fit.values[-1][0] == pytest.approx(size, abs=max(3.0 * error, 0.05 * abs(size)))
     assert law.gain > max(GAIN, law.chance)
     assert law.held_out.score_low > 0.0
-    told = unknown_of(trial, fit(trial, ()), sailed(0)).findings[0]
+    made = unknown_of(trial, fit(trial, ()), sailed(0))
+    told = made.findings[0]
+    # What it holds of the error is what it removes, where it does.
+    assert made.holds == {axis: max(share, 0.0) for axis, share in told.improvement.items()}
     assert told.effect == "unknown"
     assert told.parameters == {}
     assert (told.law[0].on, told.law[0].quantity) == (on, name)
