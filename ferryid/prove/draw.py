@@ -33,6 +33,8 @@ KINDS = (
 """Kinds of cells, in the order of the report."""
 LEVELS = 5
 """Sizes of a detection curve, from invisible to gross."""
+TURNS = (2, 4, 1, 3, 0)
+"""Levels in the order of the runs: a few runs are not all of the smallest."""
 TIMES: Mapping[str, float] = {"clean": 12.0, "pair": 4.0, "triple": 2.0}
 """Runs of a cell for one run of each size, where it is not one."""
 HULL_ERROR = 0.1
@@ -113,13 +115,17 @@ def drawn(seed: int, runs: float, only: Sequence[str] = ()) -> list[Case]:
     Raises
     ------
     FerryIdError
-        For a cell that there is not.
+        For a cell that there is not, and a number of runs that is none.
     """
+    if not 0.0 < runs < 1e3:
+        raise FerryIdError(f"--runs: {runs:g} is no number of runs. Fix: give one above 0, such as 1")
     every = cells()
     known = {cell.name for cell in every} | set(KINDS)
     for name in only:
         if name not in known:
-            raise FerryIdError(f"prove: there is no cell {name!r}. Fix: one of {', '.join(KINDS)}, or an effect's id")
+            raise FerryIdError(
+                f"--only: there is no cell {name!r}. Fix: give one of {', '.join(KINDS)}, or an effect's id"
+            )
     made = []
     for cell in every:
         if only and not {cell.name, cell.kind} & set(only):
@@ -170,7 +176,7 @@ def _single(name: str) -> Callable[[int, np.random.Generator], Case]:
     hiding = HIDINGS[name]
 
     def draw(number: int, rng: np.random.Generator) -> Case:
-        level = number % LEVELS
+        level = TURNS[number % LEVELS]
         # Anywhere in its fifth of the way from invisible to gross, by the logarithm.
         share = (level + rng.uniform()) / LEVELS
         size = hiding.least * (hiding.most / hiding.least) ** share

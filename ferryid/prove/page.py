@@ -193,6 +193,7 @@ def page(result: Mapping[str, Any], scores: Scores) -> str:
         "|---|--:|--:|--:|--:|--:|--:|--:|",
         *(_method(one) for one in scores.methods),
         "",
+        *(f"- `{name}` could not be asked: {why}" for name, why in scores.missing.items()),
     ]
     return "\n".join(text)
 

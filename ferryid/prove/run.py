@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from ferryid import __version__
@@ -76,6 +77,7 @@ def prove(
         For a seed or a cluster that cannot be used, for answers that were changed, and where a log cannot be written.
     """
     seed = _seed(seed)
+    cases = parts.draw(seed, runs, only)
     folder = (out / "proof").resolve()
     python_rooms(folder)
     tell(f"seed {seed}; if interrupted, go on with: {_again(seed, runs, only, out)}")
@@ -83,7 +85,6 @@ def prove(
         at = desk(folder, seed, {"runs": runs, "only": list(only)}, tell)
         do = partial(carry_out, spread=workers, progress=progress)
 
-        cases = parts.draw(seed, runs, only)
         written = _written(do, at, cases, parts.generate)
         acted = {name: one["acted"] for name, one in written.items()}
         bound = _sealed(at, {"seed": seed, "cases": [case.as_json() for case in cases], "acted": acted})
@@ -142,8 +143,8 @@ def _seed(seed: int | None) -> int:
 
 
 def _again(seed: int, runs: float, only: Sequence[str], out: Path) -> str:
-    cells = f" --only {','.join(only)}" if only else ""
-    return f"ferryid prove --seed {seed} --runs {runs:g}{cells} --out {out}"
+    cells = f" --only {quote(','.join(only))}" if only else ""
+    return f"ferryid prove --seed {seed} --runs {runs:g}{cells} --out {quote(str(out))}"
 
 
 def _written(do: Any, at: Desk, cases: Sequence[Case], generate: Generate) -> dict[str, dict[str, Any]]:

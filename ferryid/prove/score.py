@@ -24,7 +24,7 @@ from ferryid.prove.names import (
     truths,
 )
 from ferryid.prove.recovery import Recovery, recoveries
-from ferryid.prove.second_log import Claim, Method, claims, methods
+from ferryid.prove.second_log import Claim, Method, claims, methods, missing
 
 CLEAN = "clean"
 """Kind of the cells in which nothing is concealed: what an oracle gains there, it gains by chance."""
@@ -88,6 +88,8 @@ class Scores:
         Claimed improvement against the one on a second log, by axis.
     methods
         The diagnosis beside its rivals.
+    missing
+        Why a rival could not be asked, by its name.
     detections
         Curves by cell.
     median_ratio
@@ -107,6 +109,7 @@ class Scores:
     recoveries: tuple[Recovery, ...]
     claims: tuple[Claim, ...]
     methods: tuple[Method, ...]
+    missing: Mapping[str, str]
     detections: tuple[Detection, ...]
     median_ratio: float
     thresholds: Mapping[str, float]
@@ -139,6 +142,7 @@ def score(lines: Sequence[Line]) -> Scores:
         recoveries(lines),
         claims(lines),
         methods(lines),
+        missing(lines),
         found,
         float(np.median(ratios)) if ratios else nan,
         thresholds,

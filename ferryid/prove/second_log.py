@@ -110,6 +110,13 @@ def methods(lines: Sequence[Line]) -> tuple[Method, ...]:
     return tuple(one for one in found if one.logs or (one.false is not None and one.false.of))
 
 
+def missing(lines: Sequence[Line]) -> dict[str, str]:
+    """Return why rivals could not be asked that were asked in vain each time, by name."""
+    judged = [(name, one) for line in lines for name, one in (line.get("second") or {}).items() if name != DIAGNOSED]
+    able = {name for name, one in judged if _has_errors(one)}
+    return {name: str(one["why"]) for name, one in judged if name not in able and one.get("why")}
+
+
 def median_interval(values: Sequence[float]) -> tuple[float, float]:
     """Return the 95 % interval of a median by order statistics: infinite for fewer than six values."""
     ordered, n = sorted(values), len(values)
@@ -142,7 +149,12 @@ def _method(name: str, lines: Sequence[Line]) -> Method:
 def _judged(line: Line, name: str) -> Mapping[str, Any]:
     """Return what a method did on the second log of a line; empty where it was not judged."""
     one = (line.get("second") or {}).get(name)
-    return one if one and one.get("mse") else {}
+    return one if one and _has_errors(one) else {}
+
+
+def _has_errors(one: Mapping[str, Any]) -> bool:
+    """Tell whether a method was judged: one that is not installed, or that could not learn, has no errors."""
+    return all((one.get("mse") or {}).get(axis) is not None for axis in AXES)
 
 
 def _free_run(line: Line, judged: Mapping[str, Any]) -> float:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near
-from ferryid.diagnose.judged import LAW, PLACEBO, _told, judged
+from ferryid.diagnose.judged import LAW, PLACEBO, _fallen, _told, judged
 from ferryid.diagnose.search import search, suspects_of
 from tests.diagnose.trials import sailed, trial_on
 
@@ -84,9 +86,10 @@ def test_what_fell_for_one_reason_is_one_sentence() -> None:
     )
 
 
-def test_what_is_too_small_beside_the_others_is_dropped_without_a_word(trial: Trial) -> None:
-    three = fit(trial, of(trial, LOSS, FIRST, ("heading_bias", None)))
-    assert abs(three.values[2][0]) < 0.5, "a heading as good as a compass"
-    stands = judged(trial.with_noise_of(three), three, suspects(trial), lambda stage: None)
-    assert stands.fit.keys == {LOSS, FIRST}
-    assert stands.told == ()
+def test_what_is_too_small_to_matter_falls_without_a_word(trial: Trial) -> None:
+    """A loss of 0.25 that is judged by somebody to whom one of less than 1 does not matter."""
+    loss, first = of(trial, LOSS, FIRST)
+    careless = replace(loss, effect=replace(loss.effect, idle=1.0))
+    for one, falls in ((loss, (None, "")), (careless, (0, ""))):
+        both = fit(trial, [one, first])
+        assert _fallen(trial.with_noise_of(both), both, None) == falls

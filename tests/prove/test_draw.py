@@ -54,12 +54,19 @@ def test_a_number_tells_nothing() -> None:
     assert [int(case.name) for case in every] == list(range(len(every)))
 
 
+def test_a_few_runs_are_not_all_of_the_smallest() -> None:
+    assert [case.level for case in sorted(drawn(5, 0.4, ["wind"]), key=lambda case: case.size)] == [2, 4]
+
+
 def test_a_few_cells_only() -> None:
     assert {case.cell for case in drawn(5, 0.2, ["wind", "short"])} == {"wind"} | {
         case.cell for case in drawn(5, 0.2) if case.kind == "short"
     }
     with pytest.raises(FerryIdError, match="no cell 'winds'"):
         drawn(5, 1.0, ["winds"])
+    for runs in (0.0, -1.0, float("nan"), 1e9):
+        with pytest.raises(FerryIdError, match="--runs"):
+            drawn(5, runs)
 
 
 @pytest.mark.parametrize("vessel", VESSELS.values(), ids=list(VESSELS))

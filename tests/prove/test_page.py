@@ -40,7 +40,8 @@ def test_a_target_is_reached_when_its_interval_says_so(
 
 
 def test_the_page_tells_seal_guard_sizes_and_what_was_missed() -> None:
-    lines = [*curve_lines(), line([WIND], [finding("current")], "pair", "pair")]
+    absent = {"sindy": {"mse": dict.fromkeys(("surge", "sway", "yaw")), "why": "pysindy is not installed"}}
+    lines = [*curve_lines(), line([WIND], [finding("current")], "pair", "pair", second=absent)]
     scores = score(lines)
     told = page({**RESULT, "targets": targets(scores)}, scores)
     assert RESULT["commitment"] in told
@@ -52,6 +53,7 @@ def test_the_page_tells_seal_guard_sizes_and_what_was_missed() -> None:
     assert "sizes named 19 times in 20 at most 1.5 times the oracle's: 0 of 1 effects | **missed** |" in told
     assert "| nothing | 20 |  |  | 0/20 |" in told
     assert "| two effects | 1 | 0/1 | 0/1 | 1/1 |" in told
+    assert "- `sindy` could not be asked: pysindy is not installed" in told
     # Clean logs come before effects, effects before pairs.
     assert told.index("### Nothing") < told.index("### One effect, from") < told.index("### Two effects")
 

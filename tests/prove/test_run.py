@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -232,6 +233,20 @@ def test_other_sources_or_another_seed_begin_anew(tmp_path: Path, monkeypatch: p
     assert (out / "proof" / "mine.txt").exists()
 
 
+def test_a_draw_that_cannot_be_leaves_no_trace_and_a_command_can_be_pasted(tmp_path: Path) -> None:
+    def refused(seed: int, runs: float, only: Any) -> Any:
+        raise FerryIdError("no such cell. Fix: another")
+
+    out = tmp_path / "an out"
+    with pytest.raises(FerryIdError, match="no such cell"):
+        proved(out, replace(PARTS, draw=refused), only=("winds",))
+    assert not out.exists()
+    _, told = proved(out, runs=1, only=("short: wind",))
+    words = shlex.split(told[0].partition("go on with: ")[2])
+    assert words[words.index("--only") + 1] == "short: wind"
+    assert words[words.index("--out") + 1] == str(out)
+
+
 def test_a_proof_that_is_not_finished_is_not_thrown_away(tmp_path: Path) -> None:
     out = tmp_path / "out"
     proved(out)
@@ -303,15 +318,16 @@ def test_beside_a_log_lies_nothing_but_its_profile(tmp_path: Path) -> None:
 
 
 def test_two_at_once_do_not_share_a_folder(tmp_path: Path) -> None:
-    def once_more(trials: Any) -> Any:
-        raise AssertionError
+    refused = []
 
-    def draw(*arguments: Any) -> Any:
+    def generate(case: Any, folder: Path, *, again: bool = False) -> Any:
         with pytest.raises(FerryIdError, match="another process is at work in it"):
             proved(tmp_path / "out")
-        return PARTS.draw(*arguments)
+        refused.append(case.name)
+        return PARTS.generate(case, folder, again=again)
 
-    proved(tmp_path / "out", replace(PARTS, draw=draw), runs=0)
+    proved(tmp_path / "out", replace(PARTS, generate=generate), runs=1)
+    assert refused
 
 
 def test_damaged_lines_are_done_again(tmp_path: Path) -> None:

@@ -273,3 +273,21 @@ def test_scores_of_nothing_are_no_error() -> None:
 def test_the_proof_draws_nothing() -> None:
     code = "import sys, ferryid.prove.oracle, ferryid.prove.score; print('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
+
+
+def test_a_rival_that_is_not_installed_is_told_and_not_counted() -> None:
+    errors = {"surge": 0.5, "sway": 0.6, "yaw": 0.7}
+    none = {"mse": dict.fromkeys(errors), "position_m": None, "base_position_m": 4.0, "why": "pysindy is not installed"}
+    second = {
+        "base": {"mse": errors},
+        "diagnosed": {"mse": errors, "position_m": 1.0, "base_position_m": 4.0},
+        "sindy": none,
+        "stepwise": {"mse": errors, "position_m": 2.0, "base_position_m": 4.0},
+    }
+    scores = score([line([WIND], [], second=second)])
+    assert [(one.name, one.logs) for one in scores.methods] == [("diagnosed", 1), ("stepwise", 1)]
+    assert scores.missing == {"sindy": "pysindy is not installed"}
+    # Once it could be asked, it was there.
+    assert (
+        score([line([WIND], [], second=second), line([WIND], [], second={"sindy": second["diagnosed"]})]).missing == {}
+    )

@@ -13,12 +13,12 @@ from pathlib import Path
 # Before numpy is imported, here and in the processes: each run keeps to one core.
 os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
 
+from ferryid.report.proof_figures import confusion_matrix, parameter_errors
 from tests.reach import wavy
 from tests.reach.cells import KINDS, cells, draws
-from tests.reach.figures import errors, matrix
 from tests.reach.page import page, results
 from tests.reach.record import run_all, version
-from tests.reach.scores import score
+from tests.reach.scores import WITHIN, score
 
 REPORTS = Path(__file__).resolve().parents[2] / "reports"
 RUNS = 10
@@ -61,7 +61,7 @@ def main() -> int:
     folder.mkdir(parents=True, exist_ok=True)
     (options.out / "diagnosis.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     (options.out / "diagnosis.md").write_text(page(lines, every, settings, "diagnosis", section), encoding="utf-8")
-    (folder / "confusion.svg").write_text(matrix(*told["confusion"].values()), encoding="utf-8")
+    (folder / "confusion.svg").write_text(confusion_matrix(*told["confusion"].values()), encoding="utf-8")
     by_cell = {
         cell.key: score(
             line for line in lines if line["draw"]["cell"] == cell.name and line["draw"]["place"] == cell.place
@@ -69,7 +69,7 @@ def main() -> int:
         for cell in every
     }
     (folder / "errors.svg").write_text(
-        errors({key: found for key, found in by_cell.items() if found}), encoding="utf-8"
+        parameter_errors({key: found for key, found in by_cell.items() if found}, WITHIN), encoding="utf-8"
     )
     for row in told["targets"]:
         if not row["reached"]:

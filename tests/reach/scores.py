@@ -8,10 +8,10 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
 
 from ferryid.diagnose.result import HINT
 from ferryid.effects import effects
+from ferryid.prove.names import Share
 from tests.reach.draw import groups
 from tests.reach.places import PLACES
 
@@ -22,29 +22,6 @@ WITHIN = 0.1
 ONSET_S = 5.0
 NEUTRAL = {"yaw_rate_scale": {"factor": 1.0}, "velocity_scale": {"factor": 1.0}}
 """Neutral values of what only the checks of the sensors know."""
-
-
-@dataclass(frozen=True)
-class Share:
-    """So many of so many."""
-
-    count: int
-    of: int
-
-    @property
-    def value(self) -> float:
-        """Return the share, NaN of none."""
-        return self.count / self.of if self.of else float("nan")
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Return the 95 % interval of Clopper and Pearson."""
-        k, n = self.count, self.of
-        if n == 0:
-            return 0.0, 1.0
-        low = 0.0 if k == 0 else float(beta.ppf(0.025, k, n - k + 1))
-        high = 1.0 if k == n else float(beta.ppf(0.975, k + 1, n - k))
-        return low, high
 
 
 @dataclass(frozen=True)
@@ -89,7 +66,7 @@ class Score:
     half_widths: Sequence[float] = field(default_factory=tuple)
     reaches: Sequence[float] = field(default_factory=tuple)
     onsets_s: Sequence[float] = field(default_factory=tuple)
-    onset_held: Share = Share(0, 0)
+    onset_held: Share = field(default_factory=lambda: Share(0, 0))
     seconds: Sequence[float] = field(default_factory=tuple)
 
     @property
