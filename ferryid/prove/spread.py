@@ -204,7 +204,7 @@ def _cluster(address: str) -> Iterator[Any]:
         from distributed import Client
     except ImportError as error:
         raise FerryIdError(
-            '--dask: the package distributed is not installed, which a cluster needs. Fix: pip install "ferryid[dask]"'
+            "--dask: the package distributed is not installed, which a cluster needs. Fix: pip install distributed"
         ) from error
     try:
         client: Any = Client(address, timeout=ANSWER_S, set_as_default=False)  # type: ignore[no-untyped-call]

@@ -68,7 +68,7 @@ def test_a_cluster_that_cannot_be_used_is_one_line(
     monkeypatch.setitem(sys.modules, "distributed", None)
     run = ferryid_run("prove", "--runs", "1", "--dask", "tcp://127.0.0.1:9", "--out", tmp_path / "out")
     assert run.code == 2
-    assert 'Fix: pip install "ferryid[dask]"' in run.err
+    assert "Fix: pip install distributed" in run.err
     assert ferryid_run("prove", "--processes", "0", "--out", tmp_path / "out").code == 2
 
 

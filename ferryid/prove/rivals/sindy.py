@@ -44,7 +44,7 @@ def need() -> None:
     except ImportError as error:
         raise FerryIdError(
             f"prove: the rival sindy needs the package pysindy, which cannot be imported ({error}). "
-            "Fix: pip install 'ferryid[prove]'"
+            "Fix: pip install pysindy"
         ) from error
 
 
