@@ -64,4 +64,7 @@ def test_the_figures_are_drawings_of_what_there_is() -> None:
     assert set(drawn) == {"confusion.svg", "detection.svg", "errors.svg"}
     for text in drawn.values():
         assert ElementTree.fromstring(text).tag.endswith("svg")
-    assert set(figures(score([line([], [], "clean", "clean")]))) == {"confusion.svg"}
+    nothing = score([line([], [], "clean", "clean")])
+    assert set(figures(nothing)) == {"confusion.svg"}
+    # Of no sizes none is near the oracle's.
+    assert targets(nothing)[-1]["reached"] is None
