@@ -248,17 +248,19 @@ def differing_sensors(
     told = [f"The simulation's log: {one.says}" for one in simulated.sensors]
     told += [
         f"The {one.suspect.effect.id} differs by what was measured, and is no finding: "
-        f"{_described(one)} in the simulation; the recording's own is part of its picture."
+        f"{_described(one, simulated.scene)} in the simulation; the recording's own is part of its picture."
         for one in simulated.conditions
         if one.suspect.effect.cannot(scene) and not one.in_hull
     ]
     return tuple(one for one in sensors if not _alike(one, own.get(one.effect))), told
 
 
-def _described(one: Condition) -> str:
+def _described(one: Condition, scene: Scene) -> str:
+    untold = one.suspect.effect.untold(scene, one.values)
     return ", ".join(
         f"{parameter.name} {_told(value, parameter.unit)}"
         for parameter, value in zip(one.suspect.parameters, one.values.tolist(), strict=True)
+        if parameter.name not in untold
     )
 
 
@@ -289,6 +291,7 @@ def _relative(suspect: Suspect, carried: Sequence[Condition], index: int, bare: 
             f"{one.name.replace('_', ' ')} {_told(neutral[one.name], one.unit)} in the simulation, "
             f"{_told(values[one.name], one.unit)} in the recording"
             for one in suspect.parameters
+            if one.name in values
         ]
         return f"{name} differs: {'; '.join(parts)}."
 
@@ -389,6 +392,7 @@ def plain_against(simulated: Simulated, compared: Paths | str) -> dict[str, Any]
                 for parameter, value, error in zip(
                     one.suspect.parameters, one.values.tolist(), one.errors.tolist(), strict=True
                 )
+                if parameter.name not in one.suspect.effect.untold(simulated.scene, one.values)
             },
         }
         for one in simulated.conditions

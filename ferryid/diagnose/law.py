@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ferryid.diagnose.evidence import Improvement, held_out, improvement
 from ferryid.diagnose.folds import Folds
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
+from ferryid.diagnose.hypothesis import WIDER, Fit, Suspect, Trial, fit, imagined
 from ferryid.diagnose.noise import ORDER, Noise, noise_of
 from ferryid.diagnose.search import VOID
 from ferryid.diagnose.terms import Term, terms_of
@@ -150,7 +150,7 @@ def law_of(trial: Trial, kept: Fit, folds: Folds, unlike: Floats | None = None) 
     better = improvement(seen, folds, before, after)
     if better.score_low <= 0.0:
         return None
-    return Law(tuple(chosen), made, seen, better, *gains[0], made.values[-1], made.told_errors(len(kept.suspects)))
+    return Law(tuple(chosen), made, seen, better, *gains[0], made.values[-1], WIDER * made.errors(len(kept.suspects)))
 
 
 def _unlike(trial: Trial, kept: Fit, terms: Sequence[Term], moved: Floats) -> list[Term]:

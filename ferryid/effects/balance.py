@@ -44,8 +44,7 @@ def masses(i: int, hull: Floats, load: Floats) -> tuple[float, float, float, flo
     """Return the entries of a row's mass matrix, that of the load included."""
     if load.shape[0] == 0:
         return hull[0], hull[1], hull[2], hull[3], hull[4]
-    m, mx, mxx = load[i, 0], load[i, 1], load[i, 2]
-    return hull[0] + m, hull[1] + m, hull[2] + mx, hull[3] + mx, hull[4] + mxx
+    return hull[0] + load[i, 0], hull[1] + load[i, 1], hull[2] + load[i, 2], hull[3] + load[i, 3], hull[4] + load[i, 4]
 
 
 @borrowing

@@ -20,7 +20,7 @@ SECOND_ORDER = (
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return a factor for each axis."""
-    return tuple(Parameter(axis, "-", 0.4, 0.3, 6.0, neutral=1.0) for axis in ("surge", "sway", "yaw"))
+    return tuple(Parameter(axis, "-", 1.0, 0.3, 6.0, neutral=1.0) for axis in ("surge", "sway", "yaw"))
 
 
 def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:

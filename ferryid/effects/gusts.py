@@ -31,7 +31,7 @@ def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:
     scene, areas = picture.scene, picture.scene.profile.wind
     if areas is None or picture.air is None:
         return ()
-    loads = []
+    loads, factors = [], 1.0 if picture.air_factors is None else picture.air_factors
     for towards in np.eye(2):
         ends = [
             wind_force(
@@ -39,7 +39,7 @@ def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:
             )
             for side in (1.0, -1.0)
         ]
-        loads.append((ends[0] - ends[1]) / (2.0 * STEP))
+        loads.append(factors * (ends[0] - ends[1]) / (2.0 * STEP))
     return tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
 
 

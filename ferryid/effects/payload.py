@@ -1,7 +1,7 @@
 """Payload: rigid mass aboard, which enters the vessel's own mass matrix; it may come aboard and leave during the log.
 
-A load sinks the hull, and a deeper hull is damped more. How much more is fitted beside the mass, as no drawing says, and not
-told: without it, what is only damping would seem to be missing thrust, and the mass too small.
+A load sinks the hull, and a deeper hull is damped more and moves more water. How much more is fitted beside the mass, as no
+drawing says, and not told: without it, what is only damping would seem to be missing thrust, and the mass too small.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.picture import Picture, Scene, aboard
 from ferryid.vessel.profile import Floats, Profile
 
 WATERPLANE = 0.85
 """Waterplane coefficient of a small workboat."""
 WATER = 1025.0
 """Density of sea water [kg/m³]."""
-DEEPER = "damping_by_draught"
-"""Parameter of a hull whose size is known: growth of all damping over that of the draught."""
+DEEPER = "by_draught"
+"""Parameter of a hull whose size is known: growth of all damping and of the added mass over that of the draught."""
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -43,12 +43,14 @@ def _by_mass(profile: Profile) -> float:
 
 def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     """Put the mass aboard."""
-    m, x = float(p[0]), float(p[1])
-    load = np.broadcast_to([m, m * x, m * x * x], (len(picture.scene.t), 3))
-    damping = picture.damping_factor
+    n = len(picture.scene.t)
+    load, damping = aboard(np.tile(p[:2], (n, 1))), picture.damping_factor
     if len(p) > 2:
-        growth = 1.0 + float(p[2]) * m * _by_mass(picture.scene.profile)
-        damping = np.full(len(load), growth) if damping is None else damping * growth
+        hull = picture.scene.profile.hull
+        more = float(p[2] * p[0]) * _by_mass(picture.scene.profile)
+        moment = hull.mass_kg * hull.x_g_m
+        load = load + more * (picture.hull[:5] - [hull.mass_kg, hull.mass_kg, moment, moment, hull.inertia_z])
+        damping = np.full(n, 1.0 + more) if damping is None else damping * (1.0 + more)
     return replace(picture, load=load if picture.load is None else picture.load + load, damping_factor=damping)
 
 

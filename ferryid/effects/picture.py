@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects.balance import Places, accelerations, from_antenna, required, slopes
+from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.profile import Floats, Profile
 from ferryid.vessel.wind import wind_force
 
@@ -33,7 +34,7 @@ UNITS = (
     *("kg/m", "kg", "kg", "kg·m"),
 )
 """Units of `COEFFICIENTS`, radians left out."""
-_NO_FLOW, _NO_LOAD, _NO_FACTOR = np.empty((0, 2)), np.empty((0, 3)), np.empty(0)
+_NO_FLOW, _NO_LOAD, _NO_FACTOR = np.empty((0, 2)), np.empty((0, 5)), np.empty(0)
 
 
 @dataclass(frozen=True)
@@ -126,12 +127,14 @@ class Picture:
     flow
         Where the water goes to, north and east [m/s], shape (n, 2), or None for still water.
     load
-        Mass aboard and its first and second moment about the body origin [kg, kg·m, kg·m²], shape (n, 3), or None.
+        What is added to the mass matrix: m11, m22 [kg], m23, m32 [kg·m], m33 [kg·m²], shape (n, 5), or None.
     damping_factor
         Factor on all damping, shape (n,), or None.
     air
         Where an air flow goes to that is imagined and not measured, north and east [m/s], shape (2,), or None; its load is
         among the external forces.
+    air_factors
+        Those on the load that the profile tells of it, surge, sway and yaw, shape (3,), or None for one each.
     gust_std
         Standard deviation of gusts about that flow, of north and east each [m/s].
     ambient
@@ -151,6 +154,7 @@ class Picture:
     load: Floats | None = None
     damping_factor: Floats | None = None
     air: Floats | None = None
+    air_factors: Floats | None = None
     gust_std: float = 0.0
     ambient: Callable[[Scene], Floats] | None = None
     turned: float = 0.0
@@ -255,6 +259,11 @@ def _forces(picture: Picture) -> tuple[Floats, Floats, Floats, Floats]:
         raise ValueError(f"a picture of {n} rows has parts of other lengths: {sorted(lengths)}")
     external, flow, load, factor = map(np.ascontiguousarray, (picture.external, flow, load, factor))
     return external, flow, load, factor
+
+
+def aboard(payload: Floats) -> Floats:
+    """Return what masses and their places, as of `payload_mass`, shape (n, 2), are as the load of a picture, shape (n, 5)."""
+    return payload_mass(payload)[:, [0, 1, 1, 2, 2], [0, 1, 2, 1, 2]]
 
 
 def between(

@@ -66,4 +66,6 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
     return f"change of the thrusters' {axis} {'moment [N·m/s]' if axis == 'yaw' else 'force [N/s]'}", rate
 
 
-EFFECT = Effect("thruster_lag", "Thruster lag", parameters_of, apply, says, scenario, vessel=True, regressor=regressor)
+EFFECT = Effect(
+    "thruster_lag", "Thruster lag", parameters_of, apply, says, scenario, vessel=True, idle=0.03, regressor=regressor
+)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, required_force
+from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, aboard, required_force
 from ferryid.errors import FerryIdError
 from ferryid.identify.estimate import Estimator, estimator, hull_values, with_hull
 from ferryid.identify.hull_terms import hull_part
@@ -162,10 +162,7 @@ def acting_estimator(model: Model) -> Estimator:
 
 def bare_picture(scene: Scene, hull: Floats) -> Picture:
     """Return the picture of a hull in a scene, in the water and with the payload that were measured, and no air."""
-    load = None
-    if scene.payload is not None:
-        mass, place = scene.payload.T
-        load = np.column_stack([mass, mass * place, mass * place**2])
+    load = None if scene.payload is None else aboard(scene.payload)
     return Picture(scene, hull, scene.parts, scene.angles, np.zeros((len(scene.t), 3)), scene.current, load)
 
 

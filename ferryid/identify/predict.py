@@ -162,11 +162,11 @@ def smoothed_scene(track: Track, motion: Motion, profile: Profile) -> Scene:
 
 
 def held_in(picture: Picture) -> Floats | None:
-    """Return load and factor on the damping on every row, shape (n, 4), where there is either."""
+    """Return load and factor on the damping on every row, shape (n, 6), where there is either."""
     if picture.load is None and picture.damping_factor is None:
         return None
     n = len(picture.scene.t)
-    load = np.zeros((n, 3)) if picture.load is None else picture.load
+    load = np.zeros((n, 5)) if picture.load is None else picture.load
     return np.column_stack([load, np.ones(n) if picture.damping_factor is None else picture.damping_factor])
 
 
@@ -192,7 +192,7 @@ def force_with(known: Pictured, hull: Floats) -> ForceModel:
         )
         picture = replace(known.plain(scene), hull=hull)
         if held is not None:
-            picture = replace(picture, load=held[:, :3], damping_factor=held[:, 3])
+            picture = replace(picture, load=held[:, :5], damping_factor=held[:, 5])
         return required_force(picture, nu_dot)
 
     return force

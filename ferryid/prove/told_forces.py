@@ -214,7 +214,8 @@ def _weighed(trial: Trial, full: _Model, suspect: Suspect) -> Weighed:
     """Return what one effect of a hypothesis gains, added last."""
     others = [one for one in full.fit.suspects if one.key != suspect.key]
     shaking = [state.suspect for state in full.states if state.suspect.key != suspect.key]
-    free = sum(one.size > HELD for one in suspect.parameters)
+    untold = suspect.effect.untold(trial.plain.scene, suspect.start)
+    free = sum(one.size > HELD and one.name not in untold for one in suspect.parameters)
     # Without the wind that they are one of, gusts push as they did about it.
     blown = any(one.effect.about == suspect.effect.id for one in shaking)
     rest = _modelled(trial, others, shaking, imagined(full.trial.plain, full.fit) if blown else None, full)

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from ferryid.diagnose.checks.azimuth_resolution import corrected as straightened
-from ferryid.diagnose.checks.azimuth_resolution import step_of
+from ferryid.diagnose.checks.azimuth_resolution import estimate, off_grid, step_of
 from ferryid.diagnose.checks.kinematics import ANGLE, NEUTRAL, SCALE, Kinematics, X, Y, kinematics
 from ferryid.diagnose.checks.yaw_rate_scale import compared
 from ferryid.diagnose.checks.yaw_rate_scale import corrected as rescaled
@@ -78,11 +78,11 @@ def _azimuth_resolution(scene: Scene) -> Sensed:
     if step == 0.0:
         return Sensed(0.0, 1)
     readings = np.degrees(np.unique(np.round(scene.angles[:, steps.index(step)], 9)))
-    off = np.abs(readings - step * np.round(readings / step))
+    off = off_grid(readings, step)
     count, near = len(readings), int(np.count_nonzero(off < 0.5 * CHANCE * step))
     share = min(max(near / count, CHANCE), 1.0 - STRAIGHT)
     gain = near * log(share / CHANCE) + (count - near) * log((1.0 - share) / (1.0 - CHANCE))
-    return Sensed(gain, 1, {"step": Estimate(step, step, step, "deg")}, lambda seen: straightened(seen, steps))
+    return Sensed(gain, 1, {"step": estimate(step)}, lambda seen: straightened(seen, steps))
 
 
 def _velocity_scale(scene: Scene) -> Sensed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -88,7 +89,7 @@ def test_only_the_fault_is_found_where_both_have_the_wind(folder: Path, windy: s
 def test_what_the_simulation_learnt_is_what_was_simulated(simulated: Simulated) -> None:
     (blown,) = simulated.conditions
     assert blown.suspect.effect.id == "wind"
-    np.testing.assert_allclose(blown.values, [2.0, 0.0], atol=0.1)
+    np.testing.assert_allclose(blown.values[:2], [2.0, 0.0], atol=0.1)
 
 
 def test_the_same_trial_with_other_noise_differs_in_nothing(folder: Path, simulated: Simulated) -> None:
@@ -102,9 +103,10 @@ def test_a_wind_that_differs_is_told_with_both_values(folder: Path, simulated: S
     result = found(simulated, sailed(folder, f"wind-{north}", wind(north), 3))
     (one,) = result.fit.suspects
     assert one.effect.id == "wind"
-    np.testing.assert_allclose(result.fit.values[0], [north, 0.0], atol=0.1)
+    np.testing.assert_allclose(result.fit.values[0][:2], [north, 0.0], atol=0.1)
     says = one.effect.says({"north": north, "east": 0.0}, None)
-    assert f"north 2.00 m/s in the simulation, {north:.2f} m/s in the recording" in says
+    assert re.search(rf"north 2\.0\d m/s in the simulation, {north:.2f} m/s in the recording", says)
+    assert "C_X" not in says
 
 
 def test_a_simulated_hull_of_seven_tenths_hides_no_fault(folder: Path) -> None:

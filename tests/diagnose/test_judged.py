@@ -72,7 +72,13 @@ def test_a_likelier_rival_takes_the_place_of_what_was_selected_first(trial: Tria
 def test_what_helps_no_held_out_stretch_falls_and_is_told(trial: Trial) -> None:
     right = fit(trial, of(trial, LOSS, FIRST))
     idle = of(trial, ("wind", None))
-    breeze = Fit((*right.suspects, *idle), (*right.values, np.array([0.2, 0.1])), np.eye(4), right.hull, right.evidence)
+    breeze = Fit(
+        (*right.suspects, *idle),
+        (*right.values, np.array([0.2, 0.1, 1.0, 1.0, 1.0])),
+        np.eye(7),
+        right.hull,
+        right.evidence,
+    )
     told = judged(trial.with_noise_of(right), breeze, [], lambda stage: None)
     assert {one.key for one in told.fit.suspects} == {LOSS, FIRST}
     (sentence,) = told.told

@@ -150,7 +150,7 @@ def test_an_effect_that_a_law_makes_idle_is_an_impostor_and_a_true_one_is_not() 
     lacking = replace(calm.plain, external=calm.plain.external - (blown.external - calm.plain.external))
     trial = trial_of(calm.windows, lacking, calm.hull_spread)
     kept = fit(trial, [breeze])
-    assert kept.values[0] == pytest.approx([-3.0, 2.0], abs=0.3)
+    assert kept.values[0][:2] == pytest.approx([-3.0, 2.0], abs=0.3)
     trial = trial.with_noise_of(kept)
     assert impostors(trial, fit(trial, [breeze], kept.values)) == ()
 

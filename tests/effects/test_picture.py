@@ -14,6 +14,7 @@ from ferryid.effects.picture import (
     UNITS,
     Picture,
     Scene,
+    aboard,
     acceleration,
     as_measured,
     between,
@@ -52,7 +53,7 @@ def picture(*, flow: bool, load: bool, damped: bool) -> Picture:
         scene.angles,
         RNG.normal(size=(N, 3)) * 50.0,
         RNG.normal(size=(N, 2)) * 0.3 if flow else None,
-        np.column_stack([mass, mass * x, mass * x**2]) if load else None,
+        aboard(np.column_stack([mass, x])) if load else None,
         1.0 + RNG.random(N) if damped else None,
     )
 
@@ -251,7 +252,7 @@ def test_changes_with_the_hull_are_those_of_a_hull_that_is_moved(flow: bool, loa
 def test_rows_that_do_not_belong_together_are_refused() -> None:
     one = picture(flow=False, load=False, damped=False)
     short = replace(one, external=one.external[:-1])
-    for refused in (short, replace(one, load=np.ones((N - 1, 3))), replace(one, parts=one.parts[1:])):
+    for refused in (short, replace(one, load=np.ones((N - 1, 5))), replace(one, parts=one.parts[1:])):
         with pytest.raises(ValueError, match="other lengths"):
             acceleration(refused)
     with pytest.raises(ValueError, match="other lengths"):

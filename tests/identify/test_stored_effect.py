@@ -44,10 +44,9 @@ CONDITIONS = {"current", "gusts", "mooring", "payload", "shallow_water", "time_d
 
 
 def stored(effect: str, instance: str | None = None, *, onset_s: float | None = None, **values: float) -> StoredEffect:
-    parameters = {
-        one.name: Quantity(values[one.name], values[one.name] - 0.1, values[one.name] + 0.1, one.unit)
-        for one in effects()[effect].parameters_of(FERRY)
-    }
+    every = {one.name: one for one in effects()[effect].parameters_of(FERRY)}
+    known = {name: values.get(name, one.neutral) for name, one in every.items()}
+    parameters = {name: Quantity(value, value - 0.1, value + 0.1, every[name].unit) for name, value in known.items()}
     source = Source("trial", HERE, 0.97, onset_s, {"surge": 0.2, "sway": 0.1, "yaw": 0.0}, ("payload",))
     return StoredEffect(effect, instance, parameters, (source,))
 

@@ -9,7 +9,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import WIDER
+from ferryid.diagnose.hypothesis import FORM, WIDER
 from ferryid.errors import FerryIdError
 from ferryid.prove.calibration import calibrated, exceeded
 from ferryid.prove.case import Truth
@@ -88,7 +88,8 @@ def test_the_gain_grows_with_the_square_of_the_size(log: Logs) -> None:
     # Of one parameter of a nearly linear model, the gain is half of the square of its deviate.
     for each in gains:
         factor = each.parameters["factor"]
-        deviate = (factor.value - 1.0) / ((factor.high - factor.low) / (2.0 * 1.96 * WIDER))
+        away, told = factor.value - 1.0, (factor.high - factor.low) / (2.0 * 1.96)
+        deviate = away * WIDER / np.sqrt(told**2 - (FORM * away) ** 2)
         assert each.gain == pytest.approx(0.5 * deviate**2, rel=0.25)
 
 

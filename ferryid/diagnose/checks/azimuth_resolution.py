@@ -16,12 +16,16 @@ from ferryid.diagnose.result import Estimate
 from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
 
-LEAST = 0.04
-"""Error across the thrust, as a share of it, from which on a step matters: that of steps of eight degrees."""
+LEAST = 0.02
+"""Error across the thrust, as a share of it, from which on a step matters: that of steps of four degrees."""
 HELD = 0.1
 """Share of the rows in which a rounded angle stays as it is from row to row at least; one that is not rounded never does."""
 ON_GRID = 0.95
 """Share of these that have to be multiples of the step."""
+CLOSE = 0.01
+"""How near a multiple a reading has to be, in steps."""
+TURNS = np.arange(-2, 3)
+"""Whole turns after which an angle may have been rounded that is written within half a turn."""
 SLEW_DEGPS = 30.0
 """Speed at which azimuth thrusters turn where they do: a reading that lasts longer than a step then takes is the angle."""
 
@@ -40,9 +44,21 @@ def step_of(angle: Floats) -> float:
     apart = apart[apart > 1e-4]
     if apart.size < 2:
         return 0.0
-    step = float(np.median(apart[apart < 1.5 * apart.min()]))
-    off = np.abs(readings - step * np.round(readings / step))
-    return step if float(np.mean(off < 0.01 * step)) >= ON_GRID else 0.0
+    # Half a turn need not be a multiple: next to it readings may lie closer than a step.
+    gaps, counts = np.unique(np.round(apart, 4), return_counts=True)
+    step = float(np.median(apart[np.abs(apart - gaps[np.argmax(counts)]) < 1e-3]))
+    return step if float(np.mean(off_grid(readings, step) < CLOSE * step)) >= ON_GRID else 0.0
+
+
+def off_grid(readings: Floats, step_deg: float) -> Floats:
+    """Return how far readings [deg], shape (n,), are from the nearest multiple of a step [deg]."""
+    turned = readings[:, None] + 360.0 * TURNS
+    return np.asarray(np.abs(turned - step_deg * np.round(turned / step_deg)).min(axis=1))
+
+
+def estimate(step_deg: float) -> Estimate:
+    """Return a step with its interval: it is known as well as multiples of it are recognised."""
+    return Estimate(step_deg, (1.0 - CLOSE) * step_deg, (1.0 + CLOSE) * step_deg, "deg")
 
 
 def restored(angle: Floats, step_deg: float, step_s: float) -> Floats:
@@ -52,7 +68,8 @@ def restored(angle: Floats, step_deg: float, step_s: float) -> Floats:
     to the reading where that lasts.
     """
     step = np.radians(step_deg)
-    level = step * np.round(angle / step)
+    turns = 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+    level = turns + step * np.round((angle - turns) / step)
     change = np.flatnonzero(np.diff(level))
     if change.size < 2:
         return angle
@@ -102,7 +119,7 @@ def find(scene: Scene) -> SensorFinding | None:
 
     return SensorFinding(
         "azimuth_resolution",
-        {"step": Estimate(step, step, step, "deg")},
+        {"step": estimate(step)},
         f"The azimuth angles are read in steps of {step:g} deg: at any moment the force points {100.0 * error:.0f} % of itself "
         "to one side or the other.",
         lambda seen: corrected(seen, steps),

@@ -19,6 +19,9 @@ from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
 
 LEAST = 0.02
+FILTERED = 0.001
+"""Standard deviation of the factor by what filters between sensors and log leave: a heading that was steadied by the gyro has a
+little of its error, too. No scatter tells of it."""
 SLOW_RADPS = 0.003
 """Below this root mean square of the rate, heading and rate are compared in vain."""
 OVERLAP = LENGTH_S / STRIDE_S
@@ -127,6 +130,7 @@ def _step(Z: Floats, J: Floats, measured: Floats, trial: Spans) -> Solution | No
     inverse = SIZE[:, None] * np.linalg.inv(scaled) * SIZE
     errors = np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse.T), 0.0))
     freedom = max(solved.freedom, int(len(left) / OVERLAP) - len(NEUTRAL))
+    errors[0] = np.hypot(errors[0], FILTERED)
     return Solution(solved.values, errors, freedom)
 
 

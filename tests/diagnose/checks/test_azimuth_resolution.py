@@ -74,4 +74,14 @@ def test_a_coarse_step_is_found_and_the_force_turned() -> None:
 
 def test_whole_degrees_make_no_difference_and_are_no_finding() -> None:
     assert find(scene(true_angle(3), 1.0)) is None
-    assert find(scene(true_angle(3), 5.0)) is None
+    assert find(scene(true_angle(3), 3.5)) is None
+
+
+@pytest.mark.parametrize("step_deg", [4.1, 11.5, 17.0])
+def test_steps_that_no_turn_is_a_multiple_of_are_read_within_half_a_turn(step_deg: float) -> None:
+    rows = np.arange(0.0, 300.0, 0.05)
+    angle = 9.0 * np.sin(0.05 * rows) + 0.5 * np.sin(0.9 * rows)
+    seen = np.unwrap(read(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi, step_deg))
+    assert step_of(seen) == pytest.approx(step_deg, rel=1e-6)
+    again = restored(seen, step_deg, 0.05)
+    assert np.std(again - angle) < 0.8 * np.std(seen - angle)
