@@ -21,10 +21,10 @@ HULL_SPREAD = 0.12
 """Standard deviation of what is believed of each of the hull's coefficients, as a share of it."""
 WIDER = 1.5
 """Factor on standard deviations of the posterior, which takes the measured velocity and heading for true where they enter
-products. Chosen in view of simulated logs; `make reach` tells how wide intervals would have to be in others."""
+products. Chosen in view of simulated logs; `make proof` tells how often intervals hold in others."""
 FORM = 0.1
-"""How far off an effect's formula, and what the model has beside it, are believed to be: a standard deviation, as a share of how
-far a parameter is from neutral. The posterior knows of noise and coefficients only. Chosen in view of trials of a plant with
+"""How far off an effect's formula, and what the model has beside it, are believed to be: a standard deviation, as a share of
+how far a parameter is from neutral. The posterior knows of noise and coefficients only. Chosen in view of trials of a plant with
 other formulas; `make proof` tells how often intervals hold."""
 STEPS = 24
 ANEW = 4
@@ -121,7 +121,7 @@ class Fit:
     def told_errors(self, index: int) -> Floats:
         """Return the standard deviations that are told: `WIDER`, and with what no log tells of an effect's size.
 
-        That is `FORM`, and what hull or instruments may be off anyway (``idle``, about as a 95 % interval). A place has no size.
+        That is `FORM`, and what hull or instruments may be off anyway (``idle``, about a 95 % interval). A place has no size.
         """
         suspect, values = self.suspects[index], self.values[index]
         sized = np.array([one.unit == suspect.parameters[0].unit for one in suspect.parameters])

@@ -1,8 +1,8 @@
 """Wind: Blendermann's load of an air flow that is steady over ground.
 
-Areas and shape of the superstructure tell the load on a vessel to some ten per cent, and its moment worse. How much more or less
-it is on each axis is fitted beside the flow and not told: without it, the axis that is measured best would tell the wind by the
-coefficient that is known worst.
+Areas and shape of the superstructure tell the load on a vessel to some ten per cent, and its moment worse. How much more or
+less it is on each axis is fitted beside the flow and not told: without it, the axis that is measured best would tell the wind
+by the coefficient that is known worst.
 """
 
 from __future__ import annotations

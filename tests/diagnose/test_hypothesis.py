@@ -9,10 +9,11 @@ from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
 from ferryid.diagnose.filter import Filter, stride_s
-from ferryid.diagnose.hypothesis import Suspect, Trial, fit
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit
 from ferryid.diagnose.kalman import DIFFUSE
 from ferryid.diagnose.noise import ORDER, Noise, noise_of
 from ferryid.diagnose.weak import steps_of, windows
+from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.picture import Picture, Scene, hull_of
 from ferryid.vessel import load_profile
@@ -178,3 +179,25 @@ def test_noise_is_white_once_its_own_autoregression_is_taken_off() -> None:
     both = learnt.white(columns, runs)
     np.testing.assert_allclose(both[:, 1], 2.0 * both[:, 0])
     np.testing.assert_allclose(both[:, 0], learnt.white(series, runs))
+
+
+def told(name: str, values: list[float], variance: float = 0.0) -> Floats:
+    """Return the errors that are told of an effect whose posterior has this variance in every parameter."""
+    effect = effects()[name]
+    suspect = Suspect(effect, effect.instances(FERRY)[0], effect.parameters_of(FERRY)[: len(values)])
+    return Fit((suspect,), (np.array(values),), variance * np.eye(len(values)), hull_of(FERRY), 0.0).told_errors(0)
+
+
+def test_a_formula_is_believed_to_a_tenth_of_what_it_changes() -> None:
+    # Of a posterior that knows everything: a tenth of the distance from what changes nothing, which is 1 of a factor.
+    np.testing.assert_allclose(told("current", [0.3, -0.2]), [0.03, 0.02])
+    np.testing.assert_allclose(told("thruster_gain", [0.7]), [0.03])
+    # Where the hull may be as much off itself, that stays however little it is.
+    np.testing.assert_allclose(told("thruster_lag", [0.0]), [0.015])
+    # Half as much again as the posterior says, and no more where nothing is changed.
+    np.testing.assert_allclose(told("thruster_gain", [1.0], 0.01**2), [0.015])
+    np.testing.assert_allclose(told("thruster_gain", [0.6], 0.02**2), [0.05])
+
+
+def test_a_place_is_no_size() -> None:
+    np.testing.assert_allclose(told("mooring", [50.0, 40.0, 300.0, -200.0]), [5.0, 4.0, 0.0, 0.0])

@@ -137,6 +137,19 @@ def test_even_noise_has_no_bursts() -> None:
     assert max(strongest) < BURSTS
 
 
+def test_a_wind_is_told_right_whose_moment_the_profile_has_too_large() -> None:
+    wind = effects()["wind"]
+    breeze = Suspect(wind, None, wind.parameters_of(FERRY))
+    calm = trial_with(pushes())
+    blown = breeze.act(calm.plain, np.array([-5.0, 3.0, 1.0, 1.0, 0.5]))
+    lacking = replace(calm.plain, external=calm.plain.external - (blown.external - calm.plain.external))
+    trial = trial_of(calm.windows, lacking, calm.hull_spread)
+    assert fit(trial, [breeze]).values[0] == pytest.approx([-5.0, 3.0, 1.0, 1.0, 0.5], abs=0.25)
+    # By the moment alone, which is measured best, it would blow less.
+    stiff = fit(trial, [replace(breeze, parameters=breeze.parameters[:2])])
+    assert np.hypot(*stiff.values[0]) < 0.9 * np.hypot(5.0, 3.0)
+
+
 def test_an_effect_that_a_law_makes_idle_is_an_impostor_and_a_true_one_is_not() -> None:
     gain = effects()["thruster_gain"]
     suspect = Suspect(gain, "thruster1", gain.parameters_of(FERRY))

@@ -257,3 +257,15 @@ def test_rows_that_do_not_belong_together_are_refused() -> None:
             acceleration(refused)
     with pytest.raises(ValueError, match="other lengths"):
         required_force(short, np.zeros((N, 3)))
+
+
+def test_a_deeper_hull_moves_more_water_and_is_damped_more() -> None:
+    one = picture(flow=False, load=False, damped=False)
+    mass, x, by_draught = 300.0, 0.5, 1.2
+    seen = acceleration(effects()["payload"].apply(one, np.array([mass, x, by_draught]), None))
+    hull = FERRY.hull
+    more = by_draught * mass / (1025.0 * 0.85 * hull.length_m * hull.beam_m * hull.draught_m)
+    rigid = np.array([hull.mass_kg, hull.mass_kg, hull.mass_kg * hull.x_g_m, hull.mass_kg * hull.x_g_m, hull.inertia_z])
+    masses = one.hull[:5] + more * (one.hull[:5] - rigid) + [mass, mass, mass * x, mass * x, mass * x * x]
+    deeper = replace(one, hull=np.concatenate([masses, (1.0 + more) * one.hull[5:]]))
+    np.testing.assert_allclose(seen, acceleration(deeper), rtol=1e-9)

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from ferryid.simulate import simulate, write_log
-from tests.reach.places import FERRY, Place
+from ferryid.simulate.scenario import parse_scenario
 
-POINTS = "[[0, 0, 0], [14, 4, 60], [10, -8, 180], [-4, -10, 270], [0, 0, 0]]"
+FERRY = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+controller = { delta = 0.7, sigma = 0.7 }
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+"""
 PATHS = (
-    Place("first", "Round a square", "milliampere", FERRY + 'path = { kind = "four-corner" }\n'),
-    Place("second", "From point to point", "milliampere", FERRY + f'path = {{ kind = "points", points = {POINTS} }}\n'),
+    'path = { kind = "four-corner" }\n',
+    'path = { kind = "points", points = [[0, 0, 0], [14, 4, 60], [10, -8, 180], [-4, -10, 270], [0, 0, 0]] }\n',
 )
-WIND = {"environment": {"wind": {"north_mps": -5.0, "east_mps": 4.0}}}
-WEAK = {"thrusters": {"faults": [{"thruster": "thruster1", "factor": 0.6}]}}
+WIND = "environment = { wind = { north_mps = -5.0, east_mps = 4.0 } }\n"
+WEAK = 'thrusters = { faults = [{ thruster = "thruster1", factor = 0.6 }] }\n'
 
 
-def two_logs(folder: Path, tables: Mapping[str, Any], seed: int = 1) -> tuple[str, str]:
-    """Return the paths of a first and a second log of vessels that something is wrong with."""
+def two_logs(folder: Path, concealed: str, seed: int = 1) -> tuple[str, str]:
+    """Return the paths of a first and a second log of vessels that something is wrong with, told as TOML."""
     logs = []
-    for i, place in enumerate(PATHS):
-        log = folder / f"{place.name}.mcap"
-        write_log(simulate(place.scenario(tables), seed + i), log)
+    for i, path in enumerate(PATHS):
+        log = folder / f"log{i + 1}.mcap"
+        write_log(simulate(parse_scenario(FERRY + path + concealed, log.stem), seed + i), log)
         logs.append(str(log))
     return logs[0], logs[1]

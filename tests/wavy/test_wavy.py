@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.reach.wavy import AXES, lines, wavy
+from tests.wavy.wavy import AXES, lines, wavy
 
 
 def test_a_hull_learnt_in_waves_serves_in_calm_water(tmp_path: Path) -> None:
