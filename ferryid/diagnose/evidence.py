@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ferryid.diagnose.folds import Folds, by_block, draws, folds_of, subset
 from ferryid.diagnose.free_runs import FreeRuns, free_runs
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, near
 from ferryid.diagnose.noise import ORDER
 from ferryid.diagnose.parallel import over
 from ferryid.diagnose.weak import Windows
@@ -168,7 +168,7 @@ def evidence(trial: Trial, found: Fit) -> Evidence | None:
     if folds is None:
         return None
     base = held_out(trial, folds, ())
-    full = held_out(trial, folds, found.suspects, found.values)
+    full = held_out(trial, folds, found.suspects, found.values, found)
     proofs = tuple(_proof(trial, folds, found, full, base, index) for index in range(len(found.suspects)))
     return Evidence(
         folds,
@@ -178,7 +178,13 @@ def evidence(trial: Trial, found: Fit) -> Evidence | None:
     )
 
 
-def held_out(trial: Trial, folds: Folds, suspects: Sequence[Suspect], start: Sequence[Floats] | None = None) -> HeldOut:
+def held_out(
+    trial: Trial,
+    folds: Folds,
+    suspects: Sequence[Suspect],
+    start: Sequence[Floats] | None = None,
+    beside: Fit | None = None,
+) -> HeldOut:
     """Return what a hypothesis leaves of the gaps of windows it was not fitted to.
 
     Parameters
@@ -189,10 +195,19 @@ def held_out(trial: Trial, folds: Folds, suspects: Sequence[Suspect], start: Seq
         From `folds_of`.
     suspects, start
         As in `ferryid.diagnose.hypothesis.fit`.
+    beside
+        A fit whose hull is not far from theirs, where the fits begin; the profile's hull where None.
     """
+    own_start = tuple(one.start for one in suspects) if start is None else tuple(start)
+
+    def made_of(training: Windows) -> Fit:
+        part = _part(trial, training)
+        begin = None if beside is None else near(part, replace(beside, suspects=tuple(suspects), values=own_start))
+        return fit(part, suspects, own_start, begin=begin)
+
     gaps = np.empty((len(trial.windows.starts), int(trial.windows.channels.sum())))
     errors = np.empty((len(trial.windows.starts), 3))
-    fits = over(lambda training: fit(_part(trial, training), suspects, start), folds.training)
+    fits = over(made_of, folds.training)
     for k, made in enumerate(fits):
         own = folds.fold == k
         judged, picture = subset(trial.windows, own), imagined(trial.plain, made)
@@ -259,18 +274,18 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
     others = [k for k in range(len(found.suspects)) if k != index]
     rest = [found.suspects[k] for k in others]
     start = [found.values[k] for k in others]
-    without = held_out(trial, folds, rest, start) if rest else base
+    without = held_out(trial, folds, rest, start, found) if rest else base
     made = improvement(trial, folds, without, full)
     in_its_place = placebos(trial, suspect, values)
 
-    def gains_of_placebos(weighed: Trial, bare: HeldOut) -> dict[str, Floats]:
+    def gains_of_placebos(weighed: Trial, bare: HeldOut, beside: Fit | None = None) -> dict[str, Floats]:
         judged = {
-            name: held_out(weighed, folds, [*rest, placebo], [*start, suspect.start])
+            name: held_out(weighed, folds, [*rest, placebo], [*start, suspect.start], beside)
             for name, placebo in in_its_place.items()
         }
         return {name: _gains(weighed, folds, bare.gaps, one.gaps) for name, one in judged.items()}
 
-    gains, by_name = _gains(trial, folds, without.gaps, full.gaps), gains_of_placebos(trial, without)
+    gains, by_name = _gains(trial, folds, without.gaps, full.gaps), gains_of_placebos(trial, without, found)
     picks = draws(folds.block)
     beaten = _beaten(picks, gains, by_name)
     scores = {name: float(one.sum()) for name, one in by_name.items()}

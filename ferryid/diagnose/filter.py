@@ -28,7 +28,7 @@ GROUPS = (0, 0, 1)
 STARTS = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5))
 """Where the search for a channel's noise begins: white error, as a share of all; time constant of the coloured, in steps; and
 disturbance, as a share of the acceleration left over."""
-GLIMPSE, SIGHT = 12, 20.0
+GLIMPSE, SIGHT = 12, 12.0
 """Steps of the search for a disturbance after which it is given up if the likelihood is farther than this from being enough."""
 SMALL = 1e-4
 """Move of a parameter's logarithm by which a slope is found."""

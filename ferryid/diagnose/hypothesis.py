@@ -24,8 +24,8 @@ WIDER = 1.5
 products. Chosen in view of simulated logs; `make proof` tells how often intervals hold in others."""
 FORM = 0.1
 """How far off an effect's formula, and what the model has beside it, are believed to be: a standard deviation, as a share of
-how far a parameter is from neutral. The posterior knows of noise and coefficients only. Chosen in view of trials of a plant with
-other formulas; `make proof` tells how often intervals hold."""
+how far a parameter is from neutral. The posterior knows of noise and coefficients only. Chosen in view of trials of a plant
+with other formulas; `make proof` tells how often intervals hold."""
 STEPS = 24
 ANEW = 4
 """Steps after which the derivatives by the hull's coefficients are taken anew."""
@@ -261,8 +261,8 @@ def fit(
     if every:
         z[h:] = (np.concatenate([one.start for one in suspects] if start is None else start) - neutral) / size
     if begin is not None:
-        free = trial.hull_spread > 0.0
-        z[:h][free] = (begin.hull - trial.plain.hull)[free] / trial.hull_spread[free]
+        moves = trial.hull_spread > 0.0
+        z[:h][moves] = (begin.hull - trial.plain.hull)[moves] / trial.hull_spread[moves]
     w = white(z)
     cost = float(w @ w + z @ z)
     A = np.eye(h + q)
@@ -273,11 +273,13 @@ def fit(
             by_hull, fresh = trial.hull_slopes(picture_of(z)), True
         J = np.zeros((len(w), h + q))
         J[:, :h] = by_hull
-        for k in np.flatnonzero(size > HELD).tolist():
-            moved = z.copy()
-            d = NUDGE if z[h + k] + NUDGE <= high[k] else -NUDGE
-            moved[h + k] += d
-            J[:, h + k] = (white(moved) - w) / d
+        free = np.flatnonzero(size > HELD)
+        if free.size:
+            d = np.where(z[h + free] + NUDGE <= high[free], NUDGE, -NUDGE)
+            moved = np.repeat(z[None], len(free), axis=0)
+            moved[np.arange(len(free)), h + free] += d
+            gaps = np.stack([trial.steps.gap(picture_of(one)) for one in moved], axis=2)
+            J[:, h + free] = (trial.sieve.white(gaps) - w[:, None]) / d
         A = J.T @ J + np.eye(h + q)
         if count == steps:
             break

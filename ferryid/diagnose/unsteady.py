@@ -106,14 +106,10 @@ def disturbed(
         worth = WORTH if states else least
         tried = []
         for suspect in left:
-            effect = suspect.effect
-            if effect.unsteady is None or not effect.unsteady(picture, _sizes(suspect)):
+            assert suspect.effect.unsteady is not None
+            processes = suspect.effect.unsteady(picture)
+            if not processes(_sizes(suspect)):
                 continue
-
-            def processes(p: Floats, suspect: Suspect = suspect) -> tuple[Process, ...]:
-                assert suspect.effect.unsteady is not None
-                return suspect.effect.unsteady(picture, p)
-
             places = before.get(suspect.key, _starts(suspect))
             begin = max(places, key=lambda one: _glance(steps, gaps, noise, processes(one), picture))
             price = 0.5 * len(begin) * log(len(steps.starts))
@@ -235,7 +231,7 @@ def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spec
     assert suspect.effect.unsteady is not None
     parameters = {name: one for name, one in state.estimates.items() if name in state.known}
     picture = trial.filter.picture or trial.plain
-    pushes = suspect.effect.unsteady(picture, state.values)
+    pushes = suspect.effect.unsteady(picture)(state.values)
     pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in pushes]
     # Newtons and newton metres compare as what they do to the vessel.
     arm = np.array([1.0, 1.0, np.sqrt(picture.hull[0] / picture.hull[4])])

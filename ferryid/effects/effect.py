@@ -72,6 +72,10 @@ class Process:
     frequency_hz: float = 0.0
 
 
+Processes = Callable[[Floats], tuple[Process, ...]]
+"""What disturbances are by their parameters."""
+
+
 @dataclass(frozen=True)
 class Effect:
     """Physics that a model may have left out.
@@ -122,7 +126,7 @@ class Effect:
     of_sensor
         True where it corrects what was measured: such effects act first, as the others act on what is true.
     unsteady
-        ``unsteady(picture, p)`` returns what comes and goes by chance, from positive parameters; none where the picture has
+        ``unsteady(picture)(p)`` returns what comes and goes by chance, from positive parameters; none where the picture has
         nothing for it to act on. Such an effect changes no picture: it is a state of the filter.
     about
         Id of the effect about which an unsteady one comes and goes, and beside which it is looked for.
@@ -150,7 +154,7 @@ class Effect:
     bends_hull: bool = False
     ridge: str = ""
     of_sensor: bool = False
-    unsteady: Callable[[Picture, Floats], tuple[Process, ...]] | None = None
+    unsteady: Callable[[Picture], Processes] | None = None
     about: str = ""
     regressor: Callable[[Picture, Floats, str | None, str], tuple[str, Floats]] | None = None
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Process, Values
+from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats, Profile
 from ferryid.vessel.wind import wind_force
@@ -26,11 +26,11 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, gust_std=float(p[0]))
 
 
-def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:
+def unsteady(picture: Picture) -> Processes:
     """Return the load of a gust to the north and to the east; none in still air, whose load is of second order."""
     scene, areas = picture.scene, picture.scene.profile.wind
     if areas is None or picture.air is None:
-        return ()
+        return lambda p: ()
     loads, factors = [], 1.0 if picture.air_factors is None else picture.air_factors
     for towards in np.eye(2):
         ends = [
@@ -40,7 +40,7 @@ def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:
             for side in (1.0, -1.0)
         ]
         loads.append(factors * (ends[0] - ends[1]) / (2.0 * STEP))
-    return tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
+    return lambda p: tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
 
 
 def cannot(scene: Scene) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Process, Values
+from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats, Profile
 
@@ -45,15 +45,17 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return picture
 
 
-def unsteady(picture: Picture, p: Floats) -> tuple[Process, ...]:
+def unsteady(picture: Picture) -> Processes:
     """Return a process on each axis."""
-    frequency, force, moment, memory = (float(value) for value in p)
-    made = []
-    for axis, std in enumerate((force, force, moment)):
-        load = np.zeros((len(picture.scene.t), 3))
-        load[:, axis] = 1.0
-        made.append(Process(load, std, memory, frequency))
-    return tuple(made)
+    loads = [np.tile(axis, (len(picture.scene.t), 1)) for axis in np.eye(3)]
+
+    def processes(p: Floats) -> tuple[Process, ...]:
+        frequency, force, moment, memory = (float(value) for value in p)
+        return tuple(
+            Process(load, std, memory, frequency) for load, std in zip(loads, (force, force, moment), strict=True)
+        )
+
+    return processes
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -18,7 +18,7 @@ from ferryid.diagnose.result import Estimate
 from ferryid.diagnose.ridge import intervals
 from ferryid.diagnose.unsteady import BANDS, STRENGTHS, State
 from ferryid.effects import effects
-from ferryid.effects.effect import HELD, Process
+from ferryid.effects.effect import HELD, Processes
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
 
@@ -167,21 +167,15 @@ def _shaken(
     steps = trial.excerpt
     gaps = steps.gap(picture)
     states = {state.suspect.key: state for state in near}
+    pushes = {suspect.key: _pushes(suspect, within) for suspect in (*unsteady, *(state.suspect for state in near))}
     noise = trial.filter
     for suspect in unsteady:
-        others = tuple(
-            one
-            for key, state in states.items()
-            if key != suspect.key
-            for one in _pushes(state.suspect, within, state.values)
-        )
+        others = tuple(one for key, state in states.items() if key != suspect.key for one in pushes[key](state.values))
+        processes = pushes[suspect.key]
         noise = Filter(noise.channels, others, within)
 
-        def processes(p: Floats, suspect: Suspect = suspect) -> tuple[Process, ...]:
-            return _pushes(suspect, within, p)
-
-        def glance(p: Floats, noise: Filter = noise, suspect: Suspect = suspect) -> float:
-            every = (*noise.processes, *_pushes(suspect, within, p))
+        def glance(p: Floats, noise: Filter = noise, processes: Processes = processes) -> float:
+            every = (*noise.processes, *processes(p))
             return likelihood(Filter(noise.channels, every, within), steps, gaps)
 
         places = [states[suspect.key].values] if suspect.key in states else _places(suspect)
@@ -194,8 +188,9 @@ def _shaken(
     return replace(trial, filter=noise, plain=plain), tuple(states.values())
 
 
-def _pushes(suspect: Suspect, picture: Picture, p: Floats) -> tuple[Process, ...]:
-    return () if suspect.effect.unsteady is None else suspect.effect.unsteady(picture, p)
+def _pushes(suspect: Suspect, picture: Picture) -> Processes:
+    assert suspect.effect.unsteady is not None
+    return suspect.effect.unsteady(picture)
 
 
 def _places(suspect: Suspect) -> list[Floats]:
