@@ -68,6 +68,12 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
                 f"{suspect.title} acts for {lasts_s(trial, suspect):.0f} s only: no fit that had not seen all of it could be "
                 "judged on it, so that it is a hint."
             )
+        single = suspect.effect.once(trial.plain.scene, kept.values[i])
+        if single:
+            told.append(
+                f"{suspect.title}: the vessel was in that place once, or hardly at all, so that something else may have come "
+                "just then: it is a hint."
+            )
         shares = harmed.get(suspect.key, {})
         worse = min(shares, key=lambda axis: shares[axis], default="")
         harms = bool(worse) and shares[worse] < -HARM
@@ -80,7 +86,9 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
             Finding(
                 effect=suspect.effect.id,
                 instance=suspect.instance,
-                probability=min(standing.probability, HINT) if unseen or brief or harms else standing.probability,
+                probability=min(standing.probability, HINT)
+                if unseen or brief or single or harms
+                else standing.probability,
                 parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
                 intervals=_intervals(trial, estimates),

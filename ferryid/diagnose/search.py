@@ -231,7 +231,12 @@ def void(trial: Trial, made: Fit, index: int = -1) -> bool:
     """Tell whether an effect of a fit, the last one if not another, moves the vessel too little to matter to anybody."""
     suspect, seen = made.suspects[index], trial.windows
     named = zip(made.values[index].tolist(), suspect.parameters, strict=True)
-    away = [abs(value - one.neutral) for value, one in named if one.unit == suspect.parameters[0].unit]
+    untold = suspect.effect.untold(trial.plain.scene, made.values[index])
+    away = [
+        abs(value - one.neutral)
+        for value, one in named
+        if one.unit == suspect.parameters[0].unit and one.name not in untold
+    ]
     if max(away) < suspect.effect.idle:
         return True
     others = [k for k in range(len(made.suspects)) if k != index % len(made.suspects)]

@@ -101,6 +101,8 @@ class Effect:
         (n, 3). What ends leaves the vessel as fast as it is.
     says
         One sentence on a finding, from its values by name and its instance.
+    once
+        ``once(scene, p)`` is True where it acted for so short a time that whatever came just then would look the same.
     in_part
         True where that sentence can be said of some of the values alone, those that a log tells.
     scenario
@@ -149,6 +151,7 @@ class Effect:
     choose: Callable[[Picture, Floats, Residual], Choice] | None = None
     least: float = 0.0
     untold: Callable[[Scene, Floats], frozenset[str]] = lambda scene, p: frozenset()
+    once: Callable[[Scene, Floats], bool] = lambda scene, p: False
     in_part: bool = False
     idle: float = 0.0
     bends_hull: bool = False

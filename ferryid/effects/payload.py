@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
-from ferryid.effects.picture import Picture, Scene, aboard
+from ferryid.effects.picture import Picture, Scene, aboard, added_mass
 from ferryid.vessel.profile import Floats, Profile
 
 WATERPLANE = 0.85
@@ -46,10 +46,8 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     n = len(picture.scene.t)
     load, damping = aboard(np.tile(p[:2], (n, 1))), picture.damping_factor
     if len(p) > 2:
-        hull = picture.scene.profile.hull
         more = float(p[2] * p[0]) * _by_mass(picture.scene.profile)
-        moment = hull.mass_kg * hull.x_g_m
-        load = load + more * (picture.hull[:5] - [hull.mass_kg, hull.mass_kg, moment, moment, hull.inertia_z])
+        load = load + more * added_mass(picture)
         damping = np.full(n, 1.0 + more) if damping is None else damping * (1.0 + more)
     return replace(picture, load=load if picture.load is None else picture.load + load, damping_factor=damping)
 

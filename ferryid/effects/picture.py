@@ -261,6 +261,13 @@ def _forces(picture: Picture) -> tuple[Floats, Floats, Floats, Floats]:
     return external, flow, load, factor
 
 
+def added_mass(picture: Picture) -> Floats:
+    """Return the part of a picture's mass matrix that is not the rigid body's, as a load, shape (5,)."""
+    hull = picture.scene.profile.hull
+    moment = hull.mass_kg * hull.x_g_m
+    return np.asarray(picture.hull[:5] - [hull.mass_kg, hull.mass_kg, moment, moment, hull.inertia_z])
+
+
 def aboard(payload: Floats) -> Floats:
     """Return what masses and their places, as of `payload_mass`, shape (n, 2), are as the load of a picture, shape (n, 5)."""
     return payload_mass(payload)[:, [0, 1, 1, 2, 2], [0, 1, 2, 1, 2]]

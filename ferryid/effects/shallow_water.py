@@ -1,6 +1,7 @@
-"""Shallow water: all damping is multiplied in a place.
+"""Shallow water: all damping is multiplied in a place, and the added mass grows there, too.
 
-Where that is, nobody says: a rectangle is chosen from a grid over the visited waters, and its sides are fitted.
+Where that is, nobody says: a rectangle is chosen from a grid over the visited waters, and its sides are fitted. How much the
+added mass grows is fitted as well and not told: without it, water that moves along would seem to be a load.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.picture import Picture, Scene, added_mass
 from ferryid.effects.scan import by_hull, linear_gains
 from ferryid.vessel.profile import Floats, Profile
 
@@ -28,8 +29,10 @@ LEAST, MOST = 0.05, 0.8
 is nearly everywhere is the hull's own damping, or its fouling."""
 BEYOND = 0.02
 """Share of the log that must lie beyond a side for the log to tell where it is."""
-FACTOR = Parameter("factor", "-", 0.4, 0.2, 6.0, neutral=1.0)
+FACTOR = Parameter("factor", "-", 0.4, 1.0, 6.0, neutral=1.0)
 SIDES = ("south", "north", "west", "east")
+HEAVIER = Parameter("added_mass", "-", 0.3, 0.0, 2.0, start=0.2)
+"""Growth of the added mass over that of the damping."""
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -38,6 +41,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (
         FACTOR,
         *(_side(name, sign * 2.0 * length, length, 100.0) for name, sign in zip(SIDES, (-1, 1, -1, 1), strict=True)),
+        HEAVIER,
     )
 
 
@@ -58,8 +62,10 @@ def inside(scene: Scene, sides: Floats) -> Floats:
 
 
 def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
-    """Multiply the damping in the place."""
-    return _damped(picture, 1.0 + (float(p[0]) - 1.0) * inside(picture.scene, p[1:]))
+    """Multiply the damping in the place, and let the added mass grow."""
+    growth = (float(p[0]) - 1.0) * inside(picture.scene, p[1:5])
+    load = float(p[5]) * growth[:, None] * added_mass(picture)
+    return replace(_damped(picture, 1.0 + growth), load=load if picture.load is None else picture.load + load)
 
 
 def _damped(picture: Picture, factor: Floats) -> Picture:
@@ -109,7 +115,7 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
     sizes = np.repeat((high - low) / CELLS, 2)
     parameters = (_side(name, float(at), float(size)) for name, at, size in zip(SIDES, sides, sizes, strict=True))
-    return Choice((FACTOR, *parameters), log(len(gains)))
+    return Choice((FACTOR, *parameters, HEAVIER), log(len(gains)))
 
 
 def cannot(scene: Scene) -> str:
@@ -120,11 +126,19 @@ def cannot(scene: Scene) -> str:
 
 
 def untold(scene: Scene, p: Floats) -> frozenset[str]:
-    """Return the sides beyond which the vessel hardly went: the place may reach any farther there."""
+    """Return the sides beyond which the vessel hardly went, as the place may reach any farther there, and the added mass."""
     x, y = scene.eta[scene.usable, 0], scene.eta[scene.usable, 1]
-    south, north, west, east = p[1:].tolist()
+    south, north, west, east = p[1:5].tolist()
     outside = (x < south, x > north, y < west, y > east)
-    return frozenset(name for name, rows in zip(SIDES, outside, strict=True) if float(np.mean(rows)) < BEYOND)
+    far = (name for name, rows in zip(SIDES, outside, strict=True) if float(np.mean(rows)) < BEYOND)
+    return frozenset({HEAVIER.name, *far})
+
+
+def once(scene: Scene, p: Floats) -> bool:
+    """Tell whether the vessel was in the place a single time, or hardly: then it is a time as well as a place."""
+    there = inside(scene, p[1:5])[scene.usable] > 0.5
+    entered = int(there[0]) + int(np.count_nonzero(there[1:] & ~there[:-1]))
+    return entered < 2 or float(np.mean(there)) < LEAST
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -162,6 +176,7 @@ EFFECT = Effect(
     cannot=cannot,
     choose=choose,
     untold=untold,
+    once=once,
     in_part=True,
     idle=0.1,
     bends_hull=True,

@@ -94,11 +94,14 @@ def wind(size: float, vessel: Vessel, rng: np.random.Generator, span: Span) -> C
 
 
 def gusts(size: float, vessel: Vessel, rng: np.random.Generator, span: Span) -> Concealed:
-    """Return gusts [m/s] about a wind of twice to four times as much."""
+    """Return gusts [m/s] about a wind of twice to four times as much.
+
+    Theirs is Kaimal's spectrum, that of the effect a Gauss-Markov process's: the two have no time constant in common.
+    """
     time_s = float(rng.uniform(4.0, 12.0))
     north, east = _plane(size * rng.uniform(2.0, 4.0), rng)
     truths = (
-        Truth("gusts", None, {"std": size, "time_constant": time_s}),
+        Truth("gusts", None, {"std": size}),
         Truth("wind", None, {"north": north, "east": east}),
     )
     return Concealed({"wind": (north, east), "gust_std": size, "gust_time": time_s}, truths, {})

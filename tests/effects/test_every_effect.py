@@ -37,7 +37,7 @@ MODERATE = {
     "wind": {"north": -2.0, "east": 1.5, "C_X": 1.0, "C_Y": 1.0, "C_N": 1.0},
     "current": {"north": 0.1, "east": -0.08},
     "hull_parameters": {**dict.fromkeys(COEFFICIENTS, 1.0), "Y_|v|v": 2.0, "X_u": 2.2},
-    "shallow_water": {"factor": 1.6, "south": 12.0, "north": 34.0, "west": -18.0, "east": 4.0},
+    "shallow_water": {"factor": 1.6, "south": 12.0, "north": 34.0, "west": -18.0, "east": 4.0, "added_mass": 0.0},
 }
 """Where one size of every parameter would be gross, or no place for a ferry."""
 

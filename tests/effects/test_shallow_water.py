@@ -9,7 +9,7 @@ import pytest
 
 from ferryid.effects import effects
 from ferryid.effects.picture import Picture, Scene, acceleration, hull_of
-from ferryid.effects.shallow_water import EDGE_M, SIDES
+from ferryid.effects.shallow_water import EDGE_M, HEAVIER, SIDES
 from ferryid.vessel import load_profile
 
 FERRY = load_profile("milliampere")
@@ -30,7 +30,7 @@ def sailed() -> Picture:
 
 
 def values(**sides: float) -> np.ndarray:
-    return np.array([FACTOR, *(sides[name] for name in SIDES)])
+    return np.array([FACTOR, *(sides[name] for name in SIDES), HEAVIER.start or 0.0])
 
 
 PLACES = [
@@ -44,7 +44,7 @@ PLACES = [
 @pytest.mark.parametrize(("sides", "wanted"), PLACES)
 def test_sides_beyond_which_nobody_went_are_untold(sides: dict[str, float], wanted: set[str]) -> None:
     picture = sailed()
-    assert EFFECT.untold(picture.scene, values(**sides)) == wanted
+    assert EFFECT.untold(picture.scene, values(**sides)) == wanted | {HEAVIER.name}
     here = acceleration(EFFECT.apply(picture, values(**sides), None))
     for name in SIDES:
         # Whatever the log could tell of a side would be told by a change of the forces there.
@@ -60,11 +60,26 @@ def test_a_share_of_two_per_cent_of_what_was_measured_makes_a_side_told() -> Non
         # Half-way between two rows, so many of them beyond.
         side = float(0.5 * (east[-beyond - 1] + east[-beyond]))
         p = values(south=30.0, north=60.0, west=10.0, east=side)
-        assert EFFECT.untold(scene, p) == wanted
+        assert EFFECT.untold(scene, p) == wanted | {HEAVIER.name}
     # Where nothing was measured nobody is known to have been.
     blind = replace(scene, usable=scene.eta[:, 0] < 60.0)
-    assert EFFECT.untold(blind, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {"north"}
-    assert EFFECT.untold(scene, values(south=30.0, north=60.0, west=10.0, east=30.0)) == frozenset()
+    assert EFFECT.untold(blind, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {"north", HEAVIER.name}
+    assert EFFECT.untold(scene, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {HEAVIER.name}
+
+
+def test_a_place_that_was_visited_once_is_a_time_as_well() -> None:
+    picture = sailed()
+    t = picture.scene.t
+    there = np.column_stack([np.full(N, 50.0), np.full(N, 20.0), np.zeros(N)])
+    p = values(south=40.0, north=60.0, west=10.0, east=30.0)
+    for times, wanted in (
+        ([(100.0, 160.0)], True),
+        ([(60.0, 100.0), (200.0, 240.0)], False),
+        ([(60.0, 65.0), (200.0, 205.0)], True),
+    ):
+        inside = np.any([(t >= first) & (t < last) for first, last in times], axis=0)
+        eta = np.where(inside[:, None], there, there + np.array([0.0, 50.0, 0.0]))
+        assert EFFECT.once(replace(picture.scene, eta=eta), p) == wanted, times
 
 
 @pytest.mark.parametrize(

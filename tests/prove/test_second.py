@@ -24,7 +24,7 @@ from ferryid.prove.second import carried, second
 from ferryid.signals.prepare import Prepared
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Floats, Profile
-from tests.prove.two_logs import WIND, two_logs
+from tests.prove.two_logs import EAST_MPS, NORTH_MPS, WIND, two_logs
 
 PROFILE = load_profile("milliampere")
 
@@ -44,8 +44,7 @@ def _true(first: Prepared) -> Model:
     """Return a model that holds the truth of the first log, and two that began in it of which there is nothing to see."""
     log, sha256 = first.motion.log, first.recording.sha256
     source = Source(log, sha256, 1.0)
-    air = WIND["environment"]["wind"]
-    wind = _effect("wind", {"north": (air["north_mps"], "m/s"), "east": (air["east_mps"], "m/s")}, source)
+    wind = _effect("wind", {"north": (NORTH_MPS, "m/s"), "east": (EAST_MPS, "m/s")}, source)
     load = _effect("payload", {"mass": (0.0, "kg"), "x": (0.0, "m")}, replace(source, onset_s=120.0, offset_s=200.0))
     gain = _effect("thruster_gain", {"factor": (1.0, "-")}, replace(source, onset_s=90.0), "thruster1")
     return replace(

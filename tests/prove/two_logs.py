@@ -17,7 +17,8 @@ PATHS = (
     'path = { kind = "four-corner" }\n',
     'path = { kind = "points", points = [[0, 0, 0], [14, 4, 60], [10, -8, 180], [-4, -10, 270], [0, 0, 0]] }\n',
 )
-WIND = "environment = { wind = { north_mps = -5.0, east_mps = 4.0 } }\n"
+NORTH_MPS, EAST_MPS = -5.0, 4.0
+WIND = f"environment = {{ wind = {{ north_mps = {NORTH_MPS}, east_mps = {EAST_MPS} }} }}\n"
 WEAK = 'thrusters = { faults = [{ thruster = "thruster1", factor = 0.6 }] }\n'
 
 

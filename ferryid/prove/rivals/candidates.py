@@ -133,12 +133,15 @@ def _load(base: Base) -> Iterator[Candidate]:
     if effects()["payload"].cannot(base.picture.scene):
         return
     mass, place, *_ = (one.size for one in effects()["payload"].parameters_of(base.picture.scene.profile))
-    for j, (label, unit) in enumerate((("mass aboard", mass), ("mass aboard times its place", mass * place))):
-        yield Candidate(label, "payload", None, partial(_with_load, j, unit))
+    for label, unit in (
+        ("mass aboard", mass * np.array([1.0, 1.0, 0.0, 0.0, 0.0])),
+        ("mass aboard times its place", mass * place * np.array([0.0, 0.0, 1.0, 1.0, 0.0])),
+    ):
+        yield Candidate(label, "payload", None, partial(_with_load, unit))
 
 
-def _with_load(j: int, unit: float, picture: Picture) -> Picture:
-    more = np.broadcast_to(unit * np.eye(3)[j], (len(picture.scene.t), 3))
+def _with_load(unit: Floats, picture: Picture) -> Picture:
+    more = np.tile(unit, (len(picture.scene.t), 1))
     return replace(picture, load=more if picture.load is None else picture.load + more)
 
 

@@ -27,7 +27,7 @@ def combined(base: Base, units: Sequence[Picture], coefficients: Floats) -> Pict
     plain = base.picture
     n = len(plain.scene.t)
     hull, external = plain.hull.copy(), plain.external.copy()
-    load = np.zeros((n, 3)) if plain.load is None else plain.load.copy()
+    load = np.zeros((n, 5)) if plain.load is None else plain.load.copy()
     damping = np.ones(n)
     for unit, coefficient in zip(units, coefficients.tolist(), strict=True):
         if unit.hull is not plain.hull:
@@ -103,8 +103,5 @@ def settled(base: Base, units: Sequence[Picture], start: Floats, rows: Places, b
 
 def _has_mass(picture: Picture) -> bool:
     """Return True where the mass matrix is positive on every row."""
-    m11, m22, m23, m32, m33 = picture.hull[:5]
-    load = np.zeros((1, 3)) if picture.load is None else picture.load
-    m, mx, mxx = load.T
-    across = (m22 + m) * (m33 + mxx) - (m23 + mx) * (m32 + mx)
-    return bool(min((m11 + m).min(), (m22 + m).min(), across.min()) > 0.0)
+    m11, m22, m23, m32, m33 = (picture.hull[:5] + (np.zeros((1, 5)) if picture.load is None else picture.load)).T
+    return bool(min(m11.min(), m22.min(), (m22 * m33 - m23 * m32).min()) > 0.0)
