@@ -9,6 +9,8 @@ from typing import Any
 from scipy.stats import beta
 
 from ferryid.diagnose.result import HINT
+from ferryid.effects import effects
+from ferryid.effects.wording import titled
 
 Line = Mapping[str, Any]
 """A finished case: ``case``, as `ferryid.prove.case.Case.as_json` gives it, and what was ``told`` of its log, as plain data."""
@@ -120,6 +122,21 @@ def wrong(line: Line) -> list[Key]:
         and one["effect"] not in line["case"]["allowed"]
         and not effects & set(one.get("unresolved_with", ()))
     ]
+
+
+def instead(line: Line, key: Key) -> str:
+    """Return what became of an effect that is in the log of a case and was not named."""
+    told = line["told"]
+    if told.get("error"):
+        return REFUSED
+    if any(key_of(one) == key for one in told.get("findings", ())):
+        return "a hint"
+    effect = effects().get(key[0])
+    title = key[0] if effect is None else titled(effect.title, key[1])
+    if any("suspected, but dropped" in note and title.lower() in note.lower() for note in told.get("notes", ())):
+        return "dropped"
+    other = first_name(line)
+    return other if other in (UNKNOWN, NONE) else f"taken for {other}"
 
 
 def first_name(line: Line) -> str:

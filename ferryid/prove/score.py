@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from math import isfinite, nan
@@ -19,6 +20,7 @@ from ferryid.prove.names import (
     cells,
     confusion,
     false_names,
+    instead,
     key_of,
     names,
     truths,
@@ -54,6 +56,8 @@ class Detection:
         Of every run, and whether the diagnosis named the effect.
     oracle_sizes, oracle_named
         Of the runs that the oracle saw, and whether it did.
+    instead
+        What became of the effect in runs in which the oracle alone named it, and how often.
     """
 
     cell: str
@@ -66,6 +70,7 @@ class Detection:
     blind_named: tuple[bool, ...]
     oracle_sizes: tuple[float, ...]
     oracle_named: tuple[bool, ...]
+    instead: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -183,7 +188,7 @@ def to_json(scores: Any) -> Any:
 
 
 def _detection(cell: str, lines: Sequence[Line], thresholds: Mapping[str, float]) -> Detection:
-    sizes, blind, told, least = [], [], [], list[float]()
+    sizes, blind, told, least, lost = [], [], [], list[float](), Counter[str]()
     for line in lines:
         # Beside a gust there is its wind: the cell is called after what its size is of.
         own = next((one for one in truths(line) if one["effect"] == cell), truths(line)[0])
@@ -193,6 +198,8 @@ def _detection(cell: str, lines: Sequence[Line], thresholds: Mapping[str, float]
         if one is not None:
             least.append(max(float(one["floor"]), thresholds.get(own["effect"], 0.0)))
         told.append(None if one is None else bool(one["gain"] > least[-1]))
+        if told[-1] and not blind[-1]:
+            lost[instead(line, key_of(own))] += 1
     effect = next((one["effect"] for one in truths(lines[0]) if one["effect"] == cell), truths(lines[0])[0]["effect"])
     seen = [k for k, answer in enumerate(told) if answer is not None]
     seen_sizes, answers = [sizes[k] for k in seen], [bool(told[k]) for k in seen]
@@ -207,6 +214,7 @@ def _detection(cell: str, lines: Sequence[Line], thresholds: Mapping[str, float]
         tuple(blind),
         tuple(seen_sizes),
         tuple(answers),
+        dict(lost.most_common()),
     )
 
 

@@ -49,7 +49,7 @@ def test_the_page_tells_seal_guard_sizes_and_what_was_missed() -> None:
     assert "this kernel has no Landlock" in told
     # Half of the sizes of the diagnosis: the oracle names from 1 m/s on, which the diagnosis does from 2 on.
     (row,) = (text for text in told.splitlines() if text.startswith("| wind | m/s |"))
-    assert row.endswith("| **more than 1.5** |")
+    assert row.endswith("| **more than 1.5**: 4 none |")
     assert "sizes named 19 times in 20 at most 1.5 times the oracle's: 0 of 1 effects | **missed** |" in told
     assert "| nothing | 20 |  |  | 0/20 |" in told
     assert "| two effects | 1 | 0/1 | 0/1 | 1/1 |" in told

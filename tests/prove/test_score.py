@@ -11,8 +11,10 @@ from typing import Any
 import pytest
 
 from ferryid.effects import effects
+from ferryid.effects.shallow_water import HEAVIER
+from ferryid.effects.wind import COEFFICIENTS
 from ferryid.prove.case import Case, Truth
-from ferryid.prove.names import NONE, OTHER, REFUSED, UNKNOWN, Share, confusion, false_names, first_name, wrong
+from ferryid.prove.names import NONE, OTHER, REFUSED, UNKNOWN, Share, confusion, false_names, first_name, instead, wrong
 from ferryid.prove.recovery import FACTORS, SIDES, neutral, recoveries
 from ferryid.prove.score import detections, score, to_json
 from ferryid.prove.second_log import claimed, claims, median_interval, methods
@@ -144,9 +146,10 @@ def test_places_on_the_chart_have_intervals_but_no_relative_error() -> None:
 
 def test_what_changes_nothing_is_what_the_library_says() -> None:
     profile = load_profile("milliampere")
+    never_told = {*COEFFICIENTS, HEAVIER.name}
     for effect in effects().values():
         for one in effect.parameters_of(profile):
-            if one.name not in SIDES.get(effect.id, ()):
+            if one.name not in SIDES.get(effect.id, ()) and one.name not in never_told:
                 assert neutral(effect.id) == one.neutral, (effect.id, one.name)
     assert {one for one in FACTORS if one not in effects()} == {"yaw_rate_scale", "velocity_scale"}
 
@@ -243,6 +246,23 @@ def test_detection_curves_of_a_diagnosis_and_of_its_oracle() -> None:
     assert strict.threshold == 10.0
     (without,) = detections([{**one, "oracle": None} for one in lines], {})
     assert (without.oracle, without.ratio) == (None, None)
+
+
+def test_what_became_of_what_the_oracle_alone_named() -> None:
+    weak = line([WEAK], [finding("wind")], "thruster_gain")
+    key = ("thruster_gain", "thruster1")
+    assert instead(line([WIND], []), ("wind", None)) == "none"
+    assert instead(line([WIND], [finding("unknown")]), ("wind", None)) == "unknown"
+    assert instead(line([WIND], [finding("wind", p=0.5), finding("current")]), ("wind", None)) == "a hint"
+    assert instead(weak, key) == "taken for wind"
+    weak["told"] = {
+        **weak["told"],
+        "notes": ["Thruster force (thruster1) was suspected, but dropped: a law explains more."],
+    }
+    assert instead(weak, key) == "dropped"
+    assert instead(weak, ("thruster_gain", "thruster2")) == "taken for wind"
+    (lost,) = (one.instead for one in score(curve_lines()).detections)
+    assert lost == {"none": 4}
 
 
 def test_the_size_of_a_cell_is_that_of_what_it_is_called_after() -> None:
