@@ -334,10 +334,10 @@ def test_what_came_and_went_by_chance_is_a_condition_of_its_log(fouled: str) -> 
         units = {one.name: one.unit for one in effects()[stored.effect].parameters_of(FERRY)}
         assert {name: one.unit for name, one in stored.parameters.items()} == units
         assert list(stored.values.values()) == CHANCE[stored.effect][0].tolist()
-    # 95 % of a normal distribution of the logarithm.
+    # 95 % of a normal distribution of the logarithm, a tenth of which is the formula's.
     strength, memory = gusts.parameters["std"], gusts.parameters["time_constant"]
-    assert (strength.low, strength.high) == pytest.approx((1.5 / 1.2165, 1.5 * 1.2165), rel=1e-3)
-    assert (memory.low, memory.high) == pytest.approx((9.0 / 1.8004, 9.0 * 1.8004), rel=1e-3)
+    assert (strength.low, strength.high) == pytest.approx((1.5 / 1.3194, 1.5 * 1.3194), rel=1e-3)
+    assert (memory.low, memory.high) == pytest.approx((9.0 / 1.8586, 9.0 * 1.8586), rel=1e-3)
     # What the log does not tell has no interval, and is not said.
     assert [name for name, one in waves.parameters.items() if not np.isfinite(one.low)] == ["force_std"]
     assert "60 N " not in waves.says()
