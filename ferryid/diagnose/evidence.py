@@ -25,6 +25,7 @@ from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, near
 from ferryid.diagnose.noise import ORDER
 from ferryid.diagnose.parallel import over
 from ferryid.diagnose.weak import Windows
+from ferryid.effects.effect import HELD
 from ferryid.effects.picture import Picture, as_measured
 from ferryid.vessel.profile import Floats
 
@@ -255,8 +256,15 @@ def placebos(trial: Trial, suspect: Suspect, values: Floats) -> dict[str, Suspec
     """Return what should explain as much as a suspect if only its shape counted and not when or where it acted.
 
     Its force late by shares of the log, and its force on a vessel that turned the other way (heading mirrored), if it depends
-    on the heading at all. Each has the parameters of the suspect, to be fitted like it.
+    on the heading at all. Each has the parameters of the suspect, to be fitted like it; but what is fitted beside an effect and
+    never told, by how much its formula is off, stays as it was found: a placebo is the same force, elsewhere.
     """
+    untold = suspect.effect.untold(trial.plain.scene, values)
+    parameters = tuple(
+        replace(one, size=HELD, neutral=value, start=value) if one.name in untold else one
+        for one, value in zip(suspect.parameters, values.tolist(), strict=True)
+    )
+    suspect = replace(suspect, parameters=parameters)
     seconds = float(trial.windows.scene.t[-1] - trial.windows.scene.t[0])
     made = {f"{share * seconds:.0f} s late": _shifted(suspect, share) for share in SHIFTS}
     mirrored = _mirrored(suspect)
@@ -280,7 +288,7 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
 
     def gains_of_placebos(weighed: Trial, bare: HeldOut, beside: Fit | None = None) -> dict[str, Floats]:
         judged = {
-            name: held_out(weighed, folds, [*rest, placebo], [*start, suspect.start], beside)
+            name: held_out(weighed, folds, [*rest, placebo], [*start, placebo.start], beside)
             for name, placebo in in_its_place.items()
         }
         return {name: _gains(weighed, folds, bare.gaps, one.gaps) for name, one in judged.items()}

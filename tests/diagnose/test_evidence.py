@@ -14,6 +14,7 @@ from ferryid.diagnose.free_runs import free_runs
 from ferryid.diagnose.hypothesis import HULL_SPREAD, Suspect, Trial, fit, trial_of
 from ferryid.diagnose.weak import windows
 from ferryid.effects import effects
+from ferryid.effects.effect import HELD
 from ferryid.effects.picture import Picture, Scene, hull_of
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import forward
@@ -177,6 +178,14 @@ def test_what_did_not_happen_does_not_hold(calm: Trial) -> None:
         assert not told.proofs[0].holds or made.evidence < nothing, name
 
 
+def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: Trial) -> None:
+    found = np.array([*WIND, 1.1, 0.9, 0.6])
+    for placebo in placebos(windy, suspect("wind"), found).values():
+        free = [one.name for one in placebo.parameters if one.size > HELD]
+        assert free == ["north", "east"]
+        np.testing.assert_array_equal(placebo.start[2:], found[2:])
+
+
 def test_a_constant_push_is_matched_by_its_placebo(calm: Trial) -> None:
     # The held-out errors shrink, but the same force late shrinks them as much: it tells nothing of when it acts.
     base = suspect("wind").effect
@@ -199,7 +208,7 @@ def test_a_constant_push_is_matched_by_its_placebo(calm: Trial) -> None:
 
 
 def test_only_what_depends_on_the_heading_has_a_mirrored_placebo(windy: Trial) -> None:
-    assert HEADING in placebos(windy, suspect("wind"), WIND)
+    assert HEADING in placebos(windy, suspect("wind"), np.array([*WIND, 1.0, 1.0, 1.0]))
     assert HEADING not in placebos(windy, suspect("payload"), np.array([300.0, 0.5]))
 
 
