@@ -169,13 +169,10 @@ def test_a_wind_that_blew_holds_and_beats_every_placebo(windy: Trial) -> None:
 
 
 def test_what_did_not_happen_does_not_hold(calm: Trial) -> None:
-    nothing = fit(calm, ()).evidence
     for name in ("wind", "current", "payload", "mooring"):
-        made = fit(calm, [suspect(name)])
-        told = evidence(calm, made)
+        told = evidence(calm, fit(calm, [suspect(name)]))
         assert told is not None
-        # One in a while holds by chance; none does that a search would have selected.
-        assert not told.proofs[0].holds or made.evidence < nothing, name
+        assert not told.proofs[0].holds, name
 
 
 def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: Trial) -> None:

@@ -55,6 +55,20 @@ def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[T
     )
 
 
+def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[Trial, Judged]) -> None:
+    trial, stands = windy
+    (blown,) = stands.fit.suspects
+    brief = replace(blown, effect=replace(blown.effect, once=lambda scene, p: True))
+    (finding,), told = forces_of(
+        trial, replace(stands, fit=replace(stands.fit, suspects=(brief,))), trial.windows.scene
+    )
+    assert finding.probability == HINT
+    assert told == (
+        "Steady wind: the vessel was in that place once, or hardly at all, so that something else may have come just then: "
+        "it is a hint.",
+    )
+
+
 @pytest.mark.parametrize(("grown", "sure"), [(1.2, False), (1.05, True)])
 def test_what_makes_an_axis_worse_is_a_hint(windy: tuple[Trial, Judged], grown: float, sure: bool) -> None:
     """By 44 and by 10 % of the squared error in yaw, whatever it improves elsewhere."""
