@@ -14,7 +14,7 @@ OUT_OF_STEP = ("time_delay", "thruster_lag")
 MOST_OF_IT = 0.5
 """Share of the squared error on an axis that a finding removes there while it acts, so that less is left than it explains."""
 LEAST = 0.1
-"""The same share of a finding that is more than a stand-in, on an axis where nothing without a name acts."""
+"""The same share of a finding that is more than a stand-in, whatever else acts."""
 Key = tuple[str, str | None]
 """Effect and instance."""
 
@@ -61,9 +61,10 @@ def about_nothing(shaken: Sequence[Finding], forces: Sequence[Finding]) -> list[
 def beside_more(
     findings: Sequence[Finding], removed: Mapping[Key, Mapping[str, float]], holds: Mapping[str, float]
 ) -> tuple[list[Finding], tuple[str, ...]]:
-    """Return findings of forces as they stand beside a force without a name that is left, and what is to be told.
+    """Return findings of forces as they stand beside what is left of the log, and what is to be told.
 
-    What explains less than that force on every axis may be no more than its stand-in.
+    What removes less than `LEAST` of the error on every axis may be no more than what hull and formulas are off; and what
+    explains less than a force without a name on every axis, its stand-in.
 
     Parameters
     ----------
@@ -75,21 +76,29 @@ def beside_more(
     holds
         Share of the squared error that they leave which is the nameless force's, by axis; none where there is none.
     """
-    if not holds:
-        return list(findings), ()
 
-    def stands(shares: Mapping[str, float]) -> bool:
+    def stands(one: Finding, holds: Mapping[str, float]) -> bool:
         # Of an error of one, r is removed and h (1 - r) the nameless force's: r is more from h / (1 + h) on.
         return any(
-            share >= max(holds.get(axis, 0.0) / (1.0 + holds.get(axis, 0.0)), LEAST) for axis, share in shares.items()
+            share >= max(holds.get(axis, 0.0) / (1.0 + holds.get(axis, 0.0)), LEAST)
+            for axis, share in removed[one.key].items()
         )
 
-    small = [one for one in findings if one.sure and one.key in removed and not stands(removed[one.key])]
-    if not small:
-        return list(findings), ()
-    names = listed(list(dict.fromkeys(titled(effects()[one.effect].title, one.instance) for one in small)))
-    note = (
-        "A force without a name is left, and on no axis does any of these explain more than it while it acts: "
-        f"{names}. They may stand in for it; take them as hints, of probability {HINT:g} at most."
+    doubted = [one for one in findings if one.sure and one.key in removed and not stands(one, holds)]
+    small = [one for one in doubted if not stands(one, {})]
+    notes = (
+        _said(small, f"On no axis does any of these remove {100.0 * LEAST:.0f} % of the error while it acts"),
+        _said(
+            [one for one in doubted if one not in small],
+            "A force without a name is left, and on no axis does any of these explain more than it while it acts",
+            "They may stand in for it; take",
+        ),
     )
-    return [hint(one) if one in small else one for one in findings], (note,)
+    return [hint(one) if one in doubted else one for one in findings], tuple(note for note in notes if note)
+
+
+def _said(findings: Sequence[Finding], why: str, take: str = "Take") -> str:
+    if not findings:
+        return ""
+    names = listed(list(dict.fromkeys(titled(effects()[one.effect].title, one.instance) for one in findings)))
+    return f"{why}: {names}. {take} them as hints, of probability {HINT:g} at most."

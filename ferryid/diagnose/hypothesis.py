@@ -22,10 +22,6 @@ HULL_SPREAD = 0.12
 WIDER = 1.5
 """Factor on standard deviations of the posterior, which takes the measured velocity and heading for true where they enter
 products. Chosen in view of simulated logs; `make proof` tells how often intervals hold in others."""
-FORM = 0.1
-"""How far off an effect's formula, and what the model has beside it, are believed to be: a standard deviation, as a share of
-how far a parameter is from neutral. The posterior knows of noise and coefficients only. Chosen in view of trials of a plant
-with other formulas; `make proof` tells how often intervals hold."""
 STEPS = 24
 ANEW = 4
 """Steps after which the derivatives by the hull's coefficients are taken anew."""
@@ -121,12 +117,13 @@ class Fit:
     def told_errors(self, index: int) -> Floats:
         """Return the standard deviations that are told: `WIDER`, and with what no log tells of an effect's size.
 
-        That is `FORM`, and what hull or instruments may be off anyway (``idle``, about a 95 % interval). A place has no size.
+        That is its formula (``form``), and what hull or instruments may be off anyway (``idle``, about a 95 % interval). A
+        place has no size.
         """
         suspect, values = self.suspects[index], self.values[index]
         sized = np.array([one.unit == suspect.parameters[0].unit for one in suspect.parameters])
         away = values - np.array([one.neutral for one in suspect.parameters])
-        beyond = np.where(sized, np.hypot(FORM * away, 0.5 * suspect.effect.idle), 0.0)
+        beyond = np.where(sized, np.hypot(suspect.effect.form * away, 0.5 * suspect.effect.idle), 0.0)
         return np.hypot(WIDER * self.errors(index), beyond)
 
 

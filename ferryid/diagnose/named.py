@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ferryid.diagnose.folds import block_s
 from ferryid.diagnose.hypothesis import WIDER, Fit, Suspect, Trial, fit, imagined, near
 from ferryid.diagnose.judged import Judged
 from ferryid.diagnose.locate import locate
@@ -15,7 +14,7 @@ from ferryid.diagnose.result import AXES, HINT, NEAR, Estimate, Finding, Rival
 from ferryid.diagnose.ridge import intervals
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shown import columns_of, regressor_of
-from ferryid.diagnose.spans import lasts_s, swapped
+from ferryid.diagnose.spans import swapped
 from ferryid.effects.picture import Scene
 
 TIME_DROP = 50.0
@@ -62,17 +61,21 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
                 "claims neither the squared force error nor the free run improves by an interval that excludes none: "
                 "it is a hint."
             )
-        brief = bool(suspect.times) and lasts_s(trial, suspect) < block_s(trial.windows)
-        if brief:
-            told.append(
-                f"{suspect.title} acts for {lasts_s(trial, suspect):.0f} s only: no fit that had not seen all of it could be "
-                "judged on it, so that it is a hint."
-            )
         single = suspect.effect.once(trial.plain.scene, kept.values[i])
         if single:
             told.append(
                 f"{suspect.title}: the vessel was in that place once, or hardly at all, so that something else may have come "
                 "just then: it is a hint."
+            )
+        first = suspect.parameters[0]
+        faint = (
+            len(suspect.times) == 2
+            and abs(values.get(first.name, first.neutral) - first.neutral) < suspect.effect.passing
+        )
+        if faint:
+            told.append(
+                f"{suspect.title} comes and goes, by less than hull and formulas may be off in a part of the manoeuvres: it "
+                "is a hint."
             )
         shares = harmed.get(suspect.key, {})
         worse = min(shares, key=lambda axis: shares[axis], default="")
@@ -87,7 +90,7 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
                 effect=suspect.effect.id,
                 instance=suspect.instance,
                 probability=min(standing.probability, HINT)
-                if unseen or brief or single or harms
+                if unseen or single or faint or harms
                 else standing.probability,
                 parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),

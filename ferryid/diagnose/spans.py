@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.filter import stride_s
+from ferryid.diagnose.folds import block_s
 from ferryid.diagnose.hypothesis import NUDGE, Fit, Near, Suspect, Trial, effect_slopes, fit, imagined, near, without
 from ferryid.effects.picture import Picture, as_measured
 from ferryid.vessel.profile import Floats
@@ -21,6 +22,8 @@ PART_S, FEWEST_PARTS = 8.0, 24
 them. In a calm log seconds matter: what acts too long or too short by them leaves a push that nothing explains."""
 MOST_NUMBERS = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
+LEAST_BLOCKS = 2.0
+"""Length of the shortest span, in blocks that are held out: a fit that is judged on one part of it must have seen another."""
 PROMISING = 3
 """Spans that are handed on to be fitted."""
 NEARBY_S, FINEST_S = 8.0, 0.2
@@ -62,6 +65,8 @@ def ground_of(trial: Trial, made: Fit, begin: Near) -> Ground:
 def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
     """Return a suspect in the few spans, other than the whole log, in which it promises most beside a fit.
 
+    None is shorter than `LEAST_BLOCKS`.
+
     The log is cut into parts; what a suspect adds in a part is linear in its parameters there, and what it adds in a span is
     the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
     """
@@ -69,8 +74,11 @@ def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
     parts = len(edges) - 1
     G, g = _cross_products(trial, ground, suspect, edges)
     a, b = np.triu_indices(parts + 1, 1)
-    part = (a > 0) | (b < parts)
+    least = shortest_s(trial) / (len(trial.steps.starts) * stride_s(trial.steps)) * parts
+    part = ((a > 0) | (b < parts)) & (b - a >= least)
     a, b = a[part], b[part]
+    if not len(a):
+        return []
     gain = _gains(G, g, a, b, suspect)
     gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(trial.windows.starts))
     found: list[tuple[int, int]] = []
@@ -89,6 +97,11 @@ def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
 def part_s(trial: Trial, suspect: Suspect) -> float:
     """Return how long a part of the log is [s]."""
     return float(np.median(np.diff(_edges(trial, suspect))))
+
+
+def shortest_s(trial: Trial) -> float:
+    """Return how long an effect acts that begins or ends within the log, at least [s]."""
+    return LEAST_BLOCKS * block_s(trial.windows)
 
 
 def lasts_s(trial: Trial, suspect: Suspect) -> float:
@@ -151,13 +164,13 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
     made
         Fit of it.
     index
-        Of the suspect; its span stays as long as `PART_S` at least.
+        Of the suspect; its span stays as long as `LEAST_BLOCKS` at least.
     begin
         Where each fit begins.
     step_s, finest_s
         First step [s], which is halved where neither side is better, and the one to stop at.
     """
-    times = trial.windows.middle_s
+    times, least = trial.windows.middle_s, shortest_s(trial)
     best, step = made, step_s
     while step > finest_s:
         before = best.suspects[index]
@@ -165,7 +178,7 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
             middle = getattr(best.suspects[index], end)
             for time in (middle - step, middle + step):
                 moved = best.suspects[index].moved(end, time)
-                if lasts_s(trial, moved) < PART_S or not times[0] < time < times[-1]:
+                if lasts_s(trial, moved) < least or not times[0] < time < times[-1]:
                     continue
                 tried = fit(trial, swapped(best.suspects, index, moved), best.values, steps=GLANCE, begin=begin)
                 best = max(best, tried, key=lambda one: one.evidence)

@@ -108,7 +108,7 @@ def impostors(trial: Trial, kept: Fit) -> tuple[int, ...]:
 
     Physics outside the library may look a little like an effect. If a law that is fitted in the effect's place explains more
     than the effect, and leaves it nothing to explain, then the effect was named by mistake. A law that says the same as the
-    effect in other words is no such law.
+    effect in other words is no such law, nor is one that explains more by no more than the effect's formula may be off.
     """
     folds = folds_of(trial.windows)
     if folds is None:
@@ -130,10 +130,12 @@ def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
     suspect, values = kept.suspects[index], kept.values[index]
     both = fit(trial, [*rest, told, suspect], [*start, coefficients, suspect.start])
     fair = trial.with_noise_of(both)
+    with_neither = fit(fair, rest, start).evidence
     with_law = fit(fair, [*rest, told], [*start, coefficients]).evidence
     with_effect = fit(fair, [*rest, suspect], [*start, values]).evidence
     with_both = fit(fair, [*rest, told, suspect], both.values).evidence
-    return with_law - with_effect > ODDS and with_both - with_law < ODDS
+    better = with_law - with_effect > max(ODDS, suspect.effect.form * (with_law - with_neither))
+    return better and with_both - with_law < ODDS
 
 
 def _of_one(finding: Finding, others: int, able: int, hold: int) -> Finding:

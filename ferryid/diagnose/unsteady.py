@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ferryid.diagnose.bands import fine_windows, spectrum_of
 from ferryid.diagnose.evidence import force_errors
 from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood, stride_s
-from ferryid.diagnose.hypothesis import FORM, Fit, Suspect, Trial, imagined
+from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
 from ferryid.diagnose.result import AXES, HINT, Estimate, Finding
 from ferryid.diagnose.weak import Windows
 from ferryid.effects.effect import Process
@@ -56,7 +56,7 @@ class State:
     @property
     def estimates(self) -> dict[str, Estimate]:
         """Parameters with their 95 % intervals, which are even in the logarithm."""
-        away = np.exp(1.96 * np.minimum(np.hypot(self.widths, FORM), WIDEST))
+        away = np.exp(1.96 * np.minimum(np.hypot(self.widths, self.suspect.effect.form), WIDEST))
         low, high = self.values / away, self.values * away
         return {
             one.name: Estimate(value, max(a, one.low), min(b, one.high), one.unit)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats, Profile
 
@@ -66,4 +66,5 @@ EFFECT = Effect(
     instances=instances,
     vessel=True,
     regressor=regressor,
+    form=DEFINITION,
 )

@@ -14,6 +14,10 @@ Values = Mapping[str, float]
 Residual = Callable[[Picture], Floats]
 """What a picture leaves of a log, whitened: so that its square is twice what the logarithm of the likelihood loses."""
 
+FORMULA, DEFINITION = 0.1, 0.02
+"""How far off an effect's formula is believed to be, as a share of what it changes: a standard deviation. What its parameter
+defines, as a share of a thruster's force or an angle, hardly is; of the rest some ten per cent are usual. Chosen in view of
+trials of a plant with other formulas; `make proof` tells how often intervals hold."""
 HELD = 1e-6
 """Size of a parameter that is not to move: one of several alternatives that was not chosen."""
 
@@ -120,6 +124,12 @@ class Effect:
     idle
         An effect whose parameters are all nearer to neutral than this is void: hull or instruments may be as much off anyway.
         Those count that have the unit of the first; a place has no size.
+    form
+        How far off its formula, and what the model has beside it, are believed to be: a standard deviation, as a share of how
+        far a parameter is from neutral. A log tells of noise and coefficients only.
+    passing
+        What both begins and ends within a log and is nearer to neutral than this is a hint: hull and formulas are as much off
+        in a part of the manoeuvres.
     bends_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
     ridge
@@ -154,6 +164,8 @@ class Effect:
     once: Callable[[Scene, Floats], bool] = lambda scene, p: False
     in_part: bool = False
     idle: float = 0.0
+    form: float = FORMULA
+    passing: float = 0.0
     bends_hull: bool = False
     ridge: str = ""
     of_sensor: bool = False

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
 from ferryid.effects.picture import Picture, corrected
 from ferryid.vessel.profile import Floats, Profile
 
@@ -63,4 +63,5 @@ EFFECT = Effect(
     # Compasses are no better.
     idle=0.5,
     regressor=regressor,
+    form=DEFINITION,
 )

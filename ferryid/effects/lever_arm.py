@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
 from ferryid.effects.picture import Picture, corrected
 from ferryid.vessel.frames import to_world
 from ferryid.vessel.profile import Floats, Profile
@@ -65,4 +65,5 @@ EFFECT = Effect(
     of_sensor=True,
     regressor=regressor,
     bends_hull=True,
+    form=DEFINITION,
 )

@@ -68,5 +68,14 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
 
 
 EFFECT = Effect(
-    "mooring", "Mooring", parameters_of, apply, says, scenario, cannot=cannot, onset=True, regressor=regressor
+    "mooring",
+    "Mooring",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    cannot=cannot,
+    onset=True,
+    regressor=regressor,
+    form=0.05,
 )

@@ -31,6 +31,22 @@ def by_hull(picture: Picture, believed: Floats, residual: Residual, places: list
     return J, e - J @ np.array(away)
 
 
+def refitted(J: Floats, residuals: Floats) -> Floats:
+    """Return what is left of the logarithm of the likelihood to lose, of each of some residuals with the hull refitted to it.
+
+    Parameters
+    ----------
+    J
+        From `by_hull`.
+    residuals
+        With the hull as believed, shape (w, q).
+    """
+    H = USUAL * J
+    product = H.T @ residuals
+    share = np.einsum("pq,pq->q", product, np.linalg.solve(H.T @ H + np.eye(H.shape[1]), product))
+    return np.asarray(0.5 * (np.einsum("wq,wq->q", residuals, residuals) - share))
+
+
 def linear_gains(J: Floats, e: Floats, columns: Floats, size: float) -> Floats:
     """Return the evidence of each of some alternatives, with the hull's coefficients refitted beside it.
 

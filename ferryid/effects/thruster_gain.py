@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ferryid.effects.effect import Effect, Parameter, Values, span
+from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values, span
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats, Profile
 
@@ -57,4 +57,6 @@ EFFECT = Effect(
     onset=True,
     vessel=True,
     regressor=regressor,
+    form=DEFINITION,
+    passing=0.1,
 )

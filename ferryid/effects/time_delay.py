@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats, Profile
 
@@ -51,4 +51,6 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
     return f"change of the thrusters' {axis} {'moment [N·m/s]' if axis == 'yaw' else 'force [N/s]'}", rate
 
 
-EFFECT = Effect("time_delay", "Time delay", parameters_of, apply, says, scenario, idle=0.03, regressor=regressor)
+EFFECT = Effect(
+    "time_delay", "Time delay", parameters_of, apply, says, scenario, idle=0.03, form=DEFINITION, regressor=regressor
+)

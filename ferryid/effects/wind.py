@@ -13,14 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.scan import by_hull, refitted
 from ferryid.effects.wording import bearing
 from ferryid.vessel.profile import Floats, Profile, WindAreas
 from ferryid.vessel.wind import wind_force
 
 COEFFICIENTS = {"C_X": 0.1, "C_Y": 0.1, "C_N": 0.3}
 """Factors on the load along each axis, and how far off the profile's are believed to be."""
+SPEEDS_MPS, BEARINGS = (0.0, 1.5, 3.0, 6.0, 12.0), 12
+"""Winds among which the likeliest is where a search begins: as a load goes with the square of the speed, and a controller leans
+against it, a wind from the other side may be likelier than none, and than all between."""
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -30,6 +34,25 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
         Parameter("east", "m/s", 4.0, -30.0, 30.0),
         *(Parameter(name, "-", size, 0.2, 3.0, neutral=1.0) for name, size in COEFFICIENTS.items()),
     )
+
+
+def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
+    """Return the parameters with the wind to begin with."""
+    parameters = parameters_of(picture.scene.profile)
+    angles = np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS
+    winds = [
+        np.array([speed * np.cos(angle), speed * np.sin(angle)])
+        for speed in SPEEDS_MPS
+        for angle in (angles if speed > 0.0 else angles[:1])
+    ]
+    J, e = by_hull(picture, believed, residual, np.flatnonzero(believed).tolist())
+    calm = residual(picture)
+    left = np.column_stack([e + residual(apply(picture, wind, None)) - calm for wind in winds])
+    sizes = np.array([one.size for one in parameters[:2]])
+    away = np.array([float(np.sum((wind / sizes) ** 2)) for wind in winds])
+    best = winds[int(np.argmin(refitted(J, left) + 0.5 * away))]
+    begun = (replace(one, start=float(at)) for one, at in zip(parameters[:2], best, strict=True))
+    return Choice((*begun, *parameters[2:]), 0.0)
 
 
 def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
@@ -92,5 +115,15 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
 
 
 EFFECT = Effect(
-    "wind", "Steady wind", parameters_of, apply, says, scenario, cannot=cannot, untold=untold, regressor=regressor
+    "wind",
+    "Steady wind",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    cannot=cannot,
+    choose=choose,
+    untold=untold,
+    regressor=regressor,
+    form=0.05,
 )

@@ -204,15 +204,16 @@ def _effect(data: Mapping[str, Any], profile: Profile, where: str, vessel: bool)
 
 def _parameters(effect: Effect, data: Mapping[str, Any], profile: Profile) -> dict[str, Quantity]:
     parameters = {name: _quantity(one, f"{effect.id}.{name}") for name, one in data.items()}
-    if effect.choose is not None:
-        # Its parameters were chosen in view of a log.
-        return parameters
     expected = {one.name: one.unit for one in effect.parameters_of(profile)}
     found = {name: one.unit for name, one in parameters.items()}
-    if found != expected:
+    # What was chosen in view of a log may lack what later versions fit beside it, which comes last.
+    complete = len(found) == len(expected) or (
+        effect.choose is not None and list(expected)[: len(found)] == list(found)
+    )
+    if not complete or any(expected.get(name) != unit for name, unit in found.items()):
         told = ", ".join(f"{name} [{unit}]" for name, unit in expected.items())
         raise ValueError(f"{effect.id} takes the parameters {told}")
-    return {name: parameters[name] for name in expected}
+    return {name: parameters[name] for name in expected if name in parameters}
 
 
 def _source(data: Mapping[str, Any]) -> Source:

@@ -52,6 +52,8 @@ class Recovered:
         By name, with 95 % intervals.
     cannot
         Why the log cannot show it; empty where it can.
+    idle
+        True where it is too small for a diagnosis to find it worth a name.
     """
 
     effect: str
@@ -61,6 +63,7 @@ class Recovered:
     floor: float
     parameters: dict[str, Estimate] = field(default_factory=dict)
     cannot: str = ""
+    idle: bool = False
 
     @property
     def named(self) -> bool:
@@ -202,7 +205,9 @@ def _told(log: _Log, truths: Sequence[Truth]) -> Told:
             kinematic[truth.key] = one
             forces.append(truth)
             continue
-        found[truth.key] = Recovered(*truth.key, one.gain, one.free, floor_of(one.free, tries), dict(one.parameters))
+        found[truth.key] = Recovered(
+            *truth.key, one.gain, one.free, floor_of(one.free, tries), dict(one.parameters), idle=one.idle
+        )
         total += one.gain
         scene = one.correct(scene) if sure else scene
     if forces:
@@ -221,7 +226,8 @@ def _better(forces: Recovered, kinematic: Sensed | None) -> Recovered:
         return forces
     floor = floor_of(forces.free, 2)
     if kinematic.gain > forces.gain:
-        return replace(forces, gain=kinematic.gain, floor=floor, parameters=dict(kinematic.parameters))
+        found = replace(forces, gain=kinematic.gain, floor=floor, parameters=dict(kinematic.parameters))
+        return replace(found, idle=kinematic.idle)
     return replace(forces, floor=floor)
 
 
@@ -239,7 +245,8 @@ def _of_forces(log: _Log, truths: Sequence[Truth]) -> tuple[float, list[Recovere
     gain, told = weighed(log.trial, [_suspect(log.scene.profile, truth) for truth in able])
     for truth, one in zip(able, told, strict=True):
         parameters = dict(one.parameters)
-        made.append(Recovered(truth.effect, truth.instance, one.gain, one.free, floor_of(one.free), parameters))
+        floor = floor_of(one.free)
+        made.append(Recovered(truth.effect, truth.instance, one.gain, one.free, floor, parameters, idle=one.idle))
     return gain, made
 
 

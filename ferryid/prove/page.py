@@ -149,9 +149,10 @@ def page(result: Mapping[str, Any], scores: Scores) -> str:
         "the effect, thruster and times, but not the size, and names as soon as the likelihood gains more than it does by",
         "chance on clean logs. Curves: logistic in the logarithm of the size; the grey line is 19 in 20.",
         "",
-        "Where the ratio is more than 1.5, the last column says what became of the effect in logs in which the oracle alone",
-        "named it: a hint, dropped because a placebo or a law without a name did as well, taken for something else, or in what",
-        "is told as unexplained. What moves the vessel by less than two per cent of its measured acceleration is never named.",
+        "The last column says what became of the effect in logs in which the oracle alone named it: too small to be worth a",
+        "name by the oracle's own estimate (less than two per cent of the measured acceleration, or a sensor's error below its",
+        "least size), a hint, dropped because a placebo or a law without a name did as well, taken for something else, or in",
+        "what is told as unexplained.",
         "",
         "| effect | unit | named 19 times in 20 from | by the oracle from | ratio | |",
         "|---|---|--:|--:|--:|---|",
@@ -244,13 +245,13 @@ def _cells(scores: Scores) -> list[str]:
 
 def _detection(one: Detection) -> str:
     unit = HIDINGS[one.cell].unit
-    ratio, note = "", ""
+    ratio = ""
+    note = ", ".join(f"{count} {what}" for what, count in one.instead.items())
     if one.ratio is not None:
         value = "" if one.ratio.value is None else f"{one.ratio.value:.2g} "
         ratio = f"{value}[{_end(one.ratio.low)}, {_end(one.ratio.high)}]"
         if (one.ratio.value is not None and one.ratio.value > MOST_RATIO) or one.ratio.low > MOST_RATIO:
-            lost = ", ".join(f"{count} {what}" for what, count in one.instead.items())
-            note = f"**more than {MOST_RATIO}**: {lost}"
+            note = f"**more than {MOST_RATIO}**: {note}"
     return f"| {one.cell} | {unit} | {one.blind.says} | {'' if one.oracle is None else one.oracle.says} | {ratio} | {note} |"
 
 

@@ -30,6 +30,8 @@ from ferryid.prove.second_log import Claim, Method, claims, methods, missing
 
 CLEAN = "clean"
 """Kind of the cells in which nothing is concealed: what an oracle gains there, it gains by chance."""
+TOO_SMALL = "too small to be worth a name"
+"""What became of an effect that the oracle itself finds smaller than what a diagnosis names."""
 SHOWN = {Share: ("value", "interval"), Curve: ("says",), Recovery: ("median_error", "within", "covered", "in_time")}
 """Properties that stand in the plain data beside the fields."""
 
@@ -199,7 +201,7 @@ def _detection(cell: str, lines: Sequence[Line], thresholds: Mapping[str, float]
             least.append(max(float(one["floor"]), thresholds.get(own["effect"], 0.0)))
         told.append(None if one is None else bool(one["gain"] > least[-1]))
         if told[-1] and not blind[-1]:
-            lost[instead(line, key_of(own))] += 1
+            lost[TOO_SMALL if one and one.get("idle") else instead(line, key_of(own))] += 1
     effect = next((one["effect"] for one in truths(lines[0]) if one["effect"] == cell), truths(lines[0])[0]["effect"])
     seen = [k for k, answer in enumerate(told) if answer is not None]
     seen_sizes, answers = [sizes[k] for k in seen], [bool(told[k]) for k in seen]

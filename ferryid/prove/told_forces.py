@@ -16,6 +16,7 @@ from ferryid.diagnose.filter import Filter, learn_with, likelihood
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, settled
 from ferryid.diagnose.result import Estimate
 from ferryid.diagnose.ridge import intervals
+from ferryid.diagnose.search import void
 from ferryid.diagnose.unsteady import BANDS, STRENGTHS, State
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD, Processes
@@ -36,11 +37,22 @@ REACH = 1.96
 
 @dataclass(frozen=True)
 class Weighed:
-    """What the forces tell of one effect: gain [nats], how many parameters were fitted for it, and these."""
+    """What the forces tell of one effect.
+
+    Attributes
+    ----------
+    gain
+        As in `ferryid.prove.oracle.Recovered`.
+    free, parameters
+        How many were fitted for it, and these.
+    idle
+        True where it moves the vessel less than a diagnosis finds worth a name.
+    """
 
     gain: float
     free: int
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    idle: bool = False
 
 
 @dataclass(frozen=True)
@@ -217,10 +229,13 @@ def _weighed(trial: Trial, full: _Model, suspect: Suspect) -> Weighed:
     if suspect.effect.unsteady is not None:
         gain = _likelihood(full, rest) - _likelihood(rest)
         parameters = next(state.estimates for state in full.states if state.suspect.key == suspect.key)
+        idle = False
     else:
         gain = _likelihood(full, rest) - _likelihood(rest, full)
-        parameters = _estimates(full, [one.key for one in full.fit.suspects].index(suspect.key))
-    return Weighed(max(gain, 0.0), free, parameters)
+        index = [one.key for one in full.fit.suspects].index(suspect.key)
+        parameters = _estimates(full, index)
+        idle = void(full.trial, full.fit, index)
+    return Weighed(max(gain, 0.0), free, parameters, idle)
 
 
 def _likelihood(model: _Model, other: _Model | None = None) -> float:

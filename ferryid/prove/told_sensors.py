@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from math import degrees, log
+from math import degrees, log, radians
 
 import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
+from ferryid.diagnose.checks import azimuth_resolution, heading_bias, velocity_scale, yaw_rate_scale
 from ferryid.diagnose.checks.azimuth_resolution import corrected as straightened
-from ferryid.diagnose.checks.azimuth_resolution import estimate, off_grid, step_of
+from ferryid.diagnose.checks.azimuth_resolution import error_of, estimate, off_grid, step_of
 from ferryid.diagnose.checks.kinematics import ANGLE, NEUTRAL, SCALE, Kinematics, X, Y, kinematics
+from ferryid.diagnose.checks.lever_arm import least_m
 from ferryid.diagnose.checks.yaw_rate_scale import compared
 from ferryid.diagnose.checks.yaw_rate_scale import corrected as rescaled
 from ferryid.diagnose.result import Estimate
@@ -39,12 +41,15 @@ class Sensed:
         By name, with 95 % intervals.
     correct
         Returns the scene without the error.
+    idle
+        True where the error is smaller than a diagnosis finds worth a name.
     """
 
     gain: float
     free: int
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     correct: Callable[[Scene], Scene] = lambda scene: scene
+    idle: bool = False
 
 
 def sensed(scene: Scene, effect: str) -> Sensed:
@@ -67,7 +72,11 @@ def _yaw_rate_scale(scene: Scene) -> Sensed:
     score = rates.off / max(float(rates.solution.errors[0]), 1e-300)
     factor = rates.solution.estimate(0, "-")
     return Sensed(
-        _gain(score, rates.solution.freedom), 1, {"factor": factor}, lambda seen: rescaled(seen, factor.value)
+        _gain(score, rates.solution.freedom),
+        1,
+        {"factor": factor},
+        lambda seen: rescaled(seen, factor.value),
+        rates.off < yaw_rate_scale.LEAST,
     )
 
 
@@ -82,7 +91,8 @@ def _azimuth_resolution(scene: Scene) -> Sensed:
     count, near = len(readings), int(np.count_nonzero(off < 0.5 * CHANCE * step))
     share = min(max(near / count, CHANCE), 1.0 - STRAIGHT)
     gain = near * log(share / CHANCE) + (count - near) * log((1.0 - share) / (1.0 - CHANCE))
-    return Sensed(gain, 1, {"step": estimate(step)}, lambda seen: straightened(seen, steps))
+    idle = error_of(step) < azimuth_resolution.LEAST
+    return Sensed(gain, 1, {"step": estimate(step)}, lambda seen: straightened(seen, steps), idle)
 
 
 def _velocity_scale(scene: Scene) -> Sensed:
@@ -96,6 +106,7 @@ def _velocity_scale(scene: Scene) -> Sensed:
         1,
         {"factor": factor},
         lambda seen: replace(seen, nu_raw=seen.nu_raw / scale, nu=seen.nu / scale),
+        abs(factor.value - 1.0) < velocity_scale.LEAST,
     )
 
 
@@ -109,6 +120,7 @@ def _heading_bias(scene: Scene) -> Sensed:
         1,
         {"angle": found.solution.estimate(ANGLE, "deg", degrees(1.0))},
         lambda seen: replace(seen, eta=seen.eta - bias),
+        abs(bias[2]) < radians(heading_bias.LEAST_DEG),
     )
 
 
@@ -124,7 +136,8 @@ def _lever_arm(scene: Scene) -> Sensed:
         return replace(seen, eta=seen.eta - arm)
 
     # The two are told by turns of their own, so that their errors hardly go together.
-    return Sensed(_compared(found, X) + _compared(found, Y), 2, {"x": x, "y": y}, correct)
+    idle = max(abs(x.value), abs(y.value)) < least_m(scene)
+    return Sensed(_compared(found, X) + _compared(found, Y), 2, {"x": x, "y": y}, correct, idle)
 
 
 SENSED: Mapping[str, Callable[[Scene], Sensed]] = {

@@ -67,6 +67,22 @@ def test_what_explains_less_than_is_left_without_a_name_is_a_hint() -> None:
     assert beside_more(several, removed, {}) == (several, ())
 
 
+def test_what_removes_hardly_anything_of_the_error_is_a_hint() -> None:
+    several = [found("wind", sway=0.1), found("thruster_gain", yaw=0.09)]
+    removed = {
+        ("wind", None): {"surge": -0.2, "sway": 0.1},
+        ("thruster_gain", "thruster1"): {"sway": 0.02, "yaw": 0.09},
+    }
+    for left in ({}, {"surge": 0.05}):
+        findings, notes = beside_more(several, removed, left)
+        assert [one.sure for one in findings] == [True, False]
+        (note,) = notes
+        assert note == (
+            "On no axis does any of these remove 10 % of the error while it acts: Thruster force (thruster1). Take them as "
+            "hints, of probability 0.5 at most."
+        )
+
+
 def test_gusts_about_a_wind_that_is_not_told_are_a_hint() -> None:
     both = [found("gusts"), found("waves")]
     assert [one.sure for one in about_nothing(both, [found("wind", sway=0.6)])] == [True, True]

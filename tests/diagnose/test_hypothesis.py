@@ -191,13 +191,15 @@ def told(name: str, values: list[float], variance: float = 0.0) -> Floats:
 def test_a_formula_is_believed_to_a_tenth_of_what_it_changes() -> None:
     # Of a posterior that knows everything: a tenth of the distance from what changes nothing, which is 1 of a factor.
     np.testing.assert_allclose(told("current", [0.3, -0.2]), [0.03, 0.02])
-    np.testing.assert_allclose(told("thruster_gain", [0.7]), [0.03])
+    np.testing.assert_allclose(told("thrust_inflow_loss", [0.3]), [0.03])
+    # What is defined by its parameter hardly has a formula.
+    np.testing.assert_allclose(told("thruster_gain", [0.7]), [0.006])
     # Where the hull may be as much off itself, that stays however little it is.
     np.testing.assert_allclose(told("thruster_lag", [0.0]), [0.015])
     # Half as much again as the posterior says, and no more where nothing is changed.
     np.testing.assert_allclose(told("thruster_gain", [1.0], 0.01**2), [0.015])
-    np.testing.assert_allclose(told("thruster_gain", [0.6], 0.02**2), [0.05])
+    np.testing.assert_allclose(told("current", [0.4, 0.0], 0.02**2), [0.05, 0.03])
 
 
 def test_a_place_is_no_size() -> None:
-    np.testing.assert_allclose(told("mooring", [50.0, 40.0, 300.0, -200.0]), [5.0, 4.0, 0.0, 0.0])
+    np.testing.assert_allclose(told("mooring", [50.0, 40.0, 300.0, -200.0]), [2.5, 2.0, 0.0, 0.0])

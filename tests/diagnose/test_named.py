@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -66,6 +67,31 @@ def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[Tria
     assert told == (
         "Steady wind: the vessel was in that place once, or hardly at all, so that something else may have come just then: "
         "it is a hint.",
+    )
+
+
+@pytest.mark.parametrize(
+    ("onset_s", "offset_s", "passing", "sure"),
+    [(100.0, 300.0, 4.0, False), (100.0, 300.0, 1.0, True), (100.0, inf, 4.0, True), (0.0, inf, 4.0, True)],
+)
+def test_what_comes_and_goes_by_little_is_a_hint(
+    windy: tuple[Trial, Judged], onset_s: float, offset_s: float, passing: float, sure: bool
+) -> None:
+    """A wind of 2.5 m/s northwards, where 4 m/s or 1 m/s are little."""
+    trial, stands = windy
+    (blown,) = stands.fit.suspects
+    suspect = replace(
+        blown, effect=replace(blown.effect, passing=passing, onset=True), onset_s=onset_s, offset_s=offset_s
+    )
+    made = replace(stands.fit, suspects=(suspect,), values=(np.array([2.5, 0.0, 1.0, 1.0, 1.0]),))
+    (finding,), told = forces_of(trial, replace(stands, fit=made), trial.windows.scene)
+    assert finding.sure == sure
+    assert told == (
+        ()
+        if sure
+        else (
+            "Steady wind comes and goes, by less than hull and formulas may be off in a part of the manoeuvres: it is a hint.",
+        )
     )
 
 

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ferryid.diagnose.folds import block_s
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit, near
 from ferryid.diagnose.search import search, suspects_of
-from ferryid.diagnose.spans import ground_of, lasts_s, part_s, promising, sharpened
+from ferryid.diagnose.spans import ground_of, lasts_s, part_s, promising, sharpened, shortest_s
 from ferryid.diagnose.weak import windows
 from tests.diagnose.test_hypothesis import PUSH, trial
 from tests.diagnose.trials import sailed, trial_on
@@ -56,6 +57,18 @@ def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: fl
     # It is some ten times as strong as what else pushes, which forgets itself in 8 s.
     assert sharp.onset_s == pytest.approx(first_s, abs=2.0)
     assert sharp.offset_s == pytest.approx(last_s, abs=2.0)
+
+
+def test_no_span_is_shorter_than_two_blocks() -> None:
+    case = pushed(240.0, 100.0, 115.0)
+    bare = fit(case, ())
+    begin = near(case, bare)
+    spans = promising(case, ground_of(case, bare, begin), PUSH)
+    assert spans
+    sharp = sharpened(case, fit(case, [spans[0]]), 0, begin, 8.0).suspects[0]
+    least = shortest_s(case)
+    assert least == pytest.approx(2.0 * block_s(case.windows))
+    assert all(lasts_s(case, one) >= least - 1.0 for one in (*spans, sharp))
 
 
 def test_where_nothing_pushes_no_span_is_promising() -> None:

@@ -156,6 +156,9 @@ def test_an_effect_that_a_law_makes_idle_is_an_impostor_and_a_true_one_is_not() 
     trial = trial_with(pushes(surge=-20.0, sway=10.0))
     kept = fit(trial, [suspect])
     assert impostors(trial, kept) == (0,)
+    # Where the law explains more by no more than the effect's formula may be off, it displaces nothing.
+    vague = replace(suspect, effect=replace(gain, form=1.0))
+    assert impostors(trial, replace(kept, suspects=(vague,))) == ()
     wind = effects()["wind"]
     breeze = Suspect(wind, None, wind.parameters_of(FERRY))
     calm = trial_with(pushes())

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
 from math import nan
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -210,6 +212,25 @@ def test_what_a_log_did_not_tell_is_not_said_of_the_model_either(tmp_path: Path)
     assert again.values == known.values, "it acts with what was fitted"
     assert again.says() == "Damping is 1.60 times as large up to 4 m north, as over shallow ground."
     assert "-900" in known.says()
+
+
+def test_parameters_that_were_chosen_are_those_of_the_effect(tmp_path: Path) -> None:
+    wind = stored("wind", north=2.0, east=1.0)
+    path = save(replace(diagnosed(), conditions=(Conditions("trial", HERE, (wind,)),)), tmp_path).path
+
+    def changed(change: Callable[[dict[str, Any]], object]) -> Path:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        change(data["conditions"][0]["effects"][0]["parameters"])
+        other = tmp_path / "other.json"
+        other.write_text(json.dumps(data), encoding="utf-8")
+        return other
+
+    # A file of before the factors on a wind's load were fitted beside it has none.
+    older = changed(lambda known: [known.pop(name) for name in ("C_X", "C_Y", "C_N")])
+    assert load_file(older).conditions[0].effects[0].values == {"north": 2.0, "east": 1.0}
+    for wrong in (lambda known: known.pop("north"), lambda known: known.update(south=known["north"])):
+        with pytest.raises(FerryIdError, match="wind takes the parameters north"):
+            load_file(changed(wrong))
 
 
 def test_what_began_in_one_log_lasts_in_the_others() -> None:

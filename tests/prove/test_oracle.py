@@ -9,7 +9,8 @@ from math import nan
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import FORM, WIDER
+from ferryid.diagnose.hypothesis import WIDER
+from ferryid.effects.effect import DEFINITION
 from ferryid.errors import FerryIdError
 from ferryid.prove.calibration import calibrated, exceeded
 from ferryid.prove.case import Truth
@@ -73,6 +74,16 @@ def test_a_told_wind_is_measured_and_its_true_size_is_never_looked_at(log: Logs)
     assert json.loads(json.dumps(told.as_json()))["recovered"][0]["parameters"]["north"]["unit"] == "m/s"
 
 
+def test_the_oracle_tells_what_is_too_small_to_be_worth_a_name(log: Logs) -> None:
+    def of(truth: Truth, tables: str) -> Recovered:
+        return one(oracle(log(tables), FERRY, [truth]))
+
+    gain, bias = Truth("thruster_gain", "thruster1", {}), Truth("heading_bias", None, {})
+    fault = "thrusters = {{ faults = [{{ thruster = 'thruster1', factor = {} }}] }}\n"
+    assert [of(gain, fault.format(factor)).idle for factor in (0.998, 0.8)] == [True, False]
+    assert [of(bias, f"navigation = {{ heading_bias_deg = {angle} }}\n").idle for angle in (0.3, 3.0)] == [True, False]
+
+
 def test_the_gain_grows_with_the_square_of_the_size(log: Logs) -> None:
     gains = [
         one(
@@ -89,7 +100,7 @@ def test_the_gain_grows_with_the_square_of_the_size(log: Logs) -> None:
     for each in gains:
         factor = each.parameters["factor"]
         away, told = factor.value - 1.0, (factor.high - factor.low) / (2.0 * 1.96)
-        deviate = away * WIDER / np.sqrt(told**2 - (FORM * away) ** 2)
+        deviate = away * WIDER / np.sqrt(told**2 - (DEFINITION * away) ** 2)
         assert each.gain == pytest.approx(0.5 * deviate**2, rel=0.25)
 
 

@@ -263,6 +263,15 @@ def test_what_became_of_what_the_oracle_alone_named() -> None:
     assert instead(weak, ("thruster_gain", "thruster2")) == "taken for wind"
     (lost,) = (one.instead for one in score(curve_lines()).detections)
     assert lost == {"none": 4}
+    small = [
+        {
+            **one,
+            "oracle": {**one["oracle"], "recovered": [{**each, "idle": True} for each in one["oracle"]["recovered"]]},
+        }
+        for one in curve_lines()
+    ]
+    (lost,) = (one.instead for one in score(small).detections)
+    assert lost == {"too small to be worth a name": 4}
 
 
 def test_the_size_of_a_cell_is_that_of_what_it_is_called_after() -> None:

@@ -107,12 +107,16 @@ def corrected(scene: Scene, steps_deg: Sequence[float]) -> Scene:
     return replace(scene, parts=parts, angles=angles)
 
 
+def error_of(step: float) -> float:
+    """Return the standard deviation of an angle's error, which is uniform within a step [rad]; the step is in degrees."""
+    return float(np.radians(step) / np.sqrt(12.0))
+
+
 def find(scene: Scene) -> SensorFinding | None:
     """Return the step of the coarsest azimuth angle, where it matters to the direction of the force."""
     steps = [step_of(angle) for angle in scene.angles.T]
     step = max(steps, default=0.0)
-    # Uniform within the step, the angle's error has this standard deviation.
-    error = np.radians(step) / np.sqrt(12.0)
+    error = error_of(step)
     if error < LEAST:
         return None
     k = int(np.argmax(steps))

@@ -19,13 +19,18 @@ LEAST_M = 0.15
 LEAST_OF_LENGTH = 0.02
 
 
+def least_m(scene: Scene) -> float:
+    """Return the least lever arm along an axis that is worth a name [m]."""
+    length = scene.profile.hull.length_m
+    return max(LEAST_M, LEAST_OF_LENGTH * length) if np.isfinite(length) else LEAST_M
+
+
 def find(scene: Scene) -> SensorFinding | None:
     """Return where positions were measured, seen from where velocities were."""
     found = kinematics(scene)
     if found is None:
         return None
-    length = scene.profile.hull.length_m
-    least = max(LEAST_M, LEAST_OF_LENGTH * length) if np.isfinite(length) else LEAST_M
+    least = least_m(scene)
     if not (found.found(X, least) or found.found(Y, least)):
         return None
     x, y = found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
