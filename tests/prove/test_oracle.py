@@ -75,13 +75,14 @@ def test_a_told_wind_is_measured_and_its_true_size_is_never_looked_at(log: Logs)
 
 
 def test_the_oracle_tells_what_is_too_small_to_be_worth_a_name(log: Logs) -> None:
-    def of(truth: Truth, tables: str) -> Recovered:
-        return one(oracle(log(tables), FERRY, [truth]))
+    def of(truth: Truth, tables: str = "", sensors: str = "") -> Recovered:
+        return one(oracle(log(tables, sensors), FERRY, [truth]))
 
     gain, bias = Truth("thruster_gain", "thruster1", {}), Truth("heading_bias", None, {})
     fault = "thrusters = {{ faults = [{{ thruster = 'thruster1', factor = {} }}] }}\n"
+    error = "navigation = {{ heading_bias_deg = {} }}"
     assert [of(gain, fault.format(factor)).idle for factor in (0.998, 0.8)] == [True, False]
-    assert [of(bias, f"navigation = {{ heading_bias_deg = {angle} }}\n").idle for angle in (0.3, 3.0)] == [True, False]
+    assert [of(bias, sensors=error.format(angle)).idle for angle in (0.3, 3.0)] == [True, False]
 
 
 def test_the_gain_grows_with_the_square_of_the_size(log: Logs) -> None:
