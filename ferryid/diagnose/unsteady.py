@@ -28,6 +28,9 @@ FASTEST = 0.4
 """Highest frequency that is believed, in steps of the filter; half of one is aliased."""
 WIDEST = 9.0
 """Standard deviation of a logarithm beyond which nothing is known."""
+ABOUT_PEAK = 0.1
+"""Share of its peak's power down to which a disturbance is compared with the velocities: a navigation that smooths them shifts
+a peak a little, and a narrow one then misses itself."""
 LACKING = 0.3
 """A disturbance of which the velocities show less than this share of the power is a hint."""
 UNSEEN = " The velocities do not show it: it may be an error of the positions."
@@ -260,9 +263,9 @@ def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spec
 
 
 def _unseen(evidence: Mapping[str, Floats]) -> bool:
-    """Tell whether the velocities lack most of what a disturbance does where it is strongest.
+    """Tell whether the velocities lack most of what a disturbance does about its peak.
 
     It was found in positions, whose errors in a narrow band look like a force; a force moves velocities as well.
     """
-    strong = evidence["explained"] >= 0.5 * evidence["explained"].max()
+    strong = evidence["explained"] >= ABOUT_PEAK * evidence["explained"].max()
     return float(evidence["before"][strong].sum()) < LACKING * float(evidence["explained"][strong].sum())

@@ -110,6 +110,14 @@ def test_what_the_velocities_lack_is_unseen(share: float, unseen: bool) -> None:
     assert _unseen(evidence) == unseen
 
 
+@pytest.mark.parametrize(("at_hz", "unseen"), [(0.35, False), (0.2, True)])
+def test_a_peak_that_the_navigation_shifts_a_little_is_seen(at_hz: float, unseen: bool) -> None:
+    """The narrow band of a disturbance of 0.4 Hz, with memory of 6 s, and as much power in the velocities elsewhere."""
+    frequency = np.linspace(0.05, 1.0, 96)
+    explained, before = (1.0 / (1.0 + (2.0 * np.pi * (frequency - peak) * 6.0) ** 2) for peak in (0.4, at_hz))
+    assert _unseen({"frequency": frequency, "explained": explained, "before": before}) == unseen
+
+
 def test_waves_slower_than_any_sea_are_none() -> None:
     ferry = load_profile("milliampere")
     waves = Suspect(effects()["waves"], None, effects()["waves"].parameters_of(ferry))
