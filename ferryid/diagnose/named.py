@@ -14,7 +14,7 @@ from ferryid.diagnose.result import AXES, HINT, NEAR, Estimate, Finding, Rival
 from ferryid.diagnose.ridge import intervals
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shown import columns_of, regressor_of
-from ferryid.diagnose.spans import swapped
+from ferryid.diagnose.spans import brief, lasts_s, swapped
 from ferryid.effects.picture import Scene
 
 TIME_DROP = 50.0
@@ -61,6 +61,12 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
                 "claims neither the squared force error nor the free run improves by an interval that excludes none: "
                 "it is a hint."
             )
+        short = brief(trial, suspect)
+        if short:
+            told.append(
+                f"{suspect.title} acts for {lasts_s(trial, suspect):.0f} s only, too short a time to judge it on data that a "
+                "fit has not seen: it is a hint."
+            )
         single = suspect.effect.once(trial.plain.scene, kept.values[i])
         if single:
             told.append(
@@ -69,7 +75,8 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
             )
         first = suspect.parameters[0]
         faint = (
-            len(suspect.times) == 2
+            not short
+            and len(suspect.times) == 2
             and abs(values.get(first.name, first.neutral) - first.neutral) < suspect.effect.passing
         )
         if faint:
@@ -90,7 +97,7 @@ def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding]
                 effect=suspect.effect.id,
                 instance=suspect.instance,
                 probability=min(standing.probability, HINT)
-                if unseen or single or faint or harms
+                if unseen or short or single or faint or harms
                 else standing.probability,
                 parameters=estimates,
                 axes=dict(zip(AXES, place.shares.tolist(), strict=True)),

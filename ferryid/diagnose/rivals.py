@@ -8,7 +8,9 @@ from math import exp
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, settled, without
 from ferryid.diagnose.parallel import over
+from ferryid.diagnose.result import HINT
 from ferryid.diagnose.search import FAR, ODDS
+from ferryid.diagnose.spans import brief
 
 NEAREST = 4
 """Rivals that are fitted to the end."""
@@ -50,8 +52,13 @@ class Standing:
 
 
 def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect]) -> Standing:
-    """Return how a suspect stands against every other of the library in its place, in its span."""
+    """Return how a suspect stands against every other of the library in its place, in its span.
+
+    One that is too brief to be judged has no rivals: it is no name, whatever else could stand there.
+    """
     suspect = kept.suspects[index]
+    if brief(trial, suspect):
+        return Standing((), HINT)
     bare = without(trial, kept, index)
     begin = near(trial, bare)
     taken = {one.key for one in kept.suspects}

@@ -23,7 +23,8 @@ them. In a calm log seconds matter: what acts too long or too short by them leav
 MOST_NUMBERS = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
 LEAST_BLOCKS = 2.0
-"""Length of the shortest span, in blocks that are held out: a fit that is judged on one part of it must have seen another."""
+"""Length of the shortest span that a name can be judged by, in blocks that are held out: a fit that is judged on one part of it
+must have seen another."""
 PROMISING = 3
 """Spans that are handed on to be fitted."""
 NEARBY_S, FINEST_S = 8.0, 0.2
@@ -65,7 +66,8 @@ def ground_of(trial: Trial, made: Fit, begin: Near) -> Ground:
 def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
     """Return a suspect in the few spans, other than the whole log, in which it promises most beside a fit.
 
-    None is shorter than `LEAST_BLOCKS`.
+    Short ones are among them that can name nothing (see `brief`): left out, what came and went within seconds would be taken
+    for something that lasts.
 
     The log is cut into parts; what a suspect adds in a part is linear in its parameters there, and what it adds in a span is
     the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
@@ -74,11 +76,8 @@ def promising(trial: Trial, ground: Ground, suspect: Suspect) -> list[Suspect]:
     parts = len(edges) - 1
     G, g = _cross_products(trial, ground, suspect, edges)
     a, b = np.triu_indices(parts + 1, 1)
-    least = shortest_s(trial) / (len(trial.steps.starts) * stride_s(trial.steps)) * parts
-    part = ((a > 0) | (b < parts)) & (b - a >= least)
+    part = (a > 0) | (b < parts)
     a, b = a[part], b[part]
-    if not len(a):
-        return []
     gain = _gains(G, g, a, b, suspect)
     gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(trial.windows.starts))
     found: list[tuple[int, int]] = []
@@ -99,9 +98,9 @@ def part_s(trial: Trial, suspect: Suspect) -> float:
     return float(np.median(np.diff(_edges(trial, suspect))))
 
 
-def shortest_s(trial: Trial) -> float:
-    """Return how long an effect acts that begins or ends within the log, at least [s]."""
-    return LEAST_BLOCKS * block_s(trial.windows)
+def brief(trial: Trial, suspect: Suspect) -> bool:
+    """Tell whether a suspect acts for so short a time that it cannot be judged: it stands in for whatever came just then."""
+    return bool(suspect.times) and lasts_s(trial, suspect) < LEAST_BLOCKS * block_s(trial.windows)
 
 
 def lasts_s(trial: Trial, suspect: Suspect) -> float:
@@ -164,13 +163,13 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
     made
         Fit of it.
     index
-        Of the suspect; its span stays as long as `LEAST_BLOCKS` at least.
+        Of the suspect; its span stays as long as `PART_S` at least.
     begin
         Where each fit begins.
     step_s, finest_s
         First step [s], which is halved where neither side is better, and the one to stop at.
     """
-    times, least = trial.windows.middle_s, shortest_s(trial)
+    times = trial.windows.middle_s
     best, step = made, step_s
     while step > finest_s:
         before = best.suspects[index]
@@ -178,7 +177,7 @@ def sharpened(trial: Trial, made: Fit, index: int, begin: Near, step_s: float, f
             middle = getattr(best.suspects[index], end)
             for time in (middle - step, middle + step):
                 moved = best.suspects[index].moved(end, time)
-                if lasts_s(trial, moved) < least or not times[0] < time < times[-1]:
+                if lasts_s(trial, moved) < PART_S or not times[0] < time < times[-1]:
                     continue
                 tried = fit(trial, swapped(best.suspects, index, moved), best.values, steps=GLANCE, begin=begin)
                 best = max(best, tried, key=lambda one: one.evidence)

@@ -22,6 +22,7 @@ from ferryid.diagnose.result import AXES, HINT, Estimate, Finding, LawTerm
 from ferryid.diagnose.search import ODDS
 from ferryid.diagnose.shared_laws import Heard
 from ferryid.diagnose.shown import columns_of
+from ferryid.diagnose.spans import brief
 from ferryid.diagnose.terms import FORCE, Term
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats
@@ -113,7 +114,8 @@ def impostors(trial: Trial, kept: Fit) -> tuple[int, ...]:
     folds = folds_of(trial.windows)
     if folds is None:
         return ()
-    return tuple(i for i in range(len(kept.suspects)) if _displaced(trial, kept, i, folds))
+    every = (i for i, one in enumerate(kept.suspects) if not brief(trial, one))
+    return tuple(i for i in every if _displaced(trial, kept, i, folds))
 
 
 def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:

@@ -12,8 +12,10 @@ import pytest
 
 from ferryid.diagnose.folds import block_s
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit, near
+from ferryid.diagnose.result import HINT
+from ferryid.diagnose.rivals import Standing, standing_of
 from ferryid.diagnose.search import search, suspects_of
-from ferryid.diagnose.spans import ground_of, lasts_s, part_s, promising, sharpened, shortest_s
+from ferryid.diagnose.spans import brief, ground_of, lasts_s, part_s, promising, sharpened
 from ferryid.diagnose.weak import windows
 from tests.diagnose.test_hypothesis import PUSH, trial
 from tests.diagnose.trials import sailed, trial_on
@@ -59,16 +61,16 @@ def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: fl
     assert sharp.offset_s == pytest.approx(last_s, abs=2.0)
 
 
-def test_no_span_is_shorter_than_two_blocks() -> None:
-    case = pushed(240.0, 100.0, 115.0)
-    bare = fit(case, ())
-    begin = near(case, bare)
-    spans = promising(case, ground_of(case, bare, begin), PUSH)
-    assert spans
-    sharp = sharpened(case, fit(case, [spans[0]]), 0, begin, 8.0).suspects[0]
-    least = shortest_s(case)
-    assert least == pytest.approx(2.0 * block_s(case.windows))
-    assert all(lasts_s(case, one) >= least - 1.0 for one in (*spans, sharp))
+def test_what_lasts_less_than_two_blocks_is_brief() -> None:
+    case = trial(0.0)
+    two_s = 2.0 * block_s(case.windows)
+    assert two_s == pytest.approx(80.0)
+    assert brief(case, replace(PUSH, onset_s=100.0, offset_s=97.0 + two_s))
+    assert not brief(case, replace(PUSH, onset_s=100.0, offset_s=103.0 + two_s))
+    assert not brief(case, PUSH)
+    # It has no rivals, and nothing is judged by it.
+    made = fit(case, [replace(PUSH, onset_s=100.0, offset_s=130.0)])
+    assert standing_of(case, made, 0, [PUSH]) == Standing((), HINT)
 
 
 def test_where_nothing_pushes_no_span_is_promising() -> None:
