@@ -27,6 +27,10 @@ class FerryIdError(Exception):
         super().__init__(one_line(message))
 
 
+class UnwritableError(FerryIdError):
+    """A place that cannot be written, or a full disk: no fault of the input, which may be usable another time."""
+
+
 def one_line(message: str) -> str:
     """Return a message fit for a terminal and a single line: control characters written out, an endless one shortened."""
     if len(message) > _LONGEST:

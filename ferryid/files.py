@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ferryid.errors import FerryIdError
+from ferryid.errors import FerryIdError, UnwritableError
 
 try:
     import fcntl
@@ -90,12 +90,12 @@ def _remove(path: Path) -> None:
         path.unlink()
 
 
-def unwritable(path: Path, error: OSError) -> FerryIdError:
+def unwritable(path: Path, error: OSError) -> UnwritableError:
     """Return the error that says why `path` cannot be written and what helps."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return FerryIdError(f"{path}: the disk is full. Fix: free some space, or choose another folder with --out")
+        return UnwritableError(f"{path}: the disk is full. Fix: free some space, or choose another folder with --out")
     reason = error.strerror or type(error).__name__
-    return FerryIdError(f"{path}: cannot be written, {reason}. Fix: choose a folder you may write to with --out")
+    return UnwritableError(f"{path}: cannot be written, {reason}. Fix: choose a folder you may write to with --out")
 
 
 def taken(path: Path) -> FerryIdError:

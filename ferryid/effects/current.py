@@ -48,5 +48,14 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
 
 
 EFFECT = Effect(
-    "current", "Current", parameters_of, apply, says, scenario, cannot=cannot, regressor=regressor, bends_hull=True
+    "current",
+    "Current",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    cannot=cannot,
+    regressor=regressor,
+    bends_hull=True,
+    idle=0.01,
 )

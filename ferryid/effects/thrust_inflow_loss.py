@@ -54,5 +54,13 @@ def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> t
 
 
 EFFECT = Effect(
-    "thrust_inflow_loss", "Inflow loss", parameters_of, apply, says, scenario, vessel=True, regressor=regressor
+    "thrust_inflow_loss",
+    "Inflow loss",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    vessel=True,
+    regressor=regressor,
+    idle=0.03,
 )

@@ -87,4 +87,5 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     regressor=regressor,
+    idle=0.05,
 )

@@ -16,8 +16,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from ferryid.errors import FerryIdError
-from ferryid.prove.blind import failed
+from ferryid.errors import FerryIdError, UnwritableError
+from ferryid.prove.blind import UNWRITABLE, failed
 
 PROGRAM = ("-m", "ferryid.prove.blind")
 TRIES = 2
@@ -59,6 +59,11 @@ class Blind:
         """Return the diagnosis of a log, as `ferryid.prove.blind.diagnosed` has it, and ``guard``.
 
         Where the process died every time, ``verdict`` is ``"crashed"``.
+
+        Raises
+        ------
+        UnwritableError
+            Where what comes of it could not be written.
         """
         out.mkdir(parents=True, exist_ok=True)
         request = {"log": str(log.resolve()), "profile": str(profile.resolve()), "out": str(out.resolve())}
@@ -66,6 +71,8 @@ class Blind:
         for _ in range(TRIES):
             self._start()
             answer = self._exchange(request)
+            if answer is not None and UNWRITABLE in answer:
+                raise UnwritableError(answer[UNWRITABLE])
             if answer is not None:
                 return {**answer, "guard": self.guard}
             code = self.close()

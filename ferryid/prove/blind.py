@@ -19,12 +19,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ferryid.errors import FerryIdError, one_line
+from ferryid.errors import FerryIdError, UnwritableError, one_line
 from ferryid.prove.guard import Hook, Rooms, landlock, python_rooms
 from ferryid.prove.sources import sources
 
 # Nothing heavy is imported above: the kernel shuts in the thread that asks for it, and NumPy starts others.
 
+UNWRITABLE = "unwritable"
+"""Key of an answer that is no diagnosis: why what comes of it could not be written."""
 RIVALS = 2
 """How many rivals of a finding are told."""
 
@@ -45,6 +47,11 @@ def diagnosed(log: Path, profile: Path, out: Path) -> dict[str, Any]:
         ``verdict``, ``findings`` without pictures, ``notes``, ``before``, ``after``, ``model`` (a path relative to `out`, or
         None) and ``seconds``, the time of the diagnosis. Of a log that was refused ``verdict`` is ``"refused"``, there are no
         findings, and ``error`` says why.
+
+    Raises
+    ------
+    UnwritableError
+        Where the model could not be written.
     """
     from ferryid.diagnose.diagnose import diagnose
     from ferryid.diagnose.remodel import keep
@@ -57,6 +64,8 @@ def diagnosed(log: Path, profile: Path, out: Path) -> dict[str, Any]:
         found = diagnose([str(log)], vessel, None, progress=lambda stage: None)
         seconds = time.perf_counter() - start
         told = to_json(keep(found, vessel, None, out)[0])
+    except UnwritableError:
+        raise
     except FerryIdError as error:
         return failed("refused", str(error), time.perf_counter() - start)
     return {
@@ -121,6 +130,8 @@ def main(diagnosis: Callable[[Path, Path, Path], dict[str, Any]] = diagnosed) ->
         start = time.perf_counter()
         try:
             answer = diagnosis(log, profile, out)
+        except UnwritableError as error:
+            answer = {UNWRITABLE: str(error)}
         except Exception as error:  # noqa: BLE001 - a bug that one log shows is told in its line, and the others go on
             place = traceback.extract_tb(error.__traceback__)[-1]
             bug = one_line(f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")

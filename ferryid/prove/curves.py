@@ -101,9 +101,9 @@ class Curve:
     def says(self) -> str:
         """The size in words."""
         if self.bound == "never":
-            return f"never within the sizes tried (more than {self.most:.3g})"
+            return f"beyond the sizes tried (more than {self.most:.3g})"
         if self.bound == "always":
-            return f"always within the sizes tried (less than {self.least:.3g})"
+            return f"below the sizes tried (less than {self.least:.3g})"
         return f"{self.size:.3g} ({self.low:.3g} to {self.high:.3g})"
 
 

@@ -71,18 +71,21 @@ def desk(folder: Path, seed: int, drawn: Mapping[str, Any], tell: Callable[[str]
     Raises
     ------
     FerryIdError
-        Where another proof is not finished.
+        Where another proof is not finished, or what is there is none that this knows of.
     """
     path, stamp = folder / "run.json", sources()
     before = _before(path)
     key = key_of(seed, before["salt"] if before else None)
     mark = key.mark(canonical(drawn).decode())
-    if before is None:
-        _clear(folder)
-    elif before["sources"] != stamp:
+    if before is None and (strange := [name for name in OURS if (folder / name).exists()]):
+        raise FerryIdError(
+            f"{folder}: holds {strange[0]}, and no run.json that tells of a proof: it may be somebody's work. "
+            "Fix: remove or move the folder, or choose another --out"
+        )
+    if before is not None and before["sources"] != stamp:
         tell("the sources of ferryid have changed since this folder's proof was begun: it begins anew")
         _clear(folder)
-    elif before["mark"] != mark:
+    elif before is not None and before["mark"] != mark:
         if not (folder / "result.json").exists():
             raise FerryIdError(
                 f"{folder}: holds a proof of another seed, --runs or --only that is not finished. "
@@ -90,9 +93,9 @@ def desk(folder: Path, seed: int, drawn: Mapping[str, Any], tell: Callable[[str]
             )
         tell("this folder's proof, of another seed, --runs or --only, is finished: another begins in its place")
         _clear(folder)
-    else:
+    elif before is not None:
         tell("what is finished of this folder's proof is kept")
-        _sweep(folder)
+        sweep(folder)
         return Desk(folder, key, stamp)
     write_text(path, dump_json({"salt": key.salt.hex(), "mark": mark, "sources": stamp}))
     return Desk(folder, key, stamp)
@@ -116,8 +119,8 @@ def _clear(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _sweep(folder: Path) -> None:
-    """Remove what a process that was killed has left half-done."""
+def sweep(folder: Path) -> None:
+    """Remove what is left half-done, and what nobody needs any more."""
     shutil.rmtree(folder / "scratch", ignore_errors=True)
     shutil.rmtree(folder / "again", ignore_errors=True)
     for path in (folder / "logs").glob(".*.part"):

@@ -75,8 +75,11 @@ def carry_out(
         with file:
             for count, (number, result) in enumerate(spread.over(function, [work[name] for name in left]), 1):
                 done[left[number]] = written = hidden(result)
-                file.write(json.dumps({"name": left[number], "result": written}, allow_nan=False) + "\n")
-                file.flush()
+                try:
+                    file.write(json.dumps({"name": left[number], "result": written}, allow_nan=False) + "\n")
+                    file.flush()
+                except OSError as error:
+                    raise unwritable(path, error) from error
                 seconds = (time.monotonic() - start) / count * (len(left) - count)
                 progress(f"{what}: {len(done)} of {len(work)}, {_time(seconds)} left")
         progress("")

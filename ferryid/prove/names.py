@@ -16,10 +16,13 @@ Line = Mapping[str, Any]
 """A finished case: ``case``, as `ferryid.prove.case.Case.as_json` gives it, and what was ``told`` of its log, as plain data."""
 Key = tuple[str, str | None]
 """Effect and instance."""
-NONE, UNKNOWN, OTHER, REFUSED = "none", "unknown", "wrong thruster", "refused"
+NONE, UNKNOWN, OTHER, REFUSED = "none", "unknown", "wrong place", "refused"
 """Columns of the confusion matrix that are no effect: nothing named, something found without a name, the right effect of the
-wrong thruster, and an error message in the place of a diagnosis."""
+wrong thruster or other coefficients of the hull, and an error message in the place of a diagnosis."""
+ELSEWHERE = "other coefficients"
+"""Instance of a hull that is told wrong in coefficients which are right."""
 LEVEL = 0.95
+HULL = "hull_parameters"
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,20 @@ def named(line: Line) -> list[Mapping[str, Any]]:
 
 def names(line: Line) -> list[Key]:
     """Return what a run names, the first first."""
-    return [key_of(one) for one in named(line)]
+    return list(told(line))
+
+
+def told(line: Line) -> dict[Key, Mapping[str, Any]]:
+    """Return the findings that name something, the first first; of several with one name, the first.
+
+    A hull is the one that is in the log only if a coefficient is told that is wrong: its instance is `ELSEWHERE` otherwise.
+    """
+    concealed = {name for truth in truths(line) if truth["effect"] == HULL for name in truth["values"]}
+    found: dict[Key, Mapping[str, Any]] = {}
+    for one in named(line):
+        missed = one["effect"] == HULL and concealed and not concealed & set(one["parameters"])
+        found.setdefault((HULL, ELSEWHERE) if missed else key_of(one), one)
+    return found
 
 
 def wrong(line: Line) -> list[Key]:
@@ -116,27 +132,40 @@ def wrong(line: Line) -> list[Key]:
     there = {key_of(truth) for truth in truths(line)}
     effects = {effect for effect, _ in there}
     return [
-        key_of(one)
-        for one in named(line)
-        if key_of(one) not in there
+        key
+        for key, one in told(line).items()
+        if key not in there
         and one["effect"] not in line["case"]["allowed"]
         and not effects & set(one.get("unresolved_with", ()))
     ]
 
 
+def strictly_wrong(line: Line) -> list[Key]:
+    """Return what a run names that is not in the log, whatever the case allows."""
+    there = {key_of(truth) for truth in truths(line)}
+    return [key for key in told(line) if key not in there]
+
+
+def hints_of_nothing(line: Line) -> list[Key]:
+    """Return what a run takes for possible, at a probability of 0.5 or less, and is not in the log."""
+    there = {key_of(truth) for truth in truths(line)}
+    doubtful = [one for one in line["told"].get("findings", ()) if one["probability"] <= HINT]
+    return [key_of(one) for one in doubtful if one["effect"] != UNKNOWN and key_of(one) not in there]
+
+
 def instead(line: Line, key: Key) -> str:
     """Return what became of an effect that is in the log of a case and was not named."""
-    told = line["told"]
-    if told.get("error"):
+    said = line["told"]
+    if said.get("error"):
         return REFUSED
-    if any(key_of(one) == key for one in told.get("findings", ())):
+    if any(key_of(one) == key and one["probability"] <= HINT for one in said.get("findings", ())):
         return "a hint"
     effect = effects().get(key[0])
     title = key[0] if effect is None else titled(effect.title, key[1])
-    if any("suspected, but dropped" in note and title.lower() in note.lower() for note in told.get("notes", ())):
+    if any("suspected, but dropped" in note and title.lower() in note.lower() for note in said.get("notes", ())):
         return "dropped"
     other = first_name(line)
-    return other if other in (UNKNOWN, NONE) else f"taken for {other}"
+    return other if other in (UNKNOWN, NONE, OTHER) else f"taken for {other}"
 
 
 def first_name(line: Line) -> str:

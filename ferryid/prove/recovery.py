@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.prove.case import vectors
-from ferryid.prove.names import Line, Share, key_of, named, truths
+from ferryid.prove.names import Line, Share, key_of, told, truths
 
 WITHIN = 0.1
 """Relative error of a parameter that is small."""
@@ -74,11 +74,11 @@ def recoveries(lines: Iterable[Line]) -> tuple[Recovery, ...]:
     """Return how near what was named rightly is to the truth: everything first, then effect by effect."""
     found: dict[str, list[Recovery]] = {}
     for line in lines:
-        told = {key_of(one): one for one in reversed(named(line))}
+        said = told(line)
         for truth in truths(line):
-            if key_of(truth) in told:
+            if key_of(truth) in said:
                 acted = (line.get("acted") or {}).get(truth["effect"], truth["values"])
-                one = _recovery(truth, acted, told[key_of(truth)])
+                one = _recovery(truth, acted, said[key_of(truth)])
                 found.setdefault(truth["effect"], []).append(one)
     every = [one for some in found.values() for one in some]
     return (_joined("all", every), *(_joined(effect, found[effect]) for effect in sorted(found)))

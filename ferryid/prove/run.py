@@ -8,9 +8,9 @@ All of it lies in one folder: ``logs`` and ``models``, a folder for each case, w
 from __future__ import annotations
 
 import secrets
-import shutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from shlex import quote
@@ -20,7 +20,7 @@ from ferryid import __version__
 from ferryid.errors import FerryIdError
 from ferryid.files import alone, dump_json, finite, write_text
 from ferryid.prove.case import Case, case_of
-from ferryid.prove.desk import Desk, desk
+from ferryid.prove.desk import Desk, desk, sweep
 from ferryid.prove.finished import carry_out
 from ferryid.prove.guard import python_rooms
 from ferryid.prove.parts import Generate, Parts, Trial
@@ -32,7 +32,7 @@ from ferryid.prove.tasks import Log, diagnosed, judged, write
 SCHEMA = "ferryid.prove/1"
 SEED_BITS = 48
 REACHED = {True: "reached", False: "MISSED ", None: "open   "}
-"""How targets are told; one is open while its interval allows either."""
+"""How targets are told; one is open that was reached, while its interval allows either."""
 
 
 def prove(
@@ -81,8 +81,10 @@ def prove(
     folder = (out / "proof").resolve()
     python_rooms(folder)
     tell(f"seed {seed}; if interrupted, go on with: {_again(seed, runs, only, out)}")
-    with alone(folder, wait=False), spread(processes, dask) as workers:
+    with alone(folder, wait=False), ExitStack() as last, spread(processes, dask) as workers:
         at = desk(folder, seed, {"runs": runs, "only": list(only)}, tell)
+        # Nothing half-done is left, however this ends: by then nobody works there any more.
+        last.callback(sweep, folder)
         do = partial(carry_out, spread=workers, progress=progress)
 
         written = _written(do, at, cases, parts.generate)
@@ -92,6 +94,8 @@ def prove(
 
         logs = {name: Log(at.folder, at.sources, name, one["log"], one["profile"]) for name, one in written.items()}
         diagnoses = do("diagnosing", at.lines("diagnosed"), logs, diagnosed)
+        if any(not isinstance(one, dict) or "verdict" not in one for one in diagnoses.values()):
+            raise _damaged(at.lines("diagnosed"))
         answers = lay_open(at.folder, at.key)
 
         trials = {
@@ -102,8 +106,6 @@ def prove(
             name: do(name, at.lines(f"{name}-{sources(judging=True)}"), trials, partial(judged, judge))
             for name, judge in parts.judges.items()
         }
-    for name in ("again", "scratch"):
-        shutil.rmtree(folder / name, ignore_errors=True)
     progress("scoring")
     every = [
         {"case": trial.case.as_json(), "acted": trial.acted, "diagnosis": trial.diagnosis}
@@ -154,7 +156,20 @@ def _written(do: Any, at: Desk, cases: Sequence[Case], generate: Generate) -> di
     at.forget("written", [case.name for case in cases if not (logs / case.name).is_dir()])
     work = {case.name: case for case in cases}
     lines = do("writing logs", path, work, partial(write, generate, logs), hidden=lambda one: sealed(one, at.key).hex())
-    return {name: opened(bytes.fromhex(line), at.key, str(path)) for name, line in lines.items()}
+    return {name: opened(_bytes(line, path), at.key, str(path)) for name, line in lines.items()}
+
+
+def _bytes(line: Any, path: Path) -> bytes:
+    try:
+        return bytes.fromhex(line)
+    except (TypeError, ValueError) as error:
+        raise _damaged(path) from error
+
+
+def _damaged(path: Path) -> FerryIdError:
+    return FerryIdError(
+        f"{path}: holds a line that no proof has written. Fix: remove the file, its cases are done again"
+    )
 
 
 def _sealed(at: Desk, answers: Mapping[str, Any]) -> str:

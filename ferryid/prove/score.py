@@ -20,9 +20,11 @@ from ferryid.prove.names import (
     cells,
     confusion,
     false_names,
+    hints_of_nothing,
     instead,
     key_of,
     names,
+    strictly_wrong,
     truths,
 )
 from ferryid.prove.recovery import Recovery, recoveries
@@ -87,6 +89,12 @@ class Scores:
         First names.
     false_names
         Share of runs with a wrong name: of ``all``, and by kind of cell.
+    strict
+        Share of runs that name anything that is not in the log, whatever was said not to be wrong.
+    hinted
+        Share of runs with a hint of something that is not in the log.
+    verdicts
+        Of the runs in which nothing is concealed, how many of each.
     cells
         How often what was concealed was named.
     recoveries
@@ -112,6 +120,9 @@ class Scores:
     runs: int
     confusion: Confusion
     false_names: Mapping[str, Share]
+    strict: Share
+    hinted: Share
+    verdicts: Mapping[str, int]
     cells: tuple[Cell, ...]
     recoveries: tuple[Recovery, ...]
     claims: tuple[Claim, ...]
@@ -145,6 +156,11 @@ def score(lines: Sequence[Line]) -> Scores:
         len(lines),
         confusion(lines),
         false_names(lines),
+        Share(sum(bool(strictly_wrong(line)) for line in lines), len(lines)),
+        Share(sum(bool(hints_of_nothing(line)) for line in lines), len(lines)),
+        Counter(
+            str(line["told"].get("verdict")) for line in lines if not truths(line) and line["case"]["kind"] == CLEAN
+        ),
         cells(lines),
         recoveries(lines),
         claims(lines),

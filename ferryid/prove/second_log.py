@@ -103,7 +103,12 @@ def claims(lines: Iterable[Line]) -> tuple[Claim, ...]:
 
 
 def methods(lines: Sequence[Line]) -> tuple[Method, ...]:
-    """Return the diagnosis and every rival that was judged on a second log."""
+    """Return the diagnosis and every rival that was judged on a second log, all on the logs of which rivals were asked.
+
+    Where a diagnosis has left the base model as it was, its errors are the base model's.
+    """
+    asked = [line for line in lines if line.get("rival_names") or set(line.get("second") or {}) - {"base", DIAGNOSED}]
+    lines = asked or lines
     known = [name for line in lines for name in (line.get("second") or {}) if name not in ("base", DIAGNOSED)]
     known += [name for line in lines for name in (line.get("rival_names") or {})]
     found = [_method(name, lines) for name in dict.fromkeys([DIAGNOSED, *known])]

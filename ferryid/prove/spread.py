@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import re
 import signal
 import threading
 from collections import deque
@@ -189,13 +190,16 @@ class _Cluster:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Have nothing logged of what is said in one line."""
-    log = logging.getLogger("distributed")
-    level = log.level
-    log.setLevel(logging.CRITICAL)
+    logs = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
+    levels = [log.level for log in logs]
+    for log in logs:
+        # Above the highest: what a connection that breaks off leaves is logged as critical.
+        log.setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        log.setLevel(level)
+        for log, level in zip(logs, levels, strict=True):
+            log.setLevel(level)
 
 
 @contextmanager
@@ -206,6 +210,8 @@ def _cluster(address: str) -> Iterator[Any]:
         raise FerryIdError(
             "--dask: the package distributed is not installed, which a cluster needs. Fix: pip install distributed"
         ) from error
+    if not re.fullmatch(r"tcp://[^\s/:]+:\d{1,5}|tcp://\[[0-9a-fA-F:]+\]:\d{1,5}", address):
+        raise FerryIdError(f"--dask: {address!r} is no scheduler's address. Fix: give one like tcp://HOST:8786")
     try:
         client: Any = Client(address, timeout=ANSWER_S, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, TimeoutError, ValueError) as error:

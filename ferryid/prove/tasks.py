@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ferryid.errors import FerryIdError
+from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import finite, replacing
 from ferryid.prove.ask import blind_of
 from ferryid.prove.case import Case
@@ -89,9 +89,18 @@ def diagnosed(log: Log) -> dict[str, Any]:
 
 
 def judged(judge: Judge, trial: Trial) -> Any:
-    """Return what a judge says of a trial; where its input cannot be used, ``error`` says why."""
+    """Return what a judge says of a trial; where its input cannot be used, ``error`` says why.
+
+    Raises
+    ------
+    UnwritableError
+        Where it could not write what it needs.
+    """
     trial.folder.mkdir(parents=True, exist_ok=True)
     try:
         return judge(trial)
+    except UnwritableError:
+        # A full disk says nothing of the trial.
+        raise
     except FerryIdError as error:
         return {"error": str(error)}

@@ -74,8 +74,8 @@ def test_what_is_always_or_never_named_is_a_bound() -> None:
     assert always.high < 1.0
     assert (never.size, never.bound, never.high) == (None, "never", inf)
     assert never.low > 4.0
-    assert never.says == "never within the sizes tried (more than 4)"
-    assert always.says == "always within the sizes tried (less than 0.25)"
+    assert never.says == "beyond the sizes tried (more than 4)"
+    assert always.says == "below the sizes tried (less than 0.25)"
     # One in six is nowhere near 19 in 20.
     rare = curve(*runs((0, 0, 0, 0, 1)))
     assert rare.bound == "never"

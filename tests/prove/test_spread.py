@@ -143,12 +143,23 @@ def test_a_cluster_that_loses_its_scheduler(
 def test_a_cluster_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr(spreading, "ANSWER_S", 1.0)
-    for address in ("tcp://127.0.0.1:9", "nonsense://x", "127.0.0.1:notaport"):
-        with (
-            pytest.raises(FerryIdError, match=r"^--dask .*: no scheduler answers there .* Fix: start one"),
-            spread(dask=address),
-        ):
-            pass
+    with (
+        pytest.raises(FerryIdError, match=r"^--dask .*: no scheduler answers there .* Fix: start one"),
+        spread(dask="tcp://127.0.0.1:9"),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    "address", ["", "nonsense", "nonsense://x", "tls://127.0.0.1:8786", "tcp://127.0.0.1", "tcp://:1", "127.0.0.1:1"]
+)
+def test_what_is_no_address_of_a_cluster(address: str) -> None:
+    pytest.importorskip("distributed")
+    with (
+        pytest.raises(FerryIdError, match=r"^--dask: .* is no scheduler's address. Fix: give one like tcp://HOST"),
+        spread(dask=address),
+    ):
+        pass
 
 
 def test_a_cluster_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
