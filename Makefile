@@ -34,7 +34,7 @@ thesis: $(VENV)/installed
 
 # Conceals physics in trials of a plant of its own, seals the answers and diagnoses blind: writes reports/proof.md and its
 # figures. SEED=N draws other cases, RUNS=N more of them. It goes on where it was interrupted.
-SEED ?= 20261222
+SEED ?= 20261223
 RUNS ?= 1
 proof: $(VENV)/installed
 	$(BIN)/ferryid prove --seed $(SEED) --runs $(RUNS) --out $(DEMO) --json $(DEMO)/proof.json

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.errors import FerryIdError
+from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.prove.ask import Blind
 from ferryid.prove.guard import landlock_version, python_rooms
 from ferryid.prove.sources import sources
@@ -71,6 +71,21 @@ def test_no_way_to_the_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
         *("OMP_NUM_THREADS", "LC_CTYPE"),
     }
     assert told["cores"] == 1
+
+
+def test_what_cannot_be_written_is_no_diagnosis(tmp_path: Path) -> None:
+    folder = with_logs(tmp_path / "proof", "one")
+    program = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from ferryid.files import unwritable\n"
+        "from ferryid.prove.blind import main\n"
+        "def full(log, profile, out):\n"
+        "    raise unwritable(out, OSError(28, 'no space'))\n"
+        "main(full)\n"
+    )
+    with Blind(folder, ("-c", program)) as blind, pytest.raises(UnwritableError, match="the disk is full"):
+        asked(blind, folder, "one")
 
 
 def test_the_kernel_alone_keeps_what_python_opens(tmp_path: Path) -> None:

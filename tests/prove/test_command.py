@@ -57,6 +57,15 @@ def test_results_to_standard_output_and_the_seed_to_standard_error(ferryid_run, 
     )
     assert conforms(again.out) == result
 
+    checked = ferryid_run("prove", "--check", tmp_path / "out" / "proof")
+    assert (checked.code, checked.err) == (0, "")
+    assert "the answers to 2 cases are those that were sealed" in checked.out
+    path = tmp_path / "out" / "proof" / "answers.json"
+    path.write_text(path.read_text("utf-8").replace('"north": ', '"north": 1'), encoding="utf-8")
+    checked = ferryid_run("prove", "--check", tmp_path / "out" / "proof")
+    assert checked.code == 2
+    assert "is not what was sealed" in checked.err
+
 
 def test_a_cluster_that_cannot_be_used_is_one_line(
     ferryid_run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

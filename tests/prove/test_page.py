@@ -17,6 +17,7 @@ RESULT: dict[str, Any] = {
     "settings": {"runs": 4.0, "only": []},
     "counts": {"cases": 41, "diagnosed": 40, "refused": 1, "crashed": 0},
     "commitment": "0123" * 16,
+    "sources": "89ab" * 4,
     "guard": "audit",
 }
 
@@ -56,6 +57,22 @@ def test_the_page_tells_seal_guard_sizes_and_what_was_missed() -> None:
     assert "- `sindy` could not be asked: pysindy is not installed" in told
     # Clean logs come before effects, effects before pairs.
     assert told.index("### Nothing") < told.index("### One effect, from") < told.index("### Two effects")
+
+
+@pytest.mark.parametrize(
+    ("share", "told"),
+    [
+        (Share(0, 400), "yes"),
+        (Share(0, 20), "reached, though the interval allows either"),
+        (Share(1, 20), "**missed**, though the interval allows either"),
+        (Share(20, 20), "**missed**"),
+    ],
+)
+def test_a_target_that_an_interval_leaves_open_is_told_as_such(share: Share, told: str) -> None:
+    scores = score(curve_lines())
+    text = page({**RESULT, "targets": [_target("so much", share, at_most=0.01)]}, scores)
+    (row,) = (line for line in text.splitlines() if line.startswith("| so much"))
+    assert row.endswith(f" | {told} |")
 
 
 def test_the_figures_are_drawings_of_what_there_is() -> None:

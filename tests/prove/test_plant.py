@@ -214,6 +214,13 @@ def test_a_late_force_comes_as_late_as_it_should() -> None:
     assert 0.005 * np.sum(1.0 - np.array(forces) / full) == pytest.approx(0.8, rel=0.01)
 
 
+@pytest.mark.parametrize("lag_s", [0.02, 0.0298, 0.05])
+def test_a_short_lag_is_no_trouble_to_the_integrator(lag_s: float) -> None:
+    """Steps of 0.05 s diverge where the stages' rate is 2 / 0.0298 s; a force so little late changes hardly anything."""
+    late, none = (sail(FERRY, Conditions(lag_s=lag), "short", 3) for lag in (lag_s, 0.0))
+    assert np.abs(late.states[:2000, :2] - none.states[:2000, :2]).max() < 0.3
+
+
 def test_steps_agree_with_a_library_integrator() -> None:
     conditions = Conditions(payload=(300.0, 1.0, 0.5), mooring=(20.0, 30.0, 4.0, -3.0))
     world = world_of(FERRY, conditions)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shlex
@@ -18,6 +19,7 @@ import jsonschema
 import pytest
 
 from ferryid.errors import FerryIdError
+from ferryid.files import unwritable
 from ferryid.prove import run as running
 from ferryid.prove.finished import carry_out, finished
 from ferryid.prove.run import prove, render_proof
@@ -245,6 +247,46 @@ def test_a_draw_that_cannot_be_leaves_no_trace_and_a_command_can_be_pasted(tmp_p
     words = shlex.split(told[0].partition("go on with: ")[2])
     assert words[words.index("--only") + 1] == "short: wind"
     assert words[words.index("--out") + 1] == str(out)
+
+
+@pytest.mark.parametrize("run", [None, "{"])
+def test_what_is_no_proofs_is_left_alone(tmp_path: Path, run: str | None) -> None:
+    mine = tmp_path / "out" / "proof" / "logs" / "trial.bag"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("a trial", encoding="utf-8")
+    if run is not None:
+        (tmp_path / "out" / "proof" / "run.json").write_text(run, encoding="utf-8")
+    with pytest.raises(FerryIdError, match=r"holds logs|holds run\.json"):
+        proved(tmp_path / "out")
+    assert mine.read_text("utf-8") == "a trial"
+    assert counted() == []
+
+
+@pytest.mark.parametrize(
+    ("stage", "result"), [("diagnosed", None), ("diagnosed", {}), ("written", None), ("written", 1), ("written", "xyz")]
+)
+def test_lines_that_no_proof_has_written(tmp_path: Path, stage: str, result: Any) -> None:
+    out = tmp_path / "out"
+    proved(out, runs=2)
+    path = out / "proof" / "lines" / f"{stage}.jsonl"
+    path.write_text(json.dumps({"name": "0000", "result": result}) + "\n", encoding="utf-8")
+    with pytest.raises(FerryIdError, match=rf"{stage}\.jsonl: holds a line that no proof has written"):
+        proved(out, runs=2)
+
+
+def test_a_full_disk_is_no_result(tmp_path: Path) -> None:
+    def full(trial: Any) -> Any:
+        (trial.folder / "half").mkdir(parents=True)
+        raise unwritable(trial.folder, OSError(errno.ENOSPC, "no space"))
+
+    out = tmp_path / "out"
+    with pytest.raises(FerryIdError, match="the disk is full"):
+        proved(out, replace(PARTS, judges={"oracle": full}), runs=2)
+    assert lines(out, "oracle") == []
+    assert not (out / "proof" / "again").exists(), "nothing half-done is left"
+    # With space again, all is done that was not.
+    result, _ = proved(out, runs=2)
+    assert [one["oracle"]["log"] for one in result["scores"]["of"]] == [True, True]
 
 
 def test_a_proof_that_is_not_finished_is_not_thrown_away(tmp_path: Path) -> None:

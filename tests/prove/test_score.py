@@ -14,7 +14,21 @@ from ferryid.effects import effects
 from ferryid.effects.shallow_water import HEAVIER
 from ferryid.effects.wind import COEFFICIENTS
 from ferryid.prove.case import Case, Truth
-from ferryid.prove.names import NONE, OTHER, REFUSED, UNKNOWN, Share, confusion, false_names, first_name, instead, wrong
+from ferryid.prove.names import (
+    NONE,
+    OTHER,
+    REFUSED,
+    UNKNOWN,
+    Share,
+    confusion,
+    false_names,
+    first_name,
+    hints_of_nothing,
+    instead,
+    names,
+    strictly_wrong,
+    wrong,
+)
 from ferryid.prove.recovery import FACTORS, SIDES, neutral, recoveries
 from ferryid.prove.score import detections, score, to_json
 from ferryid.prove.second_log import claimed, claims, median_interval, methods
@@ -100,6 +114,31 @@ def test_what_is_named_is_right_wrong_or_one_of_what_cannot_be_told_apart() -> N
     assert made.counts == ((2, 1, 1, 0, 0, 1, 1), (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, 0, 1, 0, 0), (0, 0, 1, 0, 0, 0, 0))
     first = score(list(lines.values())).cells[0]
     assert (first.first, first.every, first.false, first.refused) == (Share(1, 6), Share(2, 6), Share(1, 6), 1)
+
+
+def test_a_hull_is_right_only_in_a_coefficient_that_is_wrong() -> None:
+    hull = Truth("hull_parameters", None, {"N_r": 1.3, "m22": 0.8})
+
+    def told(**values: float) -> dict[str, Any]:
+        found = finding("hull_parameters", {name.replace("Y_rv", "Y_|r|v"): one for name, one in values.items()})
+        return line([hull], [found], cell="hull_parameters", allowed=("hull_parameters",))
+
+    right, beside = told(Y_rv=0.3, N_r=1.2), told(Y_rv=0.3)
+    assert (names(right), first_name(right)) == ([("hull_parameters", None)], "hull_parameters")
+    assert (names(beside), first_name(beside)) == ([("hull_parameters", "other coefficients")], OTHER)
+    assert (wrong(beside), len(strictly_wrong(beside)), strictly_wrong(right)) == ([], 1, [])
+    assert [one.found for one in recoveries([beside])] == [0]
+    assert [one.found for one in recoveries([right])] == [1, 1]
+    # Where no hull is concealed, it is an exception that is counted without.
+    clean = line([], [finding("hull_parameters", {"N_r": 1.2})], "clean", "clean", allowed=("hull_parameters",))
+    assert (names(clean), wrong(clean)) == ([("hull_parameters", None)], [])
+    assert score([right, beside, clean]).strict == Share(2, 3)
+
+
+def test_hints_of_what_is_not_there_are_counted() -> None:
+    doubtful = [finding(name, p=0.5) for name in ("wind", "current", "unknown")]
+    assert hints_of_nothing(line([WIND], doubtful)) == [("current", None)]
+    assert score([line([WIND], doubtful), line([WIND], doubtful[:1])]).hinted == Share(1, 2)
 
 
 def test_errors_are_those_of_vectors_and_intervals_those_of_parameters() -> None:
@@ -193,6 +232,10 @@ def test_claims_are_held_against_a_second_log() -> None:
     assert (made["sindy"].first, made["sindy"].false) == (Share(0, 1), Share(1, 1))
     assert (made["stepwise"].logs, made["stepwise"].first) == (0, Share(1, 1))
     assert isnan(made["stepwise"].free_run)
+    # A log of which no rival was asked counts in no row.
+    unasked = judged(0.01)
+    del unasked["sindy"], unasked["thesis"]
+    assert methods([both, whole, line([WIND], [one], second=unasked)]) == methods([both, whole])
 
 
 def test_intervals_of_shares_and_medians() -> None:

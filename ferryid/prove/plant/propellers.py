@@ -19,6 +19,8 @@ from ferryid.prove.plant.vessels import Vessel
 Floats = NDArray[np.float64]
 STATES = 5
 """Of a thruster: speed [rpm], angle [rad], race [rpm], and two of a force that is late [N]."""
+LAG_RATE = 2.0
+"""Of each of two stages of a force that is late, over the rate of both together."""
 MOTOR_S, RATE_S = 0.25, 0.9
 """Time constant of the motor, and time that it takes from rest to its most."""
 STEER_S, STEER_RADPS = 0.15, radians(60.0)
@@ -120,9 +122,8 @@ def thrust(
             parts[i, 1] *= gear.gain[i]
         parts[i, 2] = along if push >= 0.0 else -along
         if gear.lag_s > 0.0:
-            # Two stages of half the time each.
-            change[i, 3] = (push - state[i, 3]) * 2.0 / gear.lag_s
-            change[i, 4] = (state[i, 3] - state[i, 4]) * 2.0 / gear.lag_s
+            change[i, 3] = (push - state[i, 3]) * LAG_RATE / gear.lag_s
+            change[i, 4] = (state[i, 3] - state[i, 4]) * LAG_RATE / gear.lag_s
             push = state[i, 4]
         parts[i, 0] = push
     for i in range(k):

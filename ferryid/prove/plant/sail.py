@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import ceil, cos, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,11 @@ from ferryid.prove.plant.hull import hull_constants, rigid_mass
 from ferryid.prove.plant.motion import BODY, World, step
 from ferryid.prove.plant.navigation import HEIGHT_M, RATE_HZ, Errors, instrument_errors, navigate
 from ferryid.prove.plant.paths import DWELL_S, set_points
-from ferryid.prove.plant.propellers import STATES, thruster_constants
+from ferryid.prove.plant.propellers import LAG_RATE, STATES, thruster_constants
 from ferryid.prove.plant.sea import SeaConstants, sea_constants, sea_load
 from ferryid.prove.plant.vessels import Vessel
 
 Floats = NDArray[np.float64]
-STEPS = 1
-"""Of the integrator in a sample of the navigation."""
 CONTROL_EVERY = 2
 """Samples of the navigation in a period of the autopilot: 10 Hz."""
 
@@ -129,6 +127,7 @@ def sail(vessel: Vessel, conditions: Conditions, path: str, seed: int) -> Voyage
         air,
         flow,
         marks,
+        _steps(conditions),
         start,
         voyage.reported,
         voyage.states,
@@ -138,6 +137,11 @@ def sail(vessel: Vessel, conditions: Conditions, path: str, seed: int) -> Voyage
         voyage.thrust,
     )
     return voyage
+
+
+def _steps(conditions: Conditions) -> int:
+    """Return the integrator's steps in a sample of the navigation: none is longer than the memory of a thruster's lag."""
+    return 1 if conditions.lag_s == 0.0 else max(1, ceil(LAG_RATE / (conditions.lag_s * RATE_HZ)))
 
 
 @compiled
@@ -150,6 +154,7 @@ def _run(
     air: Floats,
     flow: Floats,
     marks: Floats,
+    steps: int,
     y: Floats,
     reported: Floats,
     states: Floats,
@@ -188,8 +193,8 @@ def _run(
         orders[row] = order
         wanted[row] = asked
         sea_load(sea, (row + 0.5) * h, y[0], y[1], y[5], waves[row])
-        for part in range(STEPS):
-            step(world, (row + part / STEPS) * h, h / STEPS, y, order, flow[row], air[row], waves[row], thrust[row])
+        for part in range(steps):
+            step(world, (row + part / steps) * h, h / steps, y, order, flow[row], air[row], waves[row], thrust[row])
 
 
 @compiled
