@@ -39,7 +39,8 @@ RUNS ?= 1
 proof: $(VENV)/installed
 	$(BIN)/ferryid prove --seed $(SEED) --runs $(RUNS) --out $(DEMO) --json $(DEMO)/proof.json
 	cp $(DEMO)/proof/proof.md reports/proof.md
-	mkdir -p reports/proof && cp $(DEMO)/proof/proof/*.svg $(DEMO)/proof/answers.json $(DEMO)/proof/seal.json reports/proof/
+	mkdir -p reports/proof && cp $(DEMO)/proof/proof/*.svg $(DEMO)/proof/answers.json $(DEMO)/proof/seal.json \
+	  $(DEMO)/proof/lines/diagnosed.jsonl reports/proof/
 	cp $(DEMO)/proof.json reports/proof.json
 
 # Learns a hull in waves that nobody measured, and uses it in calm water: writes reports/waves.md.
