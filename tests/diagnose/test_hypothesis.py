@@ -190,15 +190,15 @@ def told(name: str, values: list[float], variance: float = 0.0) -> Floats:
 
 def test_a_formula_is_believed_to_a_tenth_of_what_it_changes() -> None:
     # Of a posterior that knows everything: a tenth of the distance from what changes nothing, which is 1 of a factor.
-    np.testing.assert_allclose(told("current", [0.3, -0.2]), [0.03, 0.02])
-    np.testing.assert_allclose(told("thrust_inflow_loss", [0.3]), [0.03])
+    np.testing.assert_allclose(told("payload", [300.0]), [30.0])
     # What is defined by its parameter hardly has a formula.
     np.testing.assert_allclose(told("thruster_gain", [0.7]), [0.006])
-    # Where the hull may be as much off itself, that stays however little it is.
+    # Where hull or instruments may be as much off themselves, that stays however little it is.
     np.testing.assert_allclose(told("thruster_lag", [0.0]), [0.015])
+    np.testing.assert_allclose(told("current", [0.12, 0.0]), [0.013, 0.005])
     # Half as much again as the posterior says, and no more where nothing is changed.
     np.testing.assert_allclose(told("thruster_gain", [1.0], 0.01**2), [0.015])
-    np.testing.assert_allclose(told("current", [0.4, 0.0], 0.02**2), [0.05, 0.03])
+    np.testing.assert_allclose(told("payload", [400.0], 20.0**2), [50.0])
 
 
 def test_a_place_is_no_size() -> None:
