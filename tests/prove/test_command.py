@@ -61,7 +61,7 @@ def test_results_to_standard_output_and_the_seed_to_standard_error(ferryid_run, 
     assert (checked.code, checked.err) == (0, "")
     assert "the answers to 2 cases are those that were sealed" in checked.out
     path = tmp_path / "out" / "proof" / "answers.json"
-    path.write_text(path.read_text("utf-8").replace('"north": ', '"north": 1'), encoding="utf-8")
+    path.write_text(path.read_text("utf-8").replace('"cell": "wind"', '"cell": "wend"'), encoding="utf-8")
     checked = ferryid_run("prove", "--check", tmp_path / "out" / "proof")
     assert checked.code == 2
     assert "is not what was sealed" in checked.err
