@@ -24,6 +24,7 @@ ORDER = (
     "diagnose",
     "simulate",
     "report",
+    "export",
     "reproduce",
     "prove",
     "cli",

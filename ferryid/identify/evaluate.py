@@ -8,16 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.errors import FerryIdError
-from ferryid.identify.estimate import base_estimator
 from ferryid.identify.excitation import RANGE_UNITS, payload_kg, range_columns
 from ferryid.identify.model import AXES, Model
-from ferryid.identify.predict import Prediction, imagine, predict
+from ferryid.identify.predict import Prediction, predict, predict_before, signal_map
 from ferryid.identify.scores import force_scores, free_run_plain, outside_ranges, usable
 from ferryid.identify.settings import check_window
 from ferryid.identify.stored_effect import StoredEffect
 from ferryid.signals.prepare import prepare
-from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
 
 OUTSIDE_WARNING = 0.05
@@ -55,17 +52,10 @@ def evaluate(
     dict
         Schema ``ferryid.evaluate/1``.
     """
-    own = parse_profile(model.profile_text, model.name)
-    profile = profile or own
-    if profile.name != own.name:
-        raise FerryIdError(
-            f"{model.name}@{model.version}: a model of {own.name} says nothing about {profile.name}. "
-            "Fix: give a model and logs of one vessel"
-        )
+    profile = signal_map(model, profile)
     check_window(window_s)
     window = float(model.settings["window_s"]) if window_s is None else window_s
     smoother = str(model.settings.get("smoother", "square"))
-    base = None if model.diagnosed else base_estimator(model)
     entries, parts = [], []
     for path in logs:
         progress(f"evaluating on {Path(path).name}")
@@ -80,11 +70,7 @@ def evaluate(
         )
         motion = prepared.motion
         new = predict(model, prepared, profile, window_s=window, smoother=smoother)
-        old = (
-            imagine(model.undiagnosed(), prepared, profile, window_s=window, smoother=smoother)
-            if base is None
-            else Prediction(base.of(motion), motion, base)
-        )
+        old = predict_before(model, prepared, profile, window_s=window, smoother=smoother)
         tau_base, tau_model = old.tau, new.tau
         rows = usable(motion, tau_model)
         parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ferryid.effects import effects
 from ferryid.effects.picture import Picture, Scene, required_force
 from ferryid.errors import FerryIdError
-from ferryid.identify.estimate import estimator
+from ferryid.identify.estimate import base_estimator, estimator
 from ferryid.identify.free_run import ForceModel, free_run
 from ferryid.identify.model import Model
 from ferryid.identify.pictured import Pictured, bridged, pushes
@@ -20,6 +20,7 @@ from ferryid.identify.stored_effect import StoredEffect
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.smooth import central_difference, measure, smooth_measured
 from ferryid.signals.track import Motion, Track
+from ferryid.vessel import parse_profile
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Floats, Profile
 
@@ -83,6 +84,34 @@ def predict(model: Model, prepared: Prepared, profile: Profile, *, window_s: flo
         return imagine(model, prepared, profile, window_s=window_s, smoother=smoother)
     force = estimator(model)
     return Prediction(force.of(prepared.motion), prepared.motion, force)
+
+
+def predict_before(model: Model, prepared: Prepared, profile: Profile, *, window_s: float, smoother: str) -> Prediction:
+    """Return what was expected of a log before the model: by its base model, or by a diagnosed one without its diagnosis.
+
+    Parameters and errors as of `predict`.
+    """
+    if model.diagnosed:
+        return imagine(model.undiagnosed(), prepared, profile, window_s=window_s, smoother=smoother)
+    base = base_estimator(model)
+    return Prediction(base.of(prepared.motion), prepared.motion, base)
+
+
+def signal_map(model: Model, profile: Profile | None) -> Profile:
+    """Return the profile to read a log with: the one that is given, or the model's own where None.
+
+    Raises
+    ------
+    FerryIdError
+        For a profile of another vessel.
+    """
+    own = parse_profile(model.profile_text, model.name)
+    if profile is not None and profile.name != own.name:
+        raise FerryIdError(
+            f"{model.name}@{model.version}: a model of {own.name} says nothing about {profile.name}. "
+            "Fix: give a model and logs of one vessel"
+        )
+    return profile or own
 
 
 def imagine(model: Model, prepared: Prepared, profile: Profile, *, window_s: float, smoother: str) -> Prediction:

@@ -85,9 +85,14 @@ def load(reference: str, out: Path) -> Model:
     FerryIdError
         When there is no such model, with the nearest name.
     """
+    return load_file(find(reference, out))
+
+
+def find(reference: str, out: Path) -> Path:
+    """Return the file of a model; see `load`."""
     path = Path(reference)
     if path.is_file():
-        return load_file(path)
+        return path
     name, _, version = reference.partition("@")
     folder = _folder(out) / name
     present = _versions(folder)
@@ -103,7 +108,7 @@ def load(reference: str, out: Path) -> Model:
     if number not in present or (version and not _is_number(version)):
         listed = ", ".join(str(n) for n in present)
         raise FerryIdError(f"{reference}: no such version of {name}, there are {listed}. Fix: give one of these")
-    return load_file(folder / f"{number}.json")
+    return folder / f"{number}.json"
 
 
 def load_file(path: Path) -> Model:

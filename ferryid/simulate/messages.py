@@ -62,6 +62,9 @@ def serialised(stream: Stream, ros_version: int) -> Iterator[bytes]:
     The serialiser writes one message of each stream. All others have the same layout, and differ from it in the places of
     those fields that change, where whole columns are put at once; only frames of a camera are written one by one.
     """
+    if stream.whole:
+        yield from stream.whole
+        return
     store = typestore(ros_version)
     message = _blank(store, stream.type)
     _put(message, "header.frame_id", stream.frame_id)

@@ -83,7 +83,7 @@ def _check_apart(asked: dict[str, Path], inputs: list[Path]) -> None:
         for one in inputs:
             if one.resolve().is_relative_to(here) or (path.exists() and one.exists() and one.samefile(path)):
                 raise FerryIdError(
-                    f"{path}: the {what.removeprefix('--')} cannot take the place of what the scenario is made of, {one}. "
+                    f"{path}: the {what.removeprefix('--')} cannot take the place of what it is made from, {one}. "
                     "Fix: give it another name"
                 )
 

@@ -41,6 +41,8 @@ class Stream:
         Field path to a value that all messages share.
     blobs
         Payload of every message of a camera.
+    whole
+        Every message as bytes already, of a type whose messages differ in length; then nothing but type and times counts.
     """
 
     topic: str
@@ -51,6 +53,7 @@ class Stream:
     columns: Mapping[str, NDArray[Any]]
     constants: Mapping[str, Any] = field(default_factory=dict)
     blobs: tuple[bytes, ...] = ()
+    whole: tuple[bytes, ...] = ()
 
 
 LINKS = {

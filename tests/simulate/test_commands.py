@@ -60,7 +60,7 @@ def test_a_seed_that_no_scenario_could_have(folder: Path, seed: int) -> None:
 def test_no_source_is_written_over(folder: Path, name: str) -> None:
     before = (folder / name).read_bytes()
     for asked in ({"truth": folder / name}, {"json": folder / name}):
-        with pytest.raises(FerryIdError, match=f"{name}: .*cannot take the place of what the scenario is made of"):
+        with pytest.raises(FerryIdError, match=f"{name}: .*cannot take the place of what it is made from"):
             run(folder, overwrite=True, **asked)
     assert (folder / name).read_bytes() == before
 

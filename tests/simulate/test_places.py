@@ -75,9 +75,9 @@ def test_no_output_takes_the_place_of_an_input(tmp_path: Path, recording: Path) 
     hard = tmp_path / "hard.json"
     hard.hardlink_to(source)
     for asked in ({"json": source}, {"truth": source}, {"json": hard}, {"json": tmp_path / "." / "model.json"}):
-        with pytest.raises(FerryIdError, match="cannot take the place of what the scenario is made of"):
+        with pytest.raises(FerryIdError, match="cannot take the place of what it is made from"):
             check_output(tmp_path / "log", overwrite=True, inputs=[source], **asked)
-    with pytest.raises(FerryIdError, match="cannot take the place of what the scenario is made of"):
+    with pytest.raises(FerryIdError, match="cannot take the place of what it is made from"):
         check_output(recording, overwrite=True, inputs=[recording / "trial.db3"])
     check_output(tmp_path / "log", json=tmp_path / "other.json", inputs=[source])
 

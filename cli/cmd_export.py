@@ -1,0 +1,38 @@
+"""ferryid export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ferryid.cli.options import OUT, Json, MaybeVessel, Out
+from ferryid.cli.output import emit, progress, tell
+
+
+def command(
+    what: Annotated[
+        str, typer.Argument(metavar="MODEL|LOG", help="Path, name or name@version of a model; with --mcap a log.")
+    ],
+    to: Annotated[str | None, typer.Option(help="Form of a model: c, matlab, python or ros2.")] = None,
+    file: Annotated[Path | None, typer.Option(help="File for a model; one in exports/ of --out if left out.")] = None,
+    mcap: Annotated[Path | None, typer.Option(help="MCAP file for a log: its forces, motion and findings.")] = None,
+    model: Annotated[str | None, typer.Option(help="With --mcap: the model to hold against the log.")] = None,
+    vessel: MaybeVessel = None,
+    diagnosis: Annotated[Path | None, typer.Option(help="With --mcap: JSON of ferryid diagnose on this log.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an export that is there.")] = False,
+    out: Out = OUT,
+    json: Json = None,
+) -> None:
+    """Write a model as code or parameters for other programs, or with --mcap a log and its forces for a viewer."""
+    from ferryid.export.commands import export, notes, render_export
+
+    result = export(
+        what, out, to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis, overwrite=overwrite,
+        json=None if json in (None, "-") else Path(json), progress=progress,
+    )  # fmt: skip
+    progress("")
+    for note in notes(result):
+        tell(f"ferryid: {note}")
+    emit(result, render_export(result), json)

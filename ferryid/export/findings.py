@@ -1,0 +1,160 @@
+"""Findings of a diagnosis as messages of ROS 2's diagnostics, at the times at which they begin and end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.diagnose.result import HINT, SCHEMA
+from ferryid.effects import effects
+from ferryid.effects.wording import titled
+from ferryid.errors import FerryIdError
+from ferryid.simulate.messages import typestore
+from ferryid.simulate.sensors import Stream
+
+TOPIC = "/diagnostics"
+OK, WARN = 0, 1
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is told at a time [s]: level, name, a sentence, and numbers as text."""
+
+    time_s: float
+    level: int
+    name: str
+    says: str
+    values: tuple[tuple[str, str], ...] = ()
+
+
+def read_diagnosis(path: Path, log: str) -> tuple[Told, ...]:
+    """Return what a diagnosis says of a log, in the order of time.
+
+    Parameters
+    ----------
+    path
+        JSON as ``ferryid diagnose --json`` writes it, of one log or several.
+    log
+        Name of the log.
+
+    Raises
+    ------
+    FerryIdError
+        When it is no diagnosis, one of a newer form, damaged, or not of this log.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise FerryIdError(
+            f"{path}: not readable as a diagnosis ({error}). Fix: give a JSON file written by ferryid diagnose --json"
+        ) from error
+    found = data.get("schema", "missing") if isinstance(data, dict) else "missing"
+    if found != SCHEMA:
+        raise FerryIdError(
+            f"{path}: not a diagnosis that this version reads, its schema is {str(found)!r}, not {SCHEMA}. "
+            "Fix: give a JSON file written by ferryid diagnose --json"
+        )
+    try:
+        one = _of_log(data, log, path)
+        # Sorted by time alone: what is told at one time keeps its order.
+        return tuple(sorted(_verdict(one), key=lambda told: told.time_s))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FerryIdError(
+            f"{path}: a part of the diagnosis is missing or wrong ({type(error).__name__}: {error}). "
+            "Fix: run ferryid diagnose again"
+        ) from error
+
+
+def _of_log(data: Mapping[str, Any], log: str, path: Path) -> Mapping[str, Any]:
+    several: Sequence[Mapping[str, Any]] = data.get("logs", [data])
+    named = [one for one in several if one["log"] == log]
+    if len(named) != 1:
+        logs = ", ".join(str(one["log"]) for one in several)
+        raise FerryIdError(
+            f"{path}: is to tell of the log {log}, found {logs or 'none'}. Fix: give the diagnosis of this very log"
+            + (" alone" if named else "")
+        )
+    return named[0]
+
+
+def _verdict(one: Mapping[str, Any]) -> Iterator[Told]:
+    verdict = str(one["verdict"])
+    level = OK if verdict == "matched" else WARN
+    yield Told(0.0, level, "ferryid: verdict", verdict.replace("_", " "))
+    for finding in one["findings"]:
+        yield from _finding(finding)
+
+
+def _finding(finding: Mapping[str, Any]) -> Iterator[Told]:
+    instance, effect = finding["instance"], effects().get(str(finding["effect"]))
+    name = f"ferryid: {titled(effect.title if effect else str(finding['effect']), instance)}"
+    probability, says = finding["probability"], str(finding["says"])
+    hint = probability is not None and float(probability) <= HINT
+    values = tuple(_values(finding))
+    for first, last in _spans(finding["where"]):
+        yield Told(first, OK if hint else WARN, name, f"A hint only: {says}" if hint else says, values)
+        if last is not None:
+            yield Told(last, OK, name, "No longer.")
+
+
+def _spans(where: Mapping[str, Any]) -> list[tuple[float, float | None]]:
+    """Return from when until when something acts [s]; the end is None where it was not seen to end."""
+    onset, offset = where["onset"], where.get("offset")
+    if onset is not None or offset is not None:
+        return [(float(onset or 0.0), None if offset is None else float(offset))]
+    known = [float(first) for first, _ in where["intervals"] if first is not None]
+    # Intervals without onset are where it shows, not when it begins: it is told once.
+    return [(min(known, default=0.0), None)]
+
+
+def _values(finding: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "probability", _text(finding["probability"])
+    for name, one in finding["parameters"].items():
+        yield name, f"{_text(one['value'])} {one['unit']} ({_text(one['low'])} to {_text(one['high'])})"
+    for axis, share in finding["improvement"].items():
+        yield f"held-out error removed, {axis}", _text(share)
+    if finding["unresolved_with"]:
+        yield "not told apart from", ", ".join(finding["unresolved_with"])
+
+
+def _text(value: float | None) -> str:
+    return "unknown" if value is None or not isfinite(value) else f"{value:.4g}"
+
+
+def diagnostics(told: Sequence[Told], t0_ns: int, vessel: str) -> Stream:
+    """Return what is told as messages; those of one time are one message.
+
+    Parameters
+    ----------
+    told
+        In the order of time.
+    t0_ns
+        Time of the log's first row [ns].
+    vessel
+        Its name.
+    """
+    types = typestore(2).types
+    by_time: dict[int, list[Any]] = {}
+    for one in told:
+        status = types["diagnostic_msgs/msg/DiagnosticStatus"](
+            level=one.level,
+            name=one.name,
+            message=one.says,
+            hardware_id=vessel,
+            values=[types["diagnostic_msgs/msg/KeyValue"](key=key, value=value) for key, value in one.values],
+        )
+        by_time.setdefault(t0_ns + round(one.time_s * 1e9), []).append(status)
+    messages = []
+    for when, several in by_time.items():
+        stamp = types["builtin_interfaces/msg/Time"](*divmod(when, 10**9))
+        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+        array = types["diagnostic_msgs/msg/DiagnosticArray"](header=header, status=several)
+        messages.append(bytes(typestore(2).serialize_cdr(array, "diagnostic_msgs/msg/DiagnosticArray")))
+    times = np.array(list(by_time), dtype=np.int64)
+    return Stream(TOPIC, "diagnostic_msgs/msg/DiagnosticArray", "", times, times, {}, whole=tuple(messages))

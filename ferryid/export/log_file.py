@@ -1,0 +1,163 @@
+"""Writing a log with the forces that a model makes of it as an MCAP file for PlotJuggler, Foxglove and the like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError
+from ferryid.export.findings import diagnostics, read_diagnosis
+from ferryid.export.model_file import SCHEMA
+from ferryid.files import replacing
+from ferryid.identify.model import Model
+from ferryid.identify.predict import Prediction, predict, predict_before, signal_map
+from ferryid.identify.residual import base_force
+from ferryid.signals.prepare import Prepared, prepare
+from ferryid.signals.recording import log_name
+from ferryid.signals.track import Motion
+from ferryid.simulate.logs import CHUNK_BYTES
+from ferryid.simulate.places import check_output
+from ferryid.simulate.recorders import write_mcap
+from ferryid.simulate.sensors import Stream
+from ferryid.vessel.profile import Floats, Profile
+
+WINDOW_S = 1.0
+"""Smoothing window without a model [s], that of a fit."""
+WORLD, BODY = "map_ned", "base_link_frd"
+"""Frames by the names of ROS REP 103: they are not the usual ones of ROS, whose z points up."""
+WRENCH = ("wrench.force.x", "wrench.force.y", "wrench.torque.z")
+TWIST = ("twist.linear.x", "twist.linear.y", "twist.angular.z")
+
+
+def export_log(
+    log: str,
+    mcap: Path,
+    out: Path,
+    *,
+    profile: Profile | None = None,
+    model: Model | None = None,
+    diagnosis: Path | None = None,
+    overwrite: bool = False,
+    progress: Callable[[str], None],
+) -> dict[str, Any]:
+    """Write measured and estimated force, what is left over, motion, and findings, at the log's own times.
+
+    Parameters
+    ----------
+    log
+        A file or folder; parts of one recording joined by ``+``.
+    mcap
+        File to write.
+    out
+        Output folder, for the ingested tables.
+    profile
+        Signal map of the log; the profile inside the model where None.
+    model
+        The model, None for the profile's hull alone.
+    diagnosis
+        JSON of a diagnosis of this log, None for no findings.
+    overwrite
+        Replace an MCAP file that is there.
+    progress
+        Called with the name of each stage.
+
+    Returns
+    -------
+    dict
+        Schema ``ferryid.export/1``.
+
+    Raises
+    ------
+    FerryIdError
+        For a log, model or diagnosis that cannot be used together, and a place that cannot or must not be written to.
+    """
+    if model is not None:
+        profile = signal_map(model, profile)
+    if profile is None:
+        raise FerryIdError(
+            f"{log}: nothing tells where its signals are, found neither model nor profile. Fix: give --model or --vessel"
+        )
+    _check_place(log, mcap, overwrite=overwrite)
+    told = () if diagnosis is None else read_diagnosis(diagnosis, log_name(log))
+    settings = {} if model is None else model.settings
+    window_s, smoother = float(settings.get("window_s", WINDOW_S)), str(settings.get("smoother", "square"))
+    progress(f"reading {Path(log).name}")
+    prepared = prepare(
+        log, profile, out, window_s=window_s, smoother=smoother, rate_hz=settings.get("rate_hz"), keep_track=True
+    )
+    motion, track = prepared.motion, prepared.track
+    assert track is not None
+    estimated: Prediction | None = None
+    if model is None:
+        base = base_force(profile, motion, {})
+    else:
+        estimated = predict(model, prepared, profile, window_s=window_s, smoother=smoother)
+        base = predict_before(model, prepared, profile, window_s=window_s, smoother=smoother).tau
+    progress("writing")
+    streams = _streams(motion, track.t0_ns, base, None if estimated is None else estimated.tau)
+    if told:
+        streams.append(diagnostics(told, track.t0_ns, profile.name))
+    _check_any(streams, prepared)
+    with replacing(mcap, new=not overwrite) as temporary:
+        write_mcap(streams, temporary, CHUNK_BYTES)
+    return {
+        "schema": SCHEMA,
+        "kind": "log",
+        "file": str(mcap),
+        "log": {"name": motion.log, "sha256": prepared.recording.sha256},
+        "vessel": profile.name,
+        "model": None if model is None else model.label,
+        "window_s": window_s,
+        "start_ns": track.t0_ns,
+        "topics": [{"topic": one.topic, "type": one.type, "messages": len(one.stamp_ns)} for one in streams],
+        "rows": len(motion.t),
+        "rows_left_out": int((~_known(motion, motion.nu)).sum()),
+        "warnings": [*prepared.doubts, *(() if estimated is None else estimated.idle)],
+    }
+
+
+def _check_place(log: str, mcap: Path, *, overwrite: bool) -> None:
+    if mcap.suffix.lower() != ".mcap":
+        raise FerryIdError(f'{mcap}: is written as MCAP, found the suffix "{mcap.suffix}". Fix: end the name in .mcap')
+    read = [Path(log)] if Path(log).exists() else [Path(part) for part in log.split("+")]
+    for one in read:
+        # A file more in the folder of a recording would be read as a part of it.
+        if one.is_dir() and mcap.resolve().is_relative_to(one.resolve()):
+            raise FerryIdError(f"{mcap}: lies in the log that it is made from, {one}. Fix: give it another place")
+    check_output(mcap, overwrite=overwrite, inputs=read)
+
+
+def _known(motion: Motion, values: Floats) -> NDArray[np.bool_]:
+    return np.asarray(motion.valid & np.isfinite(values).all(axis=1))
+
+
+def _streams(motion: Motion, t0_ns: int, base: Floats, tau: Floats | None) -> list[Stream]:
+    """Return every topic, without the rows of which a value is not known."""
+    times = t0_ns + np.round(motion.t * 1e9).astype(np.int64)
+
+    def stream(topic: str, kind: str, frame: str, fields: tuple[str, ...], values: Floats) -> Stream:
+        rows = _known(motion, values)
+        columns = dict(zip(fields, values[rows].T, strict=True))
+        return Stream(topic, f"geometry_msgs/msg/{kind}", frame, times[rows], times[rows], columns)
+
+    forces = {"measured": motion.tau, "base": base, **({} if tau is None else {"model": tau})}
+    forces["residual"] = motion.tau - (base if tau is None else tau)
+    half = 0.5 * motion.eta[:, 2]
+    pose = np.column_stack([motion.eta[:, :2], np.cos(half), np.sin(half)])
+    where = ("pose.position.x", "pose.position.y", "pose.orientation.w", "pose.orientation.z")
+    made = [stream(f"/ferryid/force/{name}", "WrenchStamped", BODY, WRENCH, force) for name, force in forces.items()]
+    made.append(stream("/ferryid/velocity", "TwistStamped", BODY, TWIST, motion.nu))
+    made.append(stream("/ferryid/pose", "PoseStamped", WORLD, where, pose))
+    return [one for one in made if len(one.stamp_ns)]
+
+
+def _check_any(streams: list[Stream], prepared: Prepared) -> None:
+    if not any(one.topic.startswith("/ferryid/force/") for one in streams):
+        raise FerryIdError(
+            f"{prepared.motion.log}: no row of it has both motion and force, so there is nothing to write. "
+            "Fix: see what is missing with ferryid inspect --vessel"
+        )

@@ -1,0 +1,140 @@
+"""Writing a model in one of the forms of export."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+from typing import Any
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.export.exported import Exported, exported
+from ferryid.export.format import Format
+from ferryid.export.formats import formats
+from ferryid.export.names import identifier
+from ferryid.export.words import MARK
+from ferryid.files import taken, unwritable, write_text
+from ferryid.identify.store import find, load_file
+
+SCHEMA = "ferryid.export/1"
+FOLDER = "exports"
+"""Folder in the output folder for what is given no name."""
+_HEAD_BYTES = 4096
+
+
+def export_model(
+    reference: str, to: str, out: Path, *, file: Path | None = None, overwrite: bool = False
+) -> dict[str, Any]:
+    """Write a model in a form of export; the same model gives the same bytes.
+
+    Parameters
+    ----------
+    reference
+        Path, name or name@version of the model.
+    to
+        Name of the form, as of `ferryid.export.formats.formats`.
+    out
+        Output folder, with the model store, and ``exports`` for the file.
+    file
+        Where to write instead.
+    overwrite
+        Replace what is there, if that is an export.
+
+    Returns
+    -------
+    dict
+        Schema ``ferryid.export/1``.
+
+    Raises
+    ------
+    FerryIdError
+        For an unknown form or model, a model that cannot be exported, or a place that cannot or must not be written to.
+    """
+    form = chosen(to)
+    source = find(reference, out)
+    model = load_file(source)
+    name = identifier(model.name, model.version)
+    place = file or out / FOLDER / f"{name}{form.suffix}"
+    if form.names_file:
+        name = _name_of(place, form)
+    one = exported(model, hashlib.sha256(source.read_bytes()).hexdigest(), name)
+    text = form.render(one)
+    _check_place(place, source, text, overwrite=overwrite or file is None)
+    write_text(place, text)
+    return {
+        "schema": SCHEMA,
+        "kind": "model",
+        "format": form.name,
+        "file": str(place),
+        "sha256": hashlib.sha256(text.encode()).hexdigest(),
+        "name": one.name,
+        "model": {
+            "name": model.name,
+            "version": model.version,
+            "accepted": model.accepted,
+            "sha256": one.sha256,
+        },
+        "effects": _effects(one),
+        "cases": len(one.cases),
+        "warnings": list(one.warnings()),
+        "left_out": list(one.left_out()),
+    }
+
+
+def chosen(to: str) -> Format:
+    """Return a form by its name.
+
+    Raises
+    ------
+    FerryIdError
+        For one that does not exist, with the nearest that does.
+    """
+    if to not in formats():
+        raise FerryIdError(
+            f'--to: there is no form "{to}" to export a model in.{did_you_mean(to, formats())} '
+            f"Fix: choose one of {', '.join(formats())}"
+        )
+    return formats()[to]
+
+
+def _name_of(place: Path, form: Format) -> str:
+    """Return what a function in a file has to be called."""
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,62}", place.stem) or place.suffix != form.suffix:
+        raise FerryIdError(
+            f"{place}: {form.title} is called as its file, found a name that it cannot have. "
+            f"Fix: give --file a name of up to 63 letters, digits and underscores that ends in {form.suffix}"
+        )
+    return place.stem
+
+
+def _check_place(place: Path, source: Path, text: str, *, overwrite: bool) -> None:
+    """Refuse to write over a model, over anything that is no export, and unasked over anything else than the same."""
+    try:
+        if not place.exists():
+            return
+        if not place.is_file():
+            raise FerryIdError(f"{place}: cannot be replaced, found no file. Fix: give --file another name")
+        with place.open("rb") as there:
+            start = there.read(_HEAD_BYTES)
+        if place.samefile(source) or (start and MARK.encode() not in start):
+            raise FerryIdError(f"{place}: cannot be replaced, found no export. Fix: give --file another name")
+        if not overwrite and place.read_bytes() != text.encode():
+            raise taken(place)
+    except OSError as error:
+        raise unwritable(place, error) from error
+
+
+def _effects(one: Exported) -> list[dict[str, Any]]:
+    return [
+        {
+            "effect": acting.stored.effect,
+            "instance": acting.stored.instance,
+            "acts_on": acting.on,
+            "name": acting.name,
+            "parameters": {
+                name: {"value": quantity.value, "unit": quantity.unit} for name, quantity in acting.parameters.items()
+            },
+            "says": acting.stored.says(),
+        }
+        for acting in one.acting
+    ]
