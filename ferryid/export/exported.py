@@ -16,8 +16,9 @@ from ferryid.identify.estimate import Estimator
 from ferryid.identify.excitation import RANGE_UNITS
 from ferryid.identify.model import Model
 from ferryid.identify.pictured import acting_estimator
+from ferryid.identify.residual import scaled
 from ferryid.identify.stored_effect import Quantity, StoredEffect
-from ferryid.vessel.profile import Floats
+from ferryid.vessel.profile import Floats, Hull
 
 HULL, THRUSTERS, SENSORS = "hull", "thrusters", "sensors"
 
@@ -74,6 +75,16 @@ class Exported:
     acting: tuple[Acting, ...]
     ranges: tuple[tuple[str, float, float, str], ...]
     cases: tuple[Case, ...]
+
+    @property
+    def hull(self) -> Hull:
+        """The hull with the factors delta and sigma in it."""
+        return scaled(self.force.profile.hull, self.force.scale)
+
+    @property
+    def zeta(self) -> float:
+        """What divides the force of hull, wind and payload."""
+        return float(self.force.scale.get("zeta", 1.0))
 
     @property
     def mass(self) -> Floats:
@@ -146,7 +157,8 @@ def exported(model: Model, sha256: str, name: str = "") -> Exported:
         for key, (low, high) in model.ranges.items()
         if math.isfinite(low) and math.isfinite(high)
     )
-    checked = cases(force, {key: (low, high) for key, low, high, _ in known})
+    with np.errstate(all="ignore"):
+        checked = cases(force, {key: (low, high) for key, low, high, _ in known})
     if not all(np.isfinite(one.tau).all() for one in checked):
         raise FerryIdError(
             f"{model.label}: gives forces that are not finite, so there is nothing to export. "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -20,6 +21,8 @@ from ferryid.simulate.sensors import Stream
 
 TOPIC = "/diagnostics"
 OK, WARN = 0, 1
+LASTING_S = 1.0
+"""What is seen until so shortly before the end of a log has not ended [s]."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,8 @@ class Told:
     values: tuple[tuple[str, str], ...] = ()
 
 
-def read_diagnosis(path: Path, log: str) -> tuple[Told, ...]:
-    """Return what a diagnosis says of a log, in the order of time.
+def read_diagnosis(path: Path, log: str) -> Mapping[str, Any]:
+    """Return the part of a diagnosis that is of a log.
 
     Parameters
     ----------
@@ -46,7 +49,7 @@ def read_diagnosis(path: Path, log: str) -> tuple[Told, ...]:
     Raises
     ------
     FerryIdError
-        When it is no diagnosis, one of a newer form, damaged, or not of this log.
+        When it is no diagnosis, one of a newer form, or not of this log.
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
@@ -60,10 +63,36 @@ def read_diagnosis(path: Path, log: str) -> tuple[Told, ...]:
             f"{path}: not a diagnosis that this version reads, its schema is {str(found)!r}, not {SCHEMA}. "
             "Fix: give a JSON file written by ferryid diagnose --json"
         )
-    try:
-        one = _of_log(data, log, path)
+    with _whole(path):
+        return _of_log(data, log, path)
+
+
+def told_by(path: Path, diagnosis: Mapping[str, Any], end_s: float) -> tuple[Told, ...]:
+    """Return what a diagnosis says, in the order of time.
+
+    Parameters
+    ----------
+    path
+        Its file, for messages.
+    diagnosis
+        Of `read_diagnosis`.
+    end_s
+        Last time of the log [s]; what lasts until then was not seen to end.
+
+    Raises
+    ------
+    FerryIdError
+        When a part is missing or wrong.
+    """
+    with _whole(path):
         # Sorted by time alone: what is told at one time keeps its order.
-        return tuple(sorted(_verdict(one), key=lambda told: told.time_s))
+        return tuple(sorted(_verdict(diagnosis, end_s), key=lambda told: told.time_s))
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    try:
+        yield
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise FerryIdError(
             f"{path}: a part of the diagnosis is missing or wrong ({type(error).__name__}: {error}). "
@@ -83,34 +112,31 @@ def _of_log(data: Mapping[str, Any], log: str, path: Path) -> Mapping[str, Any]:
     return named[0]
 
 
-def _verdict(one: Mapping[str, Any]) -> Iterator[Told]:
+def _verdict(one: Mapping[str, Any], end_s: float) -> Iterator[Told]:
     verdict = str(one["verdict"])
     level = OK if verdict == "matched" else WARN
     yield Told(0.0, level, "ferryid: verdict", verdict.replace("_", " "))
     for finding in one["findings"]:
-        yield from _finding(finding)
+        yield from _finding(finding, end_s)
 
 
-def _finding(finding: Mapping[str, Any]) -> Iterator[Told]:
+def _finding(finding: Mapping[str, Any], end_s: float) -> Iterator[Told]:
     instance, effect = finding["instance"], effects().get(str(finding["effect"]))
     name = f"ferryid: {titled(effect.title if effect else str(finding['effect']), instance)}"
     probability, says = finding["probability"], str(finding["says"])
     hint = probability is not None and float(probability) <= HINT
     values = tuple(_values(finding))
-    for first, last in _spans(finding["where"]):
+    for first, last in _spans(finding["where"], end_s):
         yield Told(first, OK if hint else WARN, name, f"A hint only: {says}" if hint else says, values)
         if last is not None:
             yield Told(last, OK, name, "No longer.")
 
 
-def _spans(where: Mapping[str, Any]) -> list[tuple[float, float | None]]:
+def _spans(where: Mapping[str, Any], end_s: float) -> list[tuple[float, float | None]]:
     """Return from when until when something acts [s]; the end is None where it was not seen to end."""
-    onset, offset = where["onset"], where.get("offset")
-    if onset is not None or offset is not None:
-        return [(float(onset or 0.0), None if offset is None else float(offset))]
-    known = [float(first) for first, _ in where["intervals"] if first is not None]
-    # Intervals without onset are where it shows, not when it begins: it is told once.
-    return [(min(known, default=0.0), None)]
+    spans = where["intervals"] or [[where["onset"], where.get("offset")]]
+    times = [(float(first or 0.0), end_s if last is None else float(last)) for first, last in spans]
+    return [(first, last if last < end_s - LASTING_S else None) for first, last in times]
 
 
 def _values(finding: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

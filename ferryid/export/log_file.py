@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.export.findings import diagnostics, read_diagnosis
+from ferryid.export.findings import diagnostics, read_diagnosis, told_by
 from ferryid.export.model_file import SCHEMA
 from ferryid.files import replacing
 from ferryid.identify.model import Model
@@ -82,7 +82,7 @@ def export_log(
             f"{log}: nothing tells where its signals are, found neither model nor profile. Fix: give --model or --vessel"
         )
     _check_place(log, mcap, overwrite=overwrite)
-    told = () if diagnosis is None else read_diagnosis(diagnosis, log_name(log))
+    found = None if diagnosis is None else read_diagnosis(diagnosis, log_name(log))
     settings = {} if model is None else model.settings
     window_s, smoother = float(settings.get("window_s", WINDOW_S)), str(settings.get("smoother", "square"))
     progress(f"reading {Path(log).name}")
@@ -99,7 +99,8 @@ def export_log(
         base = predict_before(model, prepared, profile, window_s=window_s, smoother=smoother).tau
     progress("writing")
     streams = _streams(motion, track.t0_ns, base, None if estimated is None else estimated.tau)
-    if told:
+    if diagnosis is not None and found is not None:
+        told = told_by(diagnosis, found, float(motion.t[-1]))
         streams.append(diagnostics(told, track.t0_ns, profile.name))
     _check_any(streams, prepared)
     with replacing(mcap, new=not overwrite) as temporary:

@@ -19,7 +19,7 @@ def legal(text: str) -> str:
 
 def identifier(name: str, version: int) -> str:
     """Return a model's name and version as one name: ``milliampere_v2``, never a keyword of a language."""
-    return f"{legal(name)[:_LONGEST].rstrip('_')}_v{version}"
+    return legal(f"{legal(name)[:_LONGEST]}_v{version}")
 
 
 def number(value: float) -> str:
@@ -34,4 +34,5 @@ def plain(text: str) -> str:
     spelt = "".join(c for c in parted if not unicodedata.combining(c)).encode("ascii", "replace").decode("ascii")
     one_line = "".join(c if c.isprintable() else " " for c in spelt)
     # Ends of comments, and what C takes for a continued line or another sign.
-    return one_line.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").replace("??", "? ?")
+    spaced = one_line.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *")
+    return re.sub(r"\?(?=\?)", "? ", spaced)

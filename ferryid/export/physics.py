@@ -16,9 +16,8 @@ from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.export.exported import Exported
 from ferryid.export.names import legal, number
 from ferryid.identify.basis import Term
-from ferryid.identify.estimate import Estimator
 from ferryid.vessel.parse_hull import rigid_mass
-from ferryid.vessel.profile import Floats, WindAreas
+from ferryid.vessel.profile import Floats, Hull, WindAreas
 from ferryid.vessel.wind import AIR_DENSITY
 
 FUNCTIONS = ("abs", "atan2", "cos", "hypot", "sin")
@@ -103,14 +102,11 @@ class Physics:
 
 def physics(one: Exported) -> Physics:
     """Return the lines of `ferryid.identify.estimate.Estimator`: base hull, wind load, payload, zeta, terms, intercept."""
-    force = one.force
-    constants = {made.name: made for made in _constants(force, one.model.units)}
-    wind = _wind(constants) if force.profile.wind is not None else ()
+    constants = {made.name: made for made in _constants(one)}
+    wind = _wind(constants) if one.force.profile.wind is not None else ()
     blocks = (
         Block("velocity and acceleration through the water; the current turns in the body frame", _flow()),
-        Block(
-            "M nu_dot: the rigid body moves over ground, the water that it takes along through the water", _mass(force)
-        ),
+        Block("M nu_dot: the rigid body moves over ground, what it takes along through the water", _mass(one.hull)),
         Block("C(nu) nu", _coriolis(constants)),
         Block("D(nu_r) nu_r", tuple(_damping(constants))),
         *((Block("velocity through the air", _relative("rw", "wind")),) if wind or one.needs_wind else ()),
@@ -141,8 +137,8 @@ def _needed(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
     return tuple(kept)
 
 
-def _constants(force: Estimator, units: tuple[tuple[str, str, str], ...]) -> Iterator[Constant]:
-    hull, areas = force.profile.hull, force.profile.wind
+def _constants(one: Exported) -> Iterator[Constant]:
+    force, hull, areas = one.force, one.hull, one.force.profile.wind
     # The same arithmetic as the hull's own: what is left of M without the rigid body is the water's.
     rigid = rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z)
     for i in range(3):
@@ -159,15 +155,16 @@ def _constants(force: Estimator, units: tuple[tuple[str, str, str], ...]) -> Ite
             yield Constant(legal(name), float(hull.D[name]), unit, f"damping {name}, negative where it damps")
     if areas is not None:
         yield from _of_air(areas)
-    zeta = float(force.scale.get("zeta", 1.0))
-    if zeta != 1.0:
-        yield Constant("zeta", zeta, "-", "divides the force of the hull: the scale of the measured one")
+    if one.zeta != 1.0:
+        yield Constant("zeta", one.zeta, "-", "divides the force of the hull: the scale of the measured one")
     if force.basis is None or force.theta is None or force.intercept is None:
         return
     for k, term in enumerate(force.basis.functions):
         for j, axis in enumerate(AXES):
             if force.theta[k, j] != 0.0:
-                yield Constant(coefficient(term, axis), float(force.theta[k, j]), units[k][j], f"{axis} by {term.name}")
+                yield Constant(
+                    coefficient(term, axis), float(force.theta[k, j]), one.model.units[k][j], f"{axis} by {term.name}"
+                )
     for axis, value in zip(AXES, force.intercept.tolist(), strict=True):
         if value != 0.0:
             yield Constant(f"constant_{axis}", value, "N m" if axis == "N" else "N", f"constant part of {axis}")
@@ -203,8 +200,7 @@ def _flow() -> tuple[Line, ...]:
     )
 
 
-def _mass(force: Estimator) -> tuple[Line, ...]:
-    hull = force.profile.hull
+def _mass(hull: Hull) -> tuple[Line, ...]:
     rigid = rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z)
     names = {(0, 0): "m", (1, 1): "m", (1, 2): "m_x_g", (2, 1): "m_x_g"}
     lines = []

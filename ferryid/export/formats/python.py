@@ -91,7 +91,7 @@ def render(one: Exported) -> str:
         cases="\n".join(_case(case) for case in one.cases),
         tau_tolerance=listed(tau_tolerance),
         rate_tolerance=listed(rate_tolerance),
-        label=plain(one.model.label).replace('"', "'").replace("{", "(").replace("}", ")"),
+        label=plain(one.model.label).replace('"', "'"),
     )
     head = [*heading(one), "", *frames(one), "", *limits(one), *beside(one)]
     return "\n".join([commented(head, "#"), "", "import math", "", *_constants(one, lines), code])

@@ -30,7 +30,7 @@ def render(one: Exported) -> str:
 
 
 def _parameters(one: Exported) -> Iterator[str]:
-    model, hull, areas = one.model, one.force.profile.hull, one.force.profile.wind
+    model, hull, areas = one.model, one.hull, one.force.profile.wind
     yield "model:"
     yield f"  label: {_text(model.label)}"
     yield f"  sha256: {_text(one.sha256)}"
@@ -46,7 +46,7 @@ def _parameters(one: Exported) -> Iterator[str]:
     yield "damping:  # negative where it damps"
     for name, unit in zip(COEFFICIENTS[5:], UNITS[5:], strict=True):
         yield f"  {legal(name)}: {number(hull.D.get(name, 0.0))}  # {name} [{plain(unit)}]"
-    yield f"zeta: {number(float(one.force.scale.get('zeta', 1.0)))}"
+    yield f"zeta: {number(one.zeta)}"
     if areas is not None:
         yield "wind:  # Blendermann's form"
         yield from _rows(
