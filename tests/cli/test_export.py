@@ -26,10 +26,11 @@ def out(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("form", "file"),
-    [("c", "milliampere_v2.h"), ("matlab", "milliampere_v2.m"), ("python", "milliampere_v2.py"), ("ros2", "milliampere_v2.yaml")],
-)  # fmt: skip
-def test_a_model_in_every_form(ferryid, out: Path, form: str, file: str) -> None:
+    ("form", "suffix"),
+    [("c", ".h"), ("matlab", ".m"), ("python", ".py"), ("ros2", ".yaml")],
+)
+def test_a_model_in_every_form(ferryid, out: Path, form: str, suffix: str) -> None:
+    file = f"milliampere_v2{suffix}"
     run = ferryid("export", "milliampere@2", "--to", form, "--out", out, "--json", "-")
     assert run.code == 0, run.err
     told = conforms(run.out)
