@@ -9,13 +9,14 @@ import typer
 
 from ferryid.cli.options import OUT, Json, MaybeVessel, Out
 from ferryid.cli.output import emit, progress, tell
+from ferryid.export.formats import names
 
 
 def command(
     what: Annotated[
         str, typer.Argument(metavar="MODEL|LOG", help="Path, name or name@version of a model; with --mcap a log.")
     ],
-    to: Annotated[str | None, typer.Option(help="Form of a model: c, matlab, python or ros2.")] = None,
+    to: Annotated[str | None, typer.Option(help=f"Form of a model: {', '.join(names())}.")] = None,
     file: Annotated[Path | None, typer.Option(help="File for a model; one in exports/ of --out if left out.")] = None,
     mcap: Annotated[Path | None, typer.Option(help="MCAP file for a log: its forces, motion and findings.")] = None,
     model: Annotated[str | None, typer.Option(help="With --mcap: the model to hold against the log.")] = None,

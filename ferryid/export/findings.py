@@ -142,7 +142,8 @@ def _spans(where: Mapping[str, Any], end_s: float) -> list[tuple[float, float | 
 def _values(finding: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "probability", _text(finding["probability"])
     for name, one in finding["parameters"].items():
-        yield name, f"{_text(one['value'])} {one['unit']} ({_text(one['low'])} to {_text(one['high'])})"
+        unit = "" if one["unit"] == "-" else f" {one['unit']}"
+        yield name, f"{_text(one['value'])}{unit} ({_text(one['low'])} to {_text(one['high'])})"
     for axis, share in finding["improvement"].items():
         yield f"held-out error removed, {axis}", _text(share)
     if finding["unresolved_with"]:

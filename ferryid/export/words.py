@@ -54,10 +54,14 @@ def frames(one: Exported) -> Iterator[str]:
         if needed:
             yield from wrapped(f"The model has terms of the {what}: without one it says nothing; still is 0, 0.")
         elif load:
-            without = "there is no wind load" if what == "wind" else "the water is still"
+            without = (
+                "there is no load of the air, not even of still air: that is 0, 0" if what == "wind" else "it is still"
+            )
             yield from wrapped(f"Without a {what}, {without}.")
         else:
             yield from wrapped(f"The model knows nothing of the {what}: it changes nothing.")
+    if areas and one.force.basis is None:
+        yield from wrapped("The hull was refitted beside the load of the air: where there is no wind, give 0, 0.")
 
 
 def limits(one: Exported) -> Iterator[str]:

@@ -26,7 +26,8 @@ FORMATS = sorted(formats())
 
 
 def test_a_file_is_a_form() -> None:
-    assert [module.name for module in pkgutil.iter_modules(ferryid.export.formats.__path__)] == FORMATS
+    files = [module.name for module in pkgutil.iter_modules(ferryid.export.formats.__path__)]
+    assert files == [form.name for form in formats().values()] == FORMATS
 
 
 @pytest.mark.parametrize("name", FORMATS)
