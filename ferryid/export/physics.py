@@ -215,8 +215,8 @@ def _mass(hull: Hull) -> tuple[Line, ...]:
             parts += [f"{names[i, j]} * {rate}"] if own else []
             water = [f"m{i + 1}{j + 1}"] if total else []
             if water or own:
-                taken = f" - {names[i, j]}" if own else ""
-                parts.append(f"({water[0] if water else '0.0'}{taken}) * {rate.replace('_dot', '_rc_dot')}")
+                added = f"({' - '.join([*(water or ['0.0']), names[i, j]])})" if own else water[0]
+                parts.append(f"{added} * {rate.replace('_dot', '_rc_dot')}")
         lines.append(Line(axis, " + ".join(parts) or "0.0"))
     return tuple(lines)
 

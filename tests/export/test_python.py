@@ -159,3 +159,16 @@ def test_a_mass_that_cannot_be_inverted_leaves_the_force() -> None:
     assert loaded(one.model).self_test() == 0
     theta[model.terms.index("u_dot"), 0] = -3000.0
     assert any("not positive definite" in told for told in exported(replace(model, theta=theta), SHA).warnings())
+
+
+def test_a_mass_whose_axes_are_one_cannot_be_inverted() -> None:
+    # Surge and sway take the same force for the same acceleration.
+    model = fitted("modulus", "coupled")
+    theta = 0.0 * model.theta
+    rows = [model.terms.index(name) for name in ("u_dot", "v_dot", "r_dot")]
+    theta[rows, 0] = 0.0, 2533.911, 62.386
+    theta[rows, 1] = 2389.657, 0.0, 0.0
+    one = exported(replace(model, theta=theta), SHA)
+    assert any("cannot be inverted" in told for told in one.warnings())
+    assert one.cases[0].rate is None
+    assert loaded(one.model).self_test() == 0
