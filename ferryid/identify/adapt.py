@@ -206,8 +206,8 @@ def data_matrix(
 
 
 def settings_of(model: Model) -> FitSettings:
-    """Return the settings that a model was fitted with, factors on the base model included, split and draws apart."""
-    kept = FitSettings.__dataclass_fields__.keys() - {"split", "draws"}
+    """Return the settings that a model was fitted with, factors on the base model included; all but split and draws."""
+    kept = FitSettings.__dataclass_fields__.keys() - {"split", "draws", "windows_s"}
     known = {key: value for key, value in model.settings.items() if key in kept}
     return FitSettings(**{**known, **_factors(model)})
 

@@ -14,14 +14,16 @@ from ferryid import __version__
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import Basis, basis
 from ferryid.identify.bootstrap import Blocks, block_seconds, bootstrap
+from ferryid.identify.choose import choose, folds_by_blocks, force_free, pieces_of
 from ferryid.identify.combine import check_vessel
 from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.excitation import ranges
-from ferryid.identify.fit import basis_of, grids, known_rows, regress, rows_of
+from ferryid.identify.fit import regress
 from ferryid.identify.judge import wanted_rows
 from ferryid.identify.model import Model
 from ferryid.identify.qr import factorise
 from ferryid.identify.residual import residual
+from ferryid.identify.rows import basis_of, grids, known_rows, rows_of
 from ferryid.identify.scores import force_scores
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import Split
@@ -130,6 +132,7 @@ def correct(profile: Profile, settings: FitSettings, task: Task, base: Model | N
     none = tuple(np.zeros_like(mask) for mask in masks)
     rows = rows_of(task.functions, task.motions, task.targets, masks)
     training = factorise(*rows, names=task.functions.terms, where=task.motions[0].log)
+    already = None if base is None else base.theta
     functions, fitted, chosen, notes = regress(
         profile,
         settings,
@@ -138,7 +141,8 @@ def correct(profile: Profile, settings: FitSettings, task: Task, base: Model | N
         task.targets,
         Split("none", masks, none, 0.0),
         training,
-        before=None if base is None else base.theta,
+        _components(profile, settings, task, already),
+        before=already,
     )
     theta, intercept = fitted.coefficients[chosen - 1], fitted.intercepts[chosen - 1]
     K = len(functions.terms)
@@ -168,6 +172,25 @@ def correct(profile: Profile, settings: FitSettings, task: Task, base: Model | N
         chosen,
         (*notes, *drawn.notes),
     )
+
+
+def _components(profile: Profile, settings: FitSettings, task: Task, already: Floats | None) -> int:
+    if settings.components != "auto":
+        return int(settings.components)
+    logs = [
+        pieces_of(task.functions, (motion, target), [(motion, target)], settings.window_s, wanted=mask)
+        for motion, target, mask in zip(task.motions, task.targets, task.masks, strict=True)
+    ]
+    return choose(
+        profile,
+        settings,
+        task.functions,
+        [settings.window_s],
+        folds_by_blocks(logs),
+        force_free(logs),
+        before=already,
+        where=logs[0].log,
+    ).components
 
 
 def bare_model(profile: Profile, settings: FitSettings, task: Task, found: Correction, name: str, draws: int) -> Model:

@@ -265,7 +265,7 @@ class Accumulator:
     def add_rows(self, rows: Rows) -> None:
         """Add rows."""
         if self._shift is None:
-            self._shift = _first_mean(rows)
+            self._shift = first_mean(rows)
         shift = self._shift
         if shift is None:
             return
@@ -318,7 +318,8 @@ class Accumulator:
         return count, products
 
 
-def _first_mean(rows: Rows) -> Floats | None:
+def first_mean(rows: Rows) -> Floats | None:
+    """Return the shift of cross-products of these rows, shape (K + m,); None where no row is in use."""
     for low in range(0, len(rows.Y), CHUNK_ROWS):
         X, Y = rows.chunk(low, low + CHUNK_ROWS)
         if len(Y):

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid import __version__
-from ferryid.errors import FerryIdError
 from ferryid.identify.accept import accept
-from ferryid.identify.basis import Basis, basis, relative_flow
+from ferryid.identify.basis import Basis
 from ferryid.identify.bootstrap import Blocks, block_seconds, bootstrap
 from ferryid.identify.cautions import cautions, free_run_cautions
-from ferryid.identify.cross_products import CrossProducts, Rows
+from ferryid.identify.choose import Choice, choose, distinct, folds_by_blocks, force_free, studied
+from ferryid.identify.cross_products import CrossProducts
+from ferryid.identify.crossed import MAX_COMPONENTS, TEST_WINDOW_S
 from ferryid.identify.estimate import Estimator
 from ferryid.identify.excitation import excitation
 from ferryid.identify.free_run import free_run
@@ -26,21 +27,19 @@ from ferryid.identify.model import AXES, Model
 from ferryid.identify.qr import QrFactor, factorise
 from ferryid.identify.residual import residual
 from ferryid.identify.result import ComponentCurve, FitResult, LogFit
-from ferryid.identify.scores import force_scores, usable
+from ferryid.identify.rows import basis_of, grids, known_rows, rows_of
+from ferryid.identify.scores import force_scores
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.simpls import Simpls, one_standard_error, simpls, sse, sweep_components
-from ferryid.identify.split import Split, folds, split
+from ferryid.identify.simpls import Simpls, simpls, sse
+from ferryid.identify.split import Split, split
 from ferryid.identify.store import checked_name
-from ferryid.signals.prepare import Prepared, prepare
-from ferryid.signals.smooth import odd_rows
+from ferryid.signals.prepare import Opened, open_track, refuse_twice, smoothed
+from ferryid.signals.smooth import smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-MAX_COMPONENTS = 21
-SWEEP_FOLDS = 5
 
 
 def quiet(_stage: str) -> None:
@@ -82,8 +81,15 @@ def fit(
         For input that cannot be used, with file, cause and remedy.
     """
     name = checked_name(name or profile.name)
-    prepared = [_prepare(path, profile, settings, out, verify, progress) for path in logs]
-    _refuse_twice(prepared)
+    opened = []
+    for path in logs:
+        progress(f"reading {Path(path).name}")
+        opened.append(open_track(path, profile, out, rate_hz=settings.rate_hz, verify=verify))
+    refuse_twice(opened)
+    if settings.windows_s:
+        progress("choosing the window")
+        settings = _windowed(profile, settings, opened)
+    prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
     motions = _told_apart([one.motion for one in prepared])
     functions = basis_of(settings, motions)
     progress("computing the residual")
@@ -100,7 +106,12 @@ def fit(
         *rows_of(functions, motions, targets, parts.training), names=functions.terms, where=motions[0].log
     )
     validation = type(training).of(*rows_of(functions, motions, measured, parts.validation))
-    functions, model_fit, chosen, held = regress(profile, settings, functions, motions, targets, parts, training)
+    components = settings.components
+    if components == "auto":
+        components = _choice(profile, settings, functions, opened, (settings.window_s,), parts.training).components
+    functions, model_fit, chosen, held = regress(
+        profile, settings, functions, motions, targets, parts, training, int(components)
+    )
     theta, intercept = model_fit.coefficients[chosen - 1], model_fit.intercepts[chosen - 1]
 
     progress("resampling blocks for the intervals")
@@ -174,30 +185,32 @@ def fit(
     return FitResult(model, verdict, tuple(fitted), curve, known, free_base, free_new, warnings)
 
 
-def _prepare(
-    path: str, profile: Profile, settings: FitSettings, out: Path, verify: bool, progress: Callable[[str], None]
-) -> Prepared:
-    progress(f"reading {Path(path).name}")
-    return prepare(
-        path,
-        profile,
-        out,
-        window_s=settings.window_s,
-        smoother=settings.smoother,
-        rate_hz=settings.rate_hz,
-        verify=verify,
-    )
+def _windowed(profile: Profile, settings: FitSettings, opened: Sequence[Opened]) -> FitSettings:
+    """Return the settings with the window, and where that is asked for the component count, that cross-validation chose.
+
+    Validation rows take no part in it.
+    """
+    windows_s = distinct(settings.windows_s, [one.measured.rate_hz for one in opened])
+    motions = [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened]
+    functions = basis_of(settings, motions)
+    parts = split(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))
+    choice = _choice(profile, settings, functions, opened, windows_s, parts.training)
+    return replace(settings, window_s=choice.window_s, components=choice.components)
 
 
-def _refuse_twice(prepared: Sequence[Prepared]) -> None:
-    """Refuse a log that is given twice: it would train and validate on the same data."""
-    seen: dict[str, str] = {}
-    for one in prepared:
-        first = seen.setdefault(one.recording.sha256, one.recording.files[0])
-        if first is not one.recording.files[0]:
-            raise FerryIdError(
-                f"{one.recording.files[0]}: the same log as {first}, so that it would judge itself. Fix: give it once"
-            )
+def _choice(
+    profile: Profile,
+    settings: FitSettings,
+    functions: Basis,
+    opened: Sequence[Opened],
+    windows_s: Sequence[float],
+    wanted: Sequence[Flags],
+) -> Choice:
+    logs = [
+        studied(profile, settings, functions, one.measured, windows_s, wanted=rows)
+        for one, rows in zip(opened, wanted, strict=True)
+    ]
+    return choose(profile, settings, functions, windows_s, folds_by_blocks(logs), force_free(logs), where=logs[0].log)
 
 
 def _told_apart(motions: Sequence[Motion]) -> list[Motion]:
@@ -211,46 +224,6 @@ def _told_apart(motions: Sequence[Motion]) -> list[Motion]:
     ]
 
 
-def basis_of(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
-    """Return the basis of the settings; wind and current join it when every log has them, unless the name says how."""
-    if "+" in settings.basis:
-        return basis(settings.basis, structure=settings.structure)
-    wind = "thesis" if all(motion.wind is not None for motion in motions) else None
-    current = "thesis" if all(motion.current is not None for motion in motions) else None
-    return basis(settings.basis, wind=wind, current=current, structure=settings.structure)
-
-
-def known_rows(motion: Motion, functions: Basis, target: Floats, error: Floats) -> Flags:
-    """Return the rows on which force, residual and every measurement that the basis needs are known."""
-    rows = usable(motion, target, error, motion.nu, motion.nu_dot)
-    if functions.needs_wind and motion.wind is not None:
-        rows &= np.isfinite(motion.wind).all(axis=1) & np.isfinite(motion.eta[:, 2])
-    if functions.needs_current and motion.current is not None:
-        rows &= np.isfinite(motion.current).all(axis=1) & np.isfinite(motion.eta[:, 2])
-    if not rows.any():
-        raise FerryIdError(
-            f"{motion.log}: no moment at which velocity, acceleration and applied force are all known. "
-            "Fix: see ferryid inspect for gaps, and give a log in which navigation and actuators overlap"
-        )
-    return rows
-
-
-def rows_of(
-    functions: Basis, motions: Sequence[Motion], outputs: Sequence[Floats], masks: Sequence[Flags]
-) -> list[Rows]:
-    """Return basis and outputs of the marked rows of every log; the basis is evaluated in chunks and forgotten."""
-    rows = []
-    for motion, output, mask in zip(motions, outputs, masks, strict=True):
-        flows = [
-            relative_flow(motion.nu, motion.eta[:, 2], flow) if needed and flow is not None else None
-            for needed, flow in ((functions.needs_wind, motion.wind), (functions.needs_current, motion.current))
-        ]
-        rows.append(
-            Rows((motion.nu, motion.nu_dot, *flows), output, mask, fill=functions.fill, terms=len(functions.terms))
-        )
-    return rows
-
-
 def regress(
     profile: Profile,
     settings: FitSettings,
@@ -259,59 +232,34 @@ def regress(
     targets: Sequence[Floats],
     parts: Split,
     training: CrossProducts | QrFactor,
+    components: int,
     *,
     before: Floats | None = None,
 ) -> tuple[Basis, Simpls, int, tuple[str, ...]]:
     """Return basis, SIMPLS fit and number of components, and on which axes the inertia had to be held and why.
 
-    `before` (K, 3) are coefficients that the ones fitted here come on top of; they count in the effective inertia.
+    `components` beyond the terms are as many as there are terms. `before` (K, 3) are coefficients that the ones fitted here
+    come on top of; they count in the effective inertia.
     """
     already = 0.0 if before is None else before
     most = min(MAX_COMPONENTS, len(functions.terms))
+    chosen = min(components, most)
     tau = np.concatenate([motion.tau[mask] for motion, mask in zip(motions, parts.training, strict=True)])
     base = tau - np.concatenate([target[mask] for target, mask in zip(targets, parts.training, strict=True)])
     fitted = functions.mask.any(axis=0)
-    axes = unforced(tau, base) & fitted if settings.inertia == "auto" else np.zeros(3, dtype=bool)
+    axes = np.zeros(3, dtype=bool)
+    if settings.inertia == "auto":
+        axes = unforced(np.std(tau, axis=0), np.std(base, axis=0)) & fitted
     told = {axis: reason(axis, np.zeros((3, 3)), profile, True) for axis in np.flatnonzero(axes).tolist()}
     while True:
         functions = replace(functions, mask=without_inertia(functions.mask, functions.terms, axes))
         model_fit = simpls(training, most, allowed=functions.mask)
-        chosen = _components(settings, functions, motions, targets, parts, most, type(training))
         mass = effective_mass(profile, settings.scale, functions.terms, model_fit.coefficients[chosen - 1] + already)
         more = unbelievable(profile, mass) & fitted & ~axes
         if settings.inertia == "fitted" or not more.any():
             return functions, model_fit, chosen, tuple(told.values())
         told |= {axis: reason(axis, mass, profile, False) for axis in np.flatnonzero(more).tolist()}
         axes = axes | more
-
-
-def _components(
-    settings: FitSettings,
-    functions: Basis,
-    motions: Sequence[Motion],
-    targets: Sequence[Floats],
-    parts: Split,
-    most: int,
-    kind: type[CrossProducts] | type[QrFactor],
-) -> int:
-    """Return the number of components asked for, or the fewest that cross-validation cannot tell from the best."""
-    if settings.components != "auto":
-        return min(int(settings.components), most)
-    cuts = list(folds(motions, SWEEP_FOLDS, window_s=settings.window_s, rows=parts.training))
-    # A row near the border of its fold would leak into the neighbour's training sum: it sits out.
-    apart = [
-        [
-            cut.validation[i] & np.logical_and.reduce([other.training[i] for other in cuts if other is not cut])
-            for i in range(len(motions))
-        ]
-        for cut in cuts
-    ]
-    rows = [rows_of(functions, motions, targets, masks) for masks in apart]
-    if kind is QrFactor:
-        errors, spread = sweep_components([QrFactor.of(*part) for part in rows], most, allowed=functions.mask)
-    else:
-        errors, spread = sweep_components([CrossProducts.of(*part) for part in rows], most, allowed=functions.mask)
-    return one_standard_error(errors, spread)
 
 
 def _scores(fitted: Sequence[LogFit], parts: Split) -> dict[str, Any]:
@@ -348,10 +296,3 @@ def _curve(
         model_fit.explained_x,
         model_fit.explained_y,
     )
-
-
-def grids(motions: Sequence[Motion], settings: FitSettings) -> dict[str, Any]:
-    """Return the grid rates [Hz] and window lengths [s] that came of the settings."""
-    rates = sorted({motion.rate_hz for motion in motions})
-    rows = [odd_rows(settings.window_s, rate) for rate in rates]
-    return {"grid_hz": rates, "window_rows": rows} if settings.smoother == "square" else {"grid_hz": rates}

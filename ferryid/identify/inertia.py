@@ -37,8 +37,8 @@ def effective_mass(profile: Profile, scale: Mapping[str, float], terms: Sequence
 
 
 def unforced(tau: Floats, base: Floats) -> Flags:
-    """Return the axes on which no actuator acts, shape (3,), from measured and base force of the training rows."""
-    return np.asarray(np.std(tau, axis=0) <= NO_FORCE * np.std(base, axis=0))
+    """Return the axes on which no actuator acts, shape (3,), from standard deviations of measured and base force, (3,)."""
+    return np.asarray(tau <= NO_FORCE * base)
 
 
 def unbelievable(profile: Profile, mass: Floats) -> Flags:

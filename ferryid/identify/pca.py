@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import Basis
 from ferryid.identify.cross_products import CrossProducts
-from ferryid.identify.fit import rows_of
 from ferryid.identify.qr import QrFactor, factorise, standard_deviations
+from ferryid.identify.rows import rows_of
 from ferryid.signals.track import Motion
 
 Floats = NDArray[np.float64]

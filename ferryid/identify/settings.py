@@ -30,6 +30,8 @@ class FitSettings:
         Number of SIMPLS components, or ``"auto"`` for cross-validation within the training rows.
     window_s
         Length of the smoothing window [s].
+    windows_s
+        Windows [s] of which cross-validation within the training rows chooses `window_s`; none: it is as given.
     rate_hz
         Rate of the uniform grid [Hz]; None takes the navigation's, at most 20 Hz.
     delta, sigma, zeta
@@ -49,6 +51,7 @@ class FitSettings:
     structure: str = "decoupled"
     components: str | int = "auto"
     window_s: float = 1.0
+    windows_s: tuple[float, ...] = ()
     smoother: str = "square"
     residual: str = "measured"
     split: str = "blocks"
@@ -76,7 +79,13 @@ class FitSettings:
                     f"--components: {text!r} is not a number of components. Fix: give 1 or more, or auto"
                 )
             object.__setattr__(self, "components", int(text))
-        check_window(self.window_s)
+        for window_s in (self.window_s, *self.windows_s):
+            check_window(window_s)
+        if self.windows_s and self.smoother == "kalman":
+            raise FerryIdError(
+                "--window auto: the Kalman smoother finds its window by likelihood. Fix: give one window, which it keeps to at "
+                "least, or another --smoother"
+            )
         if self.rate_hz is not None and not 0.1 <= self.rate_hz <= 1000.0:
             raise FerryIdError(f"--rate: {self.rate_hz} Hz is no usable rate. Fix: give 0.1 to 1000 Hz, 20 is usual")
         if not 0 <= self.seed < 2**63:
@@ -93,7 +102,9 @@ class FitSettings:
 
     def plain(self) -> dict[str, Any]:
         """Return the settings as plain values for a model file."""
-        return {key: value for key, value in asdict(self).items() if key not in self.scale}
+        plain = {key: value for key, value in asdict(self).items() if key not in self.scale}
+        windows_s = list(plain.pop("windows_s"))
+        return {**plain, "windows_s": windows_s} if windows_s else plain
 
 
 def check_window(window_s: float | None) -> None:

@@ -134,7 +134,7 @@ def folds(
     if k < 2:
         raise FerryIdError(f"settings: cross-validation needs 2 folds or more, found {k}. Fix: give 5, which is usual")
     used = [motion.valid if rows is None else rows[i] & motion.valid for i, motion in enumerate(motions)]
-    purge_s = [_purge_s(motion, window_s, guard_s) for motion in motions]
+    purge_s = [purge_seconds(motion, window_s, guard_s) for motion in motions]
     parts = [
         max(1, min(k, int(np.count_nonzero(mask) / motion.rate_hz / (2.0 * purge))))
         for motion, mask, purge in zip(motions, used, purge_s, strict=True)
@@ -189,7 +189,8 @@ def correlation_time(values: Floats, valid: Flags, rate_hz: float, longest_s: fl
     return float(longest)
 
 
-def _purge_s(motion: Motion, window_s: float, guard_s: float) -> float:
+def purge_seconds(motion: Motion, window_s: float, guard_s: float = GUARD_S) -> float:
+    """Return the time [s] within which two rows of a motion share what was smoothed over `window_s`."""
     # The derivative reaches one row further than the window on both sides.
     return window_s + 2.0 / motion.rate_hz + guard_s
 
@@ -216,7 +217,7 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
     training, validation, notes, purges = [], [], [], []
     short = 0
     for motion in motions:
-        purge_s = _purge_s(motion, window_s, guard_s)
+        purge_s = purge_seconds(motion, window_s, guard_s)
         seconds = np.count_nonzero(motion.valid) / motion.rate_hz
         wanted = blocks or min(max(round(seconds / BLOCK_S), FEWEST_BLOCKS), MOST_BLOCKS)
         number = min(wanted, int(seconds / (_LEAST_PURGES * purge_s)))

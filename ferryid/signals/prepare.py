@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,9 +10,23 @@ from typing import Any
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.recording import Recording, data_quality, record
-from ferryid.signals.smooth import smooth
+from ferryid.signals.smooth import Measured, measure, smooth_measured
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class Opened:
+    """One log before smoothing: as it was recorded, on one grid, and as velocities and forces."""
+
+    recording: Recording
+    track: Track
+    measured: Measured
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Contradictions between its signals, as sentences."""
+        return tuple(doubt.says for doubt in self.track.doubts)
 
 
 @dataclass(frozen=True)
@@ -24,6 +38,23 @@ class Prepared:
     quality: Mapping[str, Any]
     doubts: tuple[str, ...] = ()
     track: Track | None = None
+
+
+def open_track(path: str, profile: Profile, out: Path, *, rate_hz: float | None = None, verify: bool = False) -> Opened:
+    """Ingest and align one log, and reconstruct its forces; arguments and errors are those of `prepare`."""
+    return track_of(record(path, profile, out, verify=verify), profile, rate_hz)
+
+
+def track_of(recording: Recording, profile: Profile, rate_hz: float | None = None) -> Opened:
+    """Align a recording and reconstruct its forces; arguments and errors are those of `prepare`."""
+    track = align(recording, profile, rate_hz)
+    for doubt in track.doubts:
+        if doubt.certain:
+            raise FerryIdError(
+                f"{recording.name}: signals contradict each other, so nothing can be learnt from them. {doubt.says} "
+                f"Fix: correct unit, frame or sign of the signal in the profile {profile.name}"
+            )
+    return Opened(recording, track, measure(track, profile))
 
 
 def prepare(
@@ -59,14 +90,23 @@ def prepare(
     FerryIdError
         For a log that cannot be used, also one whose signals contradict each other beyond doubt.
     """
-    recording = record(path, profile, out, verify=verify)
-    track = align(recording, profile, rate_hz)
-    for doubt in track.doubts:
-        if doubt.certain:
+    opened = open_track(path, profile, out, rate_hz=rate_hz, verify=verify)
+    return smoothed(opened, window_s, smoother, keep_track=keep_track)
+
+
+def smoothed(opened: Opened, window_s: float, smoother: str = "square", *, keep_track: bool = False) -> Prepared:
+    """Smooth an opened log; arguments and errors are those of `prepare`."""
+    motion = smooth_measured(opened.measured, window_s, smoother)
+    quality = data_quality(opened.recording, motion)
+    return Prepared(opened.recording, motion, quality, opened.doubts, opened.track if keep_track else None)
+
+
+def refuse_twice(opened: Sequence[Opened]) -> None:
+    """Refuse a log that is given twice: it would train and validate on the same data."""
+    seen: dict[str, str] = {}
+    for one in opened:
+        first = seen.setdefault(one.recording.sha256, one.recording.files[0])
+        if first is not one.recording.files[0]:
             raise FerryIdError(
-                f"{recording.name}: signals contradict each other, so nothing can be learnt from them. {doubt.says} "
-                f"Fix: correct unit, frame or sign of the signal in the profile {profile.name}"
+                f"{one.recording.files[0]}: the same log as {first}, so that it would judge itself. Fix: give it once"
             )
-    motion = smooth(track, profile, window_s, smoother)
-    doubts = tuple(doubt.says for doubt in track.doubts)
-    return Prepared(recording, motion, data_quality(recording, motion), doubts, track if keep_track else None)
