@@ -8,15 +8,16 @@ import typer
 
 from ferryid.cli.options import OUT, Json, Logs, Out, Verify, Vessel
 from ferryid.cli.output import emit, progress
+from ferryid.identify.bases import names
 
 
 def command(
     logs: Logs,
     vessel: Vessel,
     name: Annotated[str, typer.Option(help="Name of the model in the store; the vessel's if left out.")] = "",
-    basis: Annotated[str, typer.Option(help="Basis functions: modulus or thesis.")] = "modulus",
+    basis: Annotated[str, typer.Option(help=f"Basis functions: {', '.join(names())}.")] = "modulus",
     structure: Annotated[
-        str, typer.Option(help="coupled: every term in every axis; decoupled: as in the 3-DOF model.")
+        str, typer.Option(help="coupled: every term in every axis; decoupled: each where physics has it.")
     ] = "decoupled",
     components: Annotated[str, typer.Option(help="Number of SIMPLS components, or auto.")] = "auto",
     window: Annotated[float, typer.Option(help="Smoothing window [s].")] = 1.0,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ferryid import __version__
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import Basis, basis
+from ferryid.identify.basis import Basis, basis, sized
 from ferryid.identify.bootstrap import Blocks, block_seconds, bootstrap
 from ferryid.identify.combine import check_vessel
 from ferryid.identify.estimate import Estimator, estimator
@@ -74,6 +74,7 @@ def task_of(
     """
     if not motions:
         raise FerryIdError("fit: there are no motions to fit. Fix: give one or more")
+    settings = replace(settings, basis=sized(settings.basis, profile.hull.length_m, profile.path or profile.name))
     if base is None:
         functions = basis_of(settings, motions)
     else:

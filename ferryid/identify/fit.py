@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ferryid import __version__
 from ferryid.errors import FerryIdError
 from ferryid.identify.accept import accept
-from ferryid.identify.basis import Basis, basis, relative_flow
+from ferryid.identify.basis import Basis, basis, relative_flow, sized
 from ferryid.identify.bootstrap import Blocks, block_seconds, bootstrap
 from ferryid.identify.cautions import cautions, free_run_cautions
 from ferryid.identify.cross_products import CrossProducts, Rows
@@ -82,6 +82,7 @@ def fit(
         For input that cannot be used, with file, cause and remedy.
     """
     name = checked_name(name or profile.name)
+    settings = replace(settings, basis=sized(settings.basis, profile.hull.length_m, profile.path or profile.name))
     prepared = [_prepare(path, profile, settings, out, verify, progress) for path in logs]
     _refuse_twice(prepared)
     motions = _told_apart([one.motion for one in prepared])

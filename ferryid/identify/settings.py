@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.basis import basis
+from ferryid.identify.basis import basis, sized
 
 CHOICES = {
     "smoother": ("square", "savgol", "kalman"),
@@ -23,7 +23,8 @@ class FitSettings:
     Attributes
     ----------
     basis, structure
-        See `ferryid.identify.basis.basis`; wind and current join the basis when all logs have them.
+        See `ferryid.identify.basis.basis`; wind and current join the basis when all logs have them, and the hull's length
+        where the name lacks it.
     smoother, residual, split, inertia
         One of `CHOICES`; inertia ``"auto"`` holds it at the base model's on axes where the fitted one cannot be right.
     components
@@ -61,7 +62,8 @@ class FitSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        basis(self.basis, structure=self.structure)  # says what is wrong with either before any log is read
+        # Says what is wrong with either before any log is read; the hull's length comes with the profile.
+        basis(sized(self.basis, 1.0, "settings"), structure=self.structure)
         for key, options in CHOICES.items():
             value = getattr(self, key)
             if value not in options:
