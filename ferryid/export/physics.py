@@ -44,8 +44,8 @@ FACTORS = {
 }
 """What the factors of a basis's terms are, `ferryid.identify.term.DIMENSIONS`; V cos(gamma) is the part of a flow along x."""
 STRIPS_SAY = (
-    "fore: integral of abs(v + x r) (v + x r) over x from 0 to half_length; aft: from -half_length to 0; "
-    "x_fore, x_aft: with another x under the integral"
+    "fore: integral of abs(v + x r) (v + x r) for x from 0 to half_length, aft from -half_length to 0; "
+    "x_fore, x_aft with x before it"
 )
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")
 _MASS_UNITS = (("kg", "kg", "kg m"), ("kg", "kg", "kg m"), ("kg m", "kg m", "kg m^2"))

@@ -13,8 +13,22 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.bases import forms
 from ferryid.identify.strips import strips
-from ferryid.identify.term import SURGE, SWAY, YAW, Term, terms
+from ferryid.identify.term import DIMENSIONS, SURGE, SWAY, YAW, Term, terms
 from ferryid.signals.track import Motion
+
+__all__ = [
+    "BASES",
+    "CURRENT",
+    "DIMENSIONS",
+    "STRUCTURES",
+    "WIND",
+    "Basis",
+    "Term",
+    "basis",
+    "coefficient_units",
+    "relative_flow",
+    "sized",
+]
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -78,6 +78,7 @@ def test_numbers_come_back_to_the_last_bit(value: float) -> None:
 
 def test_text_is_plain() -> None:
     assert plain("milliAmpère: 2 N·s²/m, 5°") == "milliAmpere: 2 N*s^2/m, 5 deg"
+    assert plain("N·s²/m⁴") == "N*s^2/m^4"
     assert plain("a\nb */ /* ???/ \\") == "a b * / / * ? ? ?/ /"
 
 
