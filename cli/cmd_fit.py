@@ -6,7 +6,23 @@ from typing import Annotated
 
 import typer
 
-from ferryid.cli.options import OUT, Json, Logs, Out, Verify, Vessel
+from ferryid.cli.options import (
+    OUT,
+    Basis,
+    Delta,
+    Inertia,
+    Json,
+    Logs,
+    Out,
+    Rate,
+    Residual,
+    Sigma,
+    Smoother,
+    Structure,
+    Verify,
+    Vessel,
+    Zeta,
+)
 from ferryid.cli.output import emit, progress
 
 
@@ -14,24 +30,21 @@ def command(
     logs: Logs,
     vessel: Vessel,
     name: Annotated[str, typer.Option(help="Name of the model in the store; the vessel's if left out.")] = "",
-    basis: Annotated[str, typer.Option(help="Basis functions: modulus or thesis.")] = "modulus",
-    structure: Annotated[
-        str, typer.Option(help="coupled: every term in every axis; decoupled: as in the 3-DOF model.")
-    ] = "decoupled",
-    components: Annotated[str, typer.Option(help="Number of SIMPLS components, or auto.")] = "auto",
-    window: Annotated[float, typer.Option(help="Smoothing window [s].")] = 1.0,
-    smoother: Annotated[str, typer.Option(help="square, savgol or kalman.")] = "square",
-    residual: Annotated[str, typer.Option(help="Lack-of-fit residual: measured, commanded or parallel.")] = "measured",
-    split: Annotated[str, typer.Option(help="blocks, logs, or every-kth as in the thesis.")] = "blocks",
-    rate: Annotated[
-        float | None, typer.Option(help="Rate of the uniform grid [Hz]; the navigation's if left out.")
-    ] = None,
-    inertia: Annotated[
-        str, typer.Option(help="auto: keep the base model's inertia where the fitted one cannot be right; or fitted.")
+    basis: Basis = "modulus",
+    structure: Structure = "decoupled",
+    components: Annotated[
+        str,
+        typer.Option(help="Number of SIMPLS components, or auto: see ferryid sweep."),
     ] = "auto",
-    delta: Annotated[float, typer.Option(help="Factor on the base model's M and C.")] = 1.0,
-    sigma: Annotated[float, typer.Option(help="Factor on the base model's D.")] = 1.0,
-    zeta: Annotated[float, typer.Option(help="Factor on the base model's force.")] = 1.0,
+    window: Annotated[str, typer.Option(help="Smoothing window [s], or auto: see ferryid sweep.")] = "1.0",
+    smoother: Smoother = "square",
+    residual: Residual = "measured",
+    split: Annotated[str, typer.Option(help="blocks, logs, or every-kth as in the thesis.")] = "blocks",
+    rate: Rate = None,
+    inertia: Inertia = "auto",
+    delta: Delta = 1.0,
+    sigma: Sigma = 1.0,
+    zeta: Zeta = 1.0,
     seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
     require_accept: Annotated[
         bool, typer.Option("--require-accept", help="Exit with 3 if the model is not accepted.")
@@ -41,12 +54,12 @@ def command(
     json: Json = None,
 ) -> None:
     """Fit a model to one or more logs, validate it, store it and write a report."""
-    from ferryid.identify.settings import FitSettings
+    from ferryid.identify.settings import FitSettings, window_choice
     from ferryid.report.fit_report import fit_and_report
     from ferryid.vessel import load_profile
 
     settings = FitSettings(
-        basis=basis, structure=structure, components=components, window_s=window, smoother=smoother, residual=residual,
+        basis=basis, structure=structure, components=components, **window_choice(window), smoother=smoother, residual=residual,
         split=split, inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
     )  # fmt: skip
     outcome = fit_and_report(logs, load_profile(vessel), settings, out, name=name, verify=verify, progress=progress)

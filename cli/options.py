@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ferryid.identify.bases import names
+
 Logs = Annotated[
     list[str],
     typer.Argument(help="Bags, MCAP files, CSV or Parquet tables, or folders; parts of one log joined by +."),
@@ -20,5 +22,23 @@ Json = Annotated[
     str | None, typer.Option("--json", help="Write the result as JSON to this file, - for standard output.")
 ]
 Verify = Annotated[bool, typer.Option("--verify", help="Read the whole file and check every checksum.")]
+Basis = Annotated[str, typer.Option("--basis", help=f"Basis functions: {', '.join(names())}.")]
+Structure = Annotated[
+    str, typer.Option("--structure", help="coupled: every term in every axis; decoupled: each where physics has it.")
+]
+Smoother = Annotated[str, typer.Option("--smoother", help="square, savgol or kalman.")]
+Residual = Annotated[str, typer.Option("--residual", help="Lack-of-fit residual: measured, commanded or parallel.")]
+Rate = Annotated[
+    float | None, typer.Option("--rate", help="Rate of the uniform grid [Hz]; the navigation's if left out.")
+]
+Inertia = Annotated[
+    str,
+    typer.Option(
+        "--inertia", help="auto: keep the base model's inertia where the fitted one cannot be right; or fitted."
+    ),
+]
+Delta = Annotated[float, typer.Option("--delta", help="Factor on the base model's M and C.")]
+Sigma = Annotated[float, typer.Option("--sigma", help="Factor on the base model's D.")]
+Zeta = Annotated[float, typer.Option("--zeta", help="Factor on the base model's force.")]
 
 OUT = Path("ferryid-out")

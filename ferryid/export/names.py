@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import unicodedata
 
-_SIGNS = str.maketrans({"·": "*", "²": "^2", "³": "^3", "°": " deg", "–": "-", "—": "-", "π": "pi", "×": "x"})
+_SIGNS = str.maketrans(
+    {"·": "*", "²": "^2", "³": "^3", "⁴": "^4", "°": " deg", "–": "-", "—": "-", "π": "pi", "×": "x"}
+)
 _LONGEST = 48
 """Most characters of a name; MATLAB takes 63, and a version follows."""
 

@@ -10,12 +10,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import pi
+from math import isfinite, pi
 
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.export.exported import Exported
 from ferryid.export.names import legal, number
-from ferryid.identify.basis import Term
+from ferryid.identify.strips import LEAST
+from ferryid.identify.term import STRIPS, Term
 from ferryid.vessel.parse_hull import rigid_mass
 from ferryid.vessel.profile import Floats, Hull, WindAreas
 from ferryid.vessel.wind import AIR_DENSITY
@@ -39,8 +40,13 @@ FACTORS = {
             "gamma": "(-atan2(v_{0}, u_{0}))",
         }.items()
     },
+    **{name: name for name in STRIPS},
 }
-"""What the factors of a basis's terms are, `ferryid.identify.basis.DIMENSIONS`; V cos(gamma) is the part of a flow along x."""
+"""What the factors of a basis's terms are, `ferryid.identify.term.DIMENSIONS`; V cos(gamma) is the part of a flow along x."""
+STRIPS_SAY = (
+    "fore: integral of abs(v + x r) (v + x r) for x from 0 to half_length, aft from -half_length to 0; "
+    "x_fore, x_aft with x before it"
+)
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")
 _MASS_UNITS = (("kg", "kg", "kg m"), ("kg", "kg", "kg m"), ("kg m", "kg m", "kg m^2"))
 
@@ -113,6 +119,7 @@ def physics(one: Exported) -> Physics:
         *((Block("wind load, Blendermann's form; angle of attack 0 from ahead", wind, of_wind=True),) if wind else ()),
         Block("payload", _payload()),
         *((Block("the scale of the measured force", _scale()),) if "zeta" in constants else ()),
+        *((Block(STRIPS_SAY, tuple(_strips())),) if "half_length" in constants else ()),
         *_correction(one, constants),
     )
     blocks = _needed(blocks)
@@ -159,6 +166,9 @@ def _constants(one: Exported) -> Iterator[Constant]:
         yield Constant("zeta", one.zeta, "-", "divides the force of the hull: the scale of the measured one")
     if force.basis is None or force.theta is None or force.intercept is None:
         return
+    if isfinite(force.basis.length_m):
+        yield Constant("half_length", 0.5 * force.basis.length_m, "m", "half the length of the hull")
+        yield Constant("least", LEAST, "m/s", "keeps a speed that is divided by from being zero")
     for k, term in enumerate(force.basis.functions):
         for j, axis in enumerate(AXES):
             if force.theta[k, j] != 0.0:
@@ -290,6 +300,23 @@ def _payload() -> tuple[Line, ...]:
 
 def _scale() -> tuple[Line, ...]:
     return tuple(Line(axis, f"{axis} / zeta", anew=True) for axis in AXES)
+
+
+def _strips() -> Iterator[Line]:
+    """Yield the lines of `ferryid.identify.strips`: ``even`` and ``odd`` of each half, and the integrals made of them."""
+    for half, sign in (("fore", "+"), ("aft", "-")):
+        end, both, even, odd = (f"{name}_{half}" for name in ("end", "both", "even", "odd"))
+        crossing = f"crossing_{half}"
+        yield Line(end, f"v {sign} half_length * r")
+        yield Line(both, f"abs(v) + abs({end}) + least")
+        yield Line(even, f"(v + {end}) / {both} * (v * v + abs(v) * abs({end}) + {end} * {end}) / 3.0")
+        yield Line(crossing, f"0.5 * (abs(v) * abs({end}) - v * {end}) / {both}")
+        yield Line(
+            odd,
+            f"(abs({end}) * {end} - abs(v) * v) / 6.0 - {crossing} * {crossing} * ({end} - v) / {both} / 3.0",
+        )
+        yield Line(half, f"half_length * {even}")
+        yield Line(f"x_{half}", f"{'' if sign == '+' else '-'}0.5 * half_length * half_length * ({even} + {odd})")
 
 
 def _correction(one: Exported, constants: Mapping[str, Constant]) -> Iterator[Block]:

@@ -1,15 +1,34 @@
-"""Bases of the correction: the thesis's 21 functions, the same without duplicates, and those of wind and current."""
+"""Bases of the correction: functions of motion, of which `ferryid.identify.bases` has the lists, and of wind and current."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.bases import forms
+from ferryid.identify.strips import strips
+from ferryid.identify.term import DIMENSIONS, SURGE, SWAY, YAW, Term, terms
 from ferryid.signals.track import Motion
+
+__all__ = [
+    "BASES",
+    "CURRENT",
+    "DIMENSIONS",
+    "STRUCTURES",
+    "WIND",
+    "Basis",
+    "Term",
+    "basis",
+    "coefficient_units",
+    "relative_flow",
+    "sized",
+]
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -18,118 +37,39 @@ Rows = NDArray[np.bool_] | NDArray[np.int64] | slice
 
 STRUCTURES = ("coupled", "decoupled")
 
-_SURGE, _SWAY, _YAW = 0, 1, 2
 _EVERY_ROW = slice(None)
+_SIZED = re.compile(r"(.+)-(\d{1,4}(?:\.\d{1,4})?)m")
 
+BASES: Mapping[str, tuple[Term, ...]] = {name: form.terms for name, form in forms().items()}
+"""Functions of motion alone, a file each in `ferryid.identify.bases`."""
 
-@dataclass(frozen=True)
-class Term:
-    """One basis function, the product of its factors.
-
-    Attributes
-    ----------
-    name
-        Name in reports and model files.
-    factors
-        Names of the factors, keys of `DIMENSIONS`.
-    axes
-        Axes that the term belongs to in the decoupled structure: 0 surge, 1 sway, 2 yaw.
-    """
-
-    name: str
-    factors: tuple[str, ...]
-    axes: tuple[int, ...]
-
-    @property
-    def dimension(self) -> tuple[int, int, int]:
-        """Exponents of metre, second and radian."""
-        parts = [DIMENSIONS[factor] for factor in self.factors]
-        return sum(p[0] for p in parts), sum(p[1] for p in parts), sum(p[2] for p in parts)
-
-
-DIMENSIONS: Mapping[str, tuple[int, int, int]] = {
-    "u_dot": (1, -2, 0),
-    "v_dot": (1, -2, 0),
-    "r_dot": (0, -2, 1),
-    "u": (1, -1, 0),
-    "v": (1, -1, 0),
-    "r": (0, -1, 1),
-    "|u|": (1, -1, 0),
-    "|v|": (1, -1, 0),
-    "|r|": (0, -1, 1),
-    # Air (rw) and water (rc) relative to the hull: V, V cos(gamma), V sin(gamma) and the angle of attack as a number.
-    **{f"{name}_{flow}": (1, -1, 0) for flow in ("rw", "rc") for name in ("V", "cos", "sin", "2cos", "|cos|", "|sin|")},
-    **{f"gamma_{flow}": (0, 0, 0) for flow in ("rw", "rc")},
-}
-"""Exponents of metre, second and radian of every factor."""
-
-
-def _terms(*rows: tuple[str, str, tuple[int, ...]]) -> tuple[Term, ...]:
-    return tuple(Term(name, tuple(factors.split()), axes) for name, factors, axes in rows)
-
-
-_BOTH = (_SWAY, _YAW)
-_LINEAR = _terms(
-    ("u_dot", "u_dot", (_SURGE,)),
-    ("v_dot", "v_dot", _BOTH),
-    ("r_dot", "r_dot", _BOTH),
-    ("uv", "u v", (_YAW,)),
-    ("ur", "u r", _BOTH),
-    ("vr", "v r", (_SURGE,)),
-    ("rr", "r r", (_SURGE,)),
-    ("u", "u", (_SURGE,)),
-    ("v", "v", _BOTH),
-    ("r", "r", _BOTH),
-)
-_SIGNED = _terms(
-    ("sgn(u)u^2", "|u| u", (_SURGE,)),
-    ("sgn(v)v^2", "|v| v", _BOTH),
-    ("sgn(r)r^2", "|r| r", _BOTH),
-)
-_CUBIC = _terms(
-    ("u^3", "u u u", (_SURGE,)),
-    ("v^3", "v v v", _BOTH),
-    ("r^3", "r r r", _BOTH),
-)
-_MODULUS = _terms(
-    ("|u|u", "|u| u", (_SURGE,)),
-    ("|v|v", "|v| v", _BOTH),
-    ("|r|r", "|r| r", _BOTH),
-    ("|v|r", "|v| r", _BOTH),
-    ("|r|v", "|r| v", _BOTH),
-)
-
-BASES: Mapping[str, tuple[Term, ...]] = {
-    "thesis": _LINEAR + _SIGNED + _CUBIC + _MODULUS,
-    "modulus": _LINEAR + _CUBIC + _MODULUS,
-}
-"""Functions of motion alone. ``thesis`` is (3.4) in its order, with three pairs of identical columns."""
+_ACROSS = (SWAY, YAW)
 
 WIND: Mapping[str, tuple[Term, ...]] = {
-    "thesis": _terms(
-        ("V_rw^2 cos(gamma_rw)", "V_rw cos_rw", (_SURGE,)),
-        ("V_rw^2 sin(gamma_rw)", "V_rw sin_rw", _BOTH),
-        ("V_rw^2 sin(2gamma_rw)", "2cos_rw sin_rw", (_YAW,)),
+    "thesis": terms(
+        ("V_rw^2 cos(gamma_rw)", "V_rw cos_rw", (SURGE,)),
+        ("V_rw^2 sin(gamma_rw)", "V_rw sin_rw", _ACROSS),
+        ("V_rw^2 sin(2gamma_rw)", "2cos_rw sin_rw", (YAW,)),
     ),
-    "paper": _terms(
-        ("V_rw^2 cos(gamma_rw)", "V_rw cos_rw", (_SURGE,)),
-        ("V_rw^2 sin(gamma_rw)", "V_rw sin_rw", _BOTH),
-        ("V_rw^2 sin(gamma_rw)gamma_rw", "V_rw sin_rw gamma_rw", (_YAW,)),
+    "paper": terms(
+        ("V_rw^2 cos(gamma_rw)", "V_rw cos_rw", (SURGE,)),
+        ("V_rw^2 sin(gamma_rw)", "V_rw sin_rw", _ACROSS),
+        ("V_rw^2 sin(gamma_rw)gamma_rw", "V_rw sin_rw gamma_rw", (YAW,)),
     ),
 }
 """Functions of the apparent wind: thesis (3.6) and paper (18)."""
 
 CURRENT: Mapping[str, tuple[Term, ...]] = {
-    "thesis": _terms(
-        ("V_rc^2 cos(gamma_rc)|cos(gamma_rc)|", "|cos|_rc cos_rc", (_SURGE,)),
-        ("V_rc^2 sin(gamma_rc)|sin(gamma_rc)|", "|sin|_rc sin_rc", _BOTH),
-        ("V_rc^2 sin(gamma_rc)", "V_rc sin_rc", _BOTH),
-        ("V_rc^2 sin(2gamma_rc)", "2cos_rc sin_rc", (_YAW,)),
+    "thesis": terms(
+        ("V_rc^2 cos(gamma_rc)|cos(gamma_rc)|", "|cos|_rc cos_rc", (SURGE,)),
+        ("V_rc^2 sin(gamma_rc)|sin(gamma_rc)|", "|sin|_rc sin_rc", _ACROSS),
+        ("V_rc^2 sin(gamma_rc)", "V_rc sin_rc", _ACROSS),
+        ("V_rc^2 sin(2gamma_rc)", "2cos_rc sin_rc", (YAW,)),
     ),
-    "paper": _terms(
-        ("V_rc^2 cos(gamma_rc)", "V_rc cos_rc", (_SURGE,)),
-        ("V_rc^2 sin(gamma_rc)", "V_rc sin_rc", _BOTH),
-        ("V_rc^2 sin(gamma_rc)gamma_rc", "V_rc sin_rc gamma_rc", (_YAW,)),
+    "paper": terms(
+        ("V_rc^2 cos(gamma_rc)", "V_rc cos_rc", (SURGE,)),
+        ("V_rc^2 sin(gamma_rc)", "V_rc sin_rc", _ACROSS),
+        ("V_rc^2 sin(gamma_rc)gamma_rc", "V_rc sin_rc gamma_rc", (YAW,)),
     ),
 }
 """Functions of the velocity through the water: thesis (3.7) and paper (19)."""
@@ -142,19 +82,22 @@ class Basis:
     Attributes
     ----------
     name
-        Name that `basis` takes: ``"modulus"``, ``"thesis+wind-paper"``.
+        Name that `basis` takes: ``"modulus"``, ``"thesis+wind-paper"``, ``"cross-flow-5m"``.
     structure
         ``"coupled"`` or ``"decoupled"``.
     functions
         The functions in order.
     mask
         True where a term may act on an axis (surge, sway, yaw), shape (K, 3).
+    length_m
+        Length of the hull [m]; NaN where no function needs it.
     """
 
     name: str
     structure: str
     functions: tuple[Term, ...]
     mask: Flags
+    length_m: float = nan
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -204,6 +147,8 @@ class Basis:
             Where a function needs a wind or current that is not given.
         """
         values = _factors(nu, nu_dot)
+        if isfinite(self.length_m):
+            values.update(strips(values["v"], values["r"], self.length_m))
         for flow, relative, what in (("rw", wind_rel, "wind"), ("rc", current_rel, "current")):
             if self._needs(flow):
                 if relative is None:
@@ -262,18 +207,18 @@ def basis(
     Parameters
     ----------
     name
-        ``"thesis"`` (21 functions, three pairs of them identical) or ``"modulus"`` (the same 18 without duplicates). A
-        name as in `Basis.name`, ``"modulus+wind-paper+current-thesis"``, sets wind and current too.
+        One of `BASES`. One that needs the hull's length has it behind: ``"cross-flow-5m"``; see `sized`. A name as in
+        `Basis.name`, ``"modulus+wind-paper+current-thesis"``, sets wind and current too.
     wind, current
         ``"thesis"``, ``"paper"`` or None for no such functions.
     structure
-        ``"coupled"``: every function may act on every axis. ``"decoupled"``: only on the axes on which it acts in the
-        three-degree-of-freedom model (2.3)-(2.14).
+        ``"coupled"``: every function may act on every axis. ``"decoupled"``: only on the axes on which the basis's own file
+        says that it acts; a term of wind or current where it acts in (2.15)-(2.20).
 
     Raises
     ------
     FerryIdError
-        For a name or structure that does not exist, with the nearest that does.
+        For a name or structure that does not exist, with the nearest that does, or a length that is missing.
     """
     head, *extensions = name.split("+")
     forms = {"wind": wind, "current": current}
@@ -282,7 +227,10 @@ def basis(
         if kind not in forms:
             raise _unknown("basis extension", extension, [f"{k}-{f}" for k in forms for f in WIND])
         forms[kind] = form
+    head, length_m = _measured(head)
     functions = _choose("basis", head, BASES)
+    if isfinite(length_m):
+        head = _with_length(head, length_m)
     for kind, table in (("wind", WIND), ("current", CURRENT)):
         chosen = forms[kind]
         if chosen is not None:
@@ -296,7 +244,35 @@ def basis(
             row[:] = False
             row[list(term.axes)] = True
     mask.setflags(write=False)
-    return Basis(head, structure, functions, mask)
+    return Basis(head, structure, functions, mask, length_m)
+
+
+def sized(name: str, length_m: float, where: str) -> str:
+    """Return a basis's name with the hull's length in it where its functions need one; any other name as it is.
+
+    Parameters
+    ----------
+    name
+        As for `basis`.
+    length_m
+        Length of the hull [m], NaN where it is not known.
+    where
+        The profile that has the length, for the message.
+
+    Raises
+    ------
+    FerryIdError
+        Where the length is needed and not known.
+    """
+    head, plus, extensions = name.partition("+")
+    if head not in BASES or not forms()[head].needs_length:
+        return name
+    if not isfinite(length_m):
+        raise FerryIdError(
+            f"{where}: the basis {head} needs the hull's length, and there is no length_m in [hull]. "
+            f"Fix: add it, or say it with --basis {head}-5m, for 5 m"
+        )
+    return _with_length(head, length_m) + plus + extensions
 
 
 def relative_flow(nu: Floats, psi: Floats, flow_ne: Floats) -> Floats:
@@ -314,6 +290,24 @@ def relative_flow(nu: Floats, psi: Floats, flow_ne: Floats) -> Floats:
     c, s = np.cos(psi), np.sin(psi)
     north, east = flow_ne[:, 0], flow_ne[:, 1]
     return np.column_stack([nu[:, 0] - (c * north + s * east), nu[:, 1] - (c * east - s * north)])
+
+
+def _measured(head: str) -> tuple[str, float]:
+    """Return the name of a basis of motion without its length, and the length, NaN where it needs none."""
+    found = _SIZED.fullmatch(head)
+    if found and found[1] in BASES and forms()[found[1]].needs_length and float(found[2]) > 0.0:
+        return found[1], float(found[2])
+    known = found[1] if found and found[1] in BASES else head
+    if known in BASES and forms()[known].needs_length:
+        raise FerryIdError(
+            f'settings: the basis "{head}" needs the hull\'s length behind its name, found none above zero. '
+            f"Fix: write {known}-5m for a hull of 5 m"
+        )
+    return head, nan
+
+
+def _with_length(head: str, length_m: float) -> str:
+    return f"{head}-{length_m:.4f}".rstrip("0").rstrip(".") + "m"
 
 
 def _choose(what: str, name: str, table: Mapping[str, tuple[Term, ...]]) -> tuple[Term, ...]:
@@ -365,7 +359,7 @@ def _flow_factors(relative: Floats, flow: str) -> dict[str, Floats]:
 def coefficient_units(term: Term) -> Unit:
     """Return the unit of a term's coefficient in surge, sway (force) and yaw (moment) as plain strings."""
     metre, second, radian = term.dimension
-    if second == -2 and len(term.factors) == 1:
+    if term.factors[0].endswith("_dot"):
         # Force over acceleration is inertia; radians are left out there, as in every table of added mass.
         return ("kg", "kg", "kg·m") if radian == 0 else ("kg·m", "kg·m", "kg·m²")
     force = _unit(-metre, -second, -radian)
@@ -382,4 +376,4 @@ def _unit(metre: int, second: int, radian: int) -> str:
     return f"{top}/({bottom})" if len(below) > 1 else f"{top}/{bottom}"
 
 
-_POWER = {1: "", 2: "²", 3: "³"}
+_POWER = {1: "", 2: "²", 3: "³", 4: "⁴"}

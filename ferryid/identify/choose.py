@@ -14,18 +14,18 @@ from ferryid.identify.inertia import effective_mass, unbelievable, unforced, wit
 from ferryid.identify.pieces import Pieces, edges_of
 from ferryid.identify.residual import residual
 from ferryid.identify.rows import known_rows, rows_of
-from ferryid.identify.settings import FitSettings
+from ferryid.identify.settings import WINDOWS_S, FitSettings, check_window
 from ferryid.identify.simpls import simpls, total
 from ferryid.identify.split import purge_seconds
-from ferryid.signals.smooth import Measured, odd_rows, smooth_measured
+from ferryid.signals.smooth import Measured, longest_stretch_s, odd_rows, smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
-"""Smoothing windows that are tried [s]."""
+_STRETCHES = 10.0
+"""A window is tried where the longest unbroken stretch of every log is so many times as long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,18 +58,25 @@ class Choice:
 
     Attributes
     ----------
-    window_s, components
-        Smoothing window [s] and number of components.
+    window, window_s, components
+        Number of the window, its length [s], and number of components.
     held
         Axes on which the inertia is the base model's, shape (3,).
     curves
         The errors that it rests on, with the inertia of these axes held.
     """
 
+    window: int
     window_s: float
     components: int
     held: Flags
     curves: Curves
+
+    @property
+    def over_base(self) -> Floats:
+        """MSE of every combination over the base model's, shape (W, A, 3); NaN where the base model makes no error."""
+        base = np.where(self.curves.base > 0.0, self.curves.base, np.nan)
+        return np.asarray(self.curves.mse / base)
 
 
 def distinct(windows_s: Iterable[float], rates_hz: Sequence[float]) -> tuple[float, ...]:
@@ -78,6 +85,16 @@ def distinct(windows_s: Iterable[float], rates_hz: Sequence[float]) -> tuple[flo
     for window_s in sorted(windows_s):
         kept.setdefault(tuple(odd_rows(window_s, rate) for rate in rates_hz), window_s)
     return tuple(kept.values())
+
+
+def tried(windows_s: Sequence[float], measured: Sequence[Measured]) -> tuple[float, ...]:
+    """Return the windows to try [s], as `distinct` does; of the usual ones, where none is given, those that suit the logs."""
+    for window_s in windows_s:
+        check_window(window_s)
+    if tuple(windows_s) in ((), WINDOWS_S):
+        longest = min(longest_stretch_s(one) for one in measured)
+        windows_s = [window_s for window_s in WINDOWS_S if window_s <= longest / _STRETCHES]
+    return distinct(windows_s, [one.rate_hz for one in measured])
 
 
 def studied(
@@ -200,7 +217,7 @@ def choose(
         if settings.components != "auto":
             components = min(int(settings.components), most)
             window = int(np.argmin(curves.normalised()[0][:, components - 1]))
-        choice = Choice(windows_s[window], components, held, curves)
+        choice = Choice(window, windows_s[window], components, held, curves)
         if settings.inertia != "auto":
             return choice
         theta = simpls(total(folds.training[window]), components, allowed=allowed).coefficients[-1]

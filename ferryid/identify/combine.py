@@ -177,7 +177,8 @@ def check_together(models: Sequence[Model]) -> None:
     first, *others = models
     vessel = parse_profile(first.profile_text, first.name)
     for other in others:
-        if other.terms != first.terms:
+        # The terms do not tell over what length they are integrals: the name does.
+        if other.terms != first.terms or other.settings["basis"] != first.settings["basis"]:
             raise FerryIdError(
                 f"model {other.name}@{other.version}: its basis is {other.settings['basis']}, that of "
                 f"{first.name}@{first.version} is {first.settings['basis']}, and their coefficients do not add up. "

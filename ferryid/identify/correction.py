@@ -76,6 +76,7 @@ def task_of(
     """
     if not motions:
         raise FerryIdError("fit: there are no motions to fit. Fix: give one or more")
+    settings = settings.on(profile)
     if base is None:
         functions = basis_of(settings, motions)
     else:

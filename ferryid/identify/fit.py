@@ -16,7 +16,7 @@ from ferryid.identify.accept import accept
 from ferryid.identify.basis import Basis
 from ferryid.identify.bootstrap import Blocks, block_seconds, bootstrap
 from ferryid.identify.cautions import cautions, free_run_cautions
-from ferryid.identify.choose import Choice, choose, distinct, folds_by_blocks, force_free, studied
+from ferryid.identify.choose import Choice, choose, folds_by_blocks, force_free, studied, tried
 from ferryid.identify.cross_products import CrossProducts
 from ferryid.identify.crossed import MAX_COMPONENTS, TEST_WINDOW_S
 from ferryid.identify.estimate import Estimator
@@ -81,6 +81,7 @@ def fit(
         For input that cannot be used, with file, cause and remedy.
     """
     name = checked_name(name or profile.name)
+    settings = settings.on(profile)
     opened = []
     for path in logs:
         progress(f"reading {Path(path).name}")
@@ -190,7 +191,7 @@ def _windowed(profile: Profile, settings: FitSettings, opened: Sequence[Opened])
 
     Validation rows take no part in it.
     """
-    windows_s = distinct(settings.windows_s, [one.measured.rate_hz for one in opened])
+    windows_s = tried(settings.windows_s, [one.measured for one in opened])
     motions = [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened]
     functions = basis_of(settings, motions)
     parts = split(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.basis import basis
+from ferryid.identify.basis import basis, sized
+from ferryid.vessel.profile import Profile
 
 CHOICES = {
     "smoother": ("square", "savgol", "kalman"),
@@ -16,6 +17,10 @@ CHOICES = {
 }
 
 
+WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
+"""Smoothing windows that are usually tried [s]."""
+
+
 @dataclass(frozen=True)
 class FitSettings:
     """How to fit; the defaults suit a first look at any trial.
@@ -23,7 +28,8 @@ class FitSettings:
     Attributes
     ----------
     basis, structure
-        See `ferryid.identify.basis.basis`; wind and current join the basis when all logs have them.
+        See `ferryid.identify.basis.basis`; wind and current join the basis when all logs have them, and the hull's length
+        where the name lacks it.
     smoother, residual, split, inertia
         One of `CHOICES`; inertia ``"auto"`` holds it at the base model's on axes where the fitted one cannot be right.
     components
@@ -64,7 +70,8 @@ class FitSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        basis(self.basis, structure=self.structure)  # says what is wrong with either before any log is read
+        # Says what is wrong with either before any log is read; the hull's length comes with the profile.
+        basis(sized(self.basis, 1.0, "settings"), structure=self.structure)
         for key, options in CHOICES.items():
             value = getattr(self, key)
             if value not in options:
@@ -100,6 +107,16 @@ class FitSettings:
         """Factors on the base model."""
         return {"delta": self.delta, "sigma": self.sigma, "zeta": self.zeta}
 
+    def on(self, profile: Profile) -> FitSettings:
+        """Return the settings on one vessel: the basis with the length of its hull, where it needs one.
+
+        Raises
+        ------
+        FerryIdError
+            Where the basis needs a length that the profile does not have.
+        """
+        return replace(self, basis=sized(self.basis, profile.hull.length_m, profile.path or profile.name))
+
     def plain(self) -> dict[str, Any]:
         """Return the settings as plain values for a model file."""
         plain = {key: value for key, value in asdict(self).items() if key not in self.scale}
@@ -111,3 +128,28 @@ def check_window(window_s: float | None) -> None:
     """Refuse what is no smoothing window; None stands for a default."""
     if window_s is not None and not 0.0 <= window_s <= 60.0:
         raise FerryIdError(f"--window: {window_s} s is no smoothing window. Fix: give 0 to 60 s, 1.0 is usual")
+
+
+def windows_of(text: str) -> tuple[float, ...]:
+    """Return the smoothing windows [s] of a list such as ``"0.5,1,2"``; none of an empty one."""
+    windows = []
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        try:
+            windows.append(float(part))
+        except ValueError as error:
+            raise FerryIdError(
+                f"--windows: {part!r} is no number of seconds. Fix: give a list such as 0.5,1,2"
+            ) from error
+    return tuple(windows)
+
+
+def window_choice(text: str) -> dict[str, Any]:
+    """Return `window_s` of a number, `windows_s` of ``"auto"``, as settings take them."""
+    if text == "auto":
+        return {"windows_s": WINDOWS_S}
+    try:
+        return {"window_s": float(text)}
+    except ValueError as error:
+        raise FerryIdError(
+            f"--window: {text!r} is no smoothing window. Fix: give seconds, 1.0 is usual, or auto"
+        ) from error

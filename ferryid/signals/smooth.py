@@ -282,17 +282,21 @@ def _within(measured: Measured, half: int) -> Flags:
     """Return the rows with `half` usable rows on either side."""
     usable = measured.usable
     valid = np.zeros_like(usable)
-    stretches = segments(usable)
-    for stretch in stretches:
+    for stretch in segments(usable):
         valid[stretch.start + half : max(stretch.start + half, stretch.stop - half)] = True
     if not valid.any():
-        longest = max(stretch.stop - stretch.start for stretch in stretches) / measured.rate_hz
+        longest = longest_stretch_s(measured)
         needed = (2 * half + 1) / measured.rate_hz
         raise FerryIdError(
             f"{measured.log}: log shorter than the smoothing window, found {longest:.2f} s unbroken where "
             f"{needed:.2f} s are needed. Fix: use a longer log or a shorter --window"
         )
     return valid
+
+
+def longest_stretch_s(measured: Measured) -> float:
+    """Return the length of the longest unbroken stretch of a log [s]."""
+    return max(stretch.stop - stretch.start for stretch in segments(measured.usable)) / measured.rate_hz
 
 
 def _payload(track: Track, profile: Profile, usable: Flags, repairs: list[str]) -> Floats | None:

@@ -17,8 +17,9 @@ from ferryid.export.formats import formats
 from ferryid.export.model_file import export_model
 from ferryid.export.names import identifier, legal, number, plain
 from ferryid.export.physics import FACTORS, FUNCTIONS, physics
-from ferryid.identify.basis import BASES, CURRENT, DIMENSIONS, WIND
+from ferryid.identify.basis import BASES, CURRENT, WIND
 from ferryid.identify.store import save
+from ferryid.identify.term import DIMENSIONS
 from tests.export.models import MODELS, SHA
 from tests.identify.test_stored_effect import FERRY, stored
 
@@ -77,6 +78,7 @@ def test_numbers_come_back_to_the_last_bit(value: float) -> None:
 
 def test_text_is_plain() -> None:
     assert plain("milliAmpère: 2 N·s²/m, 5°") == "milliAmpere: 2 N*s^2/m, 5 deg"
+    assert plain("N·s²/m⁴") == "N*s^2/m^4"
     assert plain("a\nb */ /* ???/ \\") == "a b * / / * ? ? ?/ /"
 
 

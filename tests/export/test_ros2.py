@@ -48,6 +48,11 @@ def test_every_number_is_there_and_the_same(name: str) -> None:
     assert told["ranges"] == {key: list(value) for key, value in RANGES.items()}
 
 
+def test_integrals_along_the_hull_come_with_half_its_length() -> None:
+    assert parameters("cross flow")["strips"] == {"half_length": 2.5}
+    assert "strips" not in parameters("lift")
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_keys_are_names_and_numbers_are_doubles(name: str) -> None:
     def walk(node: Any) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from math import isfinite
 
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.export.exported import Exported
 from ferryid.export.format import Format
 from ferryid.export.names import legal, number, plain
-from ferryid.export.physics import FACTORS
+from ferryid.export.physics import FACTORS, STRIPS_SAY
 from ferryid.export.words import beside, commented, frames, heading, limits
 from ferryid.identify.model import AXES
 from ferryid.vessel.wind import AIR_DENSITY
@@ -79,6 +80,10 @@ def _terms(one: Exported) -> Iterator[str]:
     force = one.force
     if force.basis is None or force.theta is None or force.intercept is None:
         return
+    if isfinite(force.basis.length_m):
+        yield f"# {STRIPS_SAY}"
+        yield "strips:"
+        yield from _rows({"half_length": (0.5 * force.basis.length_m, "m")})
     yield "terms:  # V cos(gamma), V sin(gamma) = u_rw, -v_rw: the hull's velocity relative to the air; rc: to the water"
     for k, term in enumerate(force.basis.functions):
         units = ", ".join(plain(unit) for unit in one.model.units[k])

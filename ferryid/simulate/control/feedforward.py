@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import sqrt
+from math import isnan, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import DIMENSIONS
 from ferryid.identify.estimate import Estimator
 from ferryid.identify.pictured import acting_estimator
 from ferryid.identify.residual import scaled
 from ferryid.identify.store import load_file
+from ferryid.identify.strips import LEAST
+from ferryid.identify.term import DIMENSIONS
 from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.hull import Hydrodynamics, hydrodynamics, required_force
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
@@ -55,6 +56,8 @@ class Feedforward(NamedTuple):
         Coefficients, shape (K, 3).
     intercept
         [N, N, N·m].
+    half
+        Half the hull's length [m], 0 where no term is an integral along it.
     """
 
     rigid: Hydrodynamics
@@ -67,6 +70,7 @@ class Feedforward(NamedTuple):
     factors: Wholes
     theta: Floats
     intercept: Triple
+    half: float
 
 
 def build_feedforward(scenario: Scenario, profile: Profile, model: Model | None) -> Feedforward:
@@ -136,6 +140,7 @@ def feedforward_of(
         factors=np.array(factors, dtype=np.int64).reshape(-1, MOST),
         theta=np.array(theta, dtype=np.float64),
         intercept=(float(intercept[0]), float(intercept[1]), float(intercept[2])),
+        half=0.0 if estimated.basis is None or isnan(estimated.basis.length_m) else 0.5 * estimated.basis.length_m,
     )
 
 
@@ -183,7 +188,7 @@ def ahead_of(
     X, Y, N = X + model.intercept[0], Y + model.intercept[1], N + model.intercept[2]
     if len(model.theta) == 0:
         return X, Y, N
-    values = _factors(nu_dot, nu, (u - u_w, v - v_w), (u - u_c, v - v_c))
+    values = _factors(nu_dot, nu, (u - u_w, v - v_w), (u - u_c, v - v_c), model.half)
     for k in range(len(model.theta)):
         term = values[model.factors[k, 0]] * values[model.factors[k, 1]] * values[model.factors[k, 2]]
         X += model.theta[k, 0] * term
@@ -193,15 +198,28 @@ def ahead_of(
 
 
 @borrowing
-def _factors(nu_dot: Triple, nu: Triple, air: Pair, water: Pair) -> tuple[float, ...]:
+def _factors(nu_dot: Triple, nu: Triple, air: Pair, water: Pair, half: float) -> tuple[float, ...]:
     """Return the values of `FACTORS`; `air` and `water` are the hull's velocity relative to them, along x and y [m/s]."""
     u, v, r = nu
     a, b = air
     c, d = water
+    fore, aft = _half_hull(v, v + half * r, half), _half_hull(v, v - half * r, half)
     # V, V cos(gamma), V sin(gamma), 2 V cos(gamma), |V cos(gamma)|, |V sin(gamma)| with gamma = -atan2(v, u).
     return (
         *(nu_dot[0], nu_dot[1], nu_dot[2], u, v, r, abs(u), abs(v), abs(r)),
         *(sqrt(a * a + b * b), a, -b, 2.0 * a, abs(a), abs(b)),
         *(sqrt(c * c + d * d), c, -d, 2.0 * c, abs(c), abs(d)),
-        *(-atan2(b, a), -atan2(d, c), 1.0),
+        *(-atan2(b, a), -atan2(d, c)),
+        *(fore[0], aft[0], fore[1], -aft[1], 1.0),
     )
+
+
+@borrowing
+def _half_hull(v: float, end: float, half: float) -> Pair:
+    """Return the two integrals of `ferryid.identify.strips.half_hull` for one state."""
+    a, b = abs(v), abs(end)
+    both = a + b + LEAST
+    even = (v + end) / both * (v * v + a * b + end * end) / 3.0
+    crossing = 0.5 * (a * b - v * end) / both
+    odd = (b * end - a * v) / 6.0 - crossing * crossing * (end - v) / both / 3.0
+    return half * even, 0.5 * half * half * (even + odd)

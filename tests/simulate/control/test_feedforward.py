@@ -11,9 +11,10 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.basis import BASES, CURRENT, DIMENSIONS, STRUCTURES, WIND, Basis, Term, basis
+from ferryid.identify.basis import BASES, CURRENT, STRUCTURES, WIND, Basis, basis, sized
 from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.model import to_json
+from ferryid.identify.term import DIMENSIONS, Term
 from ferryid.simulate.control.feedforward import ahead_of, build_feedforward, feedforward_of
 from ferryid.simulate.sections import Control, Sensors
 from ferryid.vessel import load_profile
@@ -55,7 +56,7 @@ def assert_equal(estimated, measured, seed):
     ("name", "wind", "current", "structure"), [*product(BASES, (None, *WIND), (None, *CURRENT), STRUCTURES)]
 )
 def test_every_basis_gives_the_force_of_its_estimator(name, wind, current, structure):
-    functions = basis(name, wind=wind, current=current, structure=structure)
+    functions = basis(sized(name, 5.0, "test"), wind=wind, current=current, structure=structure)
     rng = np.random.default_rng(3)
     theta = np.where(functions.mask, 100.0 * rng.normal(size=functions.mask.shape), 0.0)
     for seed, (wind_on, current_on, payload_on) in enumerate(product((False, True), repeat=3)):
@@ -75,7 +76,7 @@ def test_every_factor_has_its_place():
     """Also those that no basis has used so far, and products of three of them."""
     names = list(DIMENSIONS)
     terms = [Term(" ".join(part), part, (0,)) for part in [(a,) for a in names] + [*zip(names, names[5:], names[9:])]]  # noqa: B905
-    functions = Basis("all", "coupled", tuple(terms), np.ones((len(terms), 3), dtype=bool))
+    functions = Basis("all", "coupled", tuple(terms), np.ones((len(terms), 3), dtype=bool), length_m=5.0)
     theta = np.random.default_rng(7).normal(size=(len(terms), 3))
     assert_equal(Estimator(PROFILE, SCALE, functions, theta, np.zeros(3)), (True, True, False), 4)
 

@@ -1,0 +1,62 @@
+"""ferryid sweep."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ferryid.cli.options import (
+    OUT,
+    Basis,
+    Delta,
+    Inertia,
+    Json,
+    Logs,
+    Out,
+    Rate,
+    Residual,
+    Sigma,
+    Smoother,
+    Structure,
+    Vessel,
+    Zeta,
+)
+from ferryid.cli.output import emit, progress
+
+
+def command(
+    what: Annotated[str, typer.Argument(help="components, window, or both at once.")],
+    logs: Logs,
+    vessel: Vessel,
+    windows: Annotated[
+        str, typer.Option(help="Smoothing windows to try [s], as 0.5,1,2; a usual range if left out.")
+    ] = "",
+    window: Annotated[float, typer.Option(help="Smoothing window [s] at which components are swept.")] = 1.0,
+    components: Annotated[str, typer.Option(help="Number of components at which windows are swept, or auto.")] = "auto",
+    folds: Annotated[int, typer.Option(help="Number of contiguous stretches that test in turn.")] = 5,
+    basis: Basis = "modulus",
+    structure: Structure = "decoupled",
+    smoother: Smoother = "square",
+    residual: Residual = "measured",
+    rate: Rate = None,
+    inertia: Inertia = "auto",
+    delta: Delta = 1.0,
+    sigma: Sigma = 1.0,
+    zeta: Zeta = 1.0,
+    out: Out = OUT,
+    json: Json = None,
+) -> None:
+    """Cross-validate smoothing windows and component counts, and mark which to fit with."""
+    from ferryid.identify.settings import FitSettings, windows_of
+    from ferryid.report.sweep_report import sweep_and_report
+    from ferryid.vessel import load_profile
+
+    settings = FitSettings(
+        basis=basis, structure=structure, components=components, window_s=window, smoother=smoother, residual=residual,
+        inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta,
+    )  # fmt: skip
+    outcome = sweep_and_report(
+        what, logs, load_profile(vessel), settings, out, windows_s=windows_of(windows), folds=folds, progress=progress
+    )
+    emit(outcome.json, outcome.text, json)

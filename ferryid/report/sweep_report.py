@@ -1,0 +1,105 @@
+"""A sweep on one HTML page: what ``ferryid sweep`` leaves."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ferryid.files import dump_json, replacing
+from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S
+from ferryid.identify.model import AXES
+from ferryid.identify.settings import FitSettings
+from ferryid.identify.sweep import BY, Sweep, headline, render_sweep, sweep, sweep_json
+from ferryid.report.html import template
+from ferryid.report.sweep_figures import curves, heat_map
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a sweep leaves: its page, and the same as JSON and as text for a terminal."""
+
+    report: Path
+    json: dict[str, Any]
+    text: str
+
+
+def sweep_and_report(
+    what: str,
+    logs: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    out: Path,
+    *,
+    windows_s: Sequence[float] = (),
+    folds: int = FOLDS,
+    progress: Callable[[str], None],
+) -> Outcome:
+    """Sweep settings over logs and write the page; arguments and errors are those of `ferryid.identify.sweep.sweep`."""
+    found = sweep(what, logs, profile, settings, out, windows_s=windows_s, folds=folds, progress=progress)
+    progress("writing the report")
+    first = str(found.logs[0]["name"])
+    more = f"-and-{len(found.logs) - 1}-more" if len(found.logs) > 1 else ""
+    report = out / "reports" / f"sweep-{what}-{first}{more}" / "report.html"
+    page, drawings = render(found)
+    plain = sweep_json(found, str(report))
+    with replacing(report.parent) as temporary:
+        os.makedirs(temporary)
+        (temporary / "report.html").write_text(page, encoding="utf-8")
+        for name, drawing in drawings.items():
+            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8")
+        (temporary / "sweep.json").write_text(dump_json(plain), encoding="utf-8")
+    progress("")
+    return Outcome(report, plain, f"{render_sweep(found)}\nreport  {report}")
+
+
+def render(found: Sweep) -> tuple[str, dict[str, str]]:
+    """Return the page of a sweep as HTML with the drawings inside, and the drawings (SVG) by name."""
+    drawings, sections = {}, []
+    for key, choice in found.by.items():
+        name = f"{found.what}-{key}"
+        drawings[name] = heat_map(found, choice) if len(found.windows_s) > 1 else curves(found, choice)
+        sections.append(
+            {
+                "title": f"By {BY[key]}",
+                "folds": choice.curves.folds,
+                "rows": choice.curves.rows,
+                "svg": drawings[name],
+                "choice": {"window_s": f"{choice.window_s:g}", "components": choice.components},
+                "table": _rows(found, key),
+            }
+        )
+    page = template("sweep.html").render(
+        what="windows and components" if found.what == "both" else f"{found.what.rstrip('s')}s",
+        vessel=found.vessel,
+        headline=headline(found),
+        notes=found.notes,
+        logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
+        sections=sections,
+        axes=AXES,
+        test_window_s=f"{TEST_WINDOW_S:g}",
+        settings={**found.settings.plain(), **found.settings.scale},
+        many=len(found.windows_s) > 1,
+    )
+    return page, drawings
+
+
+def _rows(found: Sweep, key: str) -> list[dict[str, Any]]:
+    """Return every combination, with its MSE over the base model's."""
+    choice = found.by[key]
+    score, band = choice.curves.normalised()
+    return [
+        {
+            "window_s": f"{found.windows_s[window]:g}",
+            "components": count + 1,
+            "ratios": [f"{value:.4g}" for value in choice.over_base[window, count]],
+            "score": f"{score[window, count]:.4f}",
+            "band": f"{band[window, count]:.4f}",
+            "chosen": (window, count) == (choice.window, choice.components - 1),
+        }
+        for window in range(score.shape[0])
+        for count in range(score.shape[1])
+    ]
