@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +42,8 @@ class Studied:
     test
         The same blocks smoothed for testing; outputs are what the base model leaves of the measured force.
     force, base
-        Count, mean and sum of squares about the mean, of the measured force and of the base model's on the test rows, shape
-        (3, 3): they say on which axes no actuator acts.
+        Count, mean and sum of squares about the mean, of the measured force and of the base model's on the test rows of each
+        block, shape (B, 3, 3): they say on which axes no actuator acts, and what R² compares with.
     """
 
     log: str
@@ -165,15 +166,15 @@ def pieces_of(
     edges = edges_of(used, min(blocks, most), round(purge * motion.rate_hz))
 
     def pieces(motion: Motion, output: Floats, rows: Flags) -> Pieces:
-        return Pieces.of(
-            *rows_of(functions, [motion], [output], [rows]), edges, names=functions.terms, where=motion.log
-        )
+        (one,) = rows_of(functions, [motion], [output], [rows])
+        return Pieces.of(one, edges, names=functions.terms, where=motion.log)
 
     at_windows = [pieces(one, target, known_rows(one, functions, target, target) & every) for one, target in training]
-    tau = motion.tau[used]
-    return Studied(
-        motion.log, tuple(at_windows), pieces(motion, error, used), _moments(tau), _moments(tau - error[used])
+    spans = [slice(low, high) for low, high in pairwise(edges[::3])]
+    force, base = (
+        np.array([_moments(values[span][used[span]]) for span in spans]) for values in (motion.tau, motion.tau - error)
     )
+    return Studied(motion.log, tuple(at_windows), pieces(motion, error, used), force, base)
 
 
 def choose(
@@ -246,7 +247,8 @@ def _folds(logs: Sequence[Studied], sums: FoldSums) -> Folds:
 
 def force_free(logs: Sequence[Studied]) -> Flags:
     """Return the axes on which no actuator acts in any of the logs, shape (3,)."""
-    return unforced(_deviation([log.force for log in logs]), _deviation([log.base for log in logs]))
+    force, base = (np.concatenate(moments) for moments in ([log.force for log in logs], [log.base for log in logs]))
+    return unforced(deviation(force), deviation(base))
 
 
 def _moments(values: Floats) -> Floats:
@@ -256,9 +258,9 @@ def _moments(values: Floats) -> Floats:
     return np.array([np.full(3, float(len(values))), mean, ((values - mean) ** 2).sum(axis=0)])
 
 
-def _deviation(logs: Sequence[Floats]) -> Floats:
-    """Return the standard deviation of all rows of several logs, shape (3,)."""
-    count, mean, squares = np.array(logs).transpose(1, 0, 2)
+def deviation(moments: Floats) -> Floats:
+    """Return the standard deviation of all rows of several blocks, shape (3,), from the moments of each, shape (B, 3, 3)."""
+    count, mean, squares = moments.transpose(1, 0, 2)
     whole = np.maximum(count.sum(axis=0), 1.0)
     between = count * (mean - (count * mean).sum(axis=0) / whole) ** 2
     return np.asarray(np.sqrt((squares + between).sum(axis=0) / whole))

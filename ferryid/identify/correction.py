@@ -18,7 +18,7 @@ from ferryid.identify.choose import choose, folds_by_blocks, force_free, pieces_
 from ferryid.identify.combine import check_vessel
 from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.excitation import ranges
-from ferryid.identify.fit import regress
+from ferryid.identify.fit import forceless, regress
 from ferryid.identify.judge import wanted_rows
 from ferryid.identify.model import Model
 from ferryid.identify.qr import factorise
@@ -26,7 +26,6 @@ from ferryid.identify.residual import residual
 from ferryid.identify.rows import basis_of, grids, known_rows, rows_of
 from ferryid.identify.scores import force_scores
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.split import Split
 from ferryid.signals.track import Motion
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
@@ -130,7 +129,6 @@ def _check_base(base: Model, profile: Profile, settings: FitSettings) -> None:
 def correct(profile: Profile, settings: FitSettings, task: Task, base: Model | None, draws: int) -> Correction:
     """Fit the correction, and with `draws` its spread; where inertia had to be held, its notes say so."""
     masks = task.masks
-    none = tuple(np.zeros_like(mask) for mask in masks)
     rows = rows_of(task.functions, task.motions, task.targets, masks)
     training = factorise(*rows, names=task.functions.terms, where=task.motions[0].log)
     already = None if base is None else base.theta
@@ -138,11 +136,9 @@ def correct(profile: Profile, settings: FitSettings, task: Task, base: Model | N
         profile,
         settings,
         task.functions,
-        task.motions,
-        task.targets,
-        Split("none", masks, none, 0.0),
         training,
         _components(profile, settings, task, already),
+        forceless(task.motions, task.targets, masks),
         before=already,
     )
     theta, intercept = fitted.coefficients[chosen - 1], fitted.intercepts[chosen - 1]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.identify.cross_products import CrossProducts
-from ferryid.identify.pieces import Pieces
+from ferryid.identify.pieces import OUT, Pieces
 from ferryid.identify.simpls import simpls_many, training_sums
 
 Floats = NDArray[np.float64]
@@ -149,12 +149,24 @@ class FoldSums:
         self._training: list[list[CrossProducts | None]] = [[None] * k for _ in range(windows)]
         self._test: list[CrossProducts | None] = [None] * k
 
-    def add(self, training: Sequence[Pieces], test: Pieces) -> None:
-        """Add one log: its pieces at every window, and those for testing, of the same blocks."""
-        parts = 1 if self._whole else min(self._k, test.blocks)
-        labels = (np.arange(test.blocks) * parts // test.blocks + self._next) % self._k
+    def add(self, training: Sequence[Pieces], test: Pieces, used: Flags | None = None) -> None:
+        """Add one log.
+
+        Parameters
+        ----------
+        training, test
+            Its pieces at every window, and those for testing, of the same blocks.
+        used
+            Blocks that take part, shape (B,); all where None.
+        """
+        blocks = np.arange(test.blocks) if used is None else np.flatnonzero(used)
+        if not blocks.size:
+            return
+        parts = 1 if self._whole else min(self._k, blocks.size)
+        labels = np.full(test.blocks, OUT)
+        labels[blocks] = (np.arange(blocks.size) * parts // blocks.size + self._next) % self._k
         self._next = (self._next + parts) % self._k
-        for fold in np.unique(labels).tolist():
+        for fold in np.unique(labels[blocks]).tolist():
             for sums, pieces in zip(self._training, training, strict=True):
                 sums[fold] = _with(sums[fold], pieces.labelled(labels, fold))
             self._test[fold] = _with(self._test[fold], test.labelled(labels, fold))

@@ -111,7 +111,7 @@ def fit(
     if components == "auto":
         components = _choice(profile, settings, functions, opened, (settings.window_s,), parts.training).components
     functions, model_fit, chosen, held = regress(
-        profile, settings, functions, motions, targets, parts, training, int(components)
+        profile, settings, functions, training, int(components), forceless(motions, targets, parts.training)
     )
     theta, intercept = model_fit.coefficients[chosen - 1], model_fit.intercepts[chosen - 1]
 
@@ -229,28 +229,30 @@ def regress(
     profile: Profile,
     settings: FitSettings,
     functions: Basis,
-    motions: Sequence[Motion],
-    targets: Sequence[Floats],
-    parts: Split,
     training: CrossProducts | QrFactor,
     components: int,
+    without_force: Flags,
     *,
     before: Floats | None = None,
 ) -> tuple[Basis, Simpls, int, tuple[str, ...]]:
     """Return basis, SIMPLS fit and number of components, and on which axes the inertia had to be held and why.
 
-    `components` beyond the terms are as many as there are terms. `before` (K, 3) are coefficients that the ones fitted here
-    come on top of; they count in the effective inertia.
+    Parameters
+    ----------
+    profile, settings, functions, training
+        Vessel, how to fit, basis and training rows.
+    components
+        Number wanted; beyond the terms as many as there are terms.
+    without_force
+        Axes on which no actuator acts, shape (3,).
+    before
+        Coefficients that those fitted here come on top of, shape (K, 3); they count in the effective inertia.
     """
     already = 0.0 if before is None else before
     most = min(MAX_COMPONENTS, len(functions.terms))
     chosen = min(components, most)
-    tau = np.concatenate([motion.tau[mask] for motion, mask in zip(motions, parts.training, strict=True)])
-    base = tau - np.concatenate([target[mask] for target, mask in zip(targets, parts.training, strict=True)])
     fitted = functions.mask.any(axis=0)
-    axes = np.zeros(3, dtype=bool)
-    if settings.inertia == "auto":
-        axes = unforced(np.std(tau, axis=0), np.std(base, axis=0)) & fitted
+    axes = without_force & fitted if settings.inertia == "auto" else np.zeros(3, dtype=bool)
     told = {axis: reason(axis, np.zeros((3, 3)), profile, True) for axis in np.flatnonzero(axes).tolist()}
     while True:
         functions = replace(functions, mask=without_inertia(functions.mask, functions.terms, axes))
@@ -261,6 +263,13 @@ def regress(
             return functions, model_fit, chosen, tuple(told.values())
         told |= {axis: reason(axis, mass, profile, False) for axis in np.flatnonzero(more).tolist()}
         axes = axes | more
+
+
+def forceless(motions: Sequence[Motion], targets: Sequence[Floats], rows: Sequence[Flags]) -> Flags:
+    """Return the axes on which no actuator acts on the given rows, shape (3,)."""
+    tau = np.concatenate([motion.tau[mask] for motion, mask in zip(motions, rows, strict=True)])
+    base = tau - np.concatenate([target[mask] for target, mask in zip(targets, rows, strict=True)])
+    return unforced(np.std(tau, axis=0), np.std(base, axis=0))
 
 
 def _scores(fitted: Sequence[LogFit], parts: Split) -> dict[str, Any]:

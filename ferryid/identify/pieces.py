@@ -123,6 +123,15 @@ class Pieces:
         """B, the number of blocks."""
         return len(self.n)
 
+    def separately(self, chosen: Flags) -> list[CrossProducts]:
+        """Return the cross-products of each chosen block, shape (B,), without its rows near blocks that are not."""
+        kept = _apart_from_others(np.where(chosen, 0, OUT))
+        return [
+            CrossProducts(int(n[keep].sum()), self.K, self.m, self.shift, products[keep].sum(axis=0))
+            for n, products, keep, one in zip(self.n, self.products, kept, chosen, strict=True)
+            if one
+        ]
+
     def labelled(self, labels: Ints, label: int = 0) -> CrossProducts:
         """Return the cross-products of all blocks with one label, without their rows near blocks of another.
 
@@ -133,13 +142,16 @@ class Pieces:
         label
             Which blocks to sum.
         """
-        chosen = labels == label
-        same = labels[1:] == labels[:-1]
-        kept = np.column_stack([np.append(True, same), np.ones(len(labels), dtype=bool), np.append(same, True)])
-        return self.summed(kept & chosen[:, None])
+        return self.summed(_apart_from_others(labels) & (labels == label)[:, None])
 
     def summed(self, kept: Flags) -> CrossProducts:
         """Return the cross-products of the pieces that `kept` marks, shape (B, 3), or whole blocks, shape (B, 1)."""
         pieces = np.broadcast_to(kept, self.n.shape)
         products = self.products[pieces].sum(axis=0)
         return CrossProducts(int(self.n[pieces].sum()), self.K, self.m, self.shift, products)
+
+
+def _apart_from_others(labels: Ints) -> Flags:
+    """Return the pieces that are not near a block of another label, shape (B, 3)."""
+    same = labels[1:] == labels[:-1]
+    return np.column_stack([np.append(True, same), np.ones(len(labels), dtype=bool), np.append(same, True)])
