@@ -12,7 +12,7 @@ from ferryid.cli.options import (
     Delta,
     Inertia,
     Json,
-    Logs,
+    MaybeLogs,
     Out,
     Rate,
     Residual,
@@ -22,13 +22,14 @@ from ferryid.cli.options import (
     Verify,
     Vessel,
     Zeta,
+    given,
 )
 from ferryid.cli.output import emit, progress
 
 
 def command(
-    logs: Logs,
     vessel: Vessel,
+    logs: MaybeLogs = None,
     name: Annotated[str, typer.Option(help="Name of the model in the store; the vessel's if left out.")] = "",
     basis: Basis = "modulus",
     structure: Structure = "decoupled",
@@ -49,20 +50,30 @@ def command(
     require_accept: Annotated[
         bool, typer.Option("--require-accept", help="Exit with 3 if the model is not accepted.")
     ] = False,
+    archive: Annotated[
+        bool,
+        typer.Option(
+            "--archive", help="Fit to sums kept of every log ingested to --out, or of those named; reads no log."
+        ),
+    ] = False,
     verify: Verify = False,
     out: Out = OUT,
     json: Json = None,
 ) -> None:
     """Fit a model to one or more logs, validate it, store it and write a report."""
     from ferryid.identify.settings import FitSettings, window_choice
-    from ferryid.report.fit_report import fit_and_report
+    from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
     from ferryid.vessel import load_profile
 
     settings = FitSettings(
         basis=basis, structure=structure, components=components, **window_choice(window), smoother=smoother, residual=residual,
         split=split, inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
     )  # fmt: skip
-    outcome = fit_and_report(logs, load_profile(vessel), settings, out, name=name, verify=verify, progress=progress)
+    profile = load_profile(vessel)
+    if archive:
+        outcome = fit_archive_and_report(profile, settings, out, logs or (), name=name, progress=progress)
+    else:
+        outcome = fit_and_report(given(logs), profile, settings, out, name=name, verify=verify, progress=progress)
     emit(outcome.json, outcome.text, json)
     if require_accept and not outcome.accepted:
         raise typer.Exit(3)

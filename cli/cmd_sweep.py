@@ -12,7 +12,7 @@ from ferryid.cli.options import (
     Delta,
     Inertia,
     Json,
-    Logs,
+    MaybeLogs,
     Out,
     Rate,
     Residual,
@@ -21,14 +21,15 @@ from ferryid.cli.options import (
     Structure,
     Vessel,
     Zeta,
+    given,
 )
 from ferryid.cli.output import emit, progress
 
 
 def command(
     what: Annotated[str, typer.Argument(help="components, window, or both at once.")],
-    logs: Logs,
     vessel: Vessel,
+    logs: MaybeLogs = None,
     windows: Annotated[
         str, typer.Option(help="Smoothing windows to try [s], as 0.5,1,2; a usual range if left out.")
     ] = "",
@@ -44,6 +45,12 @@ def command(
     delta: Delta = 1.0,
     sigma: Sigma = 1.0,
     zeta: Zeta = 1.0,
+    archive: Annotated[
+        bool,
+        typer.Option(
+            "--archive", help="Sweep sums kept of every log ingested to --out, or of those named; reads no log."
+        ),
+    ] = False,
     out: Out = OUT,
     json: Json = None,
 ) -> None:
@@ -57,6 +64,14 @@ def command(
         inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta,
     )  # fmt: skip
     outcome = sweep_and_report(
-        what, logs, load_profile(vessel), settings, out, windows_s=windows_of(windows), folds=folds, progress=progress
+        what,
+        logs or [] if archive else given(logs),
+        load_profile(vessel),
+        settings,
+        out,
+        windows_s=windows_of(windows),
+        folds=folds,
+        archive=archive,
+        progress=progress,
     )
     emit(outcome.json, outcome.text, json)

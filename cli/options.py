@@ -13,6 +13,10 @@ Logs = Annotated[
     list[str],
     typer.Argument(help="Bags, MCAP files, CSV or Parquet tables, or folders; parts of one log joined by +."),
 ]
+MaybeLogs = Annotated[
+    list[str] | None,
+    typer.Argument(help="Bags, MCAP files, CSV or Parquet tables, or folders; parts of one log joined by +."),
+]
 Vessel = Annotated[str, typer.Option("--vessel", help="Name of a bundled vessel profile, or the path of a TOML file.")]
 MaybeVessel = Annotated[
     str | None, typer.Option("--vessel", help="Name of a bundled vessel profile, or the path of a TOML file.")
@@ -42,3 +46,10 @@ Sigma = Annotated[float, typer.Option("--sigma", help="Factor on the base model'
 Zeta = Annotated[float, typer.Option("--zeta", help="Factor on the base model's force.")]
 
 OUT = Path("ferryid-out")
+
+
+def given(logs: list[str] | None) -> list[str]:
+    """Return the logs of a command line, which must name one unless it takes an archive."""
+    if not logs:
+        raise typer.BadParameter("Missing argument 'LOGS...'")
+    return logs

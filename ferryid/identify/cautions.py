@@ -32,34 +32,14 @@ def cautions(
     warnings = []
     if parts.kind == "every-kth":
         warnings.append("Validation rows share smoothing windows with training rows: the error is told too small.")
-    if np.isfinite(known.heading_coverage) and known.heading_coverage < 0.5:
-        warnings.append(
-            f"Headings cover only {known.heading_coverage:.0%} of the compass: a steady wind or current could not be told "
-            "from the hull."
-        )
-    if known.undetermined:
-        terms = list(known.undetermined)
-        named = ", ".join(terms[:6]) + (f" and {len(terms) - 6} more" if len(terms) > 6 else "")
-        which = "These logs" if len(prepared) > 1 else "This log"
-        warnings.append(f"{which} cannot determine {len(terms)} of the terms: {named}.")
     seconds = sum(float(mask.sum()) / motion.rate_hz for motion, mask in zip(motions, parts.validation, strict=True))
-    if seconds < LEAST_VALIDATION_S:
-        warnings.append(f"Only {seconds:.0f} s validate: the verdict rests on little data.")
+    warnings += general_cautions(settings, known, scores, len(prepared), seconds)
     weighed = [motion.payload is not None for motion in motions]
     if any(weighed) and not all(weighed):
         warnings.append(
             f"{len(weighed) - sum(weighed)} of {len(weighed)} logs have no payload measured and are taken as empty: a load "
             "aboard there ends up in the coefficients."
         )
-    if settings.residual == "commanded":
-        warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
-    for axis in AXES:
-        share = scores["r2"]["model"][axis]
-        if np.isfinite(share) and share < 0.0:
-            warnings.append(
-                f"In {axis} the model explains the measured force worse than its mean does (R² {share:.2f}): hardly any force "
-                "varies there, or something else moves the vessel."
-            )
     for one in prepared:
         warnings.extend(f"{one.recording.name}: {doubt}" for doubt in one.doubts)
         moved = max((s.clock.out_of_order + s.clock.duplicates for s in one.recording.streams.values()), default=0)
@@ -72,6 +52,35 @@ def cautions(
             more = f" (and {len(one.recording.losses) - 1} more losses)" if len(one.recording.losses) > 1 else ""
             warnings.append(f"{one.recording.name}: not all could be read: {one.recording.losses[-1].what}{more}")
     return tuple(warnings)
+
+
+def general_cautions(
+    settings: FitSettings, known: Excitation, scores: Mapping[str, Any], logs: int, validation_s: float
+) -> list[str]:
+    """Return what scores and excitation alone tell a reader to mind."""
+    warnings = []
+    if np.isfinite(known.heading_coverage) and known.heading_coverage < 0.5:
+        warnings.append(
+            f"Headings cover only {known.heading_coverage:.0%} of the compass: a steady wind or current could not be told "
+            "from the hull."
+        )
+    if known.undetermined:
+        terms = list(known.undetermined)
+        named = ", ".join(terms[:6]) + (f" and {len(terms) - 6} more" if len(terms) > 6 else "")
+        which = "These logs" if logs > 1 else "This log"
+        warnings.append(f"{which} cannot determine {len(terms)} of the terms: {named}.")
+    if validation_s < LEAST_VALIDATION_S:
+        warnings.append(f"Only {validation_s:.0f} s validate: the verdict rests on little data.")
+    if settings.residual == "commanded":
+        warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
+    for axis in AXES:
+        share = scores["r2"]["model"][axis]
+        if np.isfinite(share) and share < 0.0:
+            warnings.append(
+                f"In {axis} the model explains the measured force worse than its mean does (R² {share:.2f}): hardly any force "
+                "varies there, or something else moves the vessel."
+            )
+    return warnings
 
 
 def free_run_cautions(base: FreeRun, new: FreeRun) -> tuple[str, ...]:

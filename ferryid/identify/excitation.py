@@ -197,12 +197,19 @@ def payload_kg(motion: Motion, rows: Flags) -> Floats:
 
 def heading_coverage(psi: Floats) -> float:
     """Fraction of twelve 30° sectors that hold at least 1 % of the headings `psi` (n,) [rad]; NaN without headings."""
-    known = psi[np.isfinite(psi)]
-    if not len(known):
-        return float("nan")
-    sector = np.floor(known / (2.0 * np.pi / SECTORS)).astype(np.int64) % SECTORS
-    shares = np.bincount(sector, minlength=SECTORS) / len(known)
-    return float(np.mean(shares >= _SECTOR_SHARE))
+    return sector_coverage(heading_sectors(psi))
+
+
+def heading_sectors(psi: Floats) -> NDArray[np.int64]:
+    """Return how many headings `psi` (n,) [rad] lie in each of twelve 30° sectors, shape (12,)."""
+    sector = np.floor(psi[np.isfinite(psi)] / (2.0 * np.pi / SECTORS)).astype(np.int64) % SECTORS
+    return np.bincount(sector, minlength=SECTORS)
+
+
+def sector_coverage(rows: NDArray[np.int64]) -> float:
+    """Return the fraction of sectors that hold at least 1 % of the rows, counted in each (12,); NaN without rows."""
+    total = int(rows.sum())
+    return float(np.mean(rows >= _SECTOR_SHARE * total)) if total else float("nan")
 
 
 def _scales(source: CrossProducts | QrFactor) -> tuple[Floats, NDArray[np.intp]]:

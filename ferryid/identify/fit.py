@@ -176,7 +176,7 @@ def fit(
         scores=scores,
         accepted=verdict.accepted,
     )
-    curve = _curve(model_fit, training, validation, scores, chosen)
+    curve = curve_of(model_fit, training, validation, scores, chosen)
     warnings = (
         *held,
         *cautions(settings, parts, known, prepared, motions, scores),
@@ -287,7 +287,7 @@ def _scores(fitted: Sequence[LogFit], parts: Split) -> dict[str, Any]:
     return {**scores, "rows": len(tau), "seconds": seconds, "split": parts.kind, "split_notes": list(parts.notes)}
 
 
-def _curve(
+def curve_of(
     model_fit: Simpls,
     training: CrossProducts | QrFactor,
     validation: CrossProducts | QrFactor,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,3 +147,5 @@ class FitResult:
     free_run_base: FreeRun
     free_run_model: FreeRun
     warnings: tuple[str, ...]
+    archive: tuple[Mapping[str, Any], ...] = ()
+    """Instead of `logs`, of a fit to sums alone: each log with its rows and its validation MSE over the base model's."""

@@ -219,8 +219,7 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
     for motion in motions:
         purge_s = purge_seconds(motion, window_s, guard_s)
         seconds = np.count_nonzero(motion.valid) / motion.rate_hz
-        wanted = blocks or min(max(round(seconds / BLOCK_S), FEWEST_BLOCKS), MOST_BLOCKS)
-        number = min(wanted, int(seconds / (_LEAST_PURGES * purge_s)))
+        number = block_number(seconds, purge_s, blocks)
         if number < 3 and len(motions) == 1:
             raise _too_short(
                 motion, motion.valid, 3 * _LEAST_PURGES * purge_s, "three blocks and the gaps between them"
@@ -230,7 +229,7 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
             validates = np.full(motion.valid.size, short % _VALIDATES_EVERY == 1)
             number, short = 1, short + 1
         else:
-            validates = _validating(number)[_number(motion.valid, number)]
+            validates = validating(number)[_number(motion.valid, number)]
         train, check = _purged(motion.valid, validates, round(purge_s * motion.rate_hz))
         training.append(train)
         validation.append(check)
@@ -245,7 +244,13 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
     return Split("blocks", tuple(training), tuple(validation), min(purges), tuple(notes))
 
 
-def _validating(number: int) -> Flags:
+def block_number(seconds: float, purge_s: float, wanted: int | None = None) -> int:
+    """Return the number of blocks of a log of `seconds`, none shorter than four purge gaps; see `split`."""
+    usual = wanted or min(max(round(seconds / BLOCK_S), FEWEST_BLOCKS), MOST_BLOCKS)
+    return min(usual, int(seconds / (_LEAST_PURGES * purge_s)))
+
+
+def validating(number: int) -> Flags:
     """Return which of `number` blocks validate, shape (number,): one of every three in a row.
 
     Which of the three follows multiples of the golden ratio. Always the same one would keep step with a trial that

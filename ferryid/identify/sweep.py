@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.archive import archive_folds
 from ferryid.identify.basis import Basis
 from ferryid.identify.choose import (
     Choice,
@@ -21,15 +23,17 @@ from ferryid.identify.choose import (
     studied,
     tried,
 )
-from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S
+from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S, Folds
 from ferryid.identify.model import AXES
 from ferryid.identify.rows import basis_of
-from ferryid.identify.settings import FitSettings
+from ferryid.identify.settings import WINDOWS_S, FitSettings
 from ferryid.signals.prepare import Opened, open_track, refuse_twice
 from ferryid.signals.smooth import smooth_measured
 from ferryid.vessel.profile import Profile
 
 KINDS = ("components", "window", "both")
+Flags = NDArray[np.bool_]
+
 SCHEMA = "ferryid.sweep/1"
 BY = {"blocks": "contiguous stretches of every log", "logs": "whole logs"}
 
@@ -77,6 +81,7 @@ def sweep(
     *,
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
+    archive: bool = False,
     progress: Callable[[str], None],
 ) -> Sweep:
     """Cross-validate logs over smoothing windows and component counts.
@@ -96,6 +101,8 @@ def sweep(
         Windows to try [s]; the usual ones where none is given.
     folds
         Number of folds by stretches, 2 to 20.
+    archive
+        True: take what is kept of the logs that were ingested to `out`, all of them where `logs` is empty.
     progress
         Called with the name of each stage.
 
@@ -114,65 +121,59 @@ def sweep(
     if what == "components" and windows_s:
         raise FerryIdError("--windows: components are swept at one window. Fix: give --window, or sweep both")
     settings = replace(settings, windows_s=tuple(windows_s)).on(profile)
+    if what != "window":
+        settings = replace(settings, components="auto")
+    fixed = (settings.window_s,) if what == "components" else tuple(windows_s)
+    if archive:
+        windows = fixed or WINDOWS_S
+        functions, free, cuts, told = archive_folds(profile, settings, out, windows, logs, folds, progress)
+    else:
+        windows, functions, free, cuts, told = _from_logs(logs, profile, settings, out, fixed, folds, progress)
+    if what != "components" and len(windows) < 2:
+        raise FerryIdError(
+            f"{told[0]['name']}: nothing to compare, as all windows come to {windows[0]:g} s at this log's rate. "
+            "Fix: give --windows that are apart, or a higher --rate"
+        )
+    progress("cross-validating")
+    by = {
+        key: choose(profile, settings, functions, windows, cut, free, where=str(told[0]["name"]))
+        for key, cut in cuts.items()
+    }
+    return Sweep(
+        what,
+        profile.name,
+        tuple(told),
+        replace(settings, basis=functions.name),
+        windows,
+        by,
+        tuple(_notes(by, windows, settings)),
+    )
+
+
+def _from_logs(
+    logs: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    out: Path,
+    windows_s: Sequence[float],
+    folds: int,
+    progress: Callable[[str], None],
+) -> tuple[tuple[float, ...], Basis, Flags, dict[str, Folds], list[dict[str, Any]]]:
+    """Return windows, basis, axes without force, folds by stretches and whole logs, and what is told of the logs."""
     opened = []
     for path in logs:
         progress(f"reading {Path(path).name}")
         opened.append(open_track(path, profile, out, rate_hz=settings.rate_hz))
     refuse_twice(opened)
-    windows = tried((settings.window_s,) if what == "components" else windows_s, [one.measured for one in opened])
-    if what != "components" and len(windows) < 2:
-        raise FerryIdError(
-            f"{opened[0].recording.name}: nothing to compare, as all windows come to {windows[0]:g} s at this log's rate. "
-            "Fix: give --windows that are apart, or a higher --rate"
-        )
+    windows = tried(windows_s, [one.measured for one in opened])
     functions = basis_of(settings, [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
     pieces = []
     for one in opened:
         progress(f"cutting {one.recording.name} into pieces")
         pieces.append(studied(profile, settings, functions, one.measured, windows, blocks=folds))
-    progress("cross-validating")
-    return judged(
-        what,
-        profile,
-        settings,
-        functions,
-        windows,
-        pieces,
-        [_log(one, log) for one, log in zip(opened, pieces, strict=True)],
-        folds,
-    )
-
-
-def judged(
-    what: str,
-    profile: Profile,
-    settings: FitSettings,
-    functions: Basis,
-    windows_s: Sequence[float],
-    pieces: Sequence[Studied],
-    logs: Sequence[Mapping[str, Any]],
-    folds: int = FOLDS,
-) -> Sweep:
-    """Cross-validate logs whose pieces are known; arguments are those of `sweep` and `ferryid.identify.choose.choose`."""
-    if what != "window":
-        settings = replace(settings, components="auto")
-    free = force_free(pieces)
-    where = pieces[0].log
-
-    def chosen(by: str) -> Choice:
-        cut = folds_by_blocks(pieces, folds) if by == "blocks" else folds_by_logs(pieces)
-        return choose(profile, settings, functions, windows_s, cut, free, where=where)
-
-    by = {key: chosen(key) for key in (("blocks", "logs") if len(pieces) > 1 else ("blocks",))}
-    return Sweep(
-        what,
-        profile.name,
-        tuple(logs),
-        replace(settings, basis=functions.name),
-        tuple(windows_s),
-        by,
-        tuple(_notes(by, windows_s, settings)),
-    )
+    cuts = {"blocks": folds_by_blocks(pieces, folds)} | ({"logs": folds_by_logs(pieces)} if len(pieces) > 1 else {})
+    told = [_log(one, log) for one, log in zip(opened, pieces, strict=True)]
+    return windows, functions, force_free(pieces), cuts, told
 
 
 def _log(one: Opened, log: Studied) -> dict[str, Any]:

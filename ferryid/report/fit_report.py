@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.files import alone, dump_json, replacing
+from ferryid.identify.archive import fit_archive
 from ferryid.identify.fit import fit, quiet
 from ferryid.identify.result import AXES, FitResult
 from ferryid.identify.scores import free_run_plain
@@ -68,7 +69,23 @@ def fit_and_report(
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
-    result = fit(logs, profile, settings, out, name=name, verify=verify, progress=progress)
+    return _reported(fit(logs, profile, settings, out, name=name, verify=verify, progress=progress), out, progress)
+
+
+def fit_archive_and_report(
+    profile: Profile,
+    settings: FitSettings,
+    out: Path,
+    logs: Sequence[str] = (),
+    *,
+    name: str = "",
+    progress: Callable[[str], None] = quiet,
+) -> Outcome:
+    """Fit a model to what is kept of the logs under `out`, else as `fit_and_report`; see `ferryid.identify.archive`."""
+    return _reported(fit_archive(profile, settings, out, logs, name=name, progress=progress), out, progress)
+
+
+def _reported(result: FitResult, out: Path, progress: Callable[[str], None]) -> Outcome:
     progress("writing the report")
     with alone(out / "models"):
         result = replace(result, model=numbered(result.model, out))
@@ -121,6 +138,7 @@ def as_json(result: FitResult, stored: Stored, report: Path) -> dict[str, Any]:
             "ranges": {name: list(span) for name, span in result.excitation.ranges.items()},
         },
         "logs": [{"name": log.motion.log, **log.data_quality} for log in result.logs],
+        **({"archive": [dict(log) for log in result.archive]} if result.archive else {}),
         "report": str(report),
     }
 

@@ -81,7 +81,9 @@ def _context(result: FitResult) -> dict[str, Any]:
         ],
         "free_run_figures": _free_run_figures(result),
         "residual_lines": [line for log in drawn for line in remainder(log)],
-        "residual_figures": [
+        "residual_figures": []
+        if not drawn
+        else [
             {
                 "file": "residual-spectrum",
                 "svg": figures.residual_spectrum(drawn),
@@ -122,7 +124,9 @@ def _context(result: FitResult) -> dict[str, Any]:
         "inertia": _inertia(result),
         "excitation_lines": _excitation_lines(result),
         "undetermined": sorted(result.excitation.undetermined.items()),
-        "excitation_figures": [
+        "excitation_figures": []
+        if not drawn
+        else [
             {
                 "file": "excitation",
                 "svg": figures.excitation(result.excitation, drawn),
@@ -141,6 +145,15 @@ def _context(result: FitResult) -> dict[str, Any]:
             for name, (low, high) in model.ranges.items()
         ],
         "quality": [_quality(log) for log in result.logs],
+        "archive": [
+            {
+                "name": log["name"],
+                "rows": log["rows"],
+                "validation_rows": log["validation_rows"],
+                "ratios": [_text(log["per_axis"][axis], ".3f") for axis in AXES],
+            }
+            for log in result.archive
+        ],
         "provenance": _provenance(result),
     }
 

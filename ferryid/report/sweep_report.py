@@ -36,10 +36,13 @@ def sweep_and_report(
     *,
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
+    archive: bool = False,
     progress: Callable[[str], None],
 ) -> Outcome:
     """Sweep settings over logs and write the page; arguments and errors are those of `ferryid.identify.sweep.sweep`."""
-    found = sweep(what, logs, profile, settings, out, windows_s=windows_s, folds=folds, progress=progress)
+    found = sweep(
+        what, logs, profile, settings, out, windows_s=windows_s, folds=folds, archive=archive, progress=progress
+    )
     progress("writing the report")
     first = str(found.logs[0]["name"])
     more = f"-and-{len(found.logs) - 1}-more" if len(found.logs) > 1 else ""

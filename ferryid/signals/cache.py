@@ -70,6 +70,19 @@ def by_content(
     return None
 
 
+def recordings(out: Path) -> dict[Path, dict[str, Any]]:
+    """Return every folder under ``out/logs`` that holds a recording, with its note, whatever its profile and version."""
+    found = {}
+    for path in sorted((out / "logs").glob(f"*/{_NOTE}")):
+        try:
+            note = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue  # an incomplete folder counts as none
+        if isinstance(note, dict) and note.get("schema") == SCHEMA:
+            found[path.parent] = note
+    return found
+
+
 def _loaded(folder: Path, paths: Sequence[Path]) -> Recording | None:
     """A kept recording under the present spelling of its paths; None for a damaged one, which is then made anew."""
     try:

@@ -1,0 +1,195 @@
+"""What a fit needs of one log, kept as a file beside the log's tables: its pieces, and what else is told of it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid import __version__
+from ferryid.errors import FerryIdError
+from ferryid.files import replacing
+from ferryid.identify.choose import Studied, studied
+from ferryid.identify.crossed import TEST_WINDOW_S
+from ferryid.identify.excitation import heading_sectors, payload_kg, ranges
+from ferryid.identify.pieces import Pieces
+from ferryid.identify.residual import residual
+from ferryid.identify.rows import basis_of, known_rows
+from ferryid.identify.settings import FitSettings
+from ferryid.identify.split import block_number, purge_seconds
+from ferryid.signals.cache import load
+from ferryid.signals.parquet import read_table, write_table
+from ferryid.signals.prepare import track_of
+from ferryid.signals.smooth import smooth_measured
+from ferryid.vessel.profile import Profile
+
+Floats = NDArray[np.float64]
+
+SCHEMA = "ferryid.pieces/1"
+_MATTERS = ("basis", "smoother", "residual", "rate_hz", "delta", "sigma", "zeta")
+"""Settings that change the pieces; all others are chosen when they are added up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """One log as it is kept.
+
+    Attributes
+    ----------
+    name, sha256, files
+        Of the log.
+    basis
+        Name of the basis that its measurements allow.
+    rate_hz
+        Rows per second.
+    ranges
+        Ranges of validity, as in a model file.
+    sectors
+        Rows in each of twelve sectors of heading.
+    studied
+        Its pieces at every window.
+    """
+
+    name: str
+    sha256: str
+    files: tuple[str, ...]
+    basis: str
+    rate_hz: float
+    ranges: Mapping[str, tuple[float, float]]
+    sectors: Sequence[int]
+    studied: Studied
+
+
+def kept(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequence[float]) -> Kept:
+    """Return what is kept of the log in a folder of ``out/logs``; it is worked out and kept where it is not yet.
+
+    Parameters
+    ----------
+    folder
+        Holds the recording, as `ferryid.signals.cache` wrote it with this very profile.
+    profile, settings
+        Vessel, and how to fit.
+    windows_s
+        Smoothing windows [s].
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be used, and a folder that cannot be written.
+    """
+    key = {
+        "version": __version__,
+        "profile_sha256": profile.sha256,
+        "windows_s": [float(window_s) for window_s in windows_s],
+        **{name: getattr(settings, name) for name in _MATTERS},
+    }
+    digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
+    path = folder / f"pieces-{digest[:16]}.parquet"
+    if path.exists():
+        try:
+            return _read(path, key)
+        except FerryIdError:
+            pass  # a damaged file is made anew
+    made = _made(folder, profile, settings, windows_s)
+    _write(path, key, made)
+    return made
+
+
+def _made(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequence[float]) -> Kept:
+    recording = load(folder)
+    opened = track_of(recording, profile, settings.rate_hz)
+    motion = smooth_measured(opened.measured, TEST_WINDOW_S)
+    functions = basis_of(settings, [motion])
+    error = residual(profile, motion, settings.scale)
+    used = known_rows(motion, functions, error, error)
+    purge_s = purge_seconds(motion, max(TEST_WINDOW_S, *windows_s))
+    blocks = block_number(np.count_nonzero(used) / motion.rate_hz, purge_s)
+    return Kept(
+        name=recording.name,
+        sha256=recording.sha256,
+        files=tuple(Path(file).name for file in recording.files),
+        basis=functions.name,
+        rate_hz=motion.rate_hz,
+        ranges=ranges(
+            motion.nu[used], motion.nu_dot[used], None if motion.payload is None else payload_kg(motion, used)
+        ),
+        sectors=heading_sectors(motion.eta[used, 2]).tolist(),
+        studied=studied(
+            profile,
+            settings,
+            functions,
+            opened.measured,
+            windows_s,
+            blocks=blocks if blocks >= 3 else 1,
+        ),
+    )
+
+
+def _write(path: Path, key: Mapping[str, Any], log: Kept) -> None:
+    one = log.studied
+    every = (*one.training, one.test)
+    # Rows trained on are often those tested on: then they are kept once.
+    same = [k for k, pieces in enumerate(one.training) if np.array_equal(pieces.products, one.test.products)]
+    stored = every[:-1] if same else every
+    width = one.test.K + one.test.m + 1
+    upper = np.triu_indices(width)
+    sums = np.concatenate([pieces.products[..., *upper].ravel() for pieces in stored])
+    told = {
+        "schema": SCHEMA,
+        "key": key,
+        "name": log.name,
+        "sha256": log.sha256,
+        "files": log.files,
+        "basis": log.basis,
+        "rate_hz": log.rate_hz,
+        "ranges": {name: list(span) for name, span in log.ranges.items()},
+        "sectors": list(log.sectors),
+        "columns": [one.test.K, one.test.m],
+        "n": [pieces.n.tolist() for pieces in stored],
+        "shift": [pieces.shift.tolist() for pieces in stored],
+        "test": same[0] if same else len(stored) - 1,
+        "force": one.force.tolist(),
+        "base": one.base.tolist(),
+    }
+    with replacing(path) as draft:
+        write_table(draft, {"sums": sums}, told)
+
+
+def _read(path: Path, key: Mapping[str, Any]) -> Kept:
+    columns, told = read_table(path)
+    if told.get("schema") != SCHEMA or told["key"] != key:
+        raise FerryIdError(f"{path}: not what was asked for. Fix: delete it, it is made anew")
+    K, m = told["columns"]
+    width = K + m + 1
+    counts = np.array(told["n"], dtype=np.int64)
+    products = np.empty((*counts.shape, width, width))
+    upper = np.triu_indices(width)
+    packed = columns["sums"].reshape(*counts.shape, -1)
+    products[..., *upper] = packed
+    products[..., upper[1], upper[0]] = packed
+    pieces = [
+        Pieces(n, K, m, np.array(shift), one) for n, shift, one in zip(counts, told["shift"], products, strict=True)
+    ]
+    windows = len(key["windows_s"])
+    return Kept(
+        name=told["name"],
+        sha256=told["sha256"],
+        files=tuple(told["files"]),
+        basis=told["basis"],
+        rate_hz=told["rate_hz"],
+        ranges={name: (low, high) for name, (low, high) in told["ranges"].items()},
+        sectors=told["sectors"],
+        studied=Studied(
+            told["name"],
+            tuple(pieces[:windows]),
+            pieces[told["test"]],
+            np.array(told["force"]),
+            np.array(told["base"]),
+        ),
+    )

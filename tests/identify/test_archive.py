@@ -1,0 +1,149 @@
+"""One fit over many logs from what is kept of each: the same as from their rows, once, and refused where it means nothing."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.identify import archive as module
+from ferryid.identify import kept_pieces
+from ferryid.identify.archive import fit_archive, folders
+from ferryid.identify.fit import fit
+from ferryid.identify.settings import FitSettings
+from ferryid.identify.sweep import sweep
+from ferryid.report.fit_report import fit_archive_and_report
+from ferryid.signals.prepare import open_track
+from ferryid.simulate import load_scenario, simulate, write_log
+from ferryid.vessel import load_profile, parse_profile
+
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+PROFILE = load_profile("milliampere")
+SETTINGS = FitSettings(delta=0.4, sigma=0.4, draws=60)
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder = tmp_path_factory.mktemp("season")
+    paths = [folder / f"day{day}.mcap" for day in (1, 2, 3)]
+    for seed, path in enumerate(paths):
+        write_log(simulate(load_scenario("four-corner"), seed), path)
+    return [str(path) for path in paths]
+
+
+@pytest.fixture(scope="module")
+def season(logs: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("out")
+    for path in logs:
+        open_track(path, PROFILE, out)
+    return out
+
+
+@pytest.mark.parametrize(("components", "split"), [("auto", "blocks"), (12, "blocks")])
+def test_the_same_as_a_fit_to_the_rows(logs: list[str], season: Path, components: str | int, split: str) -> None:
+    settings = replace(SETTINGS, components=components, split=split)
+    rows = fit(logs, PROFILE, settings, season)
+    sums = fit_archive(PROFILE, settings, season)
+    assert sums.curve.chosen == rows.curve.chosen
+    np.testing.assert_allclose(sums.model.theta, rows.model.theta, rtol=1e-6, atol=1e-6)
+    for key in ("mse", "r2"):
+        for who in ("base", "model"):
+            for axis, value in rows.model.scores[key][who].items():
+                assert sums.model.scores[key][who][axis] == pytest.approx(value, rel=1e-9)
+    assert sums.model.scores["rows"] == rows.model.scores["rows"]
+    assert [one["rows"] for one in sums.model.training] == [one["rows"] for one in rows.model.training]
+    np.testing.assert_allclose(sums.excitation.heading_coverage, rows.excitation.heading_coverage, atol=0.09)
+
+
+def test_rows_are_read_once(season: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = fit_archive(PROFILE, SETTINGS, season)
+
+    def never(*_: object) -> None:
+        raise AssertionError("read again")
+
+    monkeypatch.setattr(kept_pieces, "load", never)
+    again = fit_archive(PROFILE, replace(SETTINGS, structure="coupled", seed=3), season)
+    assert again.model.terms == first.model.terms
+    with pytest.raises(AssertionError, match="read again"):
+        fit_archive(PROFILE, replace(SETTINGS, delta=0.5), season)
+
+
+def test_a_damaged_file_is_made_anew(season: Path) -> None:
+    whole = fit_archive(PROFILE, SETTINGS, season)
+    for path in season.glob("logs/*/pieces-*.parquet"):
+        path.write_bytes(path.read_bytes()[:-100])
+    np.testing.assert_array_equal(fit_archive(PROFILE, SETTINGS, season).model.theta, whole.model.theta)
+
+
+def test_whole_logs_validate(season: Path) -> None:
+    result = fit_archive(PROFILE, replace(SETTINGS, split="logs"), season)
+    held = [log for log in result.archive if log["validation_rows"]]
+    assert len(held) == 1
+    assert held[0]["validation_rows"] == held[0]["rows"]
+    assert held[0]["sha256"] not in {log["sha256"] for log in result.model.training}
+
+
+def test_a_sweep_of_the_archive_is_that_of_the_logs(logs: list[str], season: Path) -> None:
+    settings = replace(SETTINGS, components="auto")
+    by_rows = sweep("both", logs, PROFILE, settings, season, windows_s=(0.5, 1.0, 2.0), progress=str)
+    by_sums = sweep("both", [], PROFILE, settings, season, windows_s=(0.5, 1.0, 2.0), archive=True, progress=str)
+    # Whole logs are the same folds; stretches are cut elsewhere, along the blocks that are kept.
+    np.testing.assert_allclose(by_sums.by["logs"].curves.mse, by_rows.by["logs"].curves.mse, rtol=1e-9)
+    np.testing.assert_allclose(by_sums.by["blocks"].curves.mse[1, 11], by_rows.by["blocks"].curves.mse[1, 11], rtol=0.2)
+
+
+def test_few_blocks_are_drawn_from_however_many_there_are(season: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_DRAWN", 4)
+    drawn = module._Sums(1, 3, by_logs=False)
+    for folder in folders(season, PROFILE):
+        drawn.add(kept_pieces.kept(folder, PROFILE, SETTINGS, (1.0,)))
+    assert len(drawn.drawn[0]) == 3
+    assert sum(part.n for part in drawn.drawn[0]) == sum(log.training_rows for log in drawn.logs)
+    monkeypatch.setattr(module, "MOST_DRAWN", 2)
+    fewer = module._Sums(1, 3, by_logs=False)
+    for folder in folders(season, PROFILE):
+        fewer.add(kept_pieces.kept(folder, PROFILE, SETTINGS, (1.0,)))
+    assert len(fewer.drawn[0]) == 2
+    assert sum(part.n for part in fewer.drawn[0]) == sum(log.training_rows for log in fewer.logs)
+
+
+def test_logs_are_named_and_those_of_another_profile_refused(season: Path, tmp_path: Path, logs: list[str]) -> None:
+    assert len(folders(season, PROFILE, ["day1", logs[1]])) == 2
+    with pytest.raises(FerryIdError, match=r'day9: not among .* Did you mean "day\d"\? Fix: '):
+        folders(season, PROFILE, ["day9"])
+    with pytest.raises(FerryIdError, match=r"no log was ingested .*Fix: ferryid ingest"):
+        folders(tmp_path, PROFILE)
+    heavier = parse_profile(PROFILE.text.replace("mass_kg = 1670.0", "mass_kg = 1700.0"), "milliampere")
+    assert heavier.sha256 != PROFILE.sha256
+    with pytest.raises(FerryIdError, match=r"day1 \(and 2 more\): ingested with another profile .*Fix: "):
+        folders(season, heavier)
+    shutil.copytree(season / "logs", tmp_path / "logs")
+    open_track(logs[0], heavier, tmp_path)
+    with pytest.raises(FerryIdError, match=r"\(and 1 more\): ingested with another profile"):
+        folders(tmp_path, heavier)
+    assert len(folders(tmp_path, heavier, ["day1"])) == 1
+
+
+def test_a_log_with_other_measurements_is_refused_by_name(season: Path, tmp_path: Path) -> None:
+    shutil.copytree(season / "logs", tmp_path / "logs")
+    open_track(str(FIXTURES / "short.mcap"), PROFILE, tmp_path)
+    with pytest.raises(FerryIdError, match=r"short: its basis is modulus\+wind-thesis.*, that of day1 modulus.*Fix: "):
+        fit_archive(PROFILE, SETTINGS, tmp_path)
+
+
+def test_what_an_archive_cannot_do_is_said(season: Path) -> None:
+    with pytest.raises(FerryIdError, match=r"every-kth: an archive keeps blocks.*Fix: "):
+        fit_archive(PROFILE, replace(SETTINGS, split="every-kth"), season)
+
+
+def test_the_page_has_a_line_for_each_log(season: Path) -> None:
+    outcome = fit_archive_and_report(PROFILE, SETTINGS, season, name="season")
+    page = outcome.report.read_text(encoding="utf-8")
+    assert "How well it fits each log" in page
+    assert all(f"<td>day{seed}</td>" in page for seed in (1, 2, 3))
+    assert "What the residual still holds" not in page
+    assert [log["name"] for log in outcome.json["archive"]] == ["day1", "day2", "day3"]
