@@ -165,9 +165,8 @@ def pieces_of(
     edges = edges_of(used, min(blocks, most), round(purge * motion.rate_hz))
 
     def pieces(motion: Motion, output: Floats, rows: Flags) -> Pieces:
-        return Pieces.of(
-            *rows_of(functions, [motion], [output], [rows]), edges, names=functions.terms, where=motion.log
-        )
+        (one,) = rows_of(functions, [motion], [output], [rows])
+        return Pieces.of(one, edges, names=functions.terms, where=motion.log)
 
     at_windows = [pieces(one, target, known_rows(one, functions, target, target) & every) for one, target in training]
     tau = motion.tau[used]

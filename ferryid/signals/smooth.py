@@ -296,7 +296,7 @@ def _within(measured: Measured, half: int) -> Flags:
 
 def longest_stretch_s(measured: Measured) -> float:
     """Return the length of the longest unbroken stretch of a log [s]."""
-    return max(stretch.stop - stretch.start for stretch in segments(measured.usable)) / measured.rate_hz
+    return float(max(stretch.stop - stretch.start for stretch in segments(measured.usable)) / measured.rate_hz)
 
 
 def _payload(track: Track, profile: Profile, usable: Flags, repairs: list[str]) -> Floats | None:
