@@ -31,7 +31,7 @@ def edges_of(used: Flags, blocks: int, purge: int) -> Ints:
     used
         Rows that count, shape (n,).
     blocks
-        B, the number of blocks.
+        B, the number of blocks; each must hold more than two purges, so that no row is near both of its borders.
     purge
         Rows within which two rows share a smoothing window.
 

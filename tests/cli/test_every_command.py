@@ -92,6 +92,40 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     conforms(ferryid("models", "milliampere@1", "--out", out, "--json", "-").out)
 
 
+@pytest.mark.parametrize(("what", "windows"), [("components", 1), ("window", 8), ("both", 2)])
+def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, windows: int) -> None:
+    logs = [fixtures / "short.mcap", fixtures / "short.bag"]
+    options = ("--windows", "0.5,1") if what == "both" else ()
+    run = ferryid("sweep", what, *logs, "--vessel", "milliampere", *SCALE, *options, "--out", tmp_path, "--json", "-")
+    assert run.code == 0, run.err
+    found = conforms(run.out)
+    assert set(found["by"]) == {"blocks", "logs"}
+    assert len(found["windows_s"]) == windows
+    for one in found["by"].values():
+        tables = [*one["mse"].values(), *one["standard_error"].values(), one["score"], one["score_standard_error"]]
+        assert {(len(table), len(row)) for table in tables for row in table} == {(windows, len(found["components"]))}
+        assert one["choice"]["window_s"] in found["windows_s"]
+    assert found["choice"] == found["by"]["blocks"]["choice"]
+    page = Path(found["report"])
+    assert conforms((page.parent / "sweep.json").read_text(encoding="utf-8")) == found
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<svg") == len(list(page.parent.glob("*.svg"))) == 2
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", text), (
+        "the page must not need another file or a network"
+    )
+
+
+def test_fit_takes_the_window_that_it_is_told_to_choose(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    run = ferryid(
+        "fit", fixtures / "short.mcap", "--vessel", "milliampere", *SCALE, "--window", "auto", "--out", tmp_path,
+        "--json", "-",
+    )  # fmt: skip
+    assert run.code == 0, run.err
+    settings = conforms(run.out)["settings"]
+    assert settings["window_s"] in settings["windows_s"]
+    assert isinstance(settings["components"], int)
+
+
 def test_diagnose_one_log_and_two(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log, other = fixtures / "short.mcap", fixtures / "short.bag"
     run = ferryid("diagnose", log, "--vessel", "milliampere", "--out", tmp_path, "--json", "-")
