@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ferryid.errors import FerryIdError
 from ferryid.identify.bases import names
 
 Logs = Annotated[
@@ -51,5 +52,7 @@ OUT = Path("ferryid-out")
 def given(logs: list[str] | None) -> list[str]:
     """Return the logs of a command line, which must name one unless it takes an archive."""
     if not logs:
-        raise typer.BadParameter("Missing argument 'LOGS...'")
+        raise FerryIdError(
+            "LOGS: no log was given. Fix: name one or more, or give --archive for all that were ingested to --out"
+        )
     return logs
