@@ -9,7 +9,9 @@ import typer
 from ferryid.cli.options import Json
 from ferryid.cli.output import emit
 
-app = typer.Typer(help="Check, show and list vessel profiles.", no_args_is_help=True)
+app = typer.Typer(
+    help="Check, show and list vessel profiles.", no_args_is_help=True, rich_markup_mode=None, add_completion=False
+)
 File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name of a bundled one.")]
 
 

@@ -1,59 +1,20 @@
-"""The application, its error boundary and its exit codes."""
+"""The entry of the command line: its error boundary and its exit codes."""
 
 from __future__ import annotations
 
-import importlib
 import os
-import pkgutil
 import signal
 import sys
 import traceback
 import warnings
 from types import FrameType
-
-import typer
-from typer.exceptions import TyperException
+from typing import TYPE_CHECKING
 
 import ferryid
 from ferryid.errors import FerryIdError
 
-app = typer.Typer(
-    name="ferryid",
-    help="Turn a recorded sea trial into a better vessel model, and say honestly whether to trust it.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"ferryid {ferryid.__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
-) -> None:
-    pass
-
-
-def _add_commands() -> None:
-    """Add every module ``cmd_<name>`` of this package: its function ``command``, or its group ``app``."""
-    for module_info in pkgutil.iter_modules([os.path.dirname(__file__)], "ferryid.cli."):
-        name = module_info.name.rpartition(".")[2].removeprefix("cmd_")
-        if not module_info.name.endswith(f".cmd_{name}"):
-            continue
-        module = importlib.import_module(module_info.name)
-        if hasattr(module, "app"):
-            app.add_typer(module.app, name=name)
-        else:
-            app.command(name)(module.command)
-
-
-_add_commands()
+if TYPE_CHECKING:
+    from typer.exceptions import TyperException
 
 # Products here are small: threads cost more than they give, and on a busy machine many times more. Read when NumPy loads.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -73,6 +34,14 @@ def main() -> None:
     Exit codes: 0 done, 1 a bug of ours, 2 unusable input, 3 model not accepted, 130 interrupted, 143 terminated.
     """
     _open_streams()
+    if sys.argv[1:] == ["--version"]:
+        # What scripts ask most often needs no parser.
+        sys.stdout.write(f"ferryid {ferryid.__version__}\n")
+        return
+    from typer.exceptions import TyperException
+
+    from ferryid.cli.app import app
+
     signal.signal(signal.SIGTERM, _terminate)
     # What NumPy cannot compute becomes NaN, and is told where it matters.
     warnings.simplefilter("ignore", RuntimeWarning)

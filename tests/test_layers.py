@@ -79,11 +79,26 @@ def test_imports_point_one_way(path: Path) -> None:
             assert layer in HOMES[package], f"{path}:{line} imports {package}, which belongs to {HOMES[package]}"
 
 
-def test_importing_the_package_and_its_command_line_is_light() -> None:
-    code = "import sys, ferryid.cli.main; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    for heavy in ("numpy", "scipy", "pandas", "pyarrow", "matplotlib", "rosbags", "mcap"):
-        assert heavy not in loaded, f"ferryid --help imports {heavy}"
+@pytest.mark.parametrize(
+    ("arguments", "unwanted"),
+    [
+        (["--help"], ("numpy", "scipy", "pandas", "pyarrow", "matplotlib", "rosbags", "mcap", "rich")),
+        (["fit", "--help"], ("numpy", "scipy", "pandas", "pyarrow", "matplotlib", "rosbags", "mcap", "rich")),
+        (["--version"], ("typer", "numpy")),
+    ],
+)
+def test_help_and_version_are_light(arguments: list[str], unwanted: tuple[str, ...]) -> None:
+    code = (
+        "import sys, ferryid.cli.main as line\n"
+        f"sys.argv = ['ferryid', *{arguments}]\n"
+        "try: line.main()\n"
+        "except SystemExit: pass\n"
+        "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.startswith(("Usage", "ferryid 0."))
+    loaded = run.stdout.splitlines()[-1].split()
+    assert not set(unwanted) & set(loaded)
 
 
 def test_every_package_is_in_the_wheel() -> None:

@@ -40,6 +40,14 @@ def test_has_help_and_is_documented(ferryid, command: str) -> None:
     assert f"ferryid {command}" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
+def test_shell_completion_knows_commands_and_options(ferryid, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_FERRYID_COMPLETE", "complete_bash")
+    for typed, offered in (("ferryid s", ["simulate", "sweep"]), ("ferryid sweep --win", ["--windows", "--window"])):
+        monkeypatch.setenv("COMP_WORDS", typed)
+        monkeypatch.setenv("COMP_CWORD", str(typed.count(" ")))
+        assert ferryid().out.split() == offered
+
+
 @pytest.mark.parametrize(
     "log", ["short.mcap", "short.bag", "short_ros2", "short_ros2_mcap", "truncated.mcap", "short.csv"]
 )
