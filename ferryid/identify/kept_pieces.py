@@ -97,7 +97,7 @@ def kept(folder: Path, profile: Profile, settings: FitSettings, windows_s: Seque
         except FerryIdError:
             pass  # a damaged file is made anew
     made = _made(folder, profile, settings, windows_s)
-    _write(path, key, made)
+    write(path, key, made)
     return made
 
 
@@ -131,7 +131,8 @@ def _made(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequ
     )
 
 
-def _write(path: Path, key: Mapping[str, Any], log: Kept) -> None:
+def write(path: Path, key: Mapping[str, Any], log: Kept) -> None:
+    """Keep a log in a file; `key` says by what it is found again."""
     one = log.studied
     every = (*one.training, one.test)
     # Rows trained on are often those tested on: then they are kept once.

@@ -1,0 +1,158 @@
+"""The archive: a fit over many logs from what is kept of each, and how long the command line takes to start."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ferryid.identify import kept_pieces
+from ferryid.identify.basis import basis
+from ferryid.identify.cross_products import CrossProducts
+from ferryid.identify.kept_pieces import Kept, kept
+from ferryid.identify.pieces import Pieces
+from ferryid.identify.settings import FitSettings
+from ferryid.signals.cache import recordings
+from ferryid.signals.prepare import open_track
+from ferryid.simulate import load_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+from tests.bench.identify import of_motion
+from tests.bench.page import Row, Section, duration, faster_row
+
+ROWS_A_LOG = 144_000
+"""Two hours at 20 Hz."""
+PROFILE = load_profile("milliampere")
+FIT = ("fit", "--archive", "--vessel", "milliampere", "--delta", "0.4", "--sigma", "0.4")
+SWEEP = ("sweep", "components", "--archive", "--vessel", "milliampere", "--delta", "0.4", "--sigma", "0.4")
+
+
+def run(quick: bool) -> Section:
+    """Measure everything; `quick` with a hundredth of the logs."""
+    logs = 7 if quick else 700
+    rows = logs * ROWS_A_LOG
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        _season(out, logs)
+        size = sum(path.stat().st_size for path in out.glob("logs/*/pieces-*.parquet"))
+        fitted, swept = [], []
+        for _ in range(3):
+            fitted.append(_process((*FIT, "--out", folder)))
+            swept.append(_process((*SWEEP, "--out", folder)))
+        read = [_one_pass(rows) for _ in range(3)]
+    peak = max(memory for _, memory in (*fitted, *swept))
+    table = [
+        faster_row(f"{what}, {rows:,} rows in {logs} logs, whole process", [one for one, _ in took], name, read, None)
+        for what, took, name in (
+            ("fit with 500 bootstrap draws", fitted, "one pass over the rows in memory"),
+            ("sweep of components, by stretches and by logs", swept, "one pass over the rows in memory"),
+        )
+    ]
+    notes = [
+        f"Kept of {logs} logs: {size / 1e6:.0f} MB of sums, 36 blocks in three pieces each. Peak memory of the process: "
+        f"{peak / 1e9:.2f} GB (goal: at most 1).",
+        "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
+        "which the sums save as well, are not counted.",
+    ]
+    return Section("Archive and start-up", [*table, *_start_up(15)], notes, ("typer",))
+
+
+def _process(arguments: Sequence[str]) -> tuple[float, int]:
+    """Return time [s] and peak memory [bytes] of one command in a process of its own."""
+    start = time.perf_counter()
+    child = subprocess.Popen(
+        [sys.executable, "-c", "from ferryid.cli.main import main; main()", *arguments], stdout=subprocess.DEVNULL
+    )
+    _, status, usage = os.wait4(child.pid, 0)
+    took = time.perf_counter() - start
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode:
+        raise RuntimeError(f"ferryid {' '.join(arguments)} ended with {child.returncode}")
+    return took, usage.ru_maxrss * 1024
+
+
+def _season(out: Path, logs: int) -> None:
+    """Write what is kept of `logs` logs of two hours, all made of one simulated trial."""
+    trial = out / "trial.mcap"
+    write_log(simulate(load_scenario("twelve-corner"), 1), trial)
+    open_track(str(trial), PROFILE, out)
+    settings = FitSettings(delta=0.4, sigma=0.4)
+    (folder, note), *_ = recordings(out).items()
+    one = kept(folder, PROFILE, settings, (settings.window_s,))
+    (path,) = folder.glob("pieces-*.parquet")
+    _, told = kept_pieces.read_table(path)
+    long = _lengthened(one)
+    for number in range(logs):
+        name, sha256 = f"day{number:04d}", f"{number:064x}"
+        place = out / "logs" / f"{name}-{sha256[-8:]}-{PROFILE.sha256[:8]}"
+        place.mkdir()
+        recording = {**note["recording"], "name": name, "sha256": sha256}
+        (place / "recording.json").write_text(json.dumps({**note, "recording": recording}), encoding="utf-8")
+        kept_pieces.write(place / path.name, told["key"], replace(long, name=name, sha256=sha256))
+    for file in folder.iterdir():
+        file.unlink()
+    folder.rmdir()
+
+
+def _lengthened(log: Kept) -> Kept:
+    """Return a log of 36 blocks and two hours that repeats the blocks of a shorter one."""
+    blocks = log.studied.test.blocks
+    chosen = np.arange(36) % blocks
+    times = ROWS_A_LOG / log.studied.test.n[chosen].sum()
+
+    def longer(pieces: Pieces) -> Pieces:
+        n = np.round(pieces.n[chosen] * times).astype(np.int64)
+        products = pieces.products[chosen] * times
+        products[..., -1, -1] = n
+        return replace(pieces, n=n, products=products)
+
+    one = log.studied
+    return replace(
+        log,
+        studied=replace(
+            one,
+            training=tuple(longer(pieces) for pieces in one.training),
+            test=longer(one.test),
+            force=one.force[chosen],
+            base=one.base[chosen],
+        ),
+    )
+
+
+def _one_pass(rows: int) -> float:
+    part = min(rows, 10_000_000)
+    random = np.random.default_rng(0)
+    nu, nu_dot, residual = (random.standard_normal((part, 3)) for _ in range(3))
+    piece = of_motion((nu, nu_dot), residual, basis("modulus"))
+    start = time.perf_counter()
+    CrossProducts.of(piece)
+    return (time.perf_counter() - start) * rows / part
+
+
+def _start_up(repeats: int) -> list[Row]:
+    """Return how long the command line takes to say what it is, against importing its parser alone."""
+    main = "from ferryid.cli.main import main; main()"
+    works = {
+        "--help": [sys.executable, "-c", main, "--help"],
+        "--version": [sys.executable, "-c", main, "--version"],
+        "typer": [sys.executable, "-c", "import typer"],
+    }
+    times: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(repeats):
+        for name, command in works.items():
+            start = time.perf_counter()
+            subprocess.run(command, check=True, capture_output=True)
+            times[name].append(time.perf_counter() - start)
+    table = []
+    for name in ("--help", "--version"):
+        row = faster_row(f"ferryid {name}, whole process", times[name], "import typer", times["typer"], None)
+        took = float(np.median(times[name]))
+        table.append(replace(row, goal="≤ 110 ms", reached=took <= 0.11, ours=duration(took)))
+    return table
