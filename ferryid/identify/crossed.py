@@ -68,7 +68,7 @@ class Curves:
         best = np.unravel_index(int(np.argmin(curve)), curve.shape)
         near = curve <= curve[best] + band[best]
         fewest = int(np.argmax(near.any(axis=0)))
-        return int(np.argmin(np.where(near[:, fewest], curve[:, fewest], np.inf))), fewest + 1
+        return int(np.argmin(curve[:, fewest])), fewest + 1
 
 
 @dataclass(frozen=True, eq=False)

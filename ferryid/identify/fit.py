@@ -87,9 +87,10 @@ def fit(
         progress(f"reading {Path(path).name}")
         opened.append(open_track(path, profile, out, rate_hz=settings.rate_hz, verify=verify))
     refuse_twice(opened)
+    parts = None
     if settings.windows_s:
         progress("choosing the window")
-        settings = _windowed(profile, settings, opened)
+        settings, parts = _windowed(profile, settings, opened)
     prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
     motions = _told_apart([one.motion for one in prepared])
     functions = basis_of(settings, motions)
@@ -100,7 +101,10 @@ def fit(
         replace(motion, valid=known_rows(motion, functions, target, error))
         for motion, target, error in zip(motions, targets, measured, strict=True)
     ]
-    parts = split(motions, settings.split, window_s=settings.window_s)
+    if parts is None:
+        parts = split(motions, settings.split, window_s=settings.window_s)
+    else:
+        parts = parts.within([motion.valid for motion in motions])
 
     progress("fitting")
     training = factorise(
@@ -186,17 +190,19 @@ def fit(
     return FitResult(model, verdict, tuple(fitted), curve, known, free_base, free_new, warnings)
 
 
-def _windowed(profile: Profile, settings: FitSettings, opened: Sequence[Opened]) -> FitSettings:
+def _windowed(profile: Profile, settings: FitSettings, opened: Sequence[Opened]) -> tuple[FitSettings, Split]:
     """Return the settings with the window, and where that is asked for the component count, that cross-validation chose.
 
-    Validation rows take no part in it.
+    Its split is of rows that every window knows, and to be kept: another, made for the window chosen, would validate on rows
+    that took part in the choice.
     """
     windows_s = tried(settings.windows_s, [one.measured for one in opened])
-    motions = [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened]
+    longest_s = max(TEST_WINDOW_S, *windows_s)
+    motions = _told_apart([smooth_measured(one.measured, longest_s) for one in opened])
     functions = basis_of(settings, motions)
-    parts = split(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))
+    parts = split(motions, settings.split, window_s=longest_s)
     choice = _choice(profile, settings, functions, opened, windows_s, parts.training)
-    return replace(settings, window_s=choice.window_s, components=choice.components)
+    return replace(settings, window_s=choice.window_s, components=choice.components), parts
 
 
 def _choice(

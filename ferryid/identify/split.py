@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,14 @@ class Split:
     validation: tuple[Flags, ...]
     purge_s: float
     notes: tuple[str, ...] = ()
+
+    def within(self, rows: Sequence[Flags]) -> Split:
+        """Return the split without what lies outside `rows`, one mask a log, shape (n,)."""
+        training, validation = (
+            tuple(mask & known for mask, known in zip(masks, rows, strict=True))
+            for masks in (self.training, self.validation)
+        )
+        return replace(self, training=training, validation=validation)
 
 
 def split(
