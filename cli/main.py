@@ -50,7 +50,7 @@ def _add_commands() -> None:
         if hasattr(module, "app"):
             app.add_typer(module.app, name=name)
         else:
-            app.command(name)(module.command)
+            app.command(name, cls=getattr(module, "Command", None))(module.command)
 
 
 _add_commands()
