@@ -21,6 +21,7 @@ from ferryid.identify.physics_rows import coefficient_rows, effect_rows, term_ro
 from ferryid.identify.predict import Prediction, predict
 from ferryid.identify.scores import by_axis, usable
 from ferryid.identify.settings import check_window
+from ferryid.identify.tracking import tracked
 from ferryid.identify.verdicts import Judged, Row, verdicts
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.track import Motion
@@ -137,6 +138,7 @@ def compare(
                 "sha256": trial.sha256,
                 "block_s": trial.block_s,
                 **_scores(field, [trial], one, runnable),
+                "tracking": tracked(trial.motion, field.profile.hull.length_m),
                 "warnings": [*trial.warnings, *_few(trial)],
             }
             for trial, one in zip(trials, judged, strict=True)

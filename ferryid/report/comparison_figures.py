@@ -7,7 +7,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from ferryid.identify.compare import Trial
@@ -24,6 +24,16 @@ MARKS = ("o", "s", "^", "D", "v", "P")
 DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1.5, 1.5)))
 GREY = "#777777"
 MINUTE_S = 60.0
+TICKS = (
+    tuple(10.0**k for k in range(-12, 13)),
+    tuple(m * 10.0**k for k in range(-3, 4) for m in (1.0, 3.0)),
+    tuple(m * 10.0**k for k in range(-2, 3) for m in (1.0, 2.0, 5.0)),
+    (0.5, 0.7, 1.0, 1.5, 2.0, 3.0),
+    (0.8, 0.9, 1.0, 1.1, 1.2, 1.5),
+)
+"""Round numbers for a logarithmic axis, the sparsest first."""
+WILD = 3.0
+"""An estimate whose error is this many times the least may leave the frame, lest it flatten the others."""
 
 
 def looks(models: Sequence[Row]) -> dict[str, dict[str, Any]]:
@@ -77,7 +87,7 @@ def mse_ratios(result: Row, shown: Sequence[tuple[str, Row]], reference: str) ->
             for group, (title, scope) in enumerate(shown):
                 top = -group * (len(labels) + 1)
                 if j == 0:
-                    ax.annotate(title, (0.0, top), xycoords=("axes fraction", "data"), fontsize=9, va="center")
+                    ax.annotate(title, (0.02, top), xycoords=("axes fraction", "data"), fontsize=9, va="center")
                 for k, label in enumerate(labels):
                     ratio = over_reference(scope, label, reference)["mse"][axis]
                     if ratio["value"] is None:
@@ -117,10 +127,11 @@ def _ratio_axis(ax: Any, spans: Sequence[float]) -> None:
 
 
 def _plain_ticks(axis: Any, low: float, high: float) -> None:
-    wide = np.log10(high / low) > 1.2
-    axis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
+    """Mark a logarithmic axis at round numbers, at least three of them."""
+    inside = next((ticks for ticks in TICKS if sum(low <= tick <= high for tick in ticks) >= 3), TICKS[-1])
+    axis.set_major_locator(FixedLocator(inside))
+    axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def forces(result: Row, trial: Trial) -> tuple[str, float] | None:
@@ -149,10 +160,21 @@ def forces(result: Row, trial: Trial) -> tuple[str, float] | None:
                     label=label,
                     **style,
                 )
+            _frame(ax, trial.motion.tau[inside][trial.rows[inside], j], trial.taus[:, inside][:, trial.rows[inside], j])
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")
         legend_above(figure, axes[0], 3)
         return svg_text(figure), start
+
+
+def _frame(ax: Any, measured: Floats, estimates: Floats) -> None:
+    """Frame the measurement, shape (n,), and those of the estimates, shape (m, n), that are not wild."""
+    error = np.mean((estimates - measured) ** 2, axis=1)
+    tame = estimates[error <= WILD**2 * error.min()]
+    values = np.concatenate([measured, tame.ravel()])
+    if np.ptp(values) > 0.0:
+        margin = 0.08 * np.ptp(values)
+        ax.set_ylim(values.min() - margin, values.max() + margin)
 
 
 def free_runs(result: Row, scope: Row, reference: str) -> str:
@@ -169,6 +191,8 @@ def free_runs(result: Row, scope: Row, reference: str) -> str:
             spans: list[float] = []
             others = [label for label in look if label != reference]
             for label in look:
+                if not any(scope["scores"][label]["free_run"][key]):
+                    continue
                 errors = np.array(scope["scores"][label]["free_run"][key], dtype=float)
                 upper.plot(horizons, errors * factor, markersize=4, label=label, **look[label])
             for k, label in enumerate(others):

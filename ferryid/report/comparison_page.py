@@ -37,6 +37,7 @@ def render(result: Row, trials: Sequence[Trial], made: Mapping[str, str]) -> tup
                 "heads": comparison_words.score_columns(scope),
                 "rows": comparison_words.score_rows(result, scope),
                 "sentences": comparison_words.sentences(result, on),
+                "tracking": comparison_words.tracking_line(scope),
                 "warnings": scope.get("warnings", ()),
                 "figures": _figures(result, trial) if trial is not None else [],
             }

@@ -69,6 +69,8 @@ def as_text(result: dict[str, Any]) -> str:
     lines += [f"warning: {warning}" for warning in result["warnings"]]
     for on, title, scope in comparison_words.scopes(result):
         lines += ["", f"{title}: {comparison_words.about(scope)}", *_score_table(result, scope, wide)]
+        tracking = comparison_words.tracking_line(scope)
+        lines += [f"  {tracking}"] if tracking else []
         lines += [f"  {sentence}" for sentence in comparison_words.sentences(result, on)]
         lines += [f"  warning: {warning}" for warning in scope.get("warnings", ())]
     if result["logs"]:

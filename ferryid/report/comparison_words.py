@@ -120,6 +120,22 @@ def told_horizon(scope: Row) -> int:
     return max((h for h, count in enumerate(runs["counted"]) if count), default=0)
 
 
+def tracking_line(scope: Row) -> str:
+    """Return how closely the vessel kept to the reference in a log; empty where there is none."""
+    found = scope.get("tracking")
+    if not found:
+        return ""
+    heading = None if found["heading_rad"] is None else float(np.degrees(found["heading_rad"]))
+    within = [
+        f"{number(value)} {unit}" for value, unit in ((found["position_m"], "m"), (heading, "deg")) if value is not None
+    ]
+    return (
+        f"the controller that sailed it kept to its reference within {listed(within)} (rms, {found['seconds']:.0f} s): "
+        f"ISE {number(found['ISE'])} m²s, IAE {number(found['IAE'])} m s, IAEW {number(found['IAEW'])} m s J, "
+        f"EC {number(found['EC'])} J"
+    )
+
+
 def score_columns(scope: Row) -> list[str]:
     """Return the heads of the columns of `score_rows`."""
     horizon = scope["free_run"]["horizons_s"][told_horizon(scope)]
