@@ -29,7 +29,7 @@ class Command(TyperCommand):
 
 
 def command(
-    models: Annotated[list[str], typer.Argument(help="Two or more models: path, name or name@version.")],
+    models: Annotated[list[str], typer.Argument(help="Two or more models, before --on: path, name or name@version.")],
     on: Annotated[
         list[str] | None,
         typer.Option(

@@ -84,11 +84,10 @@ def line_up(references: Sequence[str], models: Sequence[Model], vessel: Profile 
             f"--vessel: models of {profiles[0].name} say nothing about {vessel.name}. "
             "Fix: give a profile of the vessel that the models are of"
         )
-    for (a, one_model), (b, other_model) in combinations(zip(labels, models, strict=True), 2):
+    for (a, one_model), (b, other_model) in combinations(zip(references, models, strict=True), 2):
         if _content(one_model) == _content(other_model):
             raise FerryIdError(
-                f"{a} and {b}: the same model, and no comparison with itself can say anything. "
-                "Fix: give two different models"
+                f"{a} and {b}: the same model, and a comparison with itself means nothing. Fix: give two different models"
             )
     warnings = []
     if vessel is None:

@@ -16,11 +16,14 @@ Ints = NDArray[np.int64]
 
 BLOCK_S = 30.0
 """Shortest block [s]."""
+MEAN_S = 3.0
 FEWEST_BLOCKS = 8
 """Blocks, less one for every log, plus one: with fewer there is no interval."""
 MOST_BLOCKS = 500
 DRAWS = 9999
 LEVEL = 0.95
+NOTHING = 1e-7
+"""A difference of ratios that is rounding."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +51,11 @@ def block_seconds(squares: Floats, rate_hz: float) -> tuple[float, bool]:
     """Return the length of a block [s] for squared errors, shape (n, c), and whether they stay correlated for longer.
 
     It is what `ferryid.identify.bootstrap.block_rows` asks for, at least `BLOCK_S`, and no longer than leaves enough blocks.
+    Means over `MEAN_S` are what is asked about: shorter memory does not matter, and more samples would hide a longer one.
     """
-    seconds = len(squares) / rate_hz
-    wanted = max(
-        BLOCK_S, seconds / MOST_BLOCKS, block_rows(squares) / rate_hz if len(squares) >= FEWEST_BLOCKS else 0.0
-    )
+    seconds, width = len(squares) / rate_hz, max(1, round(MEAN_S * rate_hz))
+    means = squares[: len(squares) // width * width].reshape(-1, width, squares.shape[1]).mean(axis=1)
+    wanted = max(BLOCK_S, seconds / MOST_BLOCKS, block_rows(means) * width / rate_hz if len(means) else 0.0)
     length = max(BLOCK_S, min(wanted, seconds / FEWEST_BLOCKS))
     return length, wanted > length
 
@@ -123,12 +126,14 @@ def compare_paired(logs: Sequence[Floats], draws: int = DRAWS, seed: int = 0) ->
                 strayed, errors = _statistics(parts, times, i, j)
                 away = np.abs(np.log(ratio[:, column])) / error[0]
                 strayed = np.sort(np.nan_to_num(np.abs(strayed) / errors, nan=np.inf), axis=0)
-            reach = strayed[int(np.ceil(LEVEL * (draws + 1))) - 1] * error[0]
+            # Blocks that all say the same leave no doubt, and nothing to stray by.
             same = error[0] == 0.0
-            low[:, column] = np.where(same, ratio[:, column], ratio[:, column] * np.exp(-reach))
-            high[:, column] = np.where(same, ratio[:, column], ratio[:, column] * np.exp(reach))
+            away = np.where(same, np.where(np.abs(ratio[:, column] - 1.0) > NOTHING, np.inf, 0.0), away)
+            strayed[:, same] = 0.0
+            reach = strayed[int(np.ceil(LEVEL * (draws + 1))) - 1] * error[0]
+            low[:, column], high[:, column] = ratio[:, column] * np.exp(-reach), ratio[:, column] * np.exp(reach)
             beyond = draws - np.array([np.searchsorted(strayed[:, k], away[k]) for k in range(len(pairs))])
-            p[:, column] = np.where(same, 1.0, (1.0 + beyond) / (draws + 1.0))
+            p[:, column] = (1.0 + beyond) / (draws + 1.0)
         for values in (low, high, p):
             values[~np.isfinite(ratio)] = np.nan
     return Paired(pairs, ratio, low, high, p)
@@ -155,7 +160,7 @@ def _statistics(parts: Sequence[Floats], times: Sequence[Floats], i: Ints, j: In
             )
             mean = own[:, i] / total[:, i] - own[:, j] / total[:, j]
             variance += blocks / (blocks - 1.0) * (spread - mean**2 / blocks)
-    return np.log(total[:, i] / total[:, j]), np.sqrt(np.where(variance > 1e-20, variance, 0.0))
+    return np.log(total[:, i] / total[:, j]), np.sqrt(np.where(variance > NOTHING**2, variance, 0.0))
 
 
 def holm(p: Floats) -> Floats:
