@@ -71,7 +71,7 @@ def tracked(motion: Motion, length_m: float) -> dict[str, Any] | None:
     motion
         Smoothed motion with the force of the actuators.
     length_m
-        Length of the hull; where it is not known (NaN) a heading error does not count in `e`.
+        Length of the hull; where it is not known (NaN) a heading error does not count in `e`, and is none by itself.
     """
     if motion.eta_d is None:
         return None
@@ -83,6 +83,8 @@ def tracked(motion: Motion, length_m: float) -> dict[str, Any] | None:
     # What is not told, such as a position under an autopilot that keeps a heading, counts for nothing.
     pose, wanted = np.where(told, motion.eta, 0.0), np.where(told, motion.eta_d, 0.0)
     error = tracking_error(pose, wanted, length_m if np.isfinite(length_m) else 0.0)
+    if not (told[:2].any() or np.isfinite(length_m)):
+        error = np.full(len(error), np.nan)
     power = np.abs(np.sum(motion.nu * motion.tau, axis=1))
     parts: Sequence[Tracking] = [
         Tracking(motion.t[rows], error[rows], running(power[rows], motion.t[rows]))
