@@ -266,7 +266,7 @@ def _runnable(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> tuple
 
 def _counted(trial: Trial, runnable: Flags) -> Flags:
     """Return the errors of free runs that count, as all models that run have them, shape (s, horizons, 4)."""
-    return np.asarray(np.isfinite(trial.errors[runnable]).all(axis=0))
+    return np.asarray(np.isfinite(trial.errors[runnable]).all(axis=0) & runnable.any())
 
 
 def _run_sums(trial: Trial, runnable: Flags, h: int) -> Floats:

@@ -18,7 +18,7 @@ BLOCK_S = 30.0
 """Shortest block [s]."""
 MEAN_S = 3.0
 FEWEST_BLOCKS = 8
-"""Blocks, less one for every log, plus one: with fewer there is no interval."""
+"""With fewer there is no interval."""
 MOST_BLOCKS = 500
 DRAWS = 9999
 LEVEL = 0.95
@@ -77,17 +77,23 @@ def block_sums(squares: Floats, at_s: Floats, block_s: float) -> Floats:
 
 def enough(logs: Sequence[Floats]) -> bool:
     """Tell whether the blocks of some logs, shape (blocks, ...) each, are enough for an interval."""
-    return sum(len(sums) - 1 for sums in logs if len(sums)) >= FEWEST_BLOCKS - 1
+    return any(len(sums) >= FEWEST_BLOCKS for sums in _strata(logs))
+
+
+def _strata(logs: Sequence[Floats]) -> list[Floats]:
+    """Return the blocks that are drawn from together: those of a log, and those of all logs that are too short alone."""
+    short = [sums for sums in logs if 0 < len(sums) < FEWEST_BLOCKS]
+    return [*(sums for sums in logs if len(sums) >= FEWEST_BLOCKS), *([np.concatenate(short)] if short else [])]
 
 
 def compare_paired(logs: Sequence[Floats], draws: int = DRAWS, seed: int = 0) -> Paired:
     """Compare the mean squares of every two models over one log or several.
 
-    The logarithm of a ratio gets a symmetric bootstrap-t interval: each draw takes as many blocks from a log as it has, with
-    replacement and the same for all models, and is held against its own standard error, that of a ratio of sums over blocks.
-    Percentiles of the ratio itself would be too narrow where blocks are few. `p` is the share of draws that lie, in
-    standard errors, at least as far from the ratio found as that lies from one; it is never less than one over the draws,
-    and below 0.05 where the interval leaves out one.
+    The logarithm of a ratio gets a symmetric bootstrap-t interval: each draw takes as many blocks from a log as it has (from
+    all logs together that are too short for draws of their own), with replacement and the same for all models, and is held
+    against its own standard error, that of a ratio of sums over blocks. Percentiles of the ratio itself would be too narrow where
+    blocks are few. `p` is the share of draws that lie, in standard errors, at least as far from the ratio found as that lies
+    from one; it is never less than one over the draws, and below 0.05 where the interval leaves out one.
 
     Parameters
     ----------
@@ -105,7 +111,7 @@ def compare_paired(logs: Sequence[Floats], draws: int = DRAWS, seed: int = 0) ->
     ----------
     Hall (1988), Annals of Statistics 16, 927-953; Davison and Hinkley (1997), Bootstrap Methods, chapters 2 and 8.
     """
-    kept = [sums for sums in logs if len(sums)]
+    kept = _strata(logs)
     m, c = logs[0].shape[1:]
     pairs = tuple(combinations(range(m), 2))
     i, j = (np.array([pair[side] for pair in pairs], dtype=np.int64) for side in (0, 1))

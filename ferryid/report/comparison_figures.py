@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ferryid.identify.compare import Trial
 from ferryid.identify.model import AXES
 from ferryid.report.figures import MEASURED, STYLE, SYMBOLS, UNITS, canvas, legend_above, margins, svg_text
-from ferryid.report.structure import envelope, worst_minute
+from ferryid.report.structure import envelope
 
 Floats = NDArray[np.float64]
 Row = dict[str, Any]
@@ -134,16 +134,14 @@ def _plain_ticks(axis: Any, low: float, high: float) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def forces(result: Row, trial: Trial) -> tuple[str, float] | None:
-    """Measured force and every model's estimate in the worst minute of a log, and when it starts [s]; None without a minute."""
-    start = worst_minute(trial.motion, trial.taus, trial.rows, MINUTE_S)
-    if start is None:
-        return None
+def forces(result: Row, trial: Trial, start_s: float | None) -> str:
+    """Measured force and every model's estimate in the minute of a log that starts at `start_s`; in all of it where None."""
     look = looks(result["models"])
     with mpl.rc_context(STYLE):
         figure, axes = canvas(3, 5.4, top=0.3 + 0.2 * ((len(look) + 3) // 3))
         t = trial.motion.t
-        inside = np.flatnonzero((t >= start) & (t <= start + MINUTE_S))
+        first, last = (t[0], t[-1]) if start_s is None else (start_s, start_s + MINUTE_S)
+        inside = np.flatnonzero((t >= first) & (t <= last))
         missing = np.where(trial.rows[inside, None], 1.0, np.nan)
         for j, ax in enumerate(axes):
             measured = (trial.motion.tau[inside] * missing)[:, j]
@@ -164,7 +162,7 @@ def forces(result: Row, trial: Trial) -> tuple[str, float] | None:
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")
         legend_above(figure, axes[0], 3)
-        return svg_text(figure), start
+        return svg_text(figure)
 
 
 def _frame(ax: Any, measured: Floats, estimates: Floats) -> None:

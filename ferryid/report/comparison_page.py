@@ -10,6 +10,7 @@ from ferryid.identify.model import AXES
 from ferryid.identify.physics_rows import render_effects
 from ferryid.report import comparison_figures, comparison_words
 from ferryid.report.html import template
+from ferryid.report.structure import worst_minute
 
 Row = dict[str, Any]
 
@@ -90,16 +91,13 @@ def _overall(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> l
 
 
 def _figures(result: Row, trial: Trial) -> list[dict[str, str]]:
-    found = comparison_figures.forces(result, trial)
-    if found is None:
-        return []
-    svg, start = found
+    start = worst_minute(trial.motion, trial.taus, trial.rows, comparison_figures.MINUTE_S)
+    which = "This log" if start is None else f"The minute in which the models err most, from {start:.0f} s"
     return [
         {
-            "file": f"forces-{trial.name}-worst-minute",
-            "svg": svg,
-            "caption": f"The minute in which the models err most, from {start:.0f} s: force measured at the actuators, and "
-            "what each model makes of the same motion.",
+            "file": f"forces-{trial.name}" + ("" if start is None else "-worst-minute"),
+            "svg": comparison_figures.forces(result, trial, start),
+            "caption": f"{which}: force measured at the actuators, and what each model makes of the same motion.",
         }
     ]
 

@@ -79,6 +79,8 @@ def _together(rows: Sequence[Row], labels: Sequence[str]) -> str:
         chance = row["p_corrected"]
         p = f", p {chance:.2f}" if chance is not None and np.isfinite(chance) else ""
         parts.append(f"{row['what']} {number(ratio)}{span}{p}")
+    if rows[0]["low"] is None:
+        return f"too little data to tell {first} from {second}, error of the first over the second's: {listed(parts)}"
     return f"no difference shown between {first} and {second}, error of the first over the second's: {listed(parts)}"
 
 

@@ -47,7 +47,13 @@ def equations(model: Model, nu: np.ndarray, nu_dot: np.ndarray) -> np.ndarray:
         **{f"|{name}|{name}": np.abs(one) * one for name, one in (("u", u), ("v", v), ("r", r))},
         **{f"sgn({name}){name}^2": np.abs(one) * one for name, one in (("u", u), ("v", v), ("r", r))},
         **{f"{name}^3": one**3 for name, one in (("u", u), ("v", v), ("r", r))},
-        **{"|v|r": np.abs(v) * r, "|r|v": np.abs(r) * v, "uv": u * v, "ur": u * r, "vr": v * r, "rr": r * r, "1": 1.0},
+        "|v|r": np.abs(v) * r,
+        "|r|v": np.abs(r) * v,
+        "uv": u * v,
+        "ur": u * r,
+        "vr": v * r,
+        "rr": r * r,
+        "1": 1.0,
     }
     for row in term_rows(candidates):
         if not is_of_a_hull(row["term"], row["axis"]):

@@ -30,8 +30,13 @@ def test_a_constant_error_has_the_integrals_of_a_rectangle() -> None:
     found = tracked(sailed((3.0, 4.0, 0.4)), LENGTH_M)
     assert found == pytest.approx(
         {
-            **{"ISE": 100.0 * e**2, "IAE": 100.0 * e, "EC": 100.0 * 50.0, "IAEW": 100.0 * e * 5000.0},
-            **{"seconds": 100.0, "position_m": 5.0, "heading_rad": 0.4},
+            "ISE": 100.0 * e**2,
+            "IAE": 100.0 * e,
+            "EC": 100.0 * 50.0,
+            "IAEW": 100.0 * e * 5000.0,
+            "seconds": 100.0,
+            "position_m": 5.0,
+            "heading_rad": 0.4,
         }
     )
 
