@@ -91,9 +91,9 @@ def compare_paired(logs: Sequence[Floats], draws: int = DRAWS, seed: int = 0) ->
 
     The logarithm of a ratio gets a symmetric bootstrap-t interval: each draw takes as many blocks from a log as it has (from
     all logs together that are too short for draws of their own), with replacement and the same for all models, and is held
-    against its own standard error, that of a ratio of sums over blocks. Percentiles of the ratio itself would be too narrow where
-    blocks are few. `p` is the share of draws that lie, in standard errors, at least as far from the ratio found as that lies
-    from one; it is never less than one over the draws, and below 0.05 where the interval leaves out one.
+    against its own standard error, that of a ratio of sums over blocks. Percentiles of the ratio itself would be too narrow
+    where blocks are few. `p` is the share of draws that lie, in standard errors, at least as far from the ratio found as
+    that lies from one; it is never less than one over the draws, and below 0.05 where the interval leaves out one.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def tracked(motion: Motion, length_m: float) -> dict[str, Any] | None:
     if motion.eta_d is None:
         return None
     off = motion.eta - motion.eta_d
-    told = np.isfinite(off[motion.valid]).any(axis=0)
+    told = np.asarray(np.isfinite(off[motion.valid]).any(axis=0))
     if not told.any():
         return None
     valid = motion.valid & np.isfinite(off[:, told]).all(axis=1) & np.isfinite(motion.tau).all(axis=1)
