@@ -17,6 +17,8 @@ Row = dict[str, Any]
 ALIKE = 0.005
 """Two models are alike where their mean squares differ by less than this share, however certain the difference."""
 SIGNIFICANT = 0.05
+LIKELY = 0.5
+"""Corrected probability up to which what is significant by itself may be a difference."""
 QUANTITIES = ("position", "heading", "speed", "yaw rate")
 """What free runs are judged by, in the order of their errors."""
 TOLD_QUANTITIES = 2
@@ -98,7 +100,7 @@ def _entry(
         first, second, ratio, low, high = second, first, 1.0 / ratio, 1.0 / high, 1.0 / low
     known, alike = isfinite(low + high) and isfinite(p), 1.0 - ratio < ALIKE
     clear = known and not alike and corrected <= SIGNIFICANT
-    hint = known and not alike and not clear and p <= SIGNIFICANT
+    hint = known and not alike and not clear and p <= SIGNIFICANT and corrected <= LIKELY
     evidence = not (clear and first in judged.trained)
     error = "MSE" if kind == "force" else f"{what} error"
     place = f"on {what}" if kind == "force" else f"in {what}, run free for {horizon:g} s"

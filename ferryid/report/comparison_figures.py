@@ -29,7 +29,7 @@ TICKS = (
     tuple(m * 10.0**k for k in range(-3, 4) for m in (1.0, 3.0)),
     tuple(m * 10.0**k for k in range(-2, 3) for m in (1.0, 2.0, 5.0)),
     (0.5, 0.7, 1.0, 1.5, 2.0, 3.0),
-    (0.8, 0.9, 1.0, 1.1, 1.2, 1.5),
+    (0.64, 0.8, 1.0, 1.25, 1.6),
 )
 """Round numbers for a logarithmic axis, the sparsest first."""
 WILD = 3.0
@@ -146,14 +146,14 @@ def forces(result: Row, trial: Trial, start_s: float | None) -> str:
         for j, ax in enumerate(axes):
             measured = (trial.motion.tau[inside] * missing)[:, j]
             ax.plot(*envelope(t[inside], measured), color=MEASURED, linewidth=2.0, label="measured")
-            for label, tau in zip(look, trial.taus, strict=True):
+            for k, (label, tau) in enumerate(zip(look, trial.taus, strict=True)):
                 style = {key: value for key, value in look[label].items() if key != "marker"}
                 x, y = envelope(t[inside], (tau[inside] * missing)[:, j])
                 ax.plot(
                     x,
                     y,
                     marker=look[label]["marker"],
-                    markevery=max(1, len(x) // 12),
+                    markevery=(k * len(x) // (8 * len(look)), max(1, len(x) // 8)),
                     markersize=3.5,
                     label=label,
                     **style,

@@ -49,12 +49,27 @@ def sentences(result: Row, on: str | None) -> list[str]:
     # The models that were asked about come before their base model.
     rows.sort(key=lambda row: BASE in (row["first"], row["second"]))
     told = [row["says"] for row in rows if row["better"]] + [row["says"] for row in rows if row["perhaps"]]
-    unclear: dict[frozenset[str], list[Row]] = {}
+    unclear = [row for row in rows if not (row["better"] or row["perhaps"])]
+    if len(labels) >= MANY:
+        return told + _by_quantity(unclear)
+    pairs: dict[frozenset[str], list[Row]] = {}
+    for row in unclear:
+        pairs.setdefault(frozenset((row["first"], row["second"])), []).append(row)
+    return told + [same[0]["says"] if len(same) == 1 else _together(same, labels) for same in pairs.values()]
+
+
+def _by_quantity(rows: Sequence[Row]) -> list[str]:
+    """Return one sentence on all that is not told apart from the best, for each quantity."""
+    groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
-        if not (row["better"] or row["perhaps"]):
-            unclear.setdefault(frozenset((row["first"], row["second"])), []).append(row)
-    for same in unclear.values():
-        told.append(same[0]["says"] if len(same) == 1 else _together(same, labels))
+        if row["ratio"] is not None:
+            groups.setdefault((row["kind"], row["what"]), []).append(row)
+    told = []
+    for (kind, what), same in groups.items():
+        place = f"on {what}" if kind == "force" else f"in {what}, run free for {same[0]['horizon_s']:g} s"
+        others = [f"{row['second']} {number(row['ratio'])}{_span(row['low'], row['high'])}" for row in same]
+        says = "no difference is shown" if same[0]["low"] is not None else "there is too little data to tell"
+        told.append(f"{place}, {same[0]['first']} errs least, but {says}: its error over that of {listed(others)}")
     return told
 
 
@@ -75,13 +90,16 @@ def _together(rows: Sequence[Row], labels: Sequence[str]) -> str:
         ratio, low, high = row["ratio"], row["low"], row["high"]
         if row["first"] != first:
             ratio, low, high = (None if one is None or not one > 0.0 else 1.0 / one for one in (ratio, high, low))
-        span = f" [{number(low)}, {number(high)}]" if low is not None and np.isfinite(low) else ""
         chance = row["p_corrected"]
         p = f", p {chance:.2f}" if chance is not None and np.isfinite(chance) else ""
-        parts.append(f"{row['what']} {number(ratio)}{span}{p}")
+        parts.append(f"{row['what']} {number(ratio)}{_span(low, high)}{p}")
     if rows[0]["low"] is None:
         return f"too little data to tell {first} from {second}, error of the first over the second's: {listed(parts)}"
     return f"no difference shown between {first} and {second}, error of the first over the second's: {listed(parts)}"
+
+
+def _span(low: float | None, high: float | None) -> str:
+    return "" if low is None or high is None else f" [{number(low)}, {number(high)}]"
 
 
 def number(value: float | None, pattern: str = ".3g") -> str:
