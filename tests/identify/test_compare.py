@@ -108,6 +108,13 @@ def test_the_true_model_is_found_better(compared: Comparison) -> None:
     assert all(row["p_corrected"] <= 15 * row["p"] for row in told.values())
 
 
+def test_blocks_of_free_runs_are_twice_as_long_as_a_run(compared: Comparison) -> None:
+    # Starts from 0 s to 400 s but for the length of a run: 30 s blocks, then 40, 60 and 120 s.
+    blocks = compared.json["logs"][0]["free_run"]["blocks"]
+    for horizon, count in zip((5.0, 10.0, 20.0, 30.0, 60.0), blocks, strict=True):
+        assert count == pytest.approx((SECONDS[0] - horizon) / max(30.0, 2.0 * horizon), abs=1.0)
+
+
 def test_a_log_with_a_reference_tells_how_it_was_kept(compared: Comparison) -> None:
     first, second = compared.json["logs"]
     assert second["tracking"] is None

@@ -51,6 +51,20 @@ def test_intervals_cover_what_is_true_as_often_as_they_say(lengths_s: tuple[floa
         assert np.mean(p <= 0.05) > 0.3
 
 
+def test_intervals_of_free_runs_that_overlap_cover_as_often() -> None:
+    """Errors that grow along a run of 30 s, from starts 12 s apart, in blocks of twice a run."""
+    rng, run = np.random.default_rng(9), 60
+    starts = np.arange(0, int(720 * RATE_HZ) - run, 24)
+    covered = []
+    for seed in range(250):
+        shared = coloured(rng, int(720 * RATE_HZ), 4.0)
+        paths = [np.cumsum(shared + 0.6 * coloured(rng, len(shared), 4.0)) for _ in range(2)]
+        squares = np.stack([(path[starts + run] - path[starts]) ** 2 for path in paths], axis=1)[:, :, None]
+        one = compare_paired([block_sums(squares, starts / RATE_HZ, 60.0)], draws=DRAWS, seed=seed)
+        covered.append(one.low[0, 0] < 1.0 < one.high[0, 0])
+    assert 0.90 <= np.mean(covered) <= 0.99
+
+
 def test_an_interval_leaves_out_one_just_where_p_is_below_a_twentieth() -> None:
     rng = np.random.default_rng(4)
     for seed in range(60):
