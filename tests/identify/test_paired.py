@@ -159,7 +159,7 @@ def test_blocks_are_as_long_as_errors_are_remembered() -> None:
 
 
 def test_holm_against_a_hand_computation() -> None:
-    # Sorted 0.01, 0.02, 0.03, 0.5 times 4, 3, 2, 1, never falling.
-    p = np.array([[0.03, 0.01], [np.nan, 0.5], [0.02, np.nan]])
+    # Sorted 0.01, 0.02, 0.021, 0.5 times 4, 3, 2, 1, never falling: 0.042 is raised to 0.06.
+    p = np.array([[0.021, 0.01], [np.nan, 0.5], [0.02, np.nan]])
     assert holm(p) == pytest.approx(np.array([[0.06, 0.04], [np.nan, 0.5], [0.06, np.nan]]), nan_ok=True)
     assert holm(np.array([0.4, 0.9])) == pytest.approx([0.8, 0.9])
