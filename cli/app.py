@@ -37,7 +37,7 @@ class _Commands(TyperGroup):
         if hasattr(module, "app"):
             return typer.main.get_command(module.app)
         alone = typer.Typer(add_completion=False, rich_markup_mode=None, context_settings=HELP)
-        alone.command(cmd_name)(module.command)
+        alone.command(cmd_name, cls=getattr(module, "Command", None))(module.command)
         return typer.main.get_command(alone)
 
     def format_commands(self, ctx: typer.Context, formatter: Any) -> None:

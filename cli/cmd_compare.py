@@ -2,36 +2,60 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import sys
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from ferryid.cli.options import OUT, Json, MaybeVessel, Out
 from ferryid.cli.output import emit, progress
 
 
+class Command(TyperCommand):
+    """Takes several logs after one ``--on``, as ``--on a.bag b.bag``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat ``--on`` before every word that follows it, up to the next option."""
+        written: list[str] = []
+        follows = False
+        for word in args:
+            if word.startswith("-"):
+                follows = word.partition("=")[0] == "--on"
+            elif follows and written[-1] != "--on":
+                written.append("--on")
+            written.append(word)
+        return super().parse_args(ctx, written)
+
+
 def command(
-    model_a: Annotated[str, typer.Argument(help="Path, name or name@version of the first model.")],
-    model_b: Annotated[str, typer.Argument(help="Path, name or name@version of the second model.")],
-    on: Annotated[list[str] | None, typer.Option("--on", help="A log to compare them on; may be given again.")] = None,
+    models: Annotated[list[str], typer.Argument(help="Two or more models, before --on: path, name or name@version.")],
+    on: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--on", help="Logs to compare them on, one or several; without them only coefficients are compared."
+        ),
+    ] = None,
     vessel: MaybeVessel = None,
-    window: Annotated[float, typer.Option(help="Smoothing window [s] of the test data, the same for both.")] = 1.0,
+    window: Annotated[float, typer.Option(help="Smoothing window [s] of the test data, the same for all.")] = 1.0,
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """Compare two models: coefficients, and on logs their errors on the same rows."""
-    from ferryid.identify.compare import compare, render_comparison
+    """Compare models on the same rows of logs, and by their coefficients.
+
+    Every two models are held against each other: by the mean square of their force errors, and by how far they stray when run
+    free. A ratio comes with a 95 % interval and a probability p: how likely a ratio this far from one is if both err alike,
+    from resampling blocks of 30 s or more of each log, in pairs, and corrected for the number of comparisons (Holm).
+    """
+    from ferryid.identify.candidates import line_up
+    from ferryid.identify.compare import compare
     from ferryid.identify.store import load
+    from ferryid.report.comparison_report import report
     from ferryid.vessel import load_profile
 
-    profile = load_profile(vessel) if vessel else None
-    result = compare(
-        load(model_a, out),
-        load(model_b, out),
-        on or [],
-        out,
-        profile=profile,
-        window_s=window,
-        progress=progress,
-    )
-    emit(result, render_comparison(result), json)
+    field = line_up(models, [load(name, out) for name in models], load_profile(vessel) if vessel else None)
+    comparison = compare(field, on or [], out, window_s=window, progress=progress)
+    progress("writing the report")
+    outcome = report(comparison, out, ("ferryid", *sys.argv[1:]))
+    progress("")
+    emit(outcome.json, outcome.text, json)

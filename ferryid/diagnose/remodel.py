@@ -18,7 +18,7 @@ from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.files import alone
 from ferryid.identify.accept import accept
-from ferryid.identify.model import AXES, NO_BASIS, Model
+from ferryid.identify.model import AXES, Model, blank
 from ferryid.identify.pictured import Pictured
 from ferryid.identify.result import Verdict
 from ferryid.identify.store import checked_name, save
@@ -27,8 +27,6 @@ from ferryid.vessel.profile import Floats, Profile
 
 APART = 0.25
 """Logs contradict each other about a parameter where its intervals are apart, by more than this share of its usual size."""
-WINDOW_S = 1.0
-"""Smoothing with which a new model is evaluated, that of the diagnosis."""
 
 
 def keep(
@@ -97,39 +95,6 @@ def remodelled(
         conditions=_added(start.conditions, logs),
     )
     return made, notes
-
-
-def blank(profile: Profile, name: str) -> Model:
-    """Return a model without terms, which is the profile's hull."""
-    nothing = np.zeros((0, 3))
-    return Model(
-        name=name,
-        version=0,
-        created="",
-        ferryid_version=__version__,
-        profile_text=profile.text,
-        scale={"delta": 1.0, "sigma": 1.0, "zeta": 1.0},
-        settings={
-            "basis": NO_BASIS,
-            "structure": "decoupled",
-            "components": 0,
-            "window_s": WINDOW_S,
-            "smoother": "square",
-        },
-        terms=(),
-        units=(),
-        theta=nothing,
-        intercept=np.zeros(3),
-        low=nothing,
-        high=nothing,
-        intercept_low=np.zeros(3),
-        intercept_high=np.zeros(3),
-        covariance=np.zeros((3, 1, 1)),
-        ranges={},
-        training=(),
-        scores={},
-        accepted=False,
-    )
 
 
 def _hull(logs: Sequence[Learnt]) -> tuple[Floats, Floats]:

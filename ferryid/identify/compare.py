@@ -1,8 +1,9 @@
-"""Compare two models: their coefficients, and on logs their errors on the same rows."""
+"""Compare models of one vessel: on logs their errors on the same rows, and the coefficients of their equations of motion."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,207 +11,355 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import AXES, Model
-from ferryid.identify.physics_rows import effect_rows, hull_rows, render_effects, render_hull
-from ferryid.identify.predict import predict
-from ferryid.identify.scores import by_axis, free_run_plain, mean_square, r_squared, usable
+from ferryid.identify.candidates import Candidate, Field
+from ferryid.identify.estimate import estimator
+from ferryid.identify.evaluate import cautions_on
+from ferryid.identify.free_run import HORIZONS_S, NO_MASS, runs_free, single_runs, starting_points
+from ferryid.identify.model import AXES
+from ferryid.identify.paired import Paired, block_seconds, block_sums, compare_paired, enough
+from ferryid.identify.physics_rows import coefficient_rows, effect_rows, term_rows
+from ferryid.identify.predict import Prediction, predict
+from ferryid.identify.scores import by_axis, usable
 from ferryid.identify.settings import check_window
-from ferryid.signals.prepare import prepare
-from ferryid.vessel import parse_profile
-from ferryid.vessel.profile import Profile
+from ferryid.identify.tracking import tracked
+from ferryid.identify.verdicts import Judged, Row, verdicts
+from ferryid.signals.prepare import Prepared, prepare
+from ferryid.signals.track import Motion
 
 Floats = NDArray[np.float64]
-BLOCK_S = 30.0
-DRAWS = 2000
-CONSTANT = "1"
-"""Name of the constant among the terms, as in a model file."""
+Flags = NDArray[np.bool_]
+
+TOLD_S = 30.0
+"""Sentences on free runs are of this horizon, or of the longest below it that has intervals."""
+MOST_LOST = 0.1
+"""Share of the free runs of a model that may diverge."""
+KEYS = ("position_m", "heading_rad", "speed_mps", "yaw_rate_radps")
+"""Errors of free runs in JSON, in the order of `QUANTITIES`."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One log, and what every model makes of it.
+
+    Attributes
+    ----------
+    name, sha256
+        Of the log; the name is unique in a comparison.
+    motion
+        Smoothed motion with the measured force.
+    rows
+        The rows on which measurement and every model's force are known, shape (n,).
+    taus
+        Force that each of m models estimates [N, N, N·m], shape (m, n, 3).
+    sums
+        Squared force errors summed over blocks, shape (blocks, m, 3).
+    block_s
+        Length of a block [s].
+    starts_s
+        When each free run starts [s], shape (s,).
+    errors
+        Absolute errors of the free runs, shape (m, s, horizons, 4); NaN where a run did not get there.
+    reached
+        Horizons that lie within the stretch of a run, shape (s, horizons).
+    warnings
+        What a reader must know of this log.
+    """
+
+    name: str
+    sha256: str
+    motion: Motion
+    rows: Flags
+    taus: Floats
+    sums: Floats
+    block_s: float
+    starts_s: Floats
+    errors: Floats
+    reached: Flags
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The result as one JSON object (schema ``ferryid.compare/1``), and the trials for figures."""
+
+    json: dict[str, Any]
+    trials: tuple[Trial, ...]
 
 
 def compare(
-    a: Model,
-    b: Model,
+    field: Field,
     logs: Sequence[str],
     out: Path,
     *,
-    profile: Profile | None = None,
     window_s: float = 1.0,
     progress: Callable[[str], None],
-) -> dict[str, Any]:
-    """Compare two models of one vessel.
+) -> Comparison:
+    """Compare two or more models, and their base model with them.
 
-    Both are judged on the same rows of test data smoothed alike, whatever window each was trained with. The difference of
-    their MSE comes with a 95 % interval from resampling blocks of 30 s, in pairs.
+    All are judged on the same rows of test data smoothed alike, whatever each was trained with, and run free from the same
+    starts. Ratios of their errors come with 95 % intervals from resampling blocks of each log, in pairs.
+
+    Parameters
+    ----------
+    field
+        The models, from `ferryid.identify.candidates.line_up`.
+    logs
+        Paths; parts of one recording joined by ``+``.
+    out
+        Output folder, for the ingested tables.
+    window_s
+        Smoothing window of the test data [s].
 
     Raises
     ------
     FerryIdError
-        When the models belong to different vessels.
-
-    Returns
-    -------
-    dict
-        Schema ``ferryid.compare/1``.
+        For a log given twice, one that cannot be used, one that lacks what a model needs, or has no row that all can be judged
+        on.
     """
-    hull_a = parse_profile(a.profile_text, a.name)
-    hull_b = parse_profile(b.profile_text, b.name)
-    if hull_a.name != hull_b.name:
-        raise FerryIdError(
-            f"{_label(a)} and {_label(b)}: models of different vessels ({hull_a.name}, {hull_b.name}) cannot be compared. "
-            "Fix: give two models of one vessel"
-        )
     check_window(window_s)
-    profile = profile or hull_b
-    entries = []
+    trials: list[Trial] = []
     for path in logs:
         progress(f"comparing on {Path(path).name}")
-        prepared = prepare(path, profile, out, window_s=window_s, keep_track=a.diagnosed or b.diagnosed)
-        motion = prepared.motion
-        one, other = (predict(model, prepared, profile, window_s=window_s, smoother="square") for model in (a, b))
-        tau_a, tau_b = one.tau, other.tau
-        rows = usable(motion, tau_a, tau_b)
-        difference = _paired(motion.tau, tau_a, tau_b, rows, round(BLOCK_S * motion.rate_hz))
-        entries.append(
-            {
-                "name": motion.log,
-                "rows": int(rows.sum()),
-                "warnings": [
-                    f"{_label(model)} was trained on this log: its scores here are no evidence"
-                    for model in (a, b)
-                    if any(log["sha256"] == prepared.recording.sha256 for log in model.training)
-                ],
-                "mse": {
-                    "a": by_axis(mean_square(motion.tau, tau_a, rows)),
-                    "b": by_axis(mean_square(motion.tau, tau_b, rows)),
-                },
-                "r2": {
-                    "a": by_axis(r_squared(motion.tau, tau_a, rows)),
-                    "b": by_axis(r_squared(motion.tau, tau_b, rows)),
-                },
-                "b_over_a": {
-                    axis: {"value": value, "low": low, "high": high, "says": _says(low, high, axis)}
-                    for axis, (value, low, high) in zip(AXES, difference, strict=True)
-                },
-                "free_run": {
-                    "a": free_run_plain(one.free_run(rows)),
-                    "b": free_run_plain(other.free_run(rows)),
-                },
-            }
-        )
-    progress("")
-    return {
+        trials.append(_trial(field, path, out, window_s, trials))
+    progress("comparing")
+    runnable, notes = _runnable(field.candidates, trials)
+    judged = [_judged(field, [trial], runnable) for trial in trials]
+    pooled = _judged(field, trials, runnable) if len(trials) > 1 else None
+    every = [*judged, *([pooled] if pooled else [])]
+    result = {
         "schema": "ferryid.compare/1",
-        "a": _entry(a),
-        "b": _entry(b),
+        "vessel": field.profile.name,
         "window_s": window_s,
-        "coefficients": _coefficients(a, b),
-        **({"hull": hull_rows(a, b), "effects": effect_rows(a, b)} if a.diagnosed or b.diagnosed else {}),
-        "logs": entries,
+        "models": [_entry(one) for one in field.candidates],
+        "warnings": [*field.warnings, *notes],
+        "logs": [
+            {
+                "name": trial.name,
+                "sha256": trial.sha256,
+                "block_s": trial.block_s,
+                **_scores(field, [trial], one, runnable),
+                "tracking": tracked(trial.motion, field.profile.hull.length_m),
+                "warnings": [*trial.warnings, *_few(trial)],
+            }
+            for trial, one in zip(trials, judged, strict=True)
+        ],
+        "pooled": _scores(field, trials, pooled, runnable) if pooled else None,
+        "better": [row for one in every for row in verdicts(one)],
+        "coefficients": {"physical": coefficient_rows(field.candidates), "terms": term_rows(field.candidates)},
+        "effects": effect_rows(field.candidates),
     }
+    progress("")
+    return Comparison(result, tuple(trials))
 
 
-def _label(model: Model) -> str:
-    return f"{model.name}@{model.version}"
-
-
-def _entry(model: Model) -> dict[str, Any]:
+def _entry(candidate: Candidate) -> Row:
+    model = candidate.model
     return {
+        "label": candidate.label,
         "name": model.name,
         "version": model.version,
-        "accepted": model.accepted,
+        "base": candidate.is_base,
+        "accepted": None if candidate.is_base else model.accepted,
+        "basis": str(model.settings["basis"]),
+        "diagnosed": model.diagnosed,
+        "scale": dict(model.scale),
+        "training": [str(log["name"]) for log in model.training],
         "validation": model.scores.get("per_axis"),
         "normalised_mse": model.scores.get("normalised_mse"),
     }
 
 
-def _coefficients(a: Model, b: Model) -> list[dict[str, Any]]:
-    """Return the terms that either model has, with both values per axis."""
-    rows = []
-    for term in dict.fromkeys((*a.terms, *b.terms, CONSTANT)):
-        row: dict[str, Any] = {"term": term}
-        for j, axis in enumerate(AXES):
-            values = {}
-            for key, model in (("a", a), ("b", b)):
-                if term == CONSTANT:
-                    values[key] = {
-                        "value": float(model.intercept[j]),
-                        "low": float(model.intercept_low[j]),
-                        "high": float(model.intercept_high[j]),
-                        "unit": "N·m" if axis == "yaw" else "N",
-                    }
-                elif term in model.terms:
-                    k = model.terms.index(term)
-                    values[key] = {
-                        "value": float(model.theta[k, j]),
-                        "low": float(model.low[k, j]),
-                        "high": float(model.high[k, j]),
-                        "unit": model.units[k][j],
-                    }
-            row[axis] = values
-        rows.append(row)
-    return rows
-
-
-def _paired(tau: Floats, a: Floats, b: Floats, rows: NDArray[np.bool_], block: int) -> list[tuple[float, float, float]]:
-    """Return the ratio of b's MSE to a's per axis with a 95 % interval from paired block resampling."""
-    used = np.flatnonzero(rows)
-    pieces = np.array_split(used, max(1, round(len(used) / max(1, block))))
-    sum_a = np.array([np.sum((tau[p] - a[p]) ** 2, axis=0) for p in pieces])
-    sum_b = np.array([np.sum((tau[p] - b[p]) ** 2, axis=0) for p in pieces])
-    draws = np.random.default_rng(0).integers(0, len(pieces), (DRAWS, len(pieces)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = sum_b[draws].sum(axis=1) / sum_a[draws].sum(axis=1)
-        value = sum_b.sum(axis=0) / sum_a.sum(axis=0)
-    # Fewer than five blocks give no interval worth the name.
-    spread = np.quantile(ratios, [0.025, 0.975], axis=0) if len(pieces) >= 5 else np.full((2, 3), np.nan)
-    return [(float(value[j]), float(spread[0, j]), float(spread[1, j])) for j in range(3)]
-
-
-def _says(low: float, high: float, axis: str) -> str:
-    if not np.isfinite(low + high):
-        return f"too little data to tell on {axis}"
-    if high < 1.0:
-        return f"B is better than A on {axis}"
-    if low > 1.0:
-        return f"A is better than B on {axis}"
-    return f"no difference that this data can show on {axis}"
-
-
-def render_comparison(result: dict[str, Any]) -> str:
-    """Return a comparison as text."""
-    a, b = result["a"], result["b"]
-    lines = [f"A = {a['name']}@{a['version']}", f"B = {b['name']}@{b['version']}", ""]
-    for entry in result["logs"]:
-        lines.append(f"{entry['name']}: {entry['rows']} rows smoothed with {result['window_s']:g} s")
-        lines.append(f"  {'':<8}{'rms A':>12}{'rms B':>12}{'MSE B/A':>10}{'95 % interval':>18}")
-        for axis in AXES:
-            ratio = entry["b_over_a"][axis]
-            interval = f"{_number(ratio['low'])} .. {_number(ratio['high'])}"
-            lines.append(
-                f"  {axis:<8}{entry['mse']['a'][axis] ** 0.5:>12.4g}{entry['mse']['b'][axis] ** 0.5:>12.4g}"
-                f"{_number(ratio['value']):>10}{interval:>18}  {ratio['says']}"
-            )
-        for key, label, factor in (
-            ("position_m", "position [m]", 1.0),
-            ("heading_rad", "heading [deg]", np.degrees(1.0)),
-        ):
-            for who in ("a", "b"):
-                run = entry["free_run"][who]
-                pairs = zip(run["horizons_s"], run[key], strict=True)
-                values = ", ".join(f"{h:g} s: {_number(value, factor)}" for h, value in pairs)
-                lines.append(f"  free run {label} {who.upper()}: {values}{'; ' + run['note'] if run['note'] else ''}")
-        lines.extend(f"  warning: {warning}" for warning in entry["warnings"])
-        lines.append("")
-    lines.append(f"  {'term':<24}" + "".join(f"{axis + ' A':>13}{axis + ' B':>13}" for axis in AXES))
-    for row in result["coefficients"]:
-        cells = "".join(
-            f"{format(row[axis][who]['value'], '.4g') if who in row[axis] else '-':>13}"
-            for axis in AXES
-            for who in ("a", "b")
+def _trial(field: Field, path: str, out: Path, window_s: float, before: Sequence[Trial]) -> Trial:
+    diagnosed = any(one.model.diagnosed for one in field.candidates)
+    prepared = prepare(path, field.profile, out, window_s=window_s, keep_track=diagnosed)
+    motion, sha256 = prepared.motion, prepared.recording.sha256
+    if sha256 in [other.sha256 for other in before]:
+        raise FerryIdError(f"{path}: the same log as another, which would count twice. Fix: give it once")
+    seen = [_prediction(one, prepared, field, window_s) for one in field.candidates]
+    taus = np.stack([prediction.tau for prediction in seen])
+    rows = _common_rows(field, motion, taus)
+    at = motion.t[rows]
+    squares = np.moveaxis((motion.tau - taus) ** 2, 0, 1)[rows]
+    block_s, remembered = block_seconds(squares.reshape(len(squares), -1), motion.rate_hz)
+    starts, ends = starting_points(motion, rows, HORIZONS_S[0], HORIZONS_S[-1])
+    steps = np.round(np.array(HORIZONS_S) * motion.rate_hz).astype(int)
+    reached = starts[:, None] + steps < ends[:, None]
+    errors = np.full((len(seen), len(starts), len(HORIZONS_S), len(KEYS)), np.nan)
+    for k, prediction in enumerate(seen):
+        if len(starts) and runs_free(prediction.force, prediction.motion):
+            errors[k] = single_runs(prediction.force, prediction.motion, starts, ends, HORIZONS_S)
+    warnings = [*prepared.doubts]
+    for one in field.candidates:
+        warnings += [f"{one.label}: {caution}" for caution in cautions_on(one.model, motion, rows)]
+        if one.trained_on(sha256):
+            warnings.append(f"{one.label} was trained on this log: its scores here are no evidence")
+    if remembered:
+        warnings.append(
+            f"squared errors stay correlated for longer than blocks of {block_s:.3g} s: intervals are probably too narrow"
         )
-        lines.append(f"  {row['term']:<24}{cells}")
-    lines += render_hull(result.get("hull", ())) + render_effects(result.get("effects", ()))
-    return "\n".join(lines)
+    name = motion.log if motion.log not in [other.name for other in before] else f"{motion.log} ({len(before) + 1})"
+    return Trial(
+        name=name,
+        sha256=sha256,
+        motion=motion,
+        rows=rows,
+        taus=taus,
+        sums=block_sums(squares, at, block_s),
+        block_s=block_s,
+        starts_s=motion.t[starts],
+        errors=errors,
+        reached=reached,
+        warnings=tuple(warnings),
+    )
 
 
-def _number(value: float | None, factor: float = 1.0) -> str:
-    return "-" if value is None or not np.isfinite(value) else f"{value * factor:.3f}"
+def _prediction(candidate: Candidate, prepared: Prepared, field: Field, window_s: float) -> Prediction:
+    model, motion = candidate.model, prepared.motion
+    functions = estimator(model).basis
+    if functions is not None and not model.diagnosed:
+        for what, needed, measured in (
+            ("wind", functions.needs_wind, motion.wind),
+            ("current", functions.needs_current, motion.current),
+        ):
+            if needed and measured is None:
+                raise FerryIdError(
+                    f"{motion.log}: {candidate.label} needs the {what}, found none measured, or not on enough rows. "
+                    f"Fix: compare on a log that has it, or leave {candidate.label} out"
+                )
+    return predict(model, prepared, field.profile, window_s=window_s, smoother="square")
+
+
+def _common_rows(field: Field, motion: Motion, taus: Floats) -> Flags:
+    """Return the rows on which measurement and every estimate are known, or say which model has none."""
+    rows = usable(motion, *taus)
+    if rows.any():
+        return rows
+    blind = [one.label for one, tau in zip(field.candidates, taus, strict=True) if not usable(motion, tau).any()]
+    raise FerryIdError(
+        f"{motion.log}: no row on which {', '.join(blind) if blind else 'all models'} can be judged, as something that "
+        "is needed was not measured there. Fix: compare on another log, or leave a model out"
+    )
+
+
+def _runnable(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> tuple[Flags, list[str]]:
+    """Return the models whose free runs can be compared, shape (m,), and why others cannot.
+
+    A run that diverges counts for no model, so that all are judged by the same runs; a model of which many diverge is left out
+    instead.
+    """
+    runs, notes = np.ones(len(candidates), dtype=bool), []
+    reached = sum(int(trial.reached.sum()) for trial in trials)
+    for k, one in enumerate(candidates):
+        came = sum(int(np.isfinite(trial.errors[k, :, :, 2])[trial.reached].sum()) for trial in trials)
+        if not reached:
+            continue
+        lost = 1.0 - came / reached
+        runs[k] = lost <= MOST_LOST
+        if not came:
+            notes.append(f"{one.label} is left out of free runs: {NO_MASS}, or all its runs diverge")
+        elif not runs[k]:
+            notes.append(f"{one.label} is left out of free runs: {lost:.0%} of its runs diverge")
+        elif lost:
+            notes.append(f"{lost:.1%} of the free runs of {one.label} diverge, and count for no model")
+    return runs, notes
+
+
+def _counted(trial: Trial, runnable: Flags) -> Flags:
+    """Return the errors of free runs that count, as all models that run have them, shape (s, horizons, 4)."""
+    return np.asarray(np.isfinite(trial.errors[runnable]).all(axis=0) & runnable.any())
+
+
+def _run_sums(trial: Trial, runnable: Flags, h: int) -> Floats:
+    """Return squared errors of free runs at a horizon summed over blocks of starts, shape (blocks, m, 4).
+
+    Runs from starts that are close see the same waves and gusts, so that a block is twice as long as a run.
+    """
+    counted = _counted(trial, runnable)[:, h]
+    some = counted.any(axis=1)
+    squares = np.where(counted[some, None], np.moveaxis(trial.errors[:, :, h], 0, 1)[some] ** 2, 0.0)
+    # A model that does not run has no errors, and no ratio.
+    squares[:, ~runnable] = np.nan
+    return block_sums(squares, trial.starts_s[some], max(trial.block_s, 2.0 * HORIZONS_S[h]))
+
+
+def _judged(field: Field, trials: Sequence[Trial], runnable: Flags) -> Judged:
+    runs, told = [], None
+    for h, horizon in enumerate(HORIZONS_S):
+        sums = [_run_sums(trial, runnable, h) for trial in trials]
+        runs.append(compare_paired(sums))
+        if horizon <= TOLD_S and enough(sums):
+            told = horizon
+    trained = {one.label for one in field.candidates if any(one.trained_on(trial.sha256) for trial in trials)}
+    return Judged(
+        on=trials[0].name if len(trials) == 1 else None,
+        labels=field.labels,
+        force=compare_paired([trial.sums for trial in trials]),
+        runs=tuple(runs),
+        horizons_s=HORIZONS_S,
+        told_s=told,
+        trained=frozenset(trained),
+    )
+
+
+def _few(trial: Trial) -> list[str]:
+    if enough([trial.sums]):
+        return []
+    count = len(trial.sums)
+    return [
+        f"{count} block{'s' * (count != 1)} of {trial.block_s:.3g} s {'are' if count != 1 else 'is'} too few for an interval, "
+        "so that nothing is said to be better on this log alone"
+    ]
+
+
+def _scores(field: Field, trials: Sequence[Trial], judged: Judged, runnable: Flags) -> Row:
+    """Return rows, blocks, errors of every model and ratios of every two, on one log or on several together."""
+    tau = np.concatenate([trial.motion.tau[trial.rows] for trial in trials])
+    mse = np.sum([trial.sums.sum(axis=0) for trial in trials], axis=0) / len(tau)
+    variance = np.var(tau, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        r2 = np.where(variance > 0.0, 1.0 - mse / variance, np.nan)
+        counted = [_counted(trial, runnable) for trial in trials]
+        squares = np.sum(
+            [np.where(use, trial.errors**2, 0.0).sum(axis=1) for trial, use in zip(trials, counted, strict=True)],
+            axis=0,
+        )
+        rms = np.sqrt(squares / np.sum([use.sum(axis=0) for use in counted], axis=0))
+    rms[~runnable] = np.nan
+    return {
+        "rows": len(tau),
+        "seconds": float(sum(trial.rows.sum() / trial.motion.rate_hz for trial in trials)),
+        "blocks": sum(len(trial.sums) for trial in trials),
+        "scores": {
+            label: {
+                "mse": by_axis(mse[k]),
+                "r2": by_axis(r2[k]),
+                "trained": label in judged.trained,
+                "free_run": {key: rms[k, :, c].tolist() for c, key in enumerate(KEYS)},
+            }
+            for k, label in enumerate(field.labels)
+        },
+        "free_run": {
+            "horizons_s": list(HORIZONS_S),
+            "told_s": judged.told_s,
+            "starts": sum(len(trial.starts_s) for trial in trials),
+            "counted": [int(sum(use[:, h].any(axis=1).sum() for use in counted)) for h in range(len(HORIZONS_S))],
+            "blocks": [sum(len(_run_sums(trial, runnable, h)) for trial in trials) for h in range(len(HORIZONS_S))],
+        },
+        "pairs": [
+            {
+                "first": field.labels[i],
+                "second": field.labels[j],
+                "mse": {axis: _ratio(judged.force, k, c) for c, axis in enumerate(AXES)},
+                "free_run": {
+                    key: [_ratio(runs, k, c, root=True) for runs in judged.runs] for c, key in enumerate(KEYS)
+                },
+            }
+            for k, (i, j) in enumerate(judged.force.pairs)
+        ],
+    }
+
+
+def _ratio(paired: Paired, k: int, column: int, *, root: bool = False) -> Row:
+    values = np.array([values[k, column] for values in (paired.ratio, paired.low, paired.high)])
+    value, low, high = (np.sqrt(values) if root else values).tolist()
+    return {"value": value, "low": low, "high": high, "p": float(paired.p[k, column])}

@@ -11,10 +11,11 @@ import numpy as np
 from ferryid.identify.excitation import RANGE_UNITS, payload_kg, range_columns
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.predict import Prediction, predict, predict_before, signal_map
-from ferryid.identify.scores import force_scores, free_run_plain, outside_ranges, usable
+from ferryid.identify.scores import Flags, force_scores, free_run_plain, outside_ranges, usable
 from ferryid.identify.settings import check_window
 from ferryid.identify.stored_effect import StoredEffect
 from ferryid.signals.prepare import prepare
+from ferryid.signals.track import Motion
 from ferryid.vessel.profile import Profile
 
 OUTSIDE_WARNING = 0.05
@@ -74,8 +75,6 @@ def evaluate(
         tau_base, tau_model = old.tau, new.tau
         rows = usable(motion, tau_model)
         parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))
-        columns = range_columns(motion.nu[rows], motion.nu_dot[rows], payload_kg(motion, rows))
-        outside = outside_ranges(columns, model.ranges)
         entries.append(
             {
                 "name": motion.log,
@@ -88,8 +87,8 @@ def evaluate(
                     "model": free_run_plain(new.free_run(rows)),
                 },
                 **({"effects": _applied(new, prepared.recording.sha256)} if model.diagnosed else {}),
-                "outside": outside,
-                "warnings": _warnings(prepared.recording.sha256, model, outside, motion.payload is not None),
+                "outside": outside_of(model, motion, rows),
+                "warnings": _warnings(prepared.recording.sha256, model, motion, rows),
                 "data_quality": prepared.quality,
             }
         )
@@ -122,19 +121,31 @@ def _applied(found: Prediction, sha256: str) -> dict[str, Any]:
     }
 
 
-def _warnings(sha256: str, model: Model, outside: dict[str, float], weighed: bool) -> list[str]:
+def cautions_on(model: Model, motion: Motion, rows: Flags) -> list[str]:
+    """Say where the marked rows of a log are not what a model was made for."""
     warnings = []
-    if not weighed and "payload_kg" in model.ranges:
+    if motion.payload is None and "payload_kg" in model.ranges:
         warnings.append("the model was trained with the payload known, and this log has none: it is taken as empty")
-    if any(log["sha256"] == sha256 for log in model.training):
-        warnings.append("the model was trained on this log: its scores here are no evidence")
-    for name, share in outside.items():
+    for name, share in outside_of(model, motion, rows).items():
         if share > OUTSIDE_WARNING:
             low, high = model.ranges[name]
             warnings.append(
                 f"{share:.0%} of the rows have {name} outside the model's range of validity, {low:.3g} to {high:.3g} "
                 f"{RANGE_UNITS[name]}"
             )
+    return warnings
+
+
+def outside_of(model: Model, motion: Motion, rows: Flags) -> dict[str, float]:
+    """Return the share of the marked rows that lies outside each range of a model's validity."""
+    columns = range_columns(motion.nu[rows], motion.nu_dot[rows], payload_kg(motion, rows))
+    return outside_ranges(columns, model.ranges)
+
+
+def _warnings(sha256: str, model: Model, motion: Motion, rows: Flags) -> list[str]:
+    warnings = cautions_on(model, motion, rows)
+    if any(log["sha256"] == sha256 for log in model.training):
+        warnings.append("the model was trained on this log: its scores here are no evidence")
     return warnings
 
 

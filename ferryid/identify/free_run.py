@@ -24,6 +24,7 @@ A sixth argument, the payload (s, 2), is passed where the log has one.
 HORIZONS_S = (5.0, 10.0, 20.0, 30.0, 60.0)
 MAX_STARTS = 60
 STEP_S = 0.2
+NO_MASS = "the model's effective mass matrix is not positive definite: it cannot be run free"
 LEAP_MPS = 5.0
 """Added to twice the greatest speed: a position that moves faster has jumped."""
 
@@ -58,10 +59,10 @@ def free_run(
     errors: list[Floats] = []
     longest: tuple[int, dict[str, Floats]] = (0, {})
     diverged = 0
-    if not _is_positive(_masses(force, replace(motions[0], payload=None))[0]):
-        return _without(horizons, "the model's effective mass matrix is not positive definite: it cannot be run free")
+    if not runs_free(force, motions[0]):
+        return _without(horizons, NO_MASS)
     for motion, allowed in zip(motions, rows, strict=True):
-        starts, ends = _starting_points(motion, allowed, float(horizons[0]), float(horizons[-1]))
+        starts, ends = starting_points(motion, allowed, float(horizons[0]), float(horizons[-1]))
         if starts.size == 0:
             continue
         path, stride = _integrate(force, motion, starts, float(horizons[-1]))
@@ -83,6 +84,22 @@ def free_run(
     rms[blind, 0] = np.nan
     note = f"{diverged} of {len(every)} runs diverged and are left out of the means" if diverged else ""
     return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note, diverged)
+
+
+def runs_free(force: ForceModel, motion: Motion) -> bool:
+    """Tell whether a model can be run free: its effective mass matrix has to be positive definite."""
+    return _is_positive(_masses(force, replace(motion, payload=None))[0])
+
+
+def single_runs(force: ForceModel, motion: Motion, starts: Rows, ends: Rows, horizons_s: Sequence[float]) -> Floats:
+    """Return the error of every run by itself at every horizon, shape (starts, horizons, 4).
+
+    Absolute errors of position [m], heading [rad], speed [m/s] and yaw rate [rad/s]; NaN where a run has diverged, or does
+    not reach the horizon within its stretch. Parameters as of `free_run`, and starts and ends as of `starting_points`.
+    """
+    horizons = np.asarray(horizons_s, dtype=float)
+    path, stride = _integrate(force, motion, starts, float(horizons[-1]))
+    return _errors(path, stride, motion, starts, ends, horizons)
 
 
 def _masses(force: ForceModel, motion: Motion) -> Floats:
@@ -114,7 +131,7 @@ def _is_positive(mass: Floats) -> bool:
     return bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0))
 
 
-def _starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[Rows, Rows]:
+def starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[Rows, Rows]:
     """Return start rows and the end of the unbroken stretch that each lies in."""
     good = allowed & motion.valid & np.isfinite(motion.nu).all(axis=1) & np.isfinite(motion.tau).all(axis=1)
     good = good & ~_jumps(motion)

@@ -24,6 +24,7 @@ from ferryid.identify.stored_effect import (
     hull_json,
 )
 from ferryid.vessel import parse_profile
+from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
 
@@ -123,6 +124,39 @@ class Model:
     def undiagnosed(self) -> Model:
         """Return the model as it was before any diagnosis."""
         return replace(self, hull={}, vessel_effects=(), conditions=())
+
+
+def blank(profile: Profile, name: str) -> Model:
+    """Return a model without terms, which is the profile's hull."""
+    nothing = np.zeros((0, 3))
+    return Model(
+        name=name,
+        version=0,
+        created="",
+        ferryid_version=__version__,
+        profile_text=profile.text,
+        scale={"delta": 1.0, "sigma": 1.0, "zeta": 1.0},
+        settings={
+            "basis": NO_BASIS,
+            "structure": "decoupled",
+            "components": 0,
+            "window_s": 1.0,
+            "smoother": "square",
+        },
+        terms=(),
+        units=(),
+        theta=nothing,
+        intercept=np.zeros(3),
+        low=nothing,
+        high=nothing,
+        intercept_low=np.zeros(3),
+        intercept_high=np.zeros(3),
+        covariance=np.zeros((3, 1, 1)),
+        ranges={},
+        training=(),
+        scores={},
+        accepted=False,
+    )
 
 
 def to_json(model: Model) -> dict[str, Any]:

@@ -43,7 +43,7 @@ STYLE: dict[Any, Any] = {
 }
 
 
-def _figure(
+def margins(
     height: float, *, top: float = 0.15, left: float = 0.85, between: tuple[float, float] = (0.25, 0.15)
 ) -> Figure:
     """Return an empty figure with margins in inches; fixed ones, since measuring all text takes longer than drawing it."""
@@ -61,7 +61,7 @@ def _figure(
 
 def canvas(rows: int, height: float, *, top: float = 0.35) -> tuple[Figure, list[Axes]]:
     """Return a figure of panels below one another that share their horizontal axis."""
-    figure = _figure(height, top=top)
+    figure = margins(height, top=top)
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
     for ax in axes[:, 0]:
         ax.yaxis.set_label_coords(-0.115, 0.5)
@@ -197,7 +197,7 @@ def coefficient_intervals(
     """Coefficients with 95 % intervals, each in units of its own interval's half width, so that all fit one axis."""
     with mpl.rc_context(STYLE):
         left = 0.4 + 0.085 * max(len(term) for term in terms)
-        figure = _figure(1.0 + 0.2 * len(terms), top=0.3, left=left, between=(0.08, 0.1))
+        figure = margins(1.0 + 0.2 * len(terms), top=0.3, left=left, between=(0.08, 0.1))
         columns = figure.subplots(1, 3, sharey=True)
         place = np.arange(len(terms))[::-1]
         for j, ax in enumerate(columns):
@@ -223,7 +223,7 @@ def coefficient_intervals(
 def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
     """Singular values of the standardised basis, and where the velocities were."""
     with mpl.rc_context(STYLE):
-        figure = _figure(5.6, between=(0.38, 0.3))
+        figure = margins(5.6, between=(0.38, 0.3))
         grid = figure.subplots(2, 2)
         values = result.singular_values
         values = values / values[0] if values.size and values[0] > 0 else values
@@ -247,7 +247,7 @@ def excitation(result: Excitation, logs: Sequence[LogFit]) -> str:
 def free_run_errors(base: FreeRun, new: FreeRun) -> str:
     """Free-run error against horizon, base and new model."""
     with mpl.rc_context(STYLE):
-        figure = _figure(4.6, between=(0.3, 0.15))
+        figure = margins(4.6, between=(0.3, 0.15))
         grid = figure.subplots(2, 2, sharex=True)
         for ax, name, label, factor in (
             (grid[0, 0], "position_m", "position [m]", 1.0),

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.result import AXES, LogFit
+from ferryid.signals.track import Motion
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 POINTS = 900
 
 
@@ -72,16 +74,31 @@ def worst_and_best_minute(log: LogFit, length_s: float = 60.0) -> tuple[float, f
     The error is the squared residual over the variance of the measured force, averaged over the axes; validation rows are
     preferred, and a minute counts when hardly a row of it is missing.
     """
-    motion = log.motion
+    allowed = log.motion.valid & np.isfinite(log.motion.tau).all(axis=1) & np.isfinite(log.tau_model).all(axis=1)
+    ordered = _minutes(log.motion, log.tau_model[None], allowed, log.validation & allowed, length_s)
+    return None if ordered is None else (float(ordered[-1]), float(ordered[0]))
+
+
+def worst_minute(motion: Motion, taus: Floats, rows: Flags, length_s: float = 60.0) -> float | None:
+    """Return the start time [s] of the minute in which several models together err most; None where there is no whole one.
+
+    `taus` are their estimates, shape (m, n, 3), and `rows` those that count, shape (n,).
+    """
+    ordered = _minutes(motion, taus, rows, rows, length_s)
+    return None if ordered is None else float(ordered[-1])
+
+
+def _minutes(motion: Motion, taus: Floats, allowed: Flags, preferred: Flags, length_s: float) -> Floats | None:
+    """Return the start times [s] of whole minutes, the one with the least error first."""
     width = round(length_s * motion.rate_hz)
     if len(motion.t) < 2 * width:
         return None
-    allowed = motion.valid & np.isfinite(motion.tau).all(axis=1) & np.isfinite(log.tau_model).all(axis=1)
     scale = np.var(motion.tau[allowed], axis=0)
-    error = np.where(allowed[:, None], (motion.tau - log.tau_model) ** 2 / np.where(scale > 0, scale, 1.0), 0.0)
+    squares = ((motion.tau - taus) ** 2).mean(axis=0) / np.where(scale > 0, scale, 1.0)
+    error = np.where(allowed[:, None], squares, 0.0)
     total = np.concatenate([[0.0], np.cumsum(error.mean(axis=1))])
     count = np.concatenate([[0], np.cumsum(allowed)])
-    judged = np.concatenate([[0], np.cumsum(log.validation & allowed)])
+    judged = np.concatenate([[0], np.cumsum(preferred)])
     starts = np.arange(0, len(motion.t) - width, max(1, width // 6))
     rows = count[starts + width] - count[starts]
     seen = judged[starts + width] - judged[starts]
@@ -90,8 +107,7 @@ def worst_and_best_minute(log: LogFit, length_s: float = 60.0) -> tuple[float, f
         return None
     mean = (total[starts + width] - total[starts]) / np.maximum(rows, 1)
     candidates = starts[enough]
-    ordered = candidates[np.argsort(mean[enough], kind="stable")]
-    return float(motion.t[ordered[-1]]), float(motion.t[ordered[0]])
+    return np.asarray(motion.t[candidates[np.argsort(mean[enough], kind="stable")]])
 
 
 SLOW_HZ = 0.05

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.signals.quality import (
     NAVIGATION,
+    REFERENCE,
     VELOCITY,
     clean,
     cross_checks,
@@ -92,7 +93,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     repairs: list[str] = []
     sources = [_source(stream, repairs) for stream in recording.streams.values() if _enough(stream)]
     navigation = [s for s in sources if _has(s, NAVIGATION)]
-    actuators = [s for s in sources if any(is_actuator(name) or is_order(name) for name in s.columns)]
+    actuators = [s for s in sources if any(is_actuator(name) or is_order(name) for name in {*s.columns} - {*REFERENCE})]
     for group, what in ((navigation, "navigation"), (actuators, "actuator")):
         if not group:
             raise FerryIdError(

@@ -27,8 +27,8 @@ def unit_of(column: str) -> str:
 
 
 _UNITS = {
-    **dict.fromkeys(("x", "y"), "m"),
-    **dict.fromkeys(("psi", "phi", "theta", "wind_from"), "rad"),
+    **dict.fromkeys(("x", "y", "x_d", "y_d"), "m"),
+    **dict.fromkeys(("psi", "phi", "theta", "wind_from", "psi_d"), "rad"),
     **dict.fromkeys(("u", "v", "vel_N", "vel_E"), "m/s"),
     **dict.fromkeys(("wind_speed", "wind_N", "wind_E", "current_N", "current_E"), "m/s"),
     "r": "rad/s",

@@ -21,6 +21,7 @@ NAVIGATION = ("x", "y", "psi", "phi", "theta", "u", "v", "r", "vel_N", "vel_E")
 VELOCITY = ("u", "v", "r", "vel_N", "vel_E")
 LOAD = ("payload_kg", "payload_x")
 WEATHER = ("wind_speed", "wind_from", "wind_N", "wind_E", "current_N", "current_E")
+REFERENCE = ("x_d", "y_d", "psi_d")
 _ACTUATOR = ("n_", "alpha_", "delta_", "F_")
 _ORDER = tuple(f"{prefix}cmd_" for prefix in _ACTUATOR)
 
@@ -128,7 +129,7 @@ class ColumnQuality:
 
 def is_order(name: str) -> bool:
     """True for a commanded value, which holds until the next one and may jump."""
-    return name.startswith(_ORDER) or name in ("X_d", "Y_d", "N_d")
+    return name.startswith(_ORDER) or name in ("X_d", "Y_d", "N_d", *REFERENCE)
 
 
 def is_actuator(name: str) -> bool:
@@ -143,7 +144,7 @@ def is_load(name: str) -> bool:
 
 def is_angle(name: str) -> bool:
     """True for an angle that may wrap and that can be unwrapped: no rudder, and no direction of the wind."""
-    return name in ("psi", "phi", "theta") or name.startswith("alpha_")
+    return name in ("psi", "phi", "theta", "psi_d") or name.startswith("alpha_")
 
 
 def unwrapped(angle: Floats) -> Floats:

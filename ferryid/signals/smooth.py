@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.align import segments
 from ferryid.signals.kalman import fit_levels, smooth_runs
-from ferryid.signals.quality import require_excited
+from ferryid.signals.quality import REFERENCE, require_excited
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel import applied_force, speed_doubts
 from ferryid.vessel.hull import current_in_body
@@ -42,6 +42,7 @@ class Measured:
     tau: Floats
     usable: Flags
     tau_d: Floats | None
+    eta_d: Floats | None
     wind: Floats | None
     current: Floats | None
     payload: Floats | None
@@ -108,6 +109,9 @@ def measure(track: Track, profile: Profile) -> Measured:
     tau_d = None
     if {"X_d", "Y_d", "N_d"} <= set(columns):
         tau_d = np.column_stack([columns[name] for name in ("X_d", "Y_d", "N_d")])
+    eta_d = None
+    if set(REFERENCE) & set(columns):
+        eta_d = np.column_stack([columns.get(name, nothing) for name in REFERENCE])
     usable &= np.isfinite(nu).all(axis=1) & np.isfinite(tau).all(axis=1)
     if not usable.any():
         raise FerryIdError(
@@ -116,7 +120,7 @@ def measure(track: Track, profile: Profile) -> Measured:
         )
     require_excited(track, nu, tau)
     return Measured(
-        track.log, track.t, track.rate_hz, eta, nu, tau, usable, tau_d, wind, current, payload, tuple(repairs)
+        track.log, track.t, track.rate_hz, eta, nu, tau, usable, tau_d, eta_d, wind, current, payload, tuple(repairs)
     )
 
 
@@ -168,6 +172,7 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
         valid=valid,
         raw_nu=measured.nu,
         tau_d=done.get("tau_d"),
+        eta_d=done.get("eta_d"),
         wind=done.get("wind"),
         current=done.get("current"),
         payload=measured.payload,
@@ -258,6 +263,7 @@ _AXIS_OF = {
     "tau": (0, 1, 2),
     "eta": (0, 1, 2),
     "tau_d": (0, 1, 2),
+    "eta_d": (0, 1, 2),
     "wind": (0, 0),
     "current": (0, 0),
 }

@@ -77,6 +77,8 @@ class Motion:
         Applied actuator force from feedback [N, N, N·m], FRD, shape (n, 3), smoothed with the same window.
     tau_d
         Commanded force, same shape and frame, or None when the log has none.
+    eta_d
+        Desired position [m] and heading [rad], NED, shape (n, 3), NaN where the log has none, or None.
     wind
         True wind [m/s] north, east, where the air goes to, shape (n, 2), or None.
     current
@@ -102,6 +104,7 @@ class Motion:
     valid: Flags
     raw_nu: Floats
     tau_d: Floats | None = None
+    eta_d: Floats | None = None
     wind: Floats | None = None
     current: Floats | None = None
     payload: Floats | None = None

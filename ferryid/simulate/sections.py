@@ -236,6 +236,7 @@ class Sensors:
     wind_rate_hz: float = off_or(0.0, 0.01, 200.0)
     current_rate_hz: float = off_or(0.0, 0.01, 200.0)
     payload_rate_hz: float = off_or(0.0, 0.01, 200.0)
+    reference_rate_hz: float = off_or(0.0, 0.01, 200.0)
     imu_rate_hz: float = off_or(100.0, 0.01, 1000.0)
     camera_rate_hz: float = off_or(1.0, 0.01, 1000.0)
     clock_offset_ms: float = signed(0.0, 1e6)

@@ -59,6 +59,7 @@ class Stream:
 LINKS = {
     "/navigation/odometry": Link(0.0, 0.012, 0.002),
     "/control/tau_d": Link(0.0, 0.001, 0.0004),
+    "/control/reference": Link(0.0, 0.001, 0.0004),
     "command": Link(0.0, 0.0015, 0.0004),
     "state": Link(0.011, 0.006, 0.0012),
     "/weather/wind": WIND,
@@ -79,6 +80,8 @@ def sense(scenario: Scenario, profile: Profile, seed: int, truth: Truth, control
     made = [_odometry(scenario, seed, truth, control)]
     if not scenario.manoeuvre.kind:
         made.append(_tau_d(scenario, seed, control))
+        if sensors.reference_rate_hz > 0.0:
+            made.append(_reference(scenario, seed, control))
     for index, actuator in enumerate(profile.actuators):
         turning = actuator.kind in TURNING
         made.append(_thruster_state(scenario, seed, truth, index, actuator.name, turning=turning))
@@ -199,6 +202,29 @@ def _tau_d(scenario: Scenario, seed: int, control: Control) -> Stream:
         "body",
         *_times(scenario, seed, topic, LINKS[topic], control.t_order),
         columns={"wrench.force.x": X, "wrench.force.y": Y, "wrench.torque.z": N},
+    )
+
+
+def _reference(scenario: Scenario, seed: int, control: Control) -> Stream:
+    """Return the desired pose, as it is at the control cycle of each sample."""
+    topic = "/control/reference"
+    taken = sample_times(float(control.t[-1]), scenario.sensors.reference_rate_hz, LINKS[topic].phase_s)
+    rows = np.maximum(np.searchsorted(control.t, taken, side="right") - 1, 0)
+    x, y, psi = control.eta_d[rows].T
+    level = np.zeros_like(psi)
+    return Stream(
+        topic,
+        "geometry_msgs/msg/PoseStamped",
+        "ned",
+        *_times(scenario, seed, topic, LINKS[topic], taken),
+        columns={
+            "pose.position.x": x,
+            "pose.position.y": y,
+            **{
+                f"pose.orientation.{axis}": values
+                for axis, values in zip("xyzw", quaternion(level, level, _wrapped(psi)), strict=True)
+            },
+        },
     )
 
 

@@ -45,6 +45,7 @@ def check_size(scenario: Scenario, actuators: int) -> None:
         "wind_rate_hz": sensors.wind_rate_hz * MESSAGE_BYTES,
         "current_rate_hz": sensors.current_rate_hz * MESSAGE_BYTES,
         "payload_rate_hz": sensors.payload_rate_hz * MESSAGE_BYTES,
+        "reference_rate_hz": sensors.reference_rate_hz * MESSAGE_BYTES,
         "imu_rate_hz": sensors.imu_rate_hz * IMU_BYTES,
         "camera_rate_hz": sensors.camera_rate_hz * FRAME_BYTES,
     }

@@ -12,10 +12,10 @@ BODY_FRAMES = ("FRD", "FLU")
 WORLD_FRAMES = ("NED", "ENU")
 VESSEL_QUANTITIES = (
     *("position", "heading", "velocity", "yaw_rate", "roll", "pitch"),
-    *("wind", "current", "payload", "tau_d"),
+    *("wind", "current", "payload", "tau_d", "position_d", "heading_d"),
 )
 ROLE_KINDS = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force": "force", "thrust": "force"}
-_OPTIONAL = ("wind", "current", "payload", "tau_d", "roll", "pitch")
+_OPTIONAL = ("wind", "current", "payload", "tau_d", "position_d", "heading_d", "roll", "pitch")
 
 
 def parse_signals(
@@ -58,15 +58,18 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         sign, offset = _sign(table), table.number("offset", 0.0)
         if len(fields) == 1:
             mount_m = (table.number("x_m", 0.0), 0.0)
-    elif quantity == "heading" and table.has("quaternion"):
+    elif quantity in ("heading", "heading_d") and table.has("quaternion"):
         fields, unit = table.texts("quaternion", 4), "quaternion"
-        frame = _frame(table, WORLD_FRAMES, "heading")
+        frame = _frame(table, WORLD_FRAMES, quantity)
         offset = _degrees_offset(table)
-    elif quantity in ("heading", "yaw_rate", "roll", "pitch"):
+    elif quantity in ("heading", "heading_d", "yaw_rate", "roll", "pitch"):
         fields = (table.text("field", required=True),)
         kind = "rate" if quantity == "yaw_rate" else "angle"
         unit = _unit(table, kind)
-        frames = {"heading": WORLD_FRAMES, "yaw_rate": (*BODY_FRAMES, *WORLD_FRAMES)}.get(quantity, BODY_FRAMES)
+        frames = {
+            **dict.fromkeys(("heading", "heading_d"), WORLD_FRAMES),
+            "yaw_rate": (*BODY_FRAMES, *WORLD_FRAMES),
+        }.get(quantity, BODY_FRAMES)
         frame = _frame(table, frames, quantity)
         sign, offset = _sign(table), table.number("offset", 0.0)
     elif quantity == "position":
@@ -74,6 +77,10 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         frame = _frame(table, (*WORLD_FRAMES, "geodetic"), quantity)
         unit = _unit(table, "angle" if frame == "geodetic" else "length")
         mount_m = _mount(table)
+    elif quantity == "position_d":
+        fields = table.texts("fields", 2, required=True)
+        frame = _frame(table, WORLD_FRAMES, quantity)
+        unit = _unit(table, "length")
     elif quantity == "tau_d":
         fields = table.texts("fields", 3, required=True)
         frame = _frame(table, BODY_FRAMES, quantity)
@@ -200,7 +207,7 @@ def _frame(table: TableReader, frames: tuple[str, ...], quantity: str) -> str:
         return ""
     if frame not in frames:
         why = f'frame "{frame}" is not one that {quantity} can be in'
-        if frame in BODY_FRAMES and quantity in ("heading", "position"):
+        if frame in BODY_FRAMES and quantity in ("heading", "position", "heading_d", "position_d"):
             why = f'{quantity} in the body frame "{frame}" is always zero: it is measured in the world'
         table.fault(f"{why}.{did_you_mean(frame, frames)} Fix: use one of {usable}", "frame")
         return ""
@@ -271,6 +278,14 @@ def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple
             f"velocity is in the world frame {velocity.frame}, and without a heading it cannot be turned into "
             'surge and sway. Fix: map [signals.heading], or give frame = "FRD" if it is in the body frame',
             "velocity",
+        )
+    position, wanted = mapped.get("position"), mapped.get("position_d")
+    if wanted is not None and (position is None or position.frame == "geodetic"):
+        reader.fault(
+            "position_d is measured from an origin of its own"
+            + (", and position from its first fix. " if position is not None else ", and there is no position. ")
+            + "Fix: map [signals.position] in the same metres, or leave position_d out",
+            "position_d",
         )
     wind = mapped.get("wind")
     if wind is not None and wind.options.get("reference") == "bow" and "heading" not in mapped:

@@ -5,7 +5,7 @@ Canonical columns: ``x, y`` [m, NED]; ``psi`` [rad]; ``phi, theta`` [rad]; ``u, 
 where the air goes to]; ``current_N, current_E`` [m/s, where the water goes to]; ``payload_kg`` [kg] and ``payload_x`` [m,
 forward of the body origin]; for an actuator NAME ``n_NAME`` [rpm],
 ``alpha_NAME`` [rad], ``delta_NAME`` [rad], ``F_NAME`` [N]; orders with ``_cmd`` after the prefix (``n_cmd_NAME``);
-``X_d, Y_d`` [N], ``N_d`` [N·m].
+``X_d, Y_d`` [N], ``N_d`` [N·m]; the desired pose ``x_d, y_d`` [m, NED] and ``psi_d`` [rad].
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ _SIMPLE = {
     "pitch": ("theta",),
     "current": ("current_N", "current_E"),
     "tau_d": ("X_d", "Y_d", "N_d"),
+    "position_d": ("x_d", "y_d"),
+    "heading_d": ("psi_d",),
 }
 _ROLE_KIND = {"speed": "rotation", "angle": "angle", "rudder": "angle", "force": "force", "thrust": "force"}
 
@@ -176,11 +178,11 @@ def convert(profile: Profile, series: Series) -> dict[str, Floats]:
 
 def _convert(signal: Signal, values: list[Floats], topic: str) -> list[Floats]:
     quantity = signal.quantity
-    if quantity == "position":
+    if quantity in ("position", "position_d"):
         return _position(signal, values, topic)
     if quantity in ("velocity", "current") or (quantity == "wind" and signal.frame):
         return _turned([value * factor(signal.unit, "speed") for value in values], signal.frame)
-    if quantity == "heading":
+    if quantity in ("heading", "heading_d"):
         return [_heading(signal, values)]
     if quantity == "wind":
         direction = _scalar(signal, values[1], factor(signal.options["direction_unit"], "angle"))
@@ -209,7 +211,7 @@ def _check_turns(profile: Profile, signal: Signal, values: list[Floats]) -> None
     """Refuse an angle that jumps from end to end of its range by the full turn of the unit that it is not declared in."""
     if signal.quantity == "wind" and not signal.frame:
         unit, path, angle = signal.options["direction_unit"], signal.fields[1], values[1]
-    elif signal.quantity == "heading" or signal.quantity.removesuffix(".command").endswith(".angle"):
+    elif signal.quantity in ("heading", "heading_d") or signal.quantity.removesuffix(".command").endswith(".angle"):
         unit, path, angle = signal.unit, signal.fields[0], values[0]
     else:
         return

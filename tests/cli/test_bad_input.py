@@ -229,3 +229,47 @@ def test_wrong_use_is_told_shortly(ferryid, arguments: tuple[str, ...]) -> None:
     assert run.code == 2
     assert run.err
     assert "Traceback" not in run.err
+
+
+def test_comparisons_that_mean_nothing(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    log, out = fixtures / "short.mcap", ("--out", tmp_path)
+    for components in ("6", "9"):
+        assert ferryid("fit", log, "--vessel", "milliampere", "--components", components, *out).code == 0
+    pair = ("compare", "milliampere@1", "milliampere@2")
+    refused(ferryid("compare", "milliampere@1", "milliampere@1", *out), "milliampere@1", "the same model")
+    refused(ferryid("compare", "milliampere@1", "--on", log, *out), "two or more models")
+    refused(ferryid("compare", "--on", log, "milliampere@1", "milliampere@2", *out), "ferryid compare --help")
+    refused(ferryid("compare", "milliampere@1", "milliampere@7", *out), "no such version")
+    refused(ferryid(*pair, "--on", log, log, *out), "short.mcap", "the same log")
+    refused(ferryid(*pair, "--on", tmp_path / "none.bag", *out), "none.bag")
+    refused(ferryid(*pair, "--on", log, "--vessel", "gunnerus", *out), "gunnerus")
+    refused(ferryid(*pair, "--on", log, "--window", "70", *out), "--window")
+    # Fitted with the wind that short.mcap has, and short.csv has not.
+    refused(ferryid(*pair, "--on", fixtures / "short.csv", *out, "--vessel", csv_profile(tmp_path)), "needs the wind")
+    assert not list(tmp_path.glob("reports/compare*"))
+
+
+def csv_profile(tmp_path: Path) -> Path:
+    """Return a profile of milliAmpère that reads the fixture's table."""
+    from ferryid.vessel import load_profile
+
+    text = load_profile("milliampere").text
+    signals = [
+        *(
+            ("position", 'fields = ["north [m]", "east [m]"]', "m", "NED"),
+            ("heading", 'field = "heading [deg]"', "deg", "NED"),
+        ),
+        *(
+            ("velocity", 'fields = ["u [m/s]", "v [m/s]"]', "m/s", "FRD"),
+            ("yaw_rate", 'field = "r [deg/s]"', "deg/s", "FRD"),
+        ),
+        *((f'"thruster{k}.speed"', f'field = "thruster{k} speed [rpm]"', "rpm", "") for k in (1, 2)),
+        *((f'"thruster{k}.angle"', f'field = "thruster{k} azimuth [deg]"', "deg", "") for k in (1, 2)),
+    ]
+    parts = [text[: text.index("[signals.")]]
+    for name, field, unit, frame in signals:
+        parts.append(f'[signals.{name}]\ntopic = "table"\n{field}\nunit = "{unit}"\n')
+        parts.append(f'frame = "{frame}"\n' if frame else "")
+    path = tmp_path / "table.toml"
+    path.write_text("".join(parts), encoding="utf-8")
+    return path

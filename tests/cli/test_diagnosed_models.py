@@ -63,7 +63,9 @@ def test_from_a_diagnosis_to_a_simulation(ferryid, tmp_path: Path) -> None:
     bare.write_text(json.dumps(model), encoding="utf-8")
     compared = conforms(ferryid("compare", bare, "ferry@1", "--on", log, "--out", out, "--json", "-").out)
     assert [row["effect"] for row in compared["effects"]] == ["thruster_gain"]
-    assert compared["logs"][0]["b_over_a"]["yaw"]["high"] < 1.0
+    pair = compared["logs"][0]["pairs"][-1]
+    assert (pair["first"], pair["second"]) == (f"ferry@1 ({bare})", "ferry@1 (ferry@1)")
+    assert pair["mse"]["yaw"]["low"] > 1.0
 
     sailed = ferryid(
         "simulate", scenario, "--model", "ferry@1", "--models", out, "--conditions", "trial", "--out", tmp_path / "a.bag",

@@ -87,12 +87,30 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     assert evaluation["logs"][0]["normalised_mse"] < 1.0
     assert evaluation["logs"][0]["per_axis"] == evaluation["pooled"]["per_axis"]
 
-    comparison = conforms(
-        ferryid("compare", "milliampere@1", "milliampere@2", "--on", other, "--out", out, "--json", "-").out
+    run = ferryid("compare", "milliampere@1", "milliampere@2", "--on", log, other, "--out", out, "--json", "-")
+    comparison = conforms(run.out)
+    assert [model["label"] for model in comparison["models"]] == ["base model", "milliampere@1", "milliampere@2"]
+    assert [entry["scores"]["milliampere@2"]["trained"] for entry in comparison["logs"]] == [True, False]
+    assert evaluation["pooled"]["mse"]["model"]["sway"] == pytest.approx(
+        comparison["logs"][1]["scores"]["milliampere@1"]["mse"]["sway"], rel=1e-9
     )
-    assert (
-        len(comparison["coefficients"]) == 21 + 3 + 1
-    )  # the wind basis joins, as the log has an anemometer, and the constant
+    # The wind basis joins, as the log has an anemometer.
+    terms = {row["term"] for row in comparison["coefficients"]["terms"]}
+    assert len(terms) == 21 + 3 + 1
+    page = Path(comparison["report"]).read_text(encoding="utf-8")
+    assert page.count("<svg") == 2 + 2
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", page)
+    conforms((Path(comparison["report"]).parent / "compare.json").read_text(encoding="utf-8"))
+    again = ferryid(
+        "compare", "milliampere@1", "milliampere@2", "--on", log, "--on", other, "--out", out, "--json", "-"
+    )
+    assert conforms(again.out) == comparison
+    text = ferryid("compare", "milliampere@1", "milliampere@2", f"--on={log}", other, "--out", out).out
+    assert f"report  {comparison['report']}" in text
+    assert "warning: milliampere@1 was trained on this log: its scores here are no evidence" in text
+    alone = conforms(ferryid("compare", "milliampere@1", "milliampere@2", "--out", out, "--json", "-").out)
+    assert alone["logs"] == []
+    assert alone["coefficients"] == comparison["coefficients"]
 
     models = conforms(ferryid("models", "--out", out, "--json", "-").out)["models"]
     assert [model["version"] for model in models] == [1, 2]

@@ -20,9 +20,11 @@ from ferryid.diagnose.unsteady import State
 from ferryid.diagnose.weak import windows
 from ferryid.effects import effects
 from ferryid.effects.picture import acceleration
-from ferryid.identify.compare import compare, render_comparison
+from ferryid.identify.candidates import line_up
+from ferryid.identify.compare import compare
 from ferryid.identify.evaluate import evaluate, render_evaluation
 from ferryid.identify.model import Model
+from ferryid.identify.physics_rows import render_effects
 from ferryid.identify.store import load_file
 from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.simulate.vessel_model import sailed_by
@@ -403,15 +405,18 @@ def test_a_wrong_hull_model_becomes_the_hull(fouled: str) -> None:
 
 def test_compare_tells_the_difference_in_physics(model: Model, fouled: str, folder: Path) -> None:
     clean = replace(model.undiagnosed(), version=7)
-    result = compare(clean, model, [fouled], folder / "out", progress=quiet)
-    assert result["logs"][0]["b_over_a"]["surge"]["value"] < 0.8
+    field = line_up(["clean", "found"], [clean, model])
+    result = compare(field, [fouled], folder / "out", progress=quiet).json
+    pair = result["logs"][0]["pairs"][-1]
+    assert (pair["first"], pair["second"]) == (clean.label, model.label)
+    assert pair["mse"]["surge"]["value"] > 1.25
+    assert result["logs"][0]["scores"][model.label]["trained"]
     assert [(row["effect"], row["log"]) for row in result["effects"]] == [("fouling", None), ("wind", "fouled")]
-    assert result["effects"][0]["a"] is None
-    text = render_comparison(result)
+    assert result["effects"][0]["values"][clean.label] is None
+    text = render_effects(result["effects"])
     assert "Fouling, a property of the vessel" in text
-    assert "A: not in it" in text
+    assert f"  {clean.label}: not in it" in text
     assert "Steady wind, a condition of fouled" in text
-    assert compare(model, model, [], folder / "out", progress=quiet)["effects"] == []
 
 
 def test_nothing_is_left_to_find_in_a_log_of_the_model(model: Model, folder: Path) -> None:

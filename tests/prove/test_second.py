@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.remodel import blank, keep
+from ferryid.diagnose.remodel import keep
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model
+from ferryid.identify.model import Model, blank
 from ferryid.identify.predict import Prediction
 from ferryid.identify.stored_effect import Conditions, Quantity, Source, StoredEffect
 from ferryid.prove.rivals import stepwise

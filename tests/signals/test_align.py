@@ -307,3 +307,18 @@ def test_real_recordings_align(
     assert any(said in sentence for sentence in track.repairs)
     for name in ("u", "v", "r"):
         assert np.isfinite(track.columns[name][track.valid]).all()
+
+
+def test_a_desired_pose_holds_until_the_next_and_is_no_actuator() -> None:
+    t = np.arange(0.0, 60.0, 0.05)
+    # A new goal every 10 s, the heading once through a full turn.
+    goals = np.arange(0.0, 60.0, 10.0)
+    wanted = stream("/goal", goals, {"x_d": 5.0 * goals, "psi_d": np.array([3.0, 3.1, -3.1, -3.0, -2.9, -2.8])})
+    track = align(recording(navigation(t), thrusters(t), wanted), PROFILE)
+    at = absolute(track)
+    np.testing.assert_allclose(track.columns["x_d"], 50.0 * np.floor(at / 10.0 + 1e-9))
+    turned = track.columns["psi_d"][(at > 25.0) & (at < 29.0)]
+    np.testing.assert_allclose(turned, 2 * np.pi - 3.1)
+    assert track.valid.all()
+    with pytest.raises(FerryIdError, match="no actuator signal to align"):
+        align(recording(navigation(t), wanted), PROFILE)

@@ -43,7 +43,8 @@ def test_mcap_without_a_profile() -> None:
     assert "header stamps were not read" in text
     (match,) = (one for one in result["bundled"] if one["name"] == "milliampere")
     assert match["usable"]
-    assert match["found"] == match["signals"] - 2  # current and payload, which this log does not have
+    # Current, payload and the desired pose, which this log does not have.
+    assert match["found"] == match["signals"] - 4
     assert "milliampere: fits" in text
     assert "Lost: nothing" in text
 
@@ -52,7 +53,7 @@ def test_mcap_with_its_profile_shows_signals_in_si() -> None:
     result, text = look(FIXTURES / "short.bag", "milliampere")
     vessel = result["vessel"]
     assert vessel["usable"]
-    assert set(vessel["missing"]) == {"current", "payload"}
+    assert set(vessel["missing"]) == {"current", "payload", "position_d", "heading_d"}
     surge = vessel["streams"]["/navigation/odometry"]["signals"]["u"]
     assert surge["unit"] == "m/s"
     assert -1 < surge["minimum"] < surge["maximum"] < 2

@@ -73,10 +73,17 @@ def test_every_format_holds_every_message(trial, tmp_path, name):
 
 def test_topics_are_those_of_the_bundled_profile(trial):
     topics = {stream.topic for stream in trial.streams}
-    asked = {signal.topic for signal in trial.profile.signals} - {"/weather/current", "/payload/waterline"}
+    asked = {signal.topic for signal in trial.profile.signals} - {
+        *("/weather/current", "/payload/waterline", "/control/reference")
+    }
     assert topics == {*asked, "/imu/data", "/camera/image/compressed"}
     sensors = replace(
-        trial.scenario.sensors, current_rate_hz=2.0, payload_rate_hz=2.0, imu_rate_hz=0.0, camera_rate_hz=0.0
+        trial.scenario.sensors,
+        current_rate_hz=2.0,
+        payload_rate_hz=2.0,
+        reference_rate_hz=2.0,
+        imu_rate_hz=0.0,
+        camera_rate_hz=0.0,
     )
     more = simulate(replace(trial.scenario, duration_s=2.0, sensors=sensors))
     assert {stream.topic for stream in more.streams} == {signal.topic for signal in trial.profile.signals}

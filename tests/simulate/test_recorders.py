@@ -34,7 +34,7 @@ def trial():
         duration_s=8.0,
         waves=Waves(significant_height_m=0.2),
         payload=(Payload(300.0, 0.5, 4.0),),
-        sensors=replace(scenario.sensors, current_rate_hz=2.0, payload_rate_hz=2.0),
+        sensors=replace(scenario.sensors, current_rate_hz=2.0, payload_rate_hz=2.0, reference_rate_hz=2.0),
     )
     return simulate(scenario)
 

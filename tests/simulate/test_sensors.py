@@ -319,6 +319,22 @@ def test_a_longer_trial_begins_like_a_shorter_one():
             np.testing.assert_array_equal(values[:n], two.columns[path][:n])
 
 
+def test_the_reference_is_the_desired_pose_of_its_cycle():
+    m = round(END_S / 0.05)
+    wanted = np.column_stack((np.arange(m) * 0.1, np.arange(m) * -0.2, 0.01 * np.arange(m)))
+    asked = scenario(reference_rate_hz=4.0)
+    stream = streams(asked, eta_d=wanted)["/control/reference"]
+    t = taken(stream, asked)
+    assert np.diff(t) == pytest.approx(0.25)
+    rows = np.floor(t / 0.05 + 1e-6).astype(int)
+    assert stream.columns["pose.position.y"] == pytest.approx(wanted[rows, 1])
+    # Level, so that the turn about z is all.
+    yaw = attitude(stream, "pose.orientation")[:, 0]
+    assert np.cos(yaw - wanted[rows, 2]) == pytest.approx(1.0)
+    assert "/control/reference" not in streams(scenario())
+    assert "/control/reference" not in streams(replace(asked, manoeuvre=Manoeuvre(kind="zigzag")))
+
+
 def test_a_manoeuvre_has_no_desired_force():
     asked = scenario()
     assert "/control/tau_d" in streams(asked)

@@ -288,6 +288,17 @@ CASES = {
         '[signals.position]\ntopic = "/p"\nfields = ["x", "y"]\nunit = "m"@\nframe = "geodetic"\n[signals.yaw_rate]',
         "measures a length, but this is an angle",
     ),
+    "desired position from another origin": (
+        "[signals.yaw_rate]",
+        '[signals.position]\ntopic = "/p"\nfields = ["x", "y"]\nunit = "deg"\nframe = "geodetic"\n'
+        '[signals.position_d]@\ntopic = "/d"\nfields = ["x", "y"]\nunit = "m"\nframe = "NED"\n[signals.yaw_rate]',
+        "position from its first fix",
+    ),
+    "desired position alone": (
+        "[signals.yaw_rate]",
+        '[signals.position_d]@\ntopic = "/d"\nfields = ["x", "y"]\nunit = "m"\nframe = "NED"\n[signals.yaw_rate]',
+        "there is no position",
+    ),
     "bow wind without heading": (
         "[signals.yaw_rate]",
         '[signals.wind]@\ntopic = "/w"\nspeed = "s"\nunit = "m/s"\ndirection = "d"\ndirection_unit = "deg"\n'

@@ -277,6 +277,19 @@ def test_commanded_force_in_kilonewtons_and_flu() -> None:
     }
 
 
+def test_a_desired_pose_in_enu() -> None:
+    text = WORLD + (
+        '[signals.position_d]\ntopic = "/goal"\nfields = ["e", "n"]\nunit = "km"\nframe = "ENU"\n'
+        '[signals.heading_d]\ntopic = "/goal"\nfield = "yaw"\nunit = "deg"\nframe = "ENU"\n'
+    )
+    columns = convert(profile(text), series("/goal", e=[0.3], n=[0.1], yaw=[30.0]))
+    assert {name: values.tolist() for name, values in columns.items()} == {
+        "x_d": [pytest.approx(100.0)],
+        "y_d": [pytest.approx(300.0)],
+        "psi_d": [pytest.approx(math.radians(60.0))],
+    }
+
+
 def test_throttle_in_per_cent() -> None:
     text = (HEAD + BODY).replace('field = "rpm"\nunit = "rpm"', 'field = "rpm"\nunit = "%"\nfull_rpm = 1200.0', 1)
     columns = convert(parse_profile(text, "boat.toml"), series("/t1", rpm=[-50.0], **{"angle[1]": [180.0]}))

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ferryid.identify.judge import force_mse
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.settings import FitSettings
+from ferryid.identify.tracking import MEASURES
 from ferryid.report.drawing import Drawing
 from ferryid.reproduce.flight import Campaign, Flight, campaign, controlled, fly, master_round, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, hull_alone, learn
-from ferryid.reproduce.performance import MEASURES
 from ferryid.reproduce.pictures import integrals
 from ferryid.reproduce.study import Row, Study, Table, change, changes, number, percent, spread
 from ferryid.reproduce.variants import noiseless, prompt

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.model import AXES
+from ferryid.identify.tracking import signal_power
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, learn
-from ferryid.reproduce.performance import signal_power
 from ferryid.reproduce.pictures import control_shares
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from ferryid.identify.judge import force_mse
 from ferryid.identify.model import AXES
+from ferryid.identify.tracking import MEASURES
 from ferryid.reproduce.flight import campaign, trial
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, hull_alone
-from ferryid.reproduce.performance import MEASURES
 from ferryid.reproduce.study import Study, Table, change, median, percent, spread
 from ferryid.reproduce.variants import noiseless, prompt, stronger, windier
 from ferryid.simulate.scenario import Scenario

@@ -1,0 +1,216 @@
+"""Figures of a comparison; each model has its colour, its mark and its dashes in all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from numpy.typing import NDArray
+
+from ferryid.identify.compare import Trial
+from ferryid.identify.model import AXES
+from ferryid.report.figures import MEASURED, STYLE, SYMBOLS, UNITS, canvas, legend_above, margins, svg_text
+from ferryid.report.structure import envelope
+
+Floats = NDArray[np.float64]
+Row = dict[str, Any]
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Okabe and Ito's, which the colour-blind tell apart."""
+MARKS = ("o", "s", "^", "D", "v", "P")
+DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1.5, 1.5)))
+GREY = "#777777"
+MINUTE_S = 60.0
+TICKS = (
+    tuple(10.0**k for k in range(-12, 13)),
+    tuple(m * 10.0**k for k in range(-3, 4) for m in (1.0, 3.0)),
+    tuple(m * 10.0**k for k in range(-2, 3) for m in (1.0, 2.0, 5.0)),
+    (0.5, 0.7, 1.0, 1.5, 2.0, 3.0),
+    (0.64, 0.8, 1.0, 1.25, 1.6),
+)
+"""Round numbers for a logarithmic axis, the sparsest first."""
+WILD = 3.0
+"""An estimate whose error is this many times the least may leave the frame, lest it flatten the others."""
+
+
+def looks(models: Sequence[Row]) -> dict[str, dict[str, Any]]:
+    """Return colour, mark and dashes of every model by its label; the base model is grey."""
+    found: dict[str, dict[str, Any]] = {}
+    k = 0
+    for model in models:
+        if model["base"]:
+            found[model["label"]] = {"color": GREY, "marker": "x", "linestyle": (0, (2, 2))}
+            continue
+        found[model["label"]] = {
+            "color": COLOURS[k % len(COLOURS)],
+            "marker": MARKS[k % len(MARKS)],
+            # Dashes set models of one colour apart, the seventh from the first.
+            "linestyle": DASHES[k // len(COLOURS) % len(DASHES)],
+        }
+        k += 1
+    return found
+
+
+def over_reference(scope: Row, label: str, reference: str) -> Row:
+    """Return the part of a scope that holds a model's ratios over a reference's; turned round where it holds the inverse."""
+    for pair in scope["pairs"]:
+        if (pair["first"], pair["second"]) == (label, reference):
+            return {"mse": pair["mse"], "free_run": pair["free_run"]}
+        if (pair["first"], pair["second"]) == (reference, label):
+            return {
+                "mse": {axis: _inverse(ratio) for axis, ratio in pair["mse"].items()},
+                "free_run": {key: [_inverse(one) for one in ratios] for key, ratios in pair["free_run"].items()},
+            }
+    raise KeyError(label)
+
+
+def _inverse(ratio: Row) -> Row:
+    def over(value: float | None) -> float | None:
+        return None if not value else 1.0 / value
+
+    return {"value": over(ratio["value"]), "low": over(ratio["high"]), "high": over(ratio["low"])}
+
+
+def mse_ratios(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> str:
+    """Mean squared force error of every model over a reference's, per axis and log, with 95 % intervals."""
+    look = looks(result["models"])
+    labels = [model["label"] for model in result["models"] if model["label"] != reference]
+    rows = len(shown) * (len(labels) + 1)
+    with mpl.rc_context(STYLE):
+        figure = margins(1.25 + 0.21 * rows, top=0.3 + 0.2 * ((len(labels) + 2) // 3), left=0.15, between=(0.08, 0.1))
+        panels = figure.subplots(1, 3, sharey=True)
+        for j, (ax, axis) in enumerate(zip(panels, AXES, strict=True)):
+            spans = []
+            for group, (title, scope) in enumerate(shown):
+                top = -group * (len(labels) + 1)
+                if j == 0:
+                    ax.annotate(title, (0.02, top), xycoords=("axes fraction", "data"), fontsize=9, va="center")
+                for k, label in enumerate(labels):
+                    ratio = over_reference(scope, label, reference)["mse"][axis]
+                    if ratio["value"] is None:
+                        continue
+                    y = top - 1 - k
+                    known = ratio["low"] is not None and ratio["high"] is not None
+                    if known:
+                        ax.plot((ratio["low"], ratio["high"]), (y, y), color=look[label]["color"], linewidth=1.6)
+                    ax.plot(
+                        ratio["value"],
+                        y,
+                        marker=look[label]["marker"],
+                        color=look[label]["color"],
+                        # Hollow: without an interval.
+                        markerfacecolor=look[label]["color"] if known else "white",
+                        markersize=5,
+                        linestyle="none",
+                        label=label if group == 0 else "_nolegend_",
+                    )
+                    spans += [one for one in (ratio["value"], ratio["low"], ratio["high"]) if one]
+            ax.axvline(1.0, color=MEASURED, linewidth=0.8)
+            _ratio_axis(ax, spans)
+            ax.set_title(axis, fontsize=10)
+            ax.set_yticks([])
+            ax.set_ylim(-rows + 0.4, 0.6)
+        panels[1].set_xlabel(f"MSE over that of {reference}")
+        legend_above(figure, panels[0], 3)
+        return svg_text(figure)
+
+
+def _ratio_axis(ax: Any, spans: Sequence[float]) -> None:
+    """Give a logarithmic axis plain numbers, and room on both sides of one."""
+    low, high = min((*spans, 0.8)), max((*spans, 1.25))
+    ax.set_xscale("log")
+    ax.set_xlim(low / 1.15, high * 1.15)
+    _plain_ticks(ax.xaxis, low, high)
+
+
+def _plain_ticks(axis: Any, low: float, high: float) -> None:
+    """Mark a logarithmic axis at round numbers, at least three of them."""
+    inside = next((ticks for ticks in TICKS if sum(low <= tick <= high for tick in ticks) >= 3), TICKS[-1])
+    axis.set_major_locator(FixedLocator(inside))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def forces(result: Row, trial: Trial, start_s: float | None) -> str:
+    """Measured force and every model's estimate in the minute of a log that starts at `start_s`; in all of it where None."""
+    look = looks(result["models"])
+    with mpl.rc_context(STYLE):
+        figure, axes = canvas(3, 5.4, top=0.3 + 0.2 * ((len(look) + 3) // 3))
+        t = trial.motion.t
+        first, last = (t[0], t[-1]) if start_s is None else (start_s, start_s + MINUTE_S)
+        inside = np.flatnonzero((t >= first) & (t <= last))
+        missing = np.where(trial.rows[inside, None], 1.0, np.nan)
+        for j, ax in enumerate(axes):
+            measured = (trial.motion.tau[inside] * missing)[:, j]
+            ax.plot(*envelope(t[inside], measured), color=MEASURED, linewidth=2.0, label="measured")
+            for k, (label, tau) in enumerate(zip(look, trial.taus, strict=True)):
+                style = {key: value for key, value in look[label].items() if key != "marker"}
+                x, y = envelope(t[inside], (tau[inside] * missing)[:, j])
+                ax.plot(
+                    x,
+                    y,
+                    marker=look[label]["marker"],
+                    markevery=(k * len(x) // (8 * len(look)), max(1, len(x) // 8)),
+                    markersize=3.5,
+                    label=label,
+                    **style,
+                )
+            _frame(ax, trial.motion.tau[inside][trial.rows[inside], j], trial.taus[:, inside][:, trial.rows[inside], j])
+            ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
+        axes[-1].set_xlabel("time [s]")
+        legend_above(figure, axes[0], 3)
+        return svg_text(figure)
+
+
+def _frame(ax: Any, measured: Floats, estimates: Floats) -> None:
+    """Frame the measurement, shape (n,), and those of the estimates, shape (m, n), that are not wild."""
+    error = np.mean((estimates - measured) ** 2, axis=1)
+    tame = estimates[error <= WILD**2 * error.min()]
+    values = np.concatenate([measured, tame.ravel()])
+    if np.ptp(values) > 0.0:
+        margin = 0.08 * np.ptp(values)
+        ax.set_ylim(values.min() - margin, values.max() + margin)
+
+
+def free_runs(result: Row, scope: Row, reference: str) -> str:
+    """Free-run errors against horizon, and below them their ratios over a reference's with 95 % intervals."""
+    look = looks(result["models"])
+    horizons = np.array(scope["free_run"]["horizons_s"])
+    with mpl.rc_context(STYLE):
+        figure = margins(5.0, top=0.3 + 0.2 * ((len(look) + 2) // 3), between=(0.3, 0.12))
+        grid = figure.subplots(2, 2, sharex=True)
+        for column, (key, name, unit, factor) in enumerate(
+            (("position_m", "position", "m", 1.0), ("heading_rad", "heading", "deg", float(np.degrees(1.0))))
+        ):
+            upper, lower = grid[:, column]
+            spans: list[float] = []
+            others = [label for label in look if label != reference]
+            for label in look:
+                if not any(scope["scores"][label]["free_run"][key]):
+                    continue
+                errors = np.array(scope["scores"][label]["free_run"][key], dtype=float)
+                upper.plot(horizons, errors * factor, markersize=4, label=label, **look[label])
+            for k, label in enumerate(others):
+                ratios = over_reference(scope, label, reference)["free_run"][key]
+                value, low, high = (
+                    np.array([one[part] for one in ratios], dtype=float) for part in ("value", "low", "high")
+                )
+                # Side by side, so that no interval hides another.
+                at = horizons * 1.04 ** (k - (len(others) - 1) / 2)
+                lower.plot(at, value, markersize=4, **look[label])
+                lower.vlines(at, low, high, color=look[label]["color"], linewidth=1.6)
+                spans += [float(one) for one in (*value, *low, *high) if np.isfinite(one) and one > 0.0]
+            upper.set_ylabel(f"{name} error [{unit}]")
+            upper.set_ylim(bottom=0)
+            lower.axhline(1.0, color=MEASURED, linewidth=0.8)
+            bottom, top = min((*spans, 0.8)), max((*spans, 1.25))
+            lower.set_yscale("log")
+            lower.set_ylim(bottom / 1.1, top * 1.1)
+            _plain_ticks(lower.yaxis, bottom, top)
+            lower.set_ylabel(f"{name}, over {reference}")
+            lower.set_xlabel("horizon [s]")
+        legend_above(figure, grid[0, 0], 3)
+        return svg_text(figure)

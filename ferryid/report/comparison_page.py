@@ -1,0 +1,107 @@
+"""A comparison of models as one HTML page that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ferryid.identify.compare import Trial
+from ferryid.identify.model import AXES
+from ferryid.identify.physics_rows import render_effects
+from ferryid.report import comparison_figures, comparison_words
+from ferryid.report.html import template
+from ferryid.report.structure import worst_minute
+
+Row = dict[str, Any]
+
+MAX_LOGS = 6
+"""Logs that are drawn; the page stays readable."""
+
+
+def render(result: Row, trials: Sequence[Trial], made: Mapping[str, str]) -> tuple[str, dict[str, str]]:
+    """Return the page and its drawings (SVG) by name; `made` are date, version and command."""
+    known = comparison_words.scopes(result)
+    reference = result["models"][0]["label"]
+    # What counts most comes first: all logs together.
+    ordered = [*known[len(result["logs"]) :], *known[: len(result["logs"])]]
+    drawn = [trial.name for trial in trials[:MAX_LOGS]]
+    left = [trial.name for trial in trials[MAX_LOGS:]]
+    shown = [(title, scope) for on, title, scope in ordered if on is None or on in drawn]
+    overall = _overall(result, shown, reference) if shown else []
+    sections = []
+    for on, title, scope in ordered:
+        trial = next((one for one in trials[:MAX_LOGS] if one.name == on), None)
+        sections.append(
+            {
+                "title": title,
+                "about": comparison_words.about(scope),
+                "heads": comparison_words.score_columns(scope),
+                "rows": comparison_words.score_rows(result, scope),
+                "sentences": comparison_words.sentences(result, on),
+                "tracking": comparison_words.tracking_line(scope),
+                "warnings": scope.get("warnings", ()),
+                "figures": _figures(result, trial) if trial is not None else [],
+            }
+        )
+    labels = [model["label"] for model in result["models"]]
+    page = template("compare.html").render(
+        title=" · ".join([result["vessel"], *(model["label"] for model in result["models"] if not model["base"])]),
+        headline=comparison_words.headline(result),
+        made=made,
+        warnings=result["warnings"],
+        models=[(model["label"], comparison_words.model_line(model)) for model in result["models"]],
+        overall=overall,
+        sections=sections,
+        about_p=comparison_words.ABOUT_P if known else "",
+        omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
+        labels=labels,
+        axes=AXES,
+        coefficients=[_cells(row, labels) for row in comparison_words.coefficient_table(result)],
+        terms=[
+            _cells({"name": f"{row['term']} in {row['axis']}", **row}, labels)
+            for row in result["coefficients"]["terms"]
+        ],
+        effects=[line.strip() for line in render_effects(result["effects"])],
+    )
+    figures = [*overall, *(figure for section in sections for figure in section["figures"])]
+    return page, {figure["file"]: figure["svg"] for figure in figures}
+
+
+def _overall(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> list[dict[str, str]]:
+    title, scope = shown[0]
+    figures = [
+        {
+            "file": "mse-ratios",
+            "svg": comparison_figures.mse_ratios(result, shown, reference),
+            "caption": f"Mean squared force error over that of {reference}, with 95 % intervals from blocks of each log, in "
+            "pairs; left of the line is better. Hollow marks have too few blocks for an interval.",
+        }
+    ]
+    if any(scope["free_run"]["counted"]):
+        figures.append(
+            {
+                "file": "free-runs",
+                "svg": comparison_figures.free_runs(result, scope, reference),
+                "caption": f"Free runs on {title}: root-mean-square error against horizon, all from the same starts, each "
+                f"with the measured state once and then only the measured forces. Below: over that of {reference}, with 95 % "
+                "intervals where there are enough runs that do not overlap.",
+            }
+        )
+    return figures
+
+
+def _figures(result: Row, trial: Trial) -> list[dict[str, str]]:
+    start = worst_minute(trial.motion, trial.taus, trial.rows, comparison_figures.MINUTE_S)
+    which = "This log" if start is None else f"The minute in which the models err most, from {start:.0f} s"
+    return [
+        {
+            "file": f"forces-{trial.name}" + ("" if start is None else "-worst-minute"),
+            "svg": comparison_figures.forces(result, trial, start),
+            "caption": f"{which}: force measured at the actuators, and what each model makes of the same motion.",
+        }
+    ]
+
+
+def _cells(row: Row, labels: Sequence[str]) -> Row:
+    cells = [comparison_words.cell(row["values"].get(label)) for label in labels]
+    return {"name": row["name"], "unit": row["unit"], "cells": cells}

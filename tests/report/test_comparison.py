@@ -1,0 +1,134 @@
+"""A comparison in words: what is shown, what may be, and what is left open; and its figures' bookkeeping."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ferryid.files import finite
+from ferryid.identify.candidates import BASE
+from ferryid.identify.paired import Paired, compare_paired
+from ferryid.identify.verdicts import Judged, chance, verdicts
+from ferryid.report import comparison_words
+from ferryid.report.comparison_figures import looks, over_reference
+
+HORIZONS = (5.0, 30.0)
+
+
+def paired(size: dict[tuple[int, int], float], p: float, m: int, columns: int) -> Paired:
+    """Return ratios that are the same in all columns, with intervals of ten per cent and one probability."""
+    pairs = tuple((i, j) for i in range(m) for j in range(i + 1, m))
+    ratio = np.array([[size[pair]] * columns for pair in pairs])
+    return Paired(pairs, ratio, 0.9 * ratio, 1.1 * ratio, np.full(ratio.shape, p))
+
+
+def result(
+    labels: tuple[str, ...], p: float, trained: frozenset[str] = frozenset(), step: float = 1.3
+) -> dict[str, Any]:
+    """Return a comparison in which every model errs `step` times more than the one before."""
+    m = len(labels)
+    size = {(i, j): step ** (i - j) for i in range(m) for j in range(i + 1, m)}
+    judged = Judged("log", labels, paired(size, p, m, 3), (paired(size, p, m, 4),) * 2, HORIZONS, 30.0, trained)
+    scope = {"rows": 10, "seconds": 1.0, "blocks": 9, "block_s": 30.0, "name": "log", "free_run": {"starts": 3}}
+    return finite(
+        {
+            "models": [{"label": label, "base": label == BASE} for label in labels],
+            "logs": [scope],
+            "pooled": None,
+            "better": verdicts(judged),
+        }
+    )
+
+
+def test_what_is_better_is_said_with_its_ratio_and_chance() -> None:
+    said = comparison_words.sentences(result(("one", "two"), 0.001), "log")
+    assert said[0] == "one is better than two on surge (p 0.005): its MSE is 0.769 of the other's [0.692, 0.846]"
+    # Errors of free runs are not squared.
+    assert "one is better than two in heading, run free for 30 s (p 0.005): its heading error is 0.877 of" in said[4]
+    assert len(said) == 5
+
+
+def test_the_better_one_comes_first_whichever_was_named_first() -> None:
+    row = result(("one", "two"), 0.001, step=1.0 / 1.3)["better"][0]
+    assert (row["first"], row["better"]) == ("two", "two")
+    assert row["ratio"] == pytest.approx(1.0 / 1.3)
+    assert row["low"] < row["ratio"] < row["high"] < 1.0
+
+
+def test_what_the_number_of_comparisons_makes_doubtful_may_be() -> None:
+    said = comparison_words.sentences(result(("one", "two"), 0.03), "log")
+    assert said[0].startswith(
+        "one may be better than two on surge (p 0.03 by itself, 0.15 among all): its MSE is 0.769"
+    )
+
+
+def test_what_is_not_shown_is_one_sentence_for_two_models() -> None:
+    (said,) = comparison_words.sentences(result((BASE, "one"), 0.4), "log")
+    # The base model is what a model is held against.
+    assert said.startswith(
+        f"no difference shown between one and {BASE}, error of the first over the second's: surge 1.3 ["
+    )
+    assert said.count("p 1.00") == 5
+
+
+def test_alike_is_what_differs_by_next_to_nothing_however_surely() -> None:
+    row = result(("one", "two"), 0.0001, step=1.004)["better"][0]
+    assert row["better"] is None
+    assert row["says"] == "one and two are alike on surge: their MSE differs by less than 0.5%"
+
+
+def test_many_models_are_held_against_the_best() -> None:
+    labels = ("a", "b", "c", "d", "e")
+    said = comparison_words.sentences(result(labels, 0.0001), "log")
+    assert len(said) == 4 * 5
+    assert all(sentence.startswith("a is better than ") for sentence in said)
+    unclear = comparison_words.sentences(result(labels, 0.9), "log")
+    assert len(unclear) == 5
+    assert unclear[0].startswith("on surge, a errs least, but no difference is shown: its error over that of b 0.769 [")
+    # Holm's first factor is the number of all pairs, not of those that are told.
+    assert result(labels, 0.0001)["better"][0]["p_corrected"] == pytest.approx(10 * 5 * 0.0001)
+
+
+def test_what_has_seen_the_log_is_no_evidence() -> None:
+    rows = result(("one", "two"), 0.001, frozenset({"one"}))
+    assert rows["better"][0]["says"].endswith("; no evidence, as one has learnt from this log")
+    assert "where it was trained, which is no evidence" in comparison_words.headline(rows)
+    assert result(("one", "two"), 0.001, frozenset({"two"}))["better"][0]["evidence"]
+
+
+@pytest.mark.parametrize(
+    ("p", "told"), [(0.001, "one on surge, sway and yaw, beyond chance."), (0.5, "which may be chance.")]
+)
+def test_the_headline_says_who_errs_least_and_how_surely(p: float, told: str) -> None:
+    assert comparison_words.headline(result(("one", "two", BASE), p)).endswith(told)
+
+
+def test_too_few_blocks_are_too_little_data() -> None:
+    few = np.random.default_rng(1).gamma(3.0, 1.0, (3, 2, 3))
+    runs = compare_paired([few[:, :, [0, 1, 2, 0]]])
+    judged = Judged("log", ("one", "two"), compare_paired([few]), (runs, runs), HORIZONS, None, frozenset())
+    rows = verdicts(judged)
+    # Without a horizon that has intervals, free runs have no sentence.
+    assert [row["what"] for row in rows] == ["surge", "sway", "yaw"]
+    assert all(row["says"].startswith("too little data to tell") for row in rows)
+
+
+def test_chances_are_short() -> None:
+    assert [chance(p) for p in (0.0001, 0.0123, 0.049, 0.31, 1.0)] == ["0.0001", "0.01", "0.05", "0.31", "1.00"]
+
+
+def test_no_two_of_many_models_look_alike() -> None:
+    models = [{"label": str(k), "base": k == 0} for k in range(20)]
+    seen = [(look["color"], look["marker"], look["linestyle"]) for look in looks(models).values()]
+    assert len(set(seen)) == 20
+
+
+def test_a_ratio_over_a_reference_is_turned_round_with_its_interval() -> None:
+    ratio = {"value": 2.0, "low": 1.6, "high": 4.0, "p": 0.1}
+    scope = {"pairs": [{"first": BASE, "second": "one", "mse": {"sway": ratio}, "free_run": {"position_m": [ratio]}}]}
+    turned = over_reference(scope, "one", BASE)
+    assert turned["mse"]["sway"] == {"value": 0.5, "low": 0.25, "high": 0.625}
+    assert turned["free_run"]["position_m"] == [turned["mse"]["sway"]]
+    assert over_reference(scope, BASE, "one")["mse"]["sway"] is ratio
