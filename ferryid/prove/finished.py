@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ferryid.batch.spread import Spread
 from ferryid.files import finite, unwritable
-from ferryid.prove.spread import Spread
 
 T = TypeVar("T")
 

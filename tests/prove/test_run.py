@@ -18,16 +18,16 @@ from typing import Any
 import jsonschema
 import pytest
 
+from ferryid.batch.spread import spread
 from ferryid.errors import FerryIdError
 from ferryid.files import unwritable
 from ferryid.prove import run as running
 from ferryid.prove.finished import carry_out, finished
 from ferryid.prove.run import prove, render_proof
 from ferryid.prove.seal import verified
-from ferryid.prove.spread import spread
 from ferryid.prove.tasks import Log, diagnosed
+from tests.batch.work import ended, environment
 from tests.prove.pretend import PARTS, TALLY, chatty, counted
-from tests.prove.work import ended, environment
 
 
 @pytest.fixture(autouse=True)

@@ -17,13 +17,15 @@ def square(item: tuple[str, int, str]) -> tuple[int, int]:
     Parameters
     ----------
     item
-        Folder of the files, number, and what becomes of it: ``dies`` for good, ``dies once``, ``raises`` or ``sleeps``.
+        Folder of the files, number, and what becomes of it: ``dies`` for good, ``dies once``, ``raises``, ``lingers`` or ``sleeps``.
     """
     folder, number, fate = item
     with (Path(folder) / str(number)).open("a") as file:
         file.write(f"{os.getpid()}\n")
     if fate == "dies" or (fate == "dies once" and calls(Path(folder), number) == 1):
         os.kill(os.getpid(), signal.SIGKILL)
+    if fate == "lingers":
+        time.sleep(2.0)
     if fate == "raises":
         raise KeyError(f"number {number}")
     time.sleep(60.0 if fate == "sleeps" else 0.05)
