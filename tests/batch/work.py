@@ -17,7 +17,7 @@ def square(item: tuple[str, int, str]) -> tuple[int, int]:
     Parameters
     ----------
     item
-        Folder of the files, number, and what becomes of it: ``dies`` for good, ``dies once``, ``raises``, ``lingers`` or ``sleeps``.
+        Folder of the files, number, and its fate: ``dies`` for good, ``dies once``, ``raises``, ``lingers`` or ``sleeps``.
     """
     folder, number, fate = item
     with (Path(folder) / str(number)).open("a") as file:
