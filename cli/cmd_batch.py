@@ -44,5 +44,5 @@ def command(
         progress=progress, tell=tell,
     )  # fmt: skip
     emit(result, render_batch(result), json)
-    if result["counts"]["done"] == 0:
+    if not result["counts"]["done"] + result["counts"]["partly"]:
         raise typer.Exit(2)

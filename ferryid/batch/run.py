@@ -209,14 +209,8 @@ def _carry_out(
             rows[numbers[number]] = tasks[number].folder, row
             left = f", {told_time(remaining.seconds(number, time.monotonic() - start))} left"
             if row["status"] != DONE:
-                tell(f"{row['status']}: {_shortly(tasks[number], row)}")
+                tell(f"{row['status']}: {tasks[number].log}: {row['reason']}")
             show()
-
-
-def _shortly(task: Task, row: Row) -> str:
-    """Return why a log went wrong, with its name, unless the reason begins with it."""
-    reason = str(row["reason"])
-    return reason if reason.startswith((task.log, f"{task.name}:")) else f"{task.name}: {reason}"
 
 
 def _summed_up(

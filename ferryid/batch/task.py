@@ -21,8 +21,9 @@ from ferryid.files import alone, finite, unwritable
 
 # Heavy packages are imported by the work itself, so that what it needs of memory is counted.
 
-DONE, REFUSED, FAILED, MEMORY, LOST = STATUSES = ("done", "refused", "failed", "memory", "lost")
-"""How a log ends: done; input that cannot be used; a bug of ours; more memory than there may be; its process died."""
+DONE, PARTLY, REFUSED, FAILED, MEMORY, LOST = STATUSES = ("done", "partly", "refused", "failed", "memory", "lost")
+"""How a log ends: done; some steps cannot use it; it cannot be used; a bug of ours; more memory than there may be; its process
+died."""
 TRACEBACK = "traceback.txt"
 _one_at_a_time = threading.Lock()
 """Memory is counted by process: a worker of a cluster with several threads does one log after the other."""
@@ -160,10 +161,23 @@ def _carry_out(task: Task, row: Row) -> None:
     row["seconds"]["read"] = time.perf_counter() - begun
     del recording
     job = Job(task.log, task.name, profile, model, task.recipe, task.folder, task.tables)
+    refused = {}
     for step in task.recipe.steps:
         begun = time.perf_counter()
-        row[step] = CARRY_OUT[step](job)
+        try:
+            row[step] = CARRY_OUT[step](job)
+        except FerryIdError as error:
+            status, reason = _told(task, error)
+            if status != REFUSED:
+                raise
+            # A log too short for a fit may well be evaluated.
+            refused[step] = reason
         row["seconds"][step] = time.perf_counter() - begun
+    if refused:
+        row["status"] = REFUSED if len(refused) == len(task.recipe.steps) else PARTLY
+        row["reason"] = "; ".join(f"{step}: {reason}" for step, reason in refused.items())
+        if len(set(refused.values())) == 1 and row["status"] == REFUSED:
+            row["reason"] = next(iter(refused.values()))
 
 
 def _told(task: Task, error: Exception) -> tuple[str, str]:
@@ -183,7 +197,8 @@ def _told(task: Task, error: Exception) -> tuple[str, str]:
                 f"needs more than {memory.told_bytes(task.memory_bytes)} of memory. Fix: give more with --memory",
             )
     if isinstance(error, FerryIdError):
-        return REFUSED, str(error)
+        # Whoever tells it says of which log.
+        return REFUSED, str(error).removeprefix(f"{task.log}: ").removeprefix(f"{task.name}: ")
     if isinstance(error, OSError):
         return REFUSED, one_line(
             f"{error.filename or task.log}: {error.strerror or error}. Fix: check the file and the disk"

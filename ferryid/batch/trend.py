@@ -33,7 +33,9 @@ WITH_THE_REST = {"gusts": ("time_constant",), "waves": ("time_constant", "peak_f
 
 
 def trends_of(rows: Sequence[Mapping[str, Any]], profiles: Mapping[str, Profile]) -> list[dict[str, Any]]:
-    """Return every parameter of every effect that was found with some certainty, over the logs of its vessel.
+    """Return every parameter of every effect that was found, over the logs of its vessel.
+
+    Hints count as well: what is doubtful in each of many logs, and yet moves with their dates, is so less.
 
     Parameters
     ----------
@@ -56,13 +58,9 @@ def trends_of(rows: Sequence[Mapping[str, Any]], profiles: Mapping[str, Profile]
             own.sort(key=lambda row: datetime.fromisoformat(row["date"]))
         for key, name in parameters_of(own).values():
             several = [found_in(row, key) for row in own]
-            if name not in NO_TREND and any(_sure(one, name) for one in several):
+            if name not in NO_TREND:
                 found.append(_trend(vessel, profile, own, several, key, name, dated))
     return found
-
-
-def _sure(finding: Any, name: str) -> bool:
-    return finding is not None and name in finding["parameters"] and finding["probability"] > HINT
 
 
 def _trend(
@@ -82,8 +80,7 @@ def _trend(
         where = {"log": row["name"], "date": row["date"], "place": place}
         if one is not None and name in one["parameters"]:
             points.append({**where, **one["parameters"][name], "probability": one["probability"]})
-            if _sure(one, name):
-                seen.append((place, one["parameters"][name]["value"]))
+            seen.append((place, one["parameters"][name]["value"]))
         elif one is None and row["diagnose"]["verdict"] != "not_testable":
             absent.append(where)
             if neutral is not None:
@@ -91,6 +88,9 @@ def _trend(
     places = [place for place, _ in seen]
     kind, change = trend([value for _, value in seen])
     unit = points[0]["unit"]
+    hints = sum(point["probability"] <= HINT for point in points)
+    doubt = f" ({hints} of {len(points)} findings are hints)" if hints else ""
+    what = f"{vessel}: {title}, {name.replace('_', ' ')}"
     return {
         "vessel": vessel,
         "effect": key[0],
@@ -104,7 +104,7 @@ def _trend(
         "absent": absent,
         "kind": kind,
         "change": change,
-        "says": _says(f"{vessel}: {title}, {name.replace('_', ' ')}", unit, kind, change, [rows[k] for k in places]),
+        "says": f"{_says(what, unit, kind, change, [rows[k] for k in places])}{doubt}" if kind else "",
     }
 
 
@@ -131,8 +131,8 @@ def trend(values: Sequence[float]) -> tuple[str | None, dict[str, float]]:
     Returns
     -------
     str, dict
-        Kind, and its numbers: ``chance`` that shuffled dates look as much like it; ``before`` and ``after``, of a step the
-        medians, of growth the ends of a straight line; of a step ``at``, the number of values before it.
+        Kind, and its numbers: ``chance`` that shuffled dates look as much like it; ``before`` and ``after``, the medians of
+        what is before and after a step, or of the first and the last third; of a step ``at``, the number of values before it.
     """
     y = np.asarray(values, dtype=np.float64)
     n = len(y)
@@ -154,7 +154,7 @@ def trend(values: Sequence[float]) -> tuple[str | None, dict[str, float]]:
     if one_step < CHANCE and (step < line or monotone >= CHANCE):
         before, after = float(np.median(y[:at])), float(np.median(y[at:]))
         return "steps", {"chance": one_step, "before": before, "after": after, "at": at}
-    ends = {"before": float(y.mean() + slope * order[0]), "after": float(y.mean() + slope * order[-1])}
+    ends = {"before": float(np.median(y[: n // 3])), "after": float(np.median(y[-(n // 3) :]))}
     return "grows" if slope > 0.0 else "falls", {"chance": monotone, **ends}
 
 
@@ -170,16 +170,13 @@ def _ranks(y: Floats) -> Floats:
     return np.asarray((ends - 0.5 * (counts - 1))[place])
 
 
-def _says(
-    what: str, unit: str, kind: str | None, change: Mapping[str, float], rows: Sequence[Mapping[str, Any]]
-) -> str:
-    if kind is None:
-        return ""
+def _says(what: str, unit: str, kind: str, change: Mapping[str, float], rows: Sequence[Mapping[str, Any]]) -> str:
     unit = "" if unit == "-" else f" {unit}"
-    ends = f"from {change['before']:.3g} to {change['after']:.3g}{unit}"
-    at = int(change.get("at", 0))
-    first, last = (rows[at - 1], rows[at]) if kind == "steps" else (rows[0], rows[-1])
-    return f"{what} {kind} {ends} between {_when(first)} and {_when(last)}"
+    before, after = (f"{change[end]:.3g}{unit}" for end in ("before", "after"))
+    if kind == "steps":
+        at = int(change["at"])
+        return f"{what} steps from {before} to {after} between {_when(rows[at - 1])} and {_when(rows[at])}"
+    return f"{what} {kind} from {before} to {after} (first and last third), {_when(rows[0])} to {_when(rows[-1])}"
 
 
 def _when(row: Mapping[str, Any]) -> str:

@@ -79,6 +79,8 @@ def errors(rows: Sequence[Mapping[str, Any]], dated: bool) -> str:
                         label=label,
                         markerfacecolor="none" if label == "base model" else colour,
                     )
+            ax.margins(y=0.15)
+            ax.autoscale_view()
             ax.set_ylim(bottom=0.0)
             ax.set_ylabel(f"{axis} [{unit}]")
         _horizontal(every, dated)

@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import groupby
+from os.path import commonpath
+from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
 
@@ -17,7 +19,8 @@ from ferryid.report.html import template
 
 WORDS = {
     "done": "done",
-    "refused": "refused: input that cannot be used",
+    "partly": "done in part",
+    "refused": "refused",
     "failed": "failed by a bug of ferryid",
     "memory": "needed more memory than allowed",
     "lost": "lost with their process",
@@ -35,9 +38,13 @@ def render(result: Mapping[str, Any]) -> str:
         Schema ``ferryid.batch/1``.
     """
     rows = [_row(row) for row in result["rows"]]
+    root = _common([row["log"] for row in rows])
+    for row in rows:
+        row["path"] = row["log"].removeprefix(root)
     counts, memory = result["counts"], result["memory"]
     return template("batch.html").render(
         rows=rows,
+        root=root,
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, ferryid {result['ferryid_version']}",
         headline=_headline(counts),
         counts=[(WORDS[name], counts[name]) for name in WORDS if counts[name] and counts["logs"] != counts[name]],
@@ -48,14 +55,30 @@ def render(result: Mapping[str, Any]) -> str:
         choices={name: sorted({row[name] for row in rows if row[name]}) for name in ("vessel", "status", "verdict")},
         effects=sorted({effect for row in rows for effect in row["effects"]}),
         dated=any(row["date"] for row in rows),
-        several_vessels=len({row["vessel"] for row in rows}) > 1,
+        vessels=sorted({row["vessel"] for row in rows}),
         noted=any(row["note"] for row in rows),
         steps=[step for step in ("fit", "evaluate", "diagnose") if step in result["recipe"]["steps"]],
         model=result["recipe"]["model"],
+        columns=_columns(result["recipe"]),
         memory=memory,
         gigabyte=1 << 30,
         took=sum(row["seconds"] for row in rows),
     )
+
+
+def _columns(recipe: Mapping[str, Any]) -> int:
+    """Return how many columns tell of results."""
+    steps = recipe["steps"]
+    return 2 * ("diagnose" in steps) + 2 * ("fit" in steps) + (1 + bool(recipe["model"])) * ("evaluate" in steps)
+
+
+def _common(logs: Sequence[str]) -> str:
+    """Return the folder that all logs are in, with a slash at its end, or nothing."""
+    try:
+        root = commonpath([str(PurePath(log).parent) for log in logs])
+    except ValueError:  # absolute and relative ones
+        return ""
+    return f"{root}/" if root.strip("./") else ""
 
 
 def _headline(counts: Mapping[str, int]) -> str:
@@ -86,19 +109,21 @@ def _row(row: Mapping[str, Any]) -> dict[str, Any]:
         "verdict": (diagnosis["verdict"] if diagnosis else "").replace("_", " "),
         "found": [{"name": _name(one), "says": one["says"]} for one in sure],
         "perhaps": [{"name": _name(one), "says": one["says"]} for one in findings if one not in sure],
-        "effects": list(dict.fromkeys(title(one["effect"]) for one in sure)),
+        "effects": list(dict.fromkeys(title(one["effect"]) for one in findings)),
         "fit": "" if fit is None else "accepted" if fit["accepted"] else "not accepted",
         "fit_mse": None if fit is None else fit["normalised_mse"],
         "warnings": len(fit["warnings"]) if fit else 0,
         "evaluated": None if evaluation is None else _mean_error(evaluation),
         "links": links,
+        "bare": not (fit or evaluation or diagnosis),
         "seconds": sum(row["seconds"].values()),
         "peak": row["peak_bytes"],
     }
 
 
 def _name(finding: Mapping[str, Any]) -> str:
-    return title(finding["effect"], finding["instance"])
+    name = title(finding["effect"], finding["instance"])
+    return name[:1].lower() + name[1:]
 
 
 def _mean_error(evaluation: Mapping[str, Any]) -> dict[str, Any]:
