@@ -102,9 +102,9 @@ class Kept:
     def __init__(self, results: Path) -> None:
         found = [(path, read_row(path)) for path in sorted(results.glob("*")) if path.is_dir()]
         self._rows = {folder: row for folder, row in found if row is not None}
-        self._stamps: dict[str, list[Mapping[str, str]]] = {}
-        for row in self._rows.values():
-            self._stamps.setdefault(json.dumps(row["files"]), []).append(row["stamp"])
+        self._folders: dict[str, list[Path]] = {}
+        for folder, row in self._rows.items():
+            self._folders.setdefault(json.dumps(row["files"]), []).append(folder)
 
     def of(
         self, folder: Path, files: list[list[Any]], stamp: Mapping[str, str], content: Callable[[], str | None]
@@ -125,10 +125,13 @@ class Kept:
         content
             Returns the log's hash, None where it cannot be read.
         """
-        row = self._rows.get(folder)
-        if row is not None and row["stamp"] == stamp and row["files"] == files:
-            return folder, row
-        alike = [*([folder] if row else []), *self._gone]
+        # Of a log that is not there, nothing but the place is known.
+        same = self._folders.get(json.dumps(files), []) if files else [folder]
+        for one in same:
+            row = self._rows.get(one)
+            if row is not None and row["stamp"] == stamp and row["files"] == files:
+                return one, row
+        alike = [*([folder] if folder in self._rows else []), *self._gone]
         alike = [one for one in alike if _alike(self._rows[one], files, stamp)]
         found = content() if alike else None
         for one in alike:
@@ -151,7 +154,7 @@ class Kept:
 
     def differing(self, files: list[list[Any]], stamp: Mapping[str, str]) -> set[str]:
         """Return in what earlier results of the same files differ from those that are asked for; empty where there are none."""
-        others = self._stamps.get(json.dumps(files), []) if files else []
+        others = [self._rows[one]["stamp"] for one in self._folders.get(json.dumps(files), [])] if files else []
         if not others or stamp in others:
             return set()
         nearest = min(others, key=lambda other: sum(other.get(name) != value for name, value in stamp.items()))

@@ -26,7 +26,7 @@ from ferryid.batch.spread import spread
 from ferryid.batch.summary import lines_of, table_of, write_table
 from ferryid.batch.task import DONE, STATUSES, Task, lost, work
 from ferryid.batch.trend import trends_of
-from ferryid.errors import FerryIdError
+from ferryid.errors import FerryIdError, one_line
 from ferryid.files import alone, dump_json, finite, write_text
 from ferryid.identify.model import Model, to_json
 from ferryid.ingest import open_log
@@ -209,7 +209,7 @@ def _carry_out(
             rows[numbers[number]] = tasks[number].folder, row
             left = f", {told_time(remaining.seconds(number, time.monotonic() - start))} left"
             if row["status"] != DONE:
-                tell(f"{row['status']}: {tasks[number].log}: {row['reason']}")
+                tell(one_line(f"{row['status']}: {tasks[number].log}: {row['reason']}"))
             show()
 
 

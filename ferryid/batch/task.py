@@ -166,6 +166,8 @@ def _carry_out(task: Task, row: Row) -> None:
         begun = time.perf_counter()
         try:
             row[step] = CARRY_OUT[step](job)
+        except UnwritableError:
+            raise
         except FerryIdError as error:
             status, reason = _told(task, error)
             if status != REFUSED:

@@ -54,6 +54,22 @@ def ended(pids: list[int], seconds: float = 10.0) -> bool:
     return True
 
 
+def children_of(pid: int) -> list[int]:
+    """Return the processes below one, of all generations."""
+    of: dict[int, list[int]] = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            text = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        of.setdefault(int(text[1]), []).append(int(path.parent.name))
+    found, left = [], [pid]
+    while left:
+        left = [child for one in left for child in of.get(one, [])]
+        found += left
+    return found
+
+
 def environment() -> dict[str, str]:
     """Return this environment, for a process that is to find these tests."""
     return {**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT), *filter(None, sys.path)))}

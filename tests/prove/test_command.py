@@ -14,11 +14,10 @@ import pytest
 
 import ferryid.cli
 from ferryid.prove import judges
-from tests.batch.work import ended, environment
+from tests.batch.work import children_of, ended, environment
 from tests.cli.conftest import ferryid as ferryid_fixture
 from tests.cli.test_every_command import conforms
 from tests.prove.pretend import PARTS, TALLY
-from tests.prove.test_run import children_of
 
 ferryid_run = ferryid_fixture
 
