@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import pytest
 from ferryid.batch.recipe import Recipe, load_recipe
 from ferryid.errors import FerryIdError
 from ferryid.identify.settings import FitSettings
+
+README = Path(__file__).resolve().parents[2] / "README.md"
 
 
 def loaded(folder: Path, text: str) -> Recipe:
@@ -21,6 +24,14 @@ def loaded(folder: Path, text: str) -> Recipe:
 def test_an_empty_one_is_the_default(tmp_path: Path) -> None:
     assert loaded(tmp_path, "") == Recipe()
     assert Recipe().steps == ("fit", "evaluate", "diagnose")
+
+
+def test_the_default_in_the_documentation_is_the_default(tmp_path: Path) -> None:
+    (text,) = (
+        block for block in re.findall(r"```toml\n(.*?)```", README.read_text("utf-8"), re.DOTALL) if "steps" in block
+    )
+    assert loaded(tmp_path, text) == Recipe()
+    assert {one.name for one in fields(FitSettings) if one.name in text} == {one.name for one in fields(FitSettings)}
 
 
 def test_every_setting_of_a_fit_can_stand_in_it(tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ def test_filters_offer_what_there_is() -> None:
 
 def test_trends_are_drawn_and_told() -> None:
     rows = [
-        row(f"s/{k}.mcap", k, findings=(finding("fouling", surge=1.0 + 0.1 * k, probability=0.9 if k > 4 else 0.4),) if k > 2 else ())
+        row(f"s/{k}.mcap", k, findings=(finding("fouling", surge=1.0 + 0.1 * k, probability=0.1 * k),) if k > 2 else ())
         for k in range(1, 11)
     ]  # fmt: skip
     page = render(result(*rows, trends=trends_of(rows, PROFILES)))
