@@ -26,6 +26,7 @@ ORDER = (
     "report",
     "export",
     "reproduce",
+    "batch",
     "prove",
     "cli",
 )
@@ -39,7 +40,7 @@ HOMES = {
     "lz4": ("ingest", "simulate"),
     "zstandard": ("ingest", "simulate"),
     "pysindy": ("prove",),
-    "distributed": ("prove",),
+    "distributed": ("batch",),
 }
 """Packages and the layers that may import them; the simulator writes logs, which is why it may know their formats."""
 

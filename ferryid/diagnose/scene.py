@@ -108,7 +108,7 @@ def scene_of(
     FerryIdError
         For a log that cannot be used, one without actuators or heading, and a signal to withhold that it does not have.
     """
-    _check_withheld(withhold)
+    check_withheld(withhold)
     if not profile.actuators:
         raise FerryIdError(
             f"{profile.path}: a diagnosis weighs motion against the actuators' force, found no actuator in the profile. "
@@ -252,7 +252,8 @@ def dimensions(profile: Profile) -> tuple[float, float, float]:
     return length, beam, draught
 
 
-def _check_withheld(withhold: Collection[str]) -> None:
+def check_withheld(withhold: Collection[str]) -> None:
+    """Refuse the name of what is no signal that can be withheld."""
     for name in withhold:
         if name not in WITHHELD:
             raise FerryIdError(

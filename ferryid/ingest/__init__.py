@@ -11,7 +11,7 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest import formats
 from ferryid.ingest.log import Format, Reader, TableLayout
 
-__all__ = ["open_log", "supported_formats"]
+__all__ = ["existing_parts", "open_log", "supported_formats"]
 
 HEAD_BYTES = 64
 PART_SUFFIXES = (".bag", ".bag.active", ".mcap", ".mcap.zstd", ".db3", ".db3.zstd")
@@ -44,7 +44,7 @@ def open_log(path: str | Path, layout: TableLayout | None = None) -> Reader:
     """
     whole = Path(path)
     if not whole.exists() and "+" in str(path):
-        return _open_parts(str(path), _existing_parts(str(path)), layout)
+        return _open_parts(str(path), existing_parts(str(path)), layout)
     if not whole.exists():
         raise FerryIdError(f"{path}: no such file or folder, a log was to be read. Fix: check the path")
     if whole.is_dir():
@@ -54,7 +54,7 @@ def open_log(path: str | Path, layout: TableLayout | None = None) -> Reader:
     return _open_file(whole, layout)
 
 
-def _existing_parts(text: str) -> list[Path]:
+def existing_parts(text: str) -> list[Path]:
     """Split a joined path at those ``+`` that leave paths which all exist (a folder's name may hold one too)."""
     pieces = text.split("+")
     for count in range(1, len(pieces) + 1):
@@ -63,7 +63,7 @@ def _existing_parts(text: str) -> list[Path]:
             continue
         if count == len(pieces):
             return [head]
-        tail = _existing_parts("+".join(pieces[count:]))
+        tail = existing_parts("+".join(pieces[count:]))
         if tail:
             return [head, *tail]
     return []

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ferryid.batch.remaining import told_time
+from ferryid.batch.spread import Spread
 from ferryid.files import finite, unwritable
-from ferryid.prove.spread import Spread
 
 T = TypeVar("T")
 
@@ -81,13 +82,6 @@ def carry_out(
                 except OSError as error:
                     raise unwritable(path, error) from error
                 seconds = (time.monotonic() - start) / count * (len(left) - count)
-                progress(f"{what}: {len(done)} of {len(work)}, {_time(seconds)} left")
+                progress(f"{what}: {len(done)} of {len(work)}, {told_time(seconds)} left")
         progress("")
     return {name: done[name] for name in work}
-
-
-def _time(seconds: float) -> str:
-    minutes = seconds / 60.0
-    return (
-        f"{seconds:.0f} s" if minutes < 2.0 else f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.1f} h"
-    )

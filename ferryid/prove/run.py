@@ -17,6 +17,7 @@ from shlex import quote
 from typing import Any
 
 from ferryid import __version__
+from ferryid.batch.spread import spread
 from ferryid.errors import FerryIdError
 from ferryid.files import alone, dump_json, finite, write_text
 from ferryid.prove.case import Case, case_of
@@ -26,7 +27,6 @@ from ferryid.prove.guard import python_rooms
 from ferryid.prove.parts import Generate, Parts, Trial
 from ferryid.prove.seal import lay_open, open_seal, opened, seal, sealed
 from ferryid.prove.sources import sources
-from ferryid.prove.spread import spread
 from ferryid.prove.tasks import Log, diagnosed, judged, write
 
 SCHEMA = "ferryid.prove/1"
@@ -60,7 +60,7 @@ def prove(
     runs, only
         How many cases, and of which cells, as `parts` takes them.
     processes, dask
-        What to spread the work over: see `ferryid.prove.spread.spread`.
+        What to spread the work over: see `ferryid.batch.spread.spread`.
     progress
         Called with each stage, what of it is done and the time left.
     tell

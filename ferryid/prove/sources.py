@@ -8,7 +8,7 @@ from pathlib import Path
 import ferryid
 
 AFTERWARDS = (
-    *("report/", "reproduce/", "schemas/", "cli/"),
+    *("report/", "reproduce/", "batch/", "schemas/", "cli/"),
     *(
         "prove/judges",
         "prove/oracle",

@@ -42,6 +42,7 @@ def fit_and_report(
     out: Path,
     *,
     name: str = "",
+    tables: Path | None = None,
     verify: bool = False,
     progress: Callable[[str], None] = quiet,
 ) -> Outcome:
@@ -59,6 +60,8 @@ def fit_and_report(
         Output folder: ``logs``, ``models`` and ``reports`` are made in it.
     name
         Name of the model; the profile's where empty.
+    tables
+        Output folder whose ``logs`` keep the ingested tables, where that is another.
     verify
         Check every checksum of the logs.
     progress
@@ -69,7 +72,9 @@ def fit_and_report(
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
-    return _reported(fit(logs, profile, settings, out, name=name, verify=verify, progress=progress), out, progress)
+    return _reported(
+        fit(logs, profile, settings, tables or out, name=name, verify=verify, progress=progress), out, progress
+    )
 
 
 def fit_archive_and_report(

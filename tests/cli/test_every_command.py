@@ -7,6 +7,7 @@ import pkgutil
 import re
 from importlib.resources import files
 from pathlib import Path
+from urllib.parse import unquote
 
 import jsonschema
 import pytest
@@ -173,6 +174,25 @@ def test_diagnose_one_log_and_two(ferryid, fixtures: Path, tmp_path: Path) -> No
     refused = ferryid("diagnose", log, "--out", tmp_path)
     assert refused.code == 2
     assert "Fix: give --vessel" in refused.err
+
+
+def test_batch(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    options = ("--vessel", "milliampere", "--out", tmp_path / "out", "--json", "-")
+    run = ferryid("batch", fixtures / "sh*.mcap", fixtures / "truncated.bag", fixtures / "README.md", *options)
+    assert run.code == 0, run.err
+    result = conforms(run.out)
+    assert [row["status"] for row in result["rows"]] == ["done", "partly", "refused"]
+    assert len(run.err.splitlines()) == 2, run.err
+    for row in result["rows"]:
+        for step, kind in (("fit", "fit"), ("diagnose", "diagnosis")):
+            if row[step]:
+                report = Path(result["folder"]) / row["folder"] / row[step]["report"]
+                conforms(report.with_name(f"{kind}.json").read_text(encoding="utf-8"))
+    page = Path(result["page"])
+    links = [unquote(link) for link in re.findall(r'href="([^"#]+)"', page.read_text(encoding="utf-8"))]
+    assert len(links) == 1 + 3 + 2
+    assert all((page.parent / link).is_file() for link in links)
+    assert ferryid("batch", fixtures / "README.md", *options[:-2]).code == 2, "of nothing came anything"
 
 
 def test_two_fits_of_one_log_are_the_same_file(ferryid, fixtures: Path, tmp_path: Path) -> None:

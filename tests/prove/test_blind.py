@@ -17,8 +17,8 @@ from ferryid.prove.guard import landlock_version, python_rooms
 from ferryid.prove.sources import sources
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
+from tests.batch.work import ended, environment
 from tests.prove.spy import BY_C
-from tests.prove.work import ended, environment
 
 SPY = ("-m", "tests.prove.spy")
 PROFILE = load_profile("milliampere").text

@@ -14,11 +14,10 @@ import pytest
 
 import ferryid.cli
 from ferryid.prove import judges
+from tests.batch.work import children_of, ended, environment
 from tests.cli.conftest import ferryid as ferryid_fixture
 from tests.cli.test_every_command import conforms
 from tests.prove.pretend import PARTS, TALLY
-from tests.prove.test_run import children_of
-from tests.prove.work import ended, environment
 
 ferryid_run = ferryid_fixture
 
@@ -70,7 +69,7 @@ def test_results_to_standard_output_and_the_seed_to_standard_error(ferryid_run, 
 def test_a_cluster_that_cannot_be_used_is_one_line(
     ferryid_run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ferryid.prove.spread.ANSWER_S", 1.0)
+    monkeypatch.setattr("ferryid.batch.spread.ANSWER_S", 1.0)
     run = ferryid_run("prove", "--runs", "1", "--dask", "tcp://127.0.0.1:9", "--out", tmp_path / "out")
     assert run.code == 2
     assert run.err.splitlines()[-1].startswith("ferryid: --dask tcp://127.0.0.1:9: no scheduler answers there")

@@ -18,16 +18,16 @@ from typing import Any
 import jsonschema
 import pytest
 
+from ferryid.batch.spread import spread
 from ferryid.errors import FerryIdError
 from ferryid.files import unwritable
 from ferryid.prove import run as running
 from ferryid.prove.finished import carry_out, finished
 from ferryid.prove.run import prove, render_proof
 from ferryid.prove.seal import verified
-from ferryid.prove.spread import spread
 from ferryid.prove.tasks import Log, diagnosed
+from tests.batch.work import children_of, ended, environment
 from tests.prove.pretend import PARTS, TALLY, chatty, counted
-from tests.prove.work import ended, environment
 
 
 @pytest.fixture(autouse=True)
@@ -195,22 +195,6 @@ def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Pat
         assert len(first) > finished_then - 1
     assert not (out / "proof" / "scratch").exists()
     assert not list((out / "proof" / "logs").glob(".*"))
-
-
-def children_of(pid: int) -> list[int]:
-    """Return the processes below one, of all generations."""
-    of: dict[int, list[int]] = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            text = path.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        of.setdefault(int(text[1]), []).append(int(path.parent.name))
-    found, left = [], [pid]
-    while left:
-        left = [child for one in left for child in of.get(one, [])]
-        found += left
-    return found
 
 
 def test_other_sources_or_another_seed_begin_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,10 +35,26 @@ ANSWER_S = 10.0
 class Spread(Protocol):
     """Something that carries out work."""
 
-    def over(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R]]:
+    def over(
+        self,
+        function: Callable[[T], R],
+        items: Sequence[T],
+        *,
+        begun: Callable[[int], None] | None = None,
+        lost: Callable[[T], R] | None = None,
+    ) -> Iterator[tuple[int, R]]:
         """Yield the number of each item and what the function makes of it, as they are ready.
 
         An item whose process is lost is done again by another. What the function raises is raised here, and ends the work.
+
+        Parameters
+        ----------
+        function, items
+            What is to be done, and with what.
+        begun
+            Called with the number of an item that is begun; on a cluster, which does not tell, never.
+        lost
+            What comes of an item that lost its process `LOSSES` times; None ends the work with an error.
 
         Raises
         ------
@@ -49,7 +65,7 @@ class Spread(Protocol):
 
 
 @contextmanager
-def spread(processes: int = 1, dask: str | None = None) -> Iterator[Spread]:
+def spread(processes: int = 1, dask: str | None = None, *, apart: bool = False) -> Iterator[Spread]:
     """Give something that carries out work; what still runs at the end of the block is ended.
 
     Parameters
@@ -58,6 +74,8 @@ def spread(processes: int = 1, dask: str | None = None) -> Iterator[Spread]:
         How many of this machine; 1 works in this process.
     dask
         Address of a Dask scheduler, such as ``tcp://localhost:8786``, which is used instead of them.
+    apart
+        A single process is another one than this, too: whatever dies there, this one goes on.
 
     Raises
     ------
@@ -70,7 +88,7 @@ def spread(processes: int = 1, dask: str | None = None) -> Iterator[Spread]:
         return
     if not 1 <= processes <= MOST_PROCESSES:
         raise FerryIdError(f"--processes: {processes} is no number of processes. Fix: give 1 to {MOST_PROCESSES}")
-    if processes == 1:
+    if processes == 1 and not apart:
         yield _Here()
         return
     pool = _Pool(processes)
@@ -81,8 +99,17 @@ def spread(processes: int = 1, dask: str | None = None) -> Iterator[Spread]:
 
 
 class _Here:
-    def over(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R]]:
+    def over(
+        self,
+        function: Callable[[T], R],
+        items: Sequence[T],
+        *,
+        begun: Callable[[int], None] | None = None,
+        lost: Callable[[T], R] | None = None,
+    ) -> Iterator[tuple[int, R]]:
         for number, item in enumerate(items):
+            if begun is not None:
+                begun(number)
             yield number, function(item)
 
 
@@ -94,14 +121,26 @@ class _Pool:
         self._pool: ProcessPoolExecutor | None = None
         self._workers: set[multiprocessing.process.BaseProcess] = set()
 
-    def over(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R]]:
+    def over(
+        self,
+        function: Callable[[T], R],
+        items: Sequence[T],
+        *,
+        begun: Callable[[int], None] | None = None,
+        lost: Callable[[T], R] | None = None,
+    ) -> Iterator[tuple[int, R]]:
         waiting, losses = deque(range(len(items))), [0] * len(items)
+        # With a process that dies, all are lost that are at work: by itself, each shows which one it was.
+        suspects: deque[int] = deque()
         running: dict[Future[R], tuple[int, ProcessPoolExecutor]] = {}
-        while waiting or running:
-            # No more than are worked on: with a process that dies, all are lost that were handed out.
-            while waiting and len(running) < self._processes:
-                future, pool = self._submit(function, items[waiting[0]])
-                running[future] = waiting.popleft(), pool
+        while waiting or suspects or running:
+            # No more than are worked on, so that no others are lost.
+            while (waiting and len(running) < self._processes) or (suspects and not running):
+                number = (waiting or suspects).popleft()
+                future, pool = self._submit(function, items[number])
+                running[future] = number, pool
+                if begun is not None:
+                    begun(number)
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 number, pool = running.pop(future)
                 try:
@@ -110,13 +149,15 @@ class _Pool:
                     if pool is self._pool:
                         self.end()
                     losses[number] += 1
-                    if losses[number] == LOSSES:
+                    if losses[number] < LOSSES:
+                        suspects.append(number)
+                        continue
+                    if lost is None:
                         raise FerryIdError(
                             f"the process that worked on item {number + 1} of {len(items)} died {LOSSES} times. "
                             "Fix: give fewer --processes, which need less memory together"
                         ) from error
-                    waiting.append(number)
-                    continue
+                    result = lost(items[number])
                 yield number, result
 
     def _submit(self, function: Callable[[T], R], item: T) -> tuple[Future[R], ProcessPoolExecutor]:
@@ -160,7 +201,14 @@ class _Cluster:
     def __init__(self, client: Any) -> None:
         self._client = client
 
-    def over(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R]]:
+    def over(
+        self,
+        function: Callable[[T], R],
+        items: Sequence[T],
+        *,
+        begun: Callable[[int], None] | None = None,
+        lost: Callable[[T], R] | None = None,
+    ) -> Iterator[tuple[int, R]]:
         from distributed import CancelledError, KilledWorker, as_completed
         from distributed.comm.core import CommClosedError
 
@@ -172,10 +220,12 @@ class _Cluster:
                 try:
                     result = future.result()
                 except KilledWorker as error:
-                    raise FerryIdError(
-                        f"the workers that were given item {futures[future] + 1} of {len(items)} died, one after the other. "
-                        "Fix: give the cluster's workers more memory"
-                    ) from error
+                    if lost is None:
+                        raise FerryIdError(
+                            f"the workers that were given item {futures[future] + 1} of {len(items)} died, one after the "
+                            "other. Fix: give the cluster's workers more memory"
+                        ) from error
+                    result = lost(items[futures[future]])
                 yield futures[future], result
                 future.release()
         except (CancelledError, CommClosedError) as error:

@@ -17,13 +17,15 @@ def square(item: tuple[str, int, str]) -> tuple[int, int]:
     Parameters
     ----------
     item
-        Folder of the files, number, and what becomes of it: ``dies`` for good, ``dies once``, ``raises`` or ``sleeps``.
+        Folder of the files, number, and its fate: ``dies`` for good, ``dies once``, ``raises``, ``lingers`` or ``sleeps``.
     """
     folder, number, fate = item
     with (Path(folder) / str(number)).open("a") as file:
         file.write(f"{os.getpid()}\n")
     if fate == "dies" or (fate == "dies once" and calls(Path(folder), number) == 1):
         os.kill(os.getpid(), signal.SIGKILL)
+    if fate == "lingers":
+        time.sleep(2.0)
     if fate == "raises":
         raise KeyError(f"number {number}")
     time.sleep(60.0 if fate == "sleeps" else 0.05)
@@ -50,6 +52,22 @@ def ended(pids: list[int], seconds: float = 10.0) -> bool:
             return False
         time.sleep(0.05)
     return True
+
+
+def children_of(pid: int) -> list[int]:
+    """Return the processes below one, of all generations."""
+    of: dict[int, list[int]] = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            text = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        of.setdefault(int(text[1]), []).append(int(path.parent.name))
+    found, left = [], [pid]
+    while left:
+        left = [child for one in left for child in of.get(one, [])]
+        found += left
+    return found
 
 
 def environment() -> dict[str, str]:

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from ferryid.batch import spread as spreading
+from ferryid.batch.spread import spread
 from ferryid.errors import FerryIdError
-from ferryid.prove import spread as spreading
-from ferryid.prove.spread import spread
-from tests.prove.work import calls, ended, environment, square
+from tests.batch.work import calls, ended, environment, square
 
 
 def items(folder: Path, count: int, **fates: str) -> list[tuple[str, int, str]]:
@@ -77,6 +77,25 @@ def test_an_item_that_kills_every_process_is_given_up(tmp_path: Path) -> None:
     assert calls(tmp_path, 1) <= 3
 
 
+def test_what_comes_of_an_item_that_kills_every_process_and_not_of_its_neighbour(tmp_path: Path) -> None:
+    begun: list[int] = []
+    fates = items(tmp_path, 5, at_0="lingers", at_1="dies")
+    with spread(2) as workers:
+        done = dict(workers.over(square, fates, begun=begun.append, lost=lambda item: (-item[1], 0)))
+    assert {number: result for number, (result, _) in done.items()} == {0: 0, 1: -1, 2: 4, 3: 9, 4: 16}
+    assert calls(tmp_path, 1) == 3
+    # Beside the one that dies it is lost once; then it goes alone.
+    assert calls(tmp_path, 0) == 2
+    assert sorted(begun) == [0, 0, 1, 1, 1, 2, 3, 4]
+
+
+def test_one_process_apart(tmp_path: Path) -> None:
+    with spread(1, apart=True) as workers:
+        done = dict(workers.over(square, items(tmp_path, 3, at_1="dies"), lost=lambda item: (0, 0)))
+    assert done[1] == (0, 0)
+    assert os.getpid() not in {pid for _, pid in done.values()}
+
+
 @pytest.mark.parametrize("processes", [0, -1, 1000])
 def test_impossible_numbers(processes: int) -> None:
     with pytest.raises(FerryIdError, match=r"--processes: .* Fix: give 1 to 64"), spread(processes):
@@ -87,8 +106,8 @@ def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
     code = f"""
 import sys
 from pathlib import Path
-from ferryid.prove.spread import spread
-from tests.prove.work import environment, square
+from ferryid.batch.spread import spread
+from tests.batch.work import environment, square
 if __name__ == "__main__":
     with spread(2) as workers:
         list(workers.over(square, [({str(tmp_path)!r}, number, "sleeps") for number in (0, 1)]))
@@ -123,6 +142,22 @@ def test_a_cluster_that_loses_a_worker(tmp_path: Path, cluster: tuple[str, list[
         assert os.getpid() not in seen
         with pytest.raises(KeyError, match="number 1"):
             list(client.over(square, items(tally, 20, at_1="raises")))
+
+
+def test_a_cluster_whose_workers_an_item_kills(
+    tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed = pytest.importorskip("distributed")
+
+    def killed(self: object) -> None:
+        raise distributed.KilledWorker("square", None, 3)
+
+    # It takes four workers in truth.
+    monkeypatch.setattr(distributed.Future, "result", killed)
+    with spread(dask=cluster[0]) as client:
+        assert dict(client.over(square, items(tmp_path, 1), lost=lambda item: (-7, 0))) == {0: (-7, 0)}
+        with pytest.raises(FerryIdError, match="died, one after the other"):
+            list(client.over(square, items(tmp_path, 1)))
 
 
 def test_a_cluster_that_loses_its_scheduler(

@@ -1,0 +1,1 @@
+"""Fit, evaluate and diagnose every log of an archive."""

@@ -1,0 +1,179 @@
+"""Which logs a batch is about: patterns, paths and manifests."""
+
+from __future__ import annotations
+
+import csv
+import glob
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.ingest import existing_parts
+
+COLUMNS = ("log", "vessel", "date", "note")
+"""Of a manifest that is a table; `log` is what makes it one."""
+LISTS = (".csv", ".txt", ".list")
+"""How files end that may be manifests."""
+LARGEST_BYTES = 64 << 20
+"""Of a manifest; a million paths are less."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One log of a batch.
+
+    Attributes
+    ----------
+    log
+        Path as it was given; parts of one recording joined by ``+``.
+    vessel
+        Profile's name or path, None where nothing says.
+    date
+        When it was recorded, where a manifest says so; ISO 8601, UTC.
+    note
+        The manifest's.
+    """
+
+    log: str
+    vessel: str | None = None
+    date: str | None = None
+    note: str = ""
+
+    @property
+    def paths(self) -> list[Path]:
+        """Absolute paths of its parts; of what is not there, where it should be."""
+        whole = Path(self.log)
+        parts = [] if whole.exists() else existing_parts(self.log)
+        return [part.resolve() for part in parts or [whole]]
+
+    @property
+    def files(self) -> list[list[Any]]:
+        """Path, size and time of change of each file, by which an unchanged log is known; empty for one that is not there."""
+        found: list[list[Any]] = []
+        for path in self.paths:
+            for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+                try:
+                    state = file.stat()
+                except OSError:  # whoever reads the log says what is wrong with it
+                    continue
+                if not file.is_dir():
+                    found.append([str(file), state.st_size, state.st_mtime_ns])
+        return found
+
+
+def entries_of(asked: Sequence[str], vessel: str | None, tell: Callable[[str], None]) -> list[Entry]:
+    """Return the logs that are asked for, each once, in the order of the question, those of a pattern by their paths.
+
+    Parameters
+    ----------
+    asked
+        Paths, patterns (``season/**/*.mcap``), and manifests.
+    vessel
+        Of logs whose manifest names none.
+    tell
+        Called with what of a manifest is not used.
+
+    Raises
+    ------
+    FerryIdError
+        Where something matches nothing, or a manifest cannot be used.
+    """
+    found: dict[tuple[str, str | None], Entry] = {}
+    for one in asked:
+        for entry in _entries(one, vessel, tell):
+            found.setdefault(("+".join(map(str, entry.paths)), entry.vessel), entry)
+    return list(found.values())
+
+
+def _entries(one: str, vessel: str | None, tell: Callable[[str], None]) -> Iterator[Entry]:
+    path = Path(one)
+    if path.is_file() and path.suffix.lower() in LISTS and path.stat().st_size <= LARGEST_BYTES:
+        text = _text(path)
+        if text is not None and "log" in _header(text):
+            yield from _table(path, text, vessel, tell)
+            return
+        lines = _lines(text or "")
+        # A log in text form holds numbers, not the names of files.
+        if any(Path(line).exists() or _matches(line) for line in (_placed(path, line) for line in lines[:20])):
+            for line in lines:
+                yield from (Entry(log, vessel) for log in _logs(_placed(path, line)) or [_placed(path, line)])
+            return
+    logs = _logs(one)
+    if not logs:
+        raise FerryIdError(
+            f"{one}: nothing is there that this matches. Fix: check the path; put a pattern in quotes, such as "
+            '"season/**/*.mcap"'
+        )
+    yield from (Entry(log, vessel) for log in logs)
+
+
+def _logs(one: str) -> list[str]:
+    if Path(one).exists() or existing_parts(one):
+        return [one]
+    return _matches(one)
+
+
+def _matches(pattern: str) -> list[str]:
+    return sorted(glob.glob(pattern, recursive=True)) if glob.has_magic(pattern) else []
+
+
+def _text(path: Path) -> str | None:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+def _lines(text: str) -> list[str]:
+    return [line for line in map(str.strip, text.splitlines()) if line and not line.startswith("#")]
+
+
+def _header(text: str) -> list[str]:
+    first = next(iter(_lines(text)), "")
+    return [cell.strip() for cell in next(csv.reader([first]), [])]
+
+
+def _placed(manifest: Path, log: str) -> str:
+    """Return a log's path as seen from here: one that is relative begins at the manifest."""
+    whole = manifest.parent / log
+    if whole.exists() or "+" not in log:
+        return str(whole)
+    return "+".join(str(manifest.parent / part) for part in log.split("+"))
+
+
+def _table(path: Path, text: str, vessel: str | None, tell: Callable[[str], None]) -> Iterator[Entry]:
+    header = _header(text)
+    for name in header:
+        if name not in COLUMNS and (near := did_you_mean(name, COLUMNS)):
+            raise FerryIdError(f'{path}: no manifest has a column "{name}".{near} Fix: rename the column')
+    unused = [name for name in header if name not in COLUMNS]
+    if unused:
+        tell(f"{path}: columns that are not used: {', '.join(unused)}")
+    rows = csv.reader(line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
+    next(rows)
+    for number, cells in enumerate(rows, 2):
+        if len(cells) > len(header):
+            raise FerryIdError(
+                f"{path}: row {number} has {len(cells)} cells, the header {len(header)}. "
+                "Fix: put a path or note with a comma in quotes"
+            )
+        row = {name: cell.strip() for name, cell in zip(header, cells, strict=False)}
+        if row["log"]:
+            placed, date = _placed(path, row["log"]), _date(path, number, row.get("date", ""))
+            for log in _logs(placed) or [placed]:
+                yield Entry(log, row.get("vessel") or vessel, date, row.get("note", ""))
+
+
+def _date(path: Path, number: int, text: str) -> str | None:
+    if not text:
+        return None
+    try:
+        date = datetime.fromisoformat(text)
+        return (date.replace(tzinfo=UTC) if date.tzinfo is None else date.astimezone(UTC)).isoformat()
+    except (ValueError, OverflowError) as error:
+        raise FerryIdError(
+            f"{path}: the date of row {number} cannot be read, found {text!r}. Fix: write 2024-05-17 or 2024-05-17T10:30"
+        ) from error

@@ -1,0 +1,266 @@
+"""A batch: the same steps for every log of an archive, each finished result kept, one table and one page of all.
+
+All of it lies in ``<out>/batch``: ``results``, a folder for each log, and ``summary.parquet`` and ``index.html``. Tables of the
+logs are in ``<out>/logs``, as those of every command.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from ferryid import __version__
+from ferryid.batch import memory
+from ferryid.batch.kept import Kept, Row, key_of, sweep_tables
+from ferryid.batch.logs import Entry, entries_of
+from ferryid.batch.recipe import Recipe, load_recipe
+from ferryid.batch.remaining import Remaining, told_time
+from ferryid.batch.spread import spread
+from ferryid.batch.summary import lines_of, table_of, write_table
+from ferryid.batch.task import DONE, STATUSES, Task, lost, work
+from ferryid.batch.trend import trends_of
+from ferryid.errors import FerryIdError, one_line
+from ferryid.files import alone, dump_json, finite, write_text
+from ferryid.identify.model import Model, to_json
+from ferryid.ingest import open_log
+from ferryid.ingest.hashing import content_hash
+from ferryid.report.batch_page import render
+from ferryid.report.diagnosis_report import patient
+from ferryid.signals.recording import log_name
+from ferryid.vessel.profile import Profile
+
+SCHEMA = "ferryid.batch/1"
+SHOWN = 2
+"""Names of logs at work that are shown."""
+LONGEST = 28
+"""Characters of such a name."""
+
+
+def batch(
+    asked: Sequence[str],
+    out: Path,
+    *,
+    vessel: str | None = None,
+    recipe: Path | None = None,
+    processes: int = 2,
+    dask: str | None = None,
+    memory_limit: str = "4G",
+    again: bool = False,
+    progress: Callable[[str], None],
+    tell: Callable[[str], None],
+) -> dict[str, Any]:
+    """Fit, evaluate and diagnose every log of an archive that is not done yet, and sum up all of it.
+
+    Parameters
+    ----------
+    asked
+        Paths, patterns and manifests: see `ferryid.batch.logs.entries_of`.
+    out
+        Output folder. On a cluster, all workers must see it, and the logs, under the same path.
+    vessel
+        Of logs whose manifest names none.
+    recipe
+        What is done: see `ferryid.batch.recipe`; all steps with their defaults where None.
+    processes, dask
+        What to spread the work over: see `ferryid.batch.spread.spread`.
+    memory_limit
+        Most memory of one process, like ``4G``.
+    again
+        Try again what went wrong before, though nothing has changed.
+    progress
+        Called with what is done, what is at work and the time left.
+    tell
+        Called with single lines that are to be kept: what is done already, and each log that went wrong.
+
+    Returns
+    -------
+    dict
+        Schema ``ferryid.batch/1``.
+
+    Raises
+    ------
+    FerryIdError
+        For a question, recipe, profile, model or cluster that cannot be used, and a disk that is full. A log that cannot be
+        used is told in its row.
+    """
+    begun = time.monotonic()
+    limit = memory.size_bytes(memory_limit)
+    chosen = Recipe() if recipe is None else load_recipe(recipe)
+    entries = entries_of(asked, vessel, tell)
+    patients = _patients(entries, chosen, out)
+    folder = (out / "batch").resolve()
+    with alone(folder, wait=False):
+        sweep_tables(out)
+        kept = Kept(folder / "results")
+        tasks = [_task(entry, patients[entry.vessel], chosen, limit, again, out.resolve()) for entry in entries]
+        rows: dict[int, tuple[Path, Row]] = {}
+        for number, (entry, task) in enumerate(zip(entries, tasks, strict=True)):
+            table = patients[entry.vessel][0].table
+            found = kept.of(task.folder, task.files, task.stamp, partial(_content, task.log, table))
+            if found is not None and replace(task, files=found[1]["files"]).stands(found[1]):
+                rows[number] = found
+        left = [number for number in range(len(tasks)) if number not in rows]
+        already = len(rows)
+        _tell_done(tell, [row["status"] for _, row in rows.values()], [tasks[number] for number in left], kept)
+        if left:
+            _carry_out([tasks[number] for number in left], left, rows, len(tasks), processes, dask, progress, tell)
+        progress("writing the summary")
+        result = _summed_up(entries, [rows[number] for number in range(len(entries))], patients, chosen, limit, out)
+        result["counts"]["done_before"] = already
+        result["seconds"] = time.monotonic() - begun
+        write_table(folder / "summary.parquet", table_of(result["rows"]))
+        write_text(folder / "index.html", render(result))
+        write_text(folder / "batch.json", dump_json(result))
+    progress("")
+    return dict(finite(result))
+
+
+def _patients(entries: Sequence[Entry], recipe: Recipe, out: Path) -> dict[str | None, tuple[Profile, Model | None]]:
+    """Return profile and model for the vessel of every log."""
+    found: dict[str | None, tuple[Profile, Model | None]] = {}
+    for entry in entries:
+        if entry.vessel not in found:
+            if entry.vessel is None and not recipe.model:
+                raise FerryIdError(
+                    f"batch: nothing says whose log {entry.log} is, found neither --vessel nor a model nor a manifest "
+                    "that names it. Fix: give --vessel a bundled profile's name or a TOML file"
+                )
+            found[entry.vessel] = patient(entry.vessel, recipe.model or None, out)
+    return found
+
+
+def _task(entry: Entry, of: tuple[Profile, Model | None], recipe: Recipe, limit: int, again: bool, out: Path) -> Task:
+    profile, model = of
+    text = None if model is None else dump_json(to_json(model))
+    stamp = {
+        "version": __version__,
+        "recipe": _hash(dump_json(recipe.plain())),
+        "profile": profile.sha256,
+        "model": "" if text is None else _hash(text),
+    }
+    log, paths = "+".join(map(str, entry.paths)), entry.paths
+    name = log_name(log)
+    place = out / "batch" / "results" / f"{name[:60]}-{key_of(paths, stamp)}"
+    return Task(log, name, entry.files, place, out, profile.text, profile.path, text, recipe, stamp, limit, again)
+
+
+def _hash(text: str) -> str:
+    return sha256(text.encode()).hexdigest()
+
+
+def _content(log: str, layout: Any) -> str | None:
+    """Return the hash of a log as its recording has it; None where it cannot be read."""
+    with suppress(FerryIdError, OSError):
+        return content_hash(open_log(log, layout).paths)
+    return None
+
+
+def _tell_done(tell: Callable[[str], None], statuses: Sequence[str], left: Sequence[Task], kept: Kept) -> None:
+    if statuses:
+        bad = sum(status != DONE for status in statuses)
+        vain = f", {bad} of them in vain (--again tries these again)" if bad else ""
+        tell(f"{len(statuses)} of {len(statuses) + len(left)} logs done already{vain}; {len(left)} left")
+    differing = [kept.differing(task.files, task.stamp) for task in left]
+    others = sum(map(bool, differing))
+    if others:
+        names = {"version": "version of ferryid"}
+        what = " and ".join(names.get(one, one) for one in sorted(set().union(*differing)))
+        tell(f"{others} of the logs left were done with another {what}, and are done again")
+
+
+def _carry_out(
+    tasks: Sequence[Task],
+    numbers: Sequence[int],
+    rows: dict[int, tuple[Path, Row]],
+    count: int,
+    processes: int,
+    dask: str | None,
+    progress: Callable[[str], None],
+    tell: Callable[[str], None],
+) -> None:
+    """Do what is left, and put its rows to the others."""
+    remaining = Remaining([sum(file[1] for file in task.files) for task in tasks])
+    start, at_work = time.monotonic(), list[int]()
+    left = ""
+
+    def show() -> None:
+        names = [tasks[one].name[:LONGEST] for one in at_work[:SHOWN]]
+        more = f" and {len(at_work) - SHOWN} more" if len(at_work) > SHOWN else ""
+        now = f"; {', '.join(names)}{more}" if names else ""
+        progress(f"{len(rows)} of {count} logs{left}{now}")
+
+    def begin(number: int) -> None:
+        if number not in at_work:
+            at_work.append(number)
+        show()
+
+    with spread(processes, dask, apart=True) as workers:
+        show()
+        for number, row in workers.over(work, tasks, begun=begin, lost=lost):
+            if number in at_work:
+                at_work.remove(number)
+            rows[numbers[number]] = tasks[number].folder, row
+            left = f", {told_time(remaining.seconds(number, time.monotonic() - start))} left"
+            if row["status"] != DONE:
+                tell(one_line(f"{row['status']}: {tasks[number].log}: {row['reason']}"))
+            show()
+
+
+def _summed_up(
+    entries: Sequence[Entry],
+    found: Sequence[tuple[Path, Row]],
+    patients: Mapping[str | None, tuple[Profile, Model | None]],
+    recipe: Recipe,
+    limit: int,
+    out: Path,
+) -> dict[str, Any]:
+    root = out / "batch"
+    vessels = [patients[entry.vessel][0].name for entry in entries]
+    rows = [
+        lines_of(entry, name, row, folder.name)
+        for entry, name, (folder, row) in zip(entries, vessels, found, strict=True)
+    ]
+    counts = Counter(row["status"] for row in rows)
+    return {
+        "schema": SCHEMA,
+        "ferryid_version": __version__,
+        "counts": {"logs": len(rows), **{status: counts[status] for status in STATUSES}},
+        "recipe": {**recipe.plain(), "model": recipe.model},
+        "memory": {
+            "limit_bytes": limit,
+            "bounded": memory.can_be_bounded(),
+            "peak_bytes": max((row["peak_bytes"] for row in rows), default=0),
+        },
+        "folder": str(root),
+        "summary": str(root / "summary.parquet"),
+        "page": str(root / "index.html"),
+        "rows": rows,
+        "trends": trends_of(rows, {profile.name: profile for profile, _ in patients.values()}),
+    }
+
+
+def render_batch(result: Mapping[str, Any]) -> str:
+    """Return a short account of a batch as text."""
+    counts = result["counts"]
+    bad = [f"{counts[status]} {status}" for status in STATUSES if status != DONE and counts[status]]
+    lines = [f"{counts['logs']} logs: {counts[DONE]} done{''.join(f', {one}' for one in bad)}"]
+    verdicts = Counter(row["diagnose"]["verdict"] for row in result["rows"] if row["diagnose"])
+    if verdicts:
+        lines.append("  " + ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(verdicts.items())))
+    fits = [row["fit"] for row in result["rows"] if row["fit"]]
+    if fits:
+        lines.append(f"  {sum(fit['accepted'] for fit in fits)} of {len(fits)} fits accepted")
+    lines += [f"  {trend['says']}" for trend in result["trends"] if trend["says"]]
+    peak = result["memory"]["peak_bytes"]
+    bound = f"at most {memory.told_bytes(result['memory']['limit_bytes'])} allowed"
+    held = bound if result["memory"]["bounded"] else "no bound: this system keeps none"
+    lines.append(f"memory  {memory.told_bytes(peak)} for the largest log ({held} to a process)")
+    lines += [f"table   {result['summary']}", f"page    {result['page']}"]
+    return "\n".join(lines)

@@ -1,0 +1,130 @@
+"""What is done with one log: its fit, its evaluation, its diagnosis, each into the folder of its results."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ferryid.batch.recipe import Recipe
+from ferryid.diagnose.diagnose import diagnose
+from ferryid.diagnose.remodel import blank, keep
+from ferryid.files import dump_json, write_text
+from ferryid.identify.kept_pieces import kept
+from ferryid.identify.evaluate import evaluate
+from ferryid.identify.model import Model
+from ferryid.report.diagnosis_report import report
+from ferryid.report.fit_report import fit_and_report
+from ferryid.vessel.profile import Profile
+
+LONGEST_NAME = 80
+
+
+@dataclass(frozen=True)
+class Job:
+    """One log and what is done with it.
+
+    Attributes
+    ----------
+    log, name
+        Its path and its name.
+    profile, model
+        The vessel, and the model to evaluate and to diagnose from; the profile's hull where None.
+    recipe
+        The steps and their settings.
+    folder
+        For the results.
+    tables
+        Output folder whose ``logs`` keep the ingested tables.
+    recorded
+        The log's own folder of these.
+    """
+
+    log: str
+    name: str
+    profile: Profile
+    model: Model | None
+    recipe: Recipe
+    folder: Path
+    tables: Path
+    recorded: Path
+
+    def below(self, path: str | Path) -> str:
+        """Return a path relative to the folder."""
+        return Path(os.path.relpath(path, self.folder)).as_posix()
+
+    def model_name(self, end: str = "") -> str:
+        """Return a name for a model of this log alone."""
+        whole = re.sub(r"[^A-Za-z0-9_.-]+", "_", f"{self.profile.name}-{self.name}")
+        return whole[: LONGEST_NAME - len(end)] + end
+
+
+def _quiet(_stage: str) -> None:
+    """Tell nobody."""
+
+
+def _fitted(job: Job) -> dict[str, Any]:
+    made = fit_and_report(
+        [job.log], job.profile, job.recipe.fit, job.folder, name=job.model_name(), tables=job.tables, progress=_quiet
+    )
+    # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
+    if job.recorded.exists():
+        settings = job.recipe.fit.on(job.profile)
+        kept(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
+    told, scores = made.json, made.json["scores"]
+    return {
+        "model": job.below(told["model"]["path"]),
+        "report": job.below(made.report),
+        "accepted": made.accepted,
+        "headline": told["headline"],
+        "warnings": list(told["warnings"]),
+        "normalised_mse": scores["normalised_mse"],
+        "per_axis": scores["per_axis"],
+        "mse": scores["mse"],
+    }
+
+
+def _evaluated(job: Job) -> dict[str, Any]:
+    model = job.model or blank(job.profile, job.profile.name)
+    told = evaluate(model, [job.log], job.tables, profile=job.profile, progress=_quiet)
+    write_text(job.folder / "evaluation.json", dump_json(told))
+    entry = told["logs"][0]
+    return {
+        "of": job.model.label if job.model else f"the hull of {job.profile.name}",
+        "result": "evaluation.json",
+        "normalised_mse": entry["normalised_mse"] if job.model else None,
+        "per_axis": entry["per_axis"] if job.model else {},
+        "mse": entry["mse"]["model"],
+        "warnings": entry["warnings"],
+    }
+
+
+def _diagnosed(job: Job) -> dict[str, Any]:
+    found = diagnose([job.log], job.profile, job.tables, model=job.model, withhold=job.recipe.withhold, progress=_quiet)
+    found = keep(found, job.profile, job.model, job.folder, name=job.model_name("-diagnosed"))
+    words = ["ferryid", "diagnose", job.log, "--vessel", job.profile.name]
+    words += [word for signal in job.recipe.withhold for word in ("--withhold", signal)]
+    made = report(found, job.folder, [*words, *(["--model", job.model.label] if job.model else [])])
+    told = made.json
+    return {
+        "report": job.below(made.report),
+        "model": None if told["model"] is None else job.below(told["model"]),
+        "verdict": told["verdict"],
+        "findings": [
+            {name: one[name] for name in ("effect", "instance", "probability", "parameters", "says")}
+            for one in told["findings"]
+        ],
+        "before": told["before"]["mse"],
+        "after": told["after"]["mse"],
+    }
+
+
+CARRY_OUT: Mapping[str, Callable[[Job], dict[str, Any]]] = {
+    "fit": _fitted,
+    "evaluate": _evaluated,
+    "diagnose": _diagnosed,
+}
+"""Steps by their names: each returns what the summary tells of it, with paths relative to the folder."""

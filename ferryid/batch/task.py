@@ -1,0 +1,219 @@
+"""One log of a batch, in whatever process and on whatever machine: from its path to a row, whatever is wrong with it."""
+
+from __future__ import annotations
+
+import errno
+import json
+import threading
+import time
+import traceback
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ferryid.batch import memory
+from ferryid.batch.kept import Row, clear, read_row, write_row
+from ferryid.batch.recipe import Recipe
+from ferryid.errors import FerryIdError, UnwritableError, one_line
+from ferryid.files import alone, finite, unwritable
+
+# Heavy packages are imported by the work itself, so that what it needs of memory is counted.
+
+DONE, PARTLY, REFUSED, FAILED, MEMORY, LOST = STATUSES = ("done", "partly", "refused", "failed", "memory", "lost")
+"""How a log ends: done; some steps cannot use it; it cannot be used; a bug of ours; more memory than there may be; its process
+died."""
+TRACEBACK = "traceback.txt"
+_one_at_a_time = threading.Lock()
+"""Memory is counted by process: a worker of a cluster with several threads does one log after the other."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A log, and what is done with it.
+
+    Attributes
+    ----------
+    log, name
+        Absolute path, and name.
+    files
+        As `ferryid.batch.logs.Entry.files` has them.
+    folder, tables
+        For its results, and the output folder whose ``logs`` keep ingested tables; absolute.
+    profile_text, profile_path
+        The vessel.
+    model_text
+        The model to evaluate and to diagnose from, as JSON; None for the profile's hull.
+    recipe
+        The steps and their settings.
+    stamp
+        Hashes of all of it.
+    memory_bytes
+        The bound.
+    again
+        True: done again if it went wrong.
+    """
+
+    log: str
+    name: str
+    files: list[list[Any]]
+    folder: Path
+    tables: Path
+    profile_text: str
+    profile_path: str
+    model_text: str | None
+    recipe: Recipe
+    stamp: Mapping[str, str]
+    memory_bytes: int
+    again: bool = False
+
+    def row(self, status: str, reason: str = "") -> Row:
+        """Return a row without results."""
+        return {
+            "name": self.name,
+            "files": self.files,
+            "stamp": dict(self.stamp),
+            "status": status,
+            "reason": reason,
+            "sha256": None,
+            "start_ns": None,
+            "duration_s": None,
+            "memory_bytes": self.memory_bytes,
+            "peak_bytes": 0,
+            "seconds": {},
+        }
+
+    def stands(self, row: Row | None) -> bool:
+        """Return whether a row tells of this log as it is now, and nothing of it is to be tried again."""
+        if row is None or row["stamp"] != dict(self.stamp) or row["files"] != self.files:
+            return False
+        more = row["status"] in (MEMORY, LOST) and self.memory_bytes > row["memory_bytes"]
+        return row["status"] == DONE or not (self.again or more)
+
+
+def work(task: Task) -> Row:
+    """Carry out a task, and return its row when all of it is on disk.
+
+    Raises
+    ------
+    UnwritableError
+        For a full disk and a folder that cannot be written: these say nothing of the log.
+    """
+    memory.count_what_is_used()
+    # Another process may be at it still, whose cluster has lost sight of it.
+    with _one_at_a_time, alone(task.folder):
+        before = read_row(task.folder)
+        if before is not None and task.stands(before):
+            return before
+        clear(task.folder)
+        row = _row(task)
+        write_row(task.folder, row)
+        return row
+
+
+def lost(task: Task) -> Row:
+    """Return the row of a log whose processes died."""
+    reason = (
+        "its process died, time and again: most likely of too little memory. "
+        "Fix: give fewer --processes, or diagnose the log by itself with ferryid diagnose"
+    )
+    with alone(task.folder):
+        clear(task.folder)
+        row = task.row(LOST, reason)
+        write_row(task.folder, row)
+    return row
+
+
+def _row(task: Task) -> Row:
+    memory.forget_peak()
+    row = task.row(DONE)
+    try:
+        with warnings.catch_warnings(), memory.bounded(task.memory_bytes):
+            # What NumPy cannot compute becomes NaN, and is told where it matters.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            _carry_out(task, row)
+    except UnwritableError:
+        raise
+    except Exception as error:  # noqa: BLE001 - whatever one log shows is told in its row, and the others go on
+        row["status"], row["reason"] = _told(task, error)
+        if row["status"] == FAILED:
+            (task.folder / TRACEBACK).write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+    row["peak_bytes"] = memory.peak_bytes()
+    return dict(finite(row))
+
+
+def _carry_out(task: Task, row: Row) -> None:
+    from ferryid.batch.steps import CARRY_OUT, Job
+    from ferryid.identify.model import from_json
+    from ferryid.signals.cache import folder_of
+    from ferryid.signals.recording import record
+    from ferryid.vessel import parse_profile
+
+    profile = parse_profile(task.profile_text, task.profile_path)
+    model = None if task.model_text is None else from_json(json.loads(task.model_text), "the model of the recipe")
+    begun = time.perf_counter()
+    recording = record(task.log, profile, task.tables)
+    row |= {
+        "sha256": recording.sha256,
+        "start_ns": recording.start_ns,
+        "duration_s": (recording.end_ns - recording.start_ns) * 1e-9,
+    }
+    row["seconds"]["read"] = time.perf_counter() - begun
+    recorded = folder_of(task.tables, recording.name, recording.sha256, profile.sha256)
+    del recording
+    job = Job(task.log, task.name, profile, model, task.recipe, task.folder, task.tables, recorded)
+    refused = {}
+    for step in task.recipe.steps:
+        begun = time.perf_counter()
+        try:
+            row[step] = CARRY_OUT[step](job)
+        except UnwritableError:
+            raise
+        except FerryIdError as error:
+            status, reason = _told(task, error)
+            if status != REFUSED:
+                raise
+            # A log too short for a fit may well be evaluated.
+            refused[step] = reason
+        row["seconds"][step] = time.perf_counter() - begun
+    if refused:
+        row["status"] = REFUSED if len(refused) == len(task.recipe.steps) else PARTLY
+        row["reason"] = "; ".join(f"{step}: {reason}" for step, reason in refused.items())
+        if len(set(refused.values())) == 1 and row["status"] == REFUSED:
+            row["reason"] = next(iter(refused.values()))
+
+
+def _told(task: Task, error: Exception) -> tuple[str, str]:
+    """Return how a log ends with an error, and why in one line.
+
+    Raises
+    ------
+    UnwritableError
+        Where the disk is full.
+    """
+    for cause in _causes(error):
+        if isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise unwritable(task.folder, cause) from error
+        if isinstance(cause, MemoryError) or str(cause) == "can't start new thread":
+            return (
+                MEMORY,
+                f"needs more than {memory.told_bytes(task.memory_bytes)} of memory. Fix: give more with --memory",
+            )
+    if isinstance(error, FerryIdError):
+        # Whoever tells it says of which log.
+        return REFUSED, str(error).removeprefix(f"{task.log}: ").removeprefix(f"{task.name}: ")
+    if isinstance(error, OSError):
+        return REFUSED, one_line(
+            f"{error.filename or task.log}: {error.strerror or error}. Fix: check the file and the disk"
+        )
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return FAILED, one_line(
+        f"a bug of ferryid: {type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+    )
+
+
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__

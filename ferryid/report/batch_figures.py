@@ -1,0 +1,138 @@
+"""Figures of a batch: findings and model errors over the dates of the logs, as SVG text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib.ticker import MaxNLocator
+
+from ferryid.diagnose.result import HINT
+from ferryid.identify.result import AXES
+from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, UNITS, canvas, svg_text
+
+PANEL = 1.35
+"""Height of a panel [inches]."""
+ABSENT = "#9a9a9a"
+
+
+def findings(trends: Sequence[Mapping[str, Any]]) -> str:
+    """Return the parameters of one effect, a panel each: values with 95 % intervals over the dates of their logs.
+
+    Parameters
+    ----------
+    trends
+        As `ferryid.batch.trend.trends_of` gives them, of one vessel and effect.
+    """
+    with mpl.rc_context(STYLE):
+        figure, every = canvas(len(trends), 1.0 + PANEL * len(trends))
+        dated = bool(trends[0]["dated"])
+        for ax, one in zip(every, trends, strict=True):
+            sure = [point for point in one["points"] if point["probability"] > HINT]
+            hints = [point for point in one["points"] if point["probability"] <= HINT]
+            _points(ax, sure, dated, "found", NEW)
+            _points(ax, hints, dated, "a hint", "white")
+            if one["neutral"] is not None:
+                x = [_x(where, dated) for where in one["absent"]]
+                ax.plot(x, [one["neutral"]] * len(x), "|", color=ABSENT, markersize=7, label="not found")
+            unit = "" if one["unit"] == "-" else f" [{one['unit']}]"
+            ax.set_ylabel(f"{one['parameter'].replace('_', ' ')}{unit}")
+        _horizontal(every, dated)
+        _legend(figure, every)
+        return svg_text(figure)
+
+
+def errors(rows: Sequence[Mapping[str, Any]], dated: bool) -> str:
+    """Return the root-mean-square force errors on each axis over the dates of their logs.
+
+    Parameters
+    ----------
+    rows
+        Rows of a batch, of one vessel.
+    dated
+        True where all have a date; else they stand in their order.
+    """
+    with mpl.rc_context(STYLE):
+        figure, every = canvas(len(AXES), 1.0 + PANEL * len(AXES))
+        for ax, axis, unit in zip(every, AXES, UNITS, strict=True):
+            for label, mark, colour, path in (
+                ("base model", "o", BASE, ("fit", "mse", "base")),
+                ("fit to the log", "o", NEW, ("fit", "mse", "model")),
+                ("evaluated, whole log", "x", MEASURED, ("evaluate", "mse")),
+            ):
+                found = [
+                    (_x({**row, "place": place}, dated), _error(row, path, axis)) for place, row in enumerate(rows)
+                ]
+                known = [(x, y) for x, y in found if y is not None]
+                if known:
+                    ax.plot(
+                        [x for x, _ in known],
+                        [y for _, y in known],
+                        mark,
+                        color=colour,
+                        markersize=4.5,
+                        label=label,
+                        markerfacecolor="none" if label == "base model" else colour,
+                    )
+            ax.margins(y=0.15)
+            ax.autoscale_view()
+            ax.set_ylim(bottom=0.0)
+            ax.set_ylabel(f"{axis} [{unit}]")
+        _horizontal(every, dated)
+        _legend(figure, every)
+        return svg_text(figure)
+
+
+def _error(row: Mapping[str, Any], path: Sequence[str], axis: str) -> float | None:
+    value: Any = row
+    for name in (*path, axis):
+        value = None if value is None else value.get(name)
+    return None if value is None else float(value) ** 0.5
+
+
+def _points(ax: Axes, points: Sequence[Mapping[str, Any]], dated: bool, label: str, face: str) -> None:
+    if not points:
+        return
+    value, low, high = (
+        np.array([np.nan if point[name] is None else point[name] for point in points], dtype=np.float64)
+        for name in ("value", "low", "high")
+    )
+    ax.errorbar(
+        [_x(point, dated) for point in points],
+        value,
+        yerr=np.maximum(np.vstack([value - low, high - value]), 0.0),
+        fmt="o",
+        color=NEW,
+        markerfacecolor=face,
+        markersize=4.5,
+        linewidth=0.9,
+        label=label,
+    )
+
+
+def _x(where: Mapping[str, Any], dated: bool) -> Any:
+    return datetime.fromisoformat(where["date"]) if dated else where["place"] + 1
+
+
+def _horizontal(every: Sequence[Axes], dated: bool) -> None:
+    ax = every[-1]
+    ax.margins(x=0.04)
+    if dated:
+        locator: Any = AutoDateLocator(minticks=3, maxticks=7)  # type: ignore[no-untyped-call]
+        ax.xaxis.set_major_locator(locator)
+        ax.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
+    else:
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.set_xlabel("log, in the order of the batch")
+
+
+def _legend(figure: Any, every: Sequence[Axes]) -> None:
+    """Put one legend over all panels, with what any of them shows."""
+    shown = {label: handle for ax in every for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    if shown:
+        figure.legend(shown.values(), shown.keys(), loc="upper center", ncols=len(shown), borderaxespad=0.1)

@@ -1,0 +1,466 @@
+"""A batch as a whole: bad logs are rows, and what is done stays done, whatever ends it."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from ferryid.batch import kept, steps, task
+from ferryid.batch import run as running
+from ferryid.batch.remaining import Remaining, told_time
+from ferryid.errors import FerryIdError, UnwritableError
+from ferryid.files import unwritable
+from tests.batch.archive import archive, deadly, recipe, rows_of, run, same
+from tests.batch.work import children_of, ended, environment
+
+FIT = 'steps = ["fit"]\n[fit]\ndelta = 0.4\nsigma = 0.4\ndraws = 20\n'
+
+
+def statuses(result: dict[str, Any]) -> dict[str, str]:
+    return {row["name"]: row["status"] for row in result["rows"]}
+
+
+def results(folder: Path) -> Path:
+    return folder / "out" / "batch" / "results"
+
+
+def test_a_bad_log_is_a_row_and_the_rest_goes_on(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 2)
+    recipe(tmp_path)
+    (logs / "a_broken.mcap").write_bytes(b"")
+    (logs / "z_other.txt").write_text("not a log\n", encoding="utf-8")
+    (logs / "list.csv").write_text(
+        "log\nday0.mcap\nday1.mcap\na_broken.mcap\nz_other.txt\ngone.mcap\n", encoding="utf-8"
+    )
+    result, told = run(tmp_path, logs / "list.csv")
+    assert statuses(result) == {
+        "day0": "done", "day1": "done", "a_broken": "refused", "z_other": "refused", "gone": "refused",
+    }  # fmt: skip
+    assert [line for line in told if line.startswith("refused: ")] == told
+    assert told[0] == f"refused: {logs / 'a_broken.mcap'}: {result['rows'][2]['reason']}"
+    assert result["rows"][2]["reason"].startswith("the file is empty, a log was expected, found 0 bytes. Fix: ")
+    assert result["counts"] == {
+        "logs": 5, "done": 2, "partly": 0, "refused": 3, "failed": 0, "memory": 0, "lost": 0, "done_before": 0,
+    }  # fmt: skip
+    # Refused ones are no more tried than others, until they change or somebody asks.
+    again, told = run(tmp_path, logs / "list.csv")
+    assert told == ["5 of 5 logs done already, 3 of them in vain (--again tries these again); 0 left"]
+    assert same(again) == same(result)
+    shutil.copy(logs / "day0.mcap", logs / "gone.mcap")
+    again, told = run(tmp_path, logs / "list.csv")
+    assert again["rows"][4]["status"] == "done"
+    assert again["counts"]["done_before"] == 4
+    before = rows_of(tmp_path)
+    again, told = run(tmp_path, logs / "list.csv", again=True)
+    assert again["counts"]["done_before"] == 3
+    assert len(set(before.items()) - set(rows_of(tmp_path).items())) == 2
+
+
+def test_every_step_of_one_log(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 1)
+    recipe(tmp_path, "[fit]\ndelta = 0.4\nsigma = 0.4\n")
+    result, _ = run(tmp_path, logs / "*.mcap")
+    (row,) = result["rows"]
+    assert row["status"] == "done", row["reason"]
+    folder = tmp_path / "out" / "batch" / row["folder"]
+    fitted = json.loads((folder / row["fit"]["report"]).with_name("fit.json").read_text("utf-8"))
+    assert row["fit"]["normalised_mse"] == fitted["scores"]["normalised_mse"]
+    assert row["fit"]["accepted"]
+    # Results of a log are its own: its model is no version of anybody else's.
+    assert json.loads((folder / row["fit"]["model"]).read_text("utf-8"))["version"] == 1
+    assert row["fit"]["model"].startswith("models/milliampere-day0/")
+    evaluated = json.loads((folder / row["evaluate"]["result"]).read_text("utf-8"))
+    assert row["evaluate"]["mse"] == evaluated["logs"][0]["mse"]["model"]
+    assert evaluated["logs"][0]["mse"]["model"] == pytest.approx(evaluated["logs"][0]["mse"]["base"])
+    diagnosed = json.loads((folder / row["diagnose"]["report"]).with_name("diagnosis.json").read_text("utf-8"))
+    assert row["diagnose"]["verdict"] == diagnosed["verdict"]
+    assert Path(diagnosed["report"]).exists()
+    assert (row["date"], row["date_from"]) == ("2021-04-20T10:00:00+00:00", "log")
+    assert set(row["seconds"]) == {"read", "fit", "evaluate", "diagnose"}
+    assert 1 << 27 < row["peak_bytes"] <= result["memory"]["limit_bytes"]
+    # The tables are where other commands look for them.
+    assert list((tmp_path / "out" / "logs").glob("day0-*/*.parquet"))
+
+
+def test_what_one_step_refuses_another_may_take(tmp_path: Path) -> None:
+    logs = tmp_path / "season"
+    logs.mkdir()
+    shutil.copy(archive(tmp_path / "season", 1).parents[1] / "season" / "season" / "day0.mcap", logs / "long.mcap")
+    shutil.copytree(Path(__file__).resolve().parents[2] / "fixtures" / "short_ros2", logs / "brief")
+    recipe(tmp_path, 'steps = ["fit", "evaluate"]\n[fit]\ndraws = 20\n')
+    result, told = run(tmp_path, logs / "long.mcap", logs / "brief")
+    assert statuses(result) == {"long": "done", "brief": "partly"}
+    row = result["rows"][1]
+    assert row["fit"] is None
+    assert row["evaluate"]["mse"]["surge"] > 0.0
+    assert row["reason"].startswith("fit: too short for three blocks")
+    assert told == [f"partly: {logs / 'brief'}: {row['reason']}"]
+
+
+def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 2)
+    recipe(tmp_path, FIT)
+    first, _ = run(tmp_path, logs / "*.mcap")
+    recipe(tmp_path, FIT.replace("20", "30"))
+    other, told = run(tmp_path, logs / "*.mcap")
+    assert told == ["2 of the logs left were done with another recipe, and are done again"]
+    assert other["counts"]["done_before"] == 0
+    # Both are kept.
+    recipe(tmp_path, FIT)
+    again, told = run(tmp_path, logs / "*.mcap")
+    assert told == ["2 of 2 logs done already; 0 left"]
+    assert same(again) == same(first)
+    # What settings there are for steps that are not asked for is no matter.
+    recipe(tmp_path, FIT + '[diagnose]\nwithhold = ["wind"]\n')
+    assert run(tmp_path, logs / "*.mcap")[0]["counts"]["done_before"] == 2
+
+    model = Path("out/batch") / first["rows"][0]["folder"] / first["rows"][0]["fit"]["model"]
+    recipe(tmp_path, f'steps = ["evaluate"]\nmodel = "{tmp_path / model}"\n')
+    evaluated, _ = run(tmp_path, logs / "day1.mcap")
+    assert evaluated["rows"][0]["evaluate"]["of"] == "milliampere-day0@1"
+    assert evaluated["rows"][0]["evaluate"]["normalised_mse"] < 1.0
+    profile = tmp_path / "boat.toml"
+    from ferryid.vessel import load_profile
+
+    profile.write_text(load_profile("milliampere").text + "\n# another day\n", encoding="utf-8")
+    changed, told = run(tmp_path, logs / "day1.mcap", vessel=str(profile))
+    assert told == ["1 of the logs left were done with another profile, and are done again"]
+    assert changed["counts"]["done_before"] == 0
+
+
+def test_a_log_is_known_by_its_content_where_it_was_touched_or_moved(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 2)
+    (logs / "day1.mcap").write_bytes((Path(__file__).resolve().parents[2] / "fixtures" / "truncated.mcap").read_bytes())
+    recipe(tmp_path)
+    first, _ = run(tmp_path, logs)  # a folder is one log
+    first, _ = run(tmp_path, logs / "*.mcap")
+    os.utime(logs / "day0.mcap")
+    (logs / "day1.mcap").rename(logs / "moved.mcap")
+    second, told = run(tmp_path, logs / "*.mcap")
+    assert told == ["2 of 2 logs done already; 0 left"]
+    assert [row["folder"] for row in second["rows"]] == [row["folder"] for row in first["rows"]]
+    assert second["rows"][1]["log"].endswith("moved.mcap")
+    # A copy beside it is another log.
+    shutil.copy(logs / "moved.mcap", logs / "copy.mcap")
+    third, _ = run(tmp_path, logs / "*.mcap")
+    assert third["counts"]["done_before"] == 2
+    # As long as before, and another.
+    data = bytearray((logs / "day0.mcap").read_bytes())
+    data[len(data) // 2] ^= 1
+    (logs / "day0.mcap").write_bytes(data)
+    fourth, _ = run(tmp_path, logs / "*.mcap")
+    assert fourth["counts"]["done_before"] == 2
+    assert fourth["rows"][1]["sha256"] != first["rows"][0]["sha256"]
+
+
+def test_a_log_that_kills_its_process_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    logs = archive(tmp_path, 3)
+    (logs / "day1.mcap").rename(logs / "deadly.mcap")
+    recipe(tmp_path)
+    monkeypatch.setattr(running, "work", deadly)
+    result, told = run(tmp_path, logs / "*.mcap", processes=2)
+    assert statuses(result) == {"day0": "done", "day2": "done", "deadly": "lost"}
+    assert any(line.startswith(f"lost: {logs / 'deadly.mcap'}: its process died") for line in told)
+    monkeypatch.undo()
+    kept_ones, _ = run(tmp_path, logs / "*.mcap")
+    assert statuses(kept_ones)["deadly"] == "lost"
+    # With more memory it is worth another try.
+    more, _ = run(tmp_path, logs / "*.mcap", memory_limit="5G")
+    assert statuses(more)["deadly"] == "done"
+    assert more["counts"]["done_before"] == 2
+
+
+@pytest.fixture
+def one(tmp_path: Path) -> task.Task:
+    """Return the task of one log, for this process."""
+    logs = archive(tmp_path, 1)
+    recipe(tmp_path)
+    tasks: list[task.Task] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(running, "_carry_out", lambda these, *rest: tasks.extend(these) or 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            run(tmp_path, logs / "*.mcap")
+    return tasks[0]
+
+
+def failing(error: Callable[[], BaseException]) -> Any:
+    def step(job: steps.Job) -> dict[str, Any]:
+        (job.folder / "half").mkdir()
+        raise error()
+
+    return step
+
+
+def test_a_bug_is_a_row_with_its_traceback(one: task.Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(steps.CARRY_OUT, "evaluate", failing(lambda: ValueError("wind\nx")))
+    row = task.work(one)
+    assert row["status"] == "failed"
+    assert row["reason"].startswith("a bug of ferryid: ValueError: wind\\nx (test_run.py:")
+    assert "\n" not in row["reason"]
+    assert "in step" in (one.folder / "traceback.txt").read_text("utf-8")
+    assert kept.read_row(one.folder) == row
+    monkeypatch.undo()
+    assert task.work(one) == row, "nothing has changed"
+    assert task.work(replace(one, again=True))["status"] == "done"
+    assert not (one.folder / "half").exists(), "what was half done before is gone"
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "reason"),
+    [
+        (MemoryError(), "memory", "needs more than 4.0 GB of memory. Fix: give more with --memory"),
+        (OSError(errno.EIO, "Input/output error", "a.mcap"), "refused", "a.mcap: Input/output error. Fix: "),
+        (RuntimeError("can't start new thread"), "memory", "needs more than 4.0 GB"),
+    ],
+)
+def test_what_a_system_does_not_give(
+    one: task.Task, monkeypatch: pytest.MonkeyPatch, error: Exception, status: str, reason: str
+) -> None:
+    monkeypatch.setitem(steps.CARRY_OUT, "evaluate", failing(lambda: error))
+    row = task.work(one)
+    assert row["status"] == status
+    assert row["reason"].startswith(reason)
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_a_full_disk_is_no_result_of_a_log(one: task.Task, monkeypatch: pytest.MonkeyPatch, wrapped: bool) -> None:
+    full = OSError(errno.ENOSPC, "No space left on device")
+
+    def error() -> BaseException:
+        if not wrapped:
+            return full
+        told = FerryIdError("x: the bag cannot be unpacked. Fix: y")
+        told.__cause__ = full
+        return told
+
+    monkeypatch.setitem(steps.CARRY_OUT, "evaluate", failing(error))
+    with pytest.raises(UnwritableError, match=r"the disk is full\. Fix: free some space"):
+        task.work(one)
+    assert kept.read_row(one.folder) is None
+    monkeypatch.setitem(steps.CARRY_OUT, "evaluate", failing(lambda: unwritable(one.folder, full)))
+    with pytest.raises(UnwritableError):
+        task.work(one)
+    monkeypatch.undo()
+    assert task.work(one)["status"] == "done"
+
+
+def test_more_memory_than_there_may_be(one: task.Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    if sys.platform != "linux":
+        pytest.skip("other systems hold no process to a bound")
+    import numpy as np
+
+    def greedy(job: steps.Job) -> dict[str, Any]:
+        return {"sum": float(np.ones(6 << 27).sum())}
+
+    monkeypatch.setitem(steps.CARRY_OUT, "evaluate", greedy)
+    assert task.work(one)["status"] == "memory"
+
+
+COMMAND = "import sys; from ferryid.cli.main import main; main()"
+
+
+def started(folder: Path, *options: str) -> subprocess.Popen[str]:
+    cli = Path(running.__file__).parents[2] / "cli"
+    # As installed: the command line is a package of ferryid.
+    code = f"""
+import importlib.util, sys
+if importlib.util.find_spec("ferryid.cli") is None:
+    place = {str(cli)!r}
+    spec = importlib.util.spec_from_file_location("ferryid.cli", place + "/__init__.py", submodule_search_locations=[place])
+    sys.modules["ferryid.cli"] = importlib.util.module_from_spec(spec)
+from ferryid.cli.main import main
+main()
+"""
+    words = [
+        "batch",
+        str(folder / "season" / "*.mcap"),
+        "--vessel",
+        "milliampere",
+        "--recipe",
+        str(folder / "recipe.toml"),
+    ]
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *words, "--out", str(folder / "out"), *options],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, env=environment(),
+    )  # fmt: skip
+
+
+def wait_for(folder: Path, count: int, working: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 90.0
+    while len(list(results(folder).glob("*/row.json"))) < count:
+        assert working.poll() is None, working.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 6)
+    recipe(tmp_path, FIT)
+    with started(tmp_path, "--processes", "2") as working:
+        wait_for(tmp_path, 2, working)
+        children = children_of(working.pid)
+        working.send_signal(signal.SIGKILL)
+    assert ended(children), "processes go on that nobody waits for"
+    before = rows_of(tmp_path)
+    assert 2 <= len(before) < 6, "it was over before it was killed"
+    assert len(list(results(tmp_path).iterdir())) > len(before), "nothing was half done"
+    abandoned = tmp_path / "out" / "logs" / ".day5-abc.part"
+    abandoned.mkdir()
+    os.utime(abandoned, (0, 0))
+
+    second, told = run(tmp_path, logs / "*.mcap", processes=2)
+    assert told == [f"{len(before)} of 6 logs done already; {6 - len(before)} left"]
+    assert before.items() <= rows_of(tmp_path).items(), "what was done is not done again"
+    assert set(statuses(second).values()) == {"done"}
+    assert not abandoned.exists()
+    assert not list((tmp_path / "out").rglob(".*.part"))
+
+    # As a run that nobody killed.
+    shutil.move(tmp_path / "out", tmp_path / "killed")
+    whole, _ = run(tmp_path, logs / "*.mcap", processes=2)
+    assert same(whole) == same(second)
+    tables = [pq.read_table(tmp_path / place / "batch" / "summary.parquet") for place in ("killed", "out")]
+    mine, other = (table.drop_columns(["seconds", "peak_bytes"]) for table in tables)
+    assert mine.equals(other, check_metadata=True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["interrupt", "terminate"])
+def test_interrupted_it_keeps_what_is_done(tmp_path: Path, number: signal.Signals) -> None:
+    archive(tmp_path, 6)
+    recipe(tmp_path, FIT)
+    with started(tmp_path, "--processes", "2") as working:
+        wait_for(tmp_path, 1, working)
+        children = children_of(working.pid)
+        os.killpg(working.pid, number) if number == signal.SIGINT else working.send_signal(number)
+        out, told = working.communicate(timeout=60.0)
+    assert working.returncode == (130 if number == signal.SIGINT else 143), told
+    assert told == "ferryid: interrupted, nothing half-written was left\n"
+    assert out == ""
+    assert ended(children)
+    assert 1 <= len(rows_of(tmp_path)) < 6
+
+
+def test_on_a_disk_that_is_full_it_stops_and_goes_on_when_there_is_space(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    small = ["unshare", "-rm", "sh", "-ec"]
+    try:
+        possible = subprocess.run(
+            [*small, f"mount -t tmpfs -o size=1m tmpfs {tmp_path}/disk"], capture_output=True
+        ).returncode
+    except FileNotFoundError:
+        possible = 1
+    if possible != 0:
+        pytest.skip("no disk of our own can be mounted here")
+    archive(tmp_path, 4)
+    recipe(tmp_path)
+    command = f"{sys.executable} -c '{COMMAND}' batch '{tmp_path}/season/*.mcap' --vessel milliampere --processes 1 "
+    command += f"--recipe {tmp_path}/recipe.toml --out {tmp_path}/disk/out"
+    script = f"""
+mount -t tmpfs -o size=700k tmpfs {tmp_path}/disk
+{command} || echo code $?
+ls {tmp_path}/disk/out/batch/results/*/row.json | wc -l
+mount -o remount,size=60m {tmp_path}/disk
+{command}
+"""
+    done = subprocess.run([*small, script], capture_output=True, text=True, env=environment())
+    lines = done.stdout.splitlines()
+    assert lines[0] == "code 2", done.stderr
+    assert 1 <= int(lines[1]) < 4
+    assert lines[2] == "4 logs: 4 done"
+    told = done.stderr.splitlines()
+    assert len(told) == 2, told
+    assert "the disk is full. Fix: free some space" in told[0]
+    assert told[1] == f"{lines[1]} of 4 logs done already; {4 - int(lines[1])} left"
+
+
+def test_on_a_cluster_that_loses_a_worker(tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]) -> None:
+    logs = archive(tmp_path, 8)
+    (logs / "day3.mcap").write_bytes(b"")
+    recipe(tmp_path, FIT)
+    address, (_, *workers) = cluster
+    told: list[str] = []
+
+    def show(stage: str) -> None:
+        # One that is at work: two are done, and as many as there are workers at work.
+        if stage.startswith("2 of 8") and workers[0].poll() is None:
+            workers[0].kill()
+
+    result = running.batch(
+        [str(logs / "*.mcap")], tmp_path / "out", vessel="milliampere", recipe=tmp_path / "recipe.toml", dask=address,
+        progress=show, tell=told.append,
+    )  # fmt: skip
+    assert workers[0].poll() is not None
+    assert statuses(result) == {f"day{k}": "refused" if k == 3 else "done" for k in range(8)}
+    here, _ = run(tmp_path, logs / "*.mcap")
+    assert here["counts"]["done_before"] == 8
+    assert same(here) == same(result)
+
+
+def test_two_at_once_do_not_share_a_folder(tmp_path: Path) -> None:
+    from ferryid.files import alone
+
+    logs = archive(tmp_path, 1)
+    recipe(tmp_path)
+    with alone(tmp_path / "out" / "batch"), pytest.raises(FerryIdError, match="another process is at work in it"):
+        run(tmp_path, logs / "*.mcap")
+
+
+def test_a_task_that_somebody_else_has_done_meanwhile_is_not_done_again(one: task.Task) -> None:
+    row = task.work(one)
+    state = (one.folder / "row.json").stat()
+    assert task.work(one) == row
+    assert (one.folder / "row.json").stat().st_ino == state.st_ino
+    changed = replace(one, files=[[one.files[0][0], 1, 1]])
+    assert task.work(changed)["files"] == changed.files
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"files": []}', "\x00" * 100])
+def test_a_damaged_row_is_none(one: task.Task, text: str) -> None:
+    task.work(one)
+    (one.folder / "row.json").write_text(text, encoding="utf-8")
+    assert kept.read_row(one.folder) is None
+    assert task.work(one)["status"] == "done"
+
+
+def test_nothing_says_whose_log_it_is(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 1)
+    recipe(tmp_path)
+    with pytest.raises(FerryIdError, match=r"nothing says whose log .* Fix: give --vessel"):
+        run(tmp_path, logs / "*.mcap", vessel=None)
+    assert not results(tmp_path).exists()
+
+
+def test_time_left_by_bytes_and_by_count() -> None:
+    equal = Remaining([5, 5, 5, 5])
+    assert equal.seconds(0, 10.0) == pytest.approx(30.0)
+    assert equal.seconds(3, 20.0) == pytest.approx(20.0)
+    # One of two, with nine tenths of the bytes: 0.25 + 0.45 of the work.
+    assert Remaining([90, 10]).seconds(0, 7.0) == pytest.approx(3.0)
+    assert Remaining([0, 0]).seconds(1, 7.0) == pytest.approx(7.0)
+    assert [told_time(s) for s in (5.0, 600.0, 10_000.0)] == ["5 s", "10 min", "2.8 h"]
+
+
+def test_progress_names_what_is_at_work(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 3)
+    recipe(tmp_path)
+    seen: list[str] = []
+    running.batch(
+        [str(logs / "*.mcap")], tmp_path / "out", vessel="milliampere", recipe=tmp_path / "recipe.toml", processes=2,
+        progress=seen.append, tell=lambda line: None,
+    )  # fmt: skip
+    assert "0 of 3 logs; day0, day1" in seen
+    assert any(line.startswith("1 of 3 logs, ") and " left; " in line and line.endswith("day2") for line in seen)
+    assert seen[-2:] == ["writing the summary", ""]

@@ -1,0 +1,148 @@
+"""The page of a batch: whole without a script, nothing unescaped, links that hold."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+
+from ferryid.batch.trend import trends_of
+from ferryid.report.batch_page import render
+from ferryid.vessel import load_profile
+from tests.batch.rows import finding, result, row
+
+PROFILES = {"milliampere": load_profile("milliampere")}
+
+
+class Table(HTMLParser):
+    """Collects the rows of the table of logs: attributes, cells by their keys, and links; and what is not closed."""
+
+    VOID = frozenset(("meta", "br", "hr", "img", "link", "input"))
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.rows: list[dict[str, Any]] = []
+        self.heads: list[str] = []
+        self.tags: list[str] = []
+        self._cell = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.tags.append(tag)
+        if tag not in self.VOID:
+            self.open.append(tag)
+        if tag == "tr" and "data-status" in given:
+            self.rows.append({"data": given, "cells": {}, "links": [], "count": 0})
+        elif tag == "th":
+            self.heads.append(given.get("data-key") or "reports")
+        elif tag == "td" and self.rows:
+            self._cell = given.get("data-key") or ("reason" if "colspan" in given else "reports")
+            self.rows[-1]["cells"][self._cell] = ""
+            self.rows[-1]["count"] += int(given.get("colspan") or 1)
+        elif tag == "a" and self.rows and "td" in self.open:
+            self.rows[-1]["links"].append(given["href"])
+
+    def handle_data(self, data: str) -> None:
+        if self.rows and "td" in self.open:
+            self.rows[-1]["cells"][self._cell] += data
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+EVIL = '<script>alert("x")</script>'
+
+
+def hostile() -> dict[str, Any]:
+    bad = {"fit": None, "evaluate": None, "diagnose": None, "start_ns": None, "duration_s": None}
+    return result(
+        row(
+            f"season/{EVIL}'\".mcap", note=EVIL, findings=(finding(EVIL, EVIL, says=f'"{EVIL}', **{EVIL: 1.0}),)
+        ),
+        row("season/b#1 100%?.mcap", 2, findings=(finding("unknown"), finding("wind", north=1.0, probability=0.2))),
+        row("season/c.mcap", status="refused", reason=EVIL, **bad),
+        row("season/d.mcap", status="failed", reason="a bug", **bad),
+    )  # fmt: skip
+
+
+def test_is_well_formed_and_needs_nothing_else() -> None:
+    page = render(hostile())
+    table = Table(page)
+    assert table.open == []
+    assert table.tags.count("script") == 1
+    assert EVIL not in page
+    assert not re.search(r"""(src|href)\s*=\s*["']?(https?:|//|data:)""", page)
+    # Every row has a cell below each head.
+    assert {one["count"] for one in table.rows} == {len(table.heads)}
+
+
+def test_what_rows_say() -> None:
+    first, second, third, fourth = Table(render(hostile())).rows
+    assert first["data"]["data-effects"] == EVIL.capitalize()
+    assert first["cells"]["date"] == "2024-05-01 00:00"
+    assert first["cells"]["fit"].startswith("accepted")
+    assert first["cells"]["fitmse"] == "0.100"
+    assert first["cells"]["rms"] == "9, 9, 9"
+    assert second["cells"]["found"] == "something without a name perhaps steady wind"
+    assert second["data"]["data-effects"].split("|")[1] == "Steady wind"
+    assert second["data"]["data-verdict"] == "explained"
+    # A name is no part of an address.
+    assert all("#" not in link and "?" not in link and " " not in link for link in second["links"])
+    assert second["links"][0] == "results/b%231%20100%25%3F.mcap-0123/reports/m-v1/report.html"
+    assert third["cells"]["reason"] == EVIL
+    assert third["data"]["data-status"] == "refused"
+    assert fourth["links"] == ["results/d.mcap-0123/traceback.txt"]
+
+
+def test_filters_offer_what_there_is() -> None:
+    page = render(hostile())
+    assert re.findall(r"<option>(\w+)</option>", page.partition('name="status"')[2].partition("</select>")[0]) == [
+        "done",
+        "failed",
+        "refused",
+    ]
+    assert 'name="vessel"' not in page, "there is but one"
+    assert '<form id="filters" hidden>' in page, "without a script they would do nothing"
+    alike = render(result(row("a.mcap"), row("b.mcap", 2)))
+    assert 'name="status"' not in alike
+    undated = render(result(row("a.mcap", start_ns=0)))
+    assert 'type="date"' not in undated
+
+
+def test_trends_are_drawn_and_told() -> None:
+    rows = [
+        row(f"s/{k}.mcap", k, findings=(finding("fouling", surge=1.0 + 0.1 * k, probability=0.1 * k),) if k > 2 else ())
+        for k in range(1, 11)
+    ]  # fmt: skip
+    page = render(result(*rows, trends=trends_of(rows, PROFILES)))
+    assert "milliampere: Fouling, surge grows from 1 to 1.9" in page
+    drawing = next(
+        svg for svg in re.findall(r"<svg.*?</svg>", page, re.DOTALL) if ">surge</text>" in svg and "not found" in svg
+    )
+    for label in ("found", "a hint", "not found"):
+        assert f">{label}</text>" in drawing
+    assert "Fouling in 8 logs" in page
+    assert ">surge [N]</text>" in page, "errors are drawn as well"
+    # One log makes no trend to be drawn.
+    assert "<svg" not in render(result(rows[5], trends=trends_of(rows[5:6], PROFILES)))
+
+
+@pytest.mark.parametrize("model", ["", "mine@2"])
+def test_what_was_evaluated_is_named(model: str) -> None:
+    page = render(result(row("a.mcap"), model=model))
+    assert f"rms error of {model or 'the hull'} [N, N, N·m]" in page
+    assert ("MSE of mine@2 over base" in page) == bool(model)
+
+
+def test_counts_memory_and_time() -> None:
+    page = render(hostile())
+    assert "4 logs, 2 done; 1 refused; 1 failed by a bug of ferryid" in page
+    assert "each process is held to 4.0 GB" in page
+    assert "22 s of work" in page
+    free = hostile()
+    free["memory"]["bounded"] = False
+    assert "holds no process to a bound" in render(free)
