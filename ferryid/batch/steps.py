@@ -11,11 +11,11 @@ from typing import Any
 
 from ferryid.batch.recipe import Recipe
 from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.remodel import blank, keep
+from ferryid.diagnose.remodel import keep
 from ferryid.files import dump_json, write_text
-from ferryid.identify.kept_pieces import kept
 from ferryid.identify.evaluate import evaluate
-from ferryid.identify.model import Model
+from ferryid.identify.kept_pieces import kept
+from ferryid.identify.model import Model, blank
 from ferryid.report.diagnosis_report import report
 from ferryid.report.fit_report import fit_and_report
 from ferryid.vessel.profile import Profile
