@@ -195,7 +195,7 @@ def _trial(field: Field, path: str, out: Path, window_s: float, before: Sequence
             warnings.append(f"{one.label} was trained on this log: its scores here are no evidence")
     if remembered:
         warnings.append(
-            f"squared errors stay correlated for longer than blocks of {block_s:.3g} s: intervals are probably too narrow"
+            f"squared errors stay correlated for longer than blocks of {block_s:.3g} s: its intervals are probably too narrow"
         )
     name = motion.log if motion.log not in [other.name for other in before] else f"{motion.log} ({len(before) + 1})"
     return Trial(

@@ -101,7 +101,7 @@ def _entry(
     known, alike = isfinite(low + high) and isfinite(p), 1.0 - ratio < ALIKE
     clear = known and not alike and corrected <= SIGNIFICANT
     hint = known and not alike and not clear and p <= SIGNIFICANT and corrected <= LIKELY
-    evidence = not (clear and first in judged.trained)
+    evidence = not ((clear or hint) and first in judged.trained)
     error = "MSE" if kind == "force" else f"{what} error"
     place = f"on {what}" if kind == "force" else f"in {what}, run free for {horizon:g} s"
     span = f" [{low:.3g}, {high:.3g}]" if known else ""
@@ -114,8 +114,6 @@ def _entry(
     elif clear:
         says = f"{first} is better than {second} {place} (p {chance(corrected)}): "
         says += f"its {error} is {ratio:.3g} of the other's{span}"
-        if not evidence:
-            says += f"; no evidence, as {first} has learnt from {'this log' if judged.on else 'some of these logs'}"
     elif hint:
         says = f"{first} may be better than {second} {place} (p {chance(p)} by itself, {chance(corrected)} among all): "
         says += f"its {error} is {ratio:.3g} of the other's{span}"
@@ -124,6 +122,8 @@ def _entry(
             f"no difference shown between {first} and {second} {place} (p {chance(corrected)}): "
             f"{error} of the first {ratio:.3g} of the other's{span}"
         )
+    if not evidence:
+        says += f"; no evidence, as {first} has learnt from {'this log' if judged.on else 'some of these logs'}"
     return {
         "on": judged.on,
         "kind": kind,

@@ -82,12 +82,18 @@ def mse_ratios(result: Row, shown: Sequence[tuple[str, Row]], reference: str) ->
     with mpl.rc_context(STYLE):
         figure = margins(1.25 + 0.21 * rows, top=0.3 + 0.2 * ((len(labels) + 2) // 3), left=0.15, between=(0.08, 0.1))
         panels = figure.subplots(1, 3, sharey=True)
+        # The names of logs may be longer than the first panel is wide.
+        panels[0].set_zorder(2)
+        panels[0].patch.set_visible(False)
         for j, (ax, axis) in enumerate(zip(panels, AXES, strict=True)):
             spans = []
             for group, (title, scope) in enumerate(shown):
                 top = -group * (len(labels) + 1)
                 if j == 0:
-                    ax.annotate(title, (0.02, top), xycoords=("axes fraction", "data"), fontsize=9, va="center")
+                    box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+                    ax.annotate(
+                        title, (0.02, top), xycoords=("axes fraction", "data"), fontsize=9, va="center", bbox=box
+                    )
                 for k, label in enumerate(labels):
                     ratio = over_reference(scope, label, reference)["mse"][axis]
                     if ratio["value"] is None:

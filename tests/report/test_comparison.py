@@ -132,3 +132,9 @@ def test_a_ratio_over_a_reference_is_turned_round_with_its_interval() -> None:
     assert turned["mse"]["sway"] == {"value": 0.5, "low": 0.25, "high": 0.625}
     assert turned["free_run"]["position_m"] == [turned["mse"]["sway"]]
     assert over_reference(scope, BASE, "one")["mse"]["sway"] is ratio
+
+
+def test_nor_is_it_where_it_may_be_better() -> None:
+    (row, *_) = result(("one", "two"), 0.03, frozenset({"one"}))["better"]
+    assert row["perhaps"] == "one"
+    assert row["says"].endswith("; no evidence, as one has learnt from this log")
