@@ -51,5 +51,17 @@ def measured(
         usable[start : start + round(3.0 * RATE_HZ)] = False
     hole = np.where(usable[:, None], 1.0, np.nan)
     return Measured(
-        made.log, made.t, RATE_HZ, made.eta, nu * hole, tau * hole, usable, tau, None, None, None, ("made",)
+        log=made.log,
+        t=made.t,
+        rate_hz=RATE_HZ,
+        eta=made.eta,
+        nu=nu * hole,
+        tau=tau * hole,
+        usable=usable,
+        tau_d=tau,
+        eta_d=None,
+        wind=None,
+        current=None,
+        payload=None,
+        repairs=("made",),
     )
