@@ -9,10 +9,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from distributed import LocalCluster
 
 from ferryid.identify import kept_pieces
 from ferryid.identify.basis import basis
@@ -26,6 +29,7 @@ from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 from tests.bench.identify import of_motion
 from tests.bench.page import Row, Section, duration, faster_row
+from tests.bench.rivals import rosbags_to_parquet
 
 ROWS_A_LOG = 144_000
 """Two hours at 20 Hz."""
@@ -61,7 +65,49 @@ def run(quick: bool) -> Section:
         "The pass over the rows forms basis and cross-products in chunks from arrays in memory, once; ingestion and smoothing, "
         "which the sums save as well, are not counted.",
     ]
-    return Section("Archive and start-up", [*table, *_start_up(15)], notes, ("typer",))
+    return Section(
+        "Archive and start-up",
+        [*table, *_batches(4 if quick else 20), *_start_up(15)],
+        notes,
+        ("rosbags", "distributed", "typer"),
+    )
+
+
+def _batches(logs: int) -> list[Row]:
+    """Return how long a batch of simulated logs takes, ingestion, fit and report of each, whole process."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        scenario = load_scenario("twelve-corner")
+        paths = [place / f"trial{seed:02d}.mcap" for seed in range(logs)]
+        for seed, path in enumerate(paths):
+            write_log(simulate(scenario, seed), path)
+        recipe = place / "recipe.toml"
+        recipe.write_text('steps = ["fit"]\n', encoding="utf-8")
+        command = (
+            "batch",
+            str(place / "*.mcap"),
+            "--vessel",
+            "milliampere",
+            "--recipe",
+            str(recipe),
+            "--processes",
+            "2",
+        )
+        pool, _ = _process((*command, "--out", str(place / "pool")))
+        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+            dask, _ = _process((*command, "--out", str(place / "dask"), "--dask", cluster.scheduler_address))
+        tables = [place / path.stem for path in paths]
+        for one in tables:
+            one.mkdir()
+        start = time.perf_counter()
+        with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as workers:
+            list(workers.map(rosbags_to_parquet, paths, tables))
+        rosbags = time.perf_counter() - start
+    what = f"batch of {logs} logs of 12 min, ingested and fitted, two processes"
+    return [
+        faster_row(what, [pool], "rosbags to Parquet in a pool of two, no fit", [rosbags], None),
+        faster_row(what, [pool], "the same on a Dask cluster of two workers", [dask], None),
+    ]
 
 
 def _process(arguments: Sequence[str]) -> tuple[float, int]:
