@@ -176,7 +176,7 @@ def test_logs_are_dealt_to_folds_where_they_are_short() -> None:
         sums.add(one.training, one.test)
     # Blocks go to folds 0 1, 2 3 and 4 0.
     shared = short[0].test.labelled(np.array([0, 1])).n + short[2].test.labelled(np.array([0, 1]), 1).n
-    assert [fold.n for fold in sums.folds().test][0] == shared
+    assert sums.folds().test[0].n == shared
     assert len(sums.folds().test) == 5
     assert len(folds_by_logs(short).test) == 7
 

@@ -24,10 +24,9 @@ def rows_with(used: Flags, seed: int = 0) -> Rows:
 def block_of(used: Flags, blocks: int) -> NDArray[np.int64]:
     """Number of the block of every used row, counted row by row; -1 elsewhere."""
     size = np.count_nonzero(used)
-    number, seen = np.full(len(used), -1), 0
-    for row in np.flatnonzero(used):
-        number[row] = seen * blocks // size
-        seen += 1
+    number = np.full(len(used), -1)
+    for place, row in enumerate(np.flatnonzero(used)):
+        number[row] = place * blocks // size
     return number
 
 
