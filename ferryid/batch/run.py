@@ -148,7 +148,21 @@ def _task(entry: Entry, of: tuple[Profile, Model | None], recipe: Recipe, limit:
     log, paths = "+".join(map(str, entry.paths)), entry.paths
     name = log_name(log)
     place = out / "batch" / "results" / f"{name[:60]}-{key_of(paths, stamp)}"
-    return Task(log, name, entry.files, place, out, profile.text, profile.path, text, recipe, stamp, limit, again)
+    return Task(
+        log,
+        name,
+        entry.files,
+        place,
+        out,
+        entry.vessel or "",
+        profile.text,
+        profile.path,
+        text,
+        recipe,
+        stamp,
+        limit,
+        again,
+    )
 
 
 def _hash(text: str) -> str:
