@@ -131,7 +131,9 @@ def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> No
     recipe(tmp_path, f'steps = ["evaluate"]\nmodel = "{tmp_path / model}"\n')
     evaluated, _ = run(tmp_path, logs / "day1.mcap")
     assert evaluated["rows"][0]["evaluate"]["of"] == "milliampere-day0@1"
-    assert evaluated["rows"][0]["evaluate"]["normalised_mse"] < 1.0
+    ratio = evaluated["rows"][0]["evaluate"]["normalised_mse"]
+    assert ratio < 1.0
+    assert f"force MSE of milliampere-day0@1: {ratio:.3f} of its" in running.render_batch(evaluated)
     profile = tmp_path / "boat.toml"
     from ferryid.vessel import load_profile
 
