@@ -58,12 +58,13 @@ EVIL = '<script>alert("x")</script>'
 
 
 def hostile() -> dict[str, Any]:
+    nameless = finding("unknown")
     bad = {"fit": None, "evaluate": None, "diagnose": None, "start_ns": None, "duration_s": None}
     return result(
         row(
             f"season/{EVIL}'\".mcap", note=EVIL, findings=(finding(EVIL, EVIL, says=f'"{EVIL}', **{EVIL: 1.0}),)
         ),
-        row("season/b#1 100%?.mcap", 2, findings=(finding("unknown"), finding("unknown"), finding("wind", north=1.0, probability=0.2))),
+        row("season/b#1 100%?.mcap", 2, findings=(nameless, nameless, finding("wind", north=1.0, probability=0.2))),
         row("season/c.mcap", status="refused", reason=EVIL, **bad),
         row("season/d.mcap", status="failed", reason="a bug", **bad),
     )  # fmt: skip
