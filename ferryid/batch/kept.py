@@ -10,6 +10,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -80,8 +81,9 @@ def clear(folder: Path) -> None:
 def sweep_tables(out: Path) -> None:
     """Remove tables that a killed process left half-written a good while ago."""
     for path in (out / "logs").glob(".*.part"):
-        if time.time() - path.stat().st_mtime > ABANDONED_S:
-            shutil.rmtree(path, ignore_errors=True)
+        with suppress(FileNotFoundError):  # finished meanwhile
+            if time.time() - path.stat().st_mtime > ABANDONED_S:
+                shutil.rmtree(path, ignore_errors=True)
 
 
 def key_of(paths: Sequence[Path], stamp: Mapping[str, str]) -> str:

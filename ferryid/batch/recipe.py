@@ -10,7 +10,7 @@ from typing import Any
 
 from ferryid.diagnose.scene import check_withheld
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.settings import WINDOWS_S, FitSettings
+from ferryid.identify.settings import FitSettings
 from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of, too_deep
 
 STEPS = ("fit", "evaluate", "diagnose")
@@ -19,6 +19,7 @@ KINDS: Mapping[str, tuple[str, tuple[type, ...]]] = {
     "str": ("text", (str,)),
     "int": ("a whole number", (int,)),
     "float": ("a number", (int, float)),
+    "tuple[float, ...]": ("a list of numbers", (list,)),
 }
 """Types of settings by their names, in words and as TOML has them."""
 
@@ -105,21 +106,16 @@ class _Reader:
         return Recipe(chosen, model, self._fit(self._section(data, "fit")), tuple(withhold))
 
     def _fit(self, section: Mapping[str, Any]) -> FitSettings:
-        kinds = {one.name: str(one.type).split(" | ") for one in fields(FitSettings) if one.name != "windows_s"}
+        kinds = {one.name: str(one.type).split(" | ") for one in fields(FitSettings)}
         self._known(section, ("fit",), tuple(kinds))
-        if section.get("window_s") == "auto":
-            # As --window auto has it: chosen for each log by cross-validation.
-            section = {**section, "windows_s": WINDOWS_S}
-            del section["window_s"]
         for name, value in section.items():
-            if name == "windows_s":
-                continue
             allowed = [KINDS[kind] for kind in kinds[name] if kind in KINDS]
-            if isinstance(value, bool) or not isinstance(value, tuple(one for _, types in allowed for one in types)):
+            types = tuple(one for _, types in allowed for one in types)
+            if isinstance(value, bool) or not isinstance(value, types) or (types == (list,) and not _numbers(value)):
                 wanted = " or ".join(words for words, _ in allowed)
                 raise self._fault(("fit", name), f'"{name}" is {wanted}, found {value!r}. Fix: correct it')
         try:
-            return FitSettings(**section)
+            return FitSettings(**{name: tuple(one) if isinstance(one, list) else one for name, one in section.items()})
         except FerryIdError as error:
             # Those that are of the wrong value are told by the names of their options.
             raise self._fault(("fit",), f"in [fit], {error}") from error
@@ -147,3 +143,7 @@ class _Reader:
 
     def _fault(self, place: KeyPath, says: str) -> FerryIdError:
         return FerryIdError(f"{self._path}:{line_of(self._lines, place)}: {says}")
+
+
+def _numbers(values: list[Any]) -> bool:
+    return all(isinstance(one, int | float) and not isinstance(one, bool) for one in values)

@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from ferryid import __version__
@@ -148,7 +149,21 @@ def _task(entry: Entry, of: tuple[Profile, Model | None], recipe: Recipe, limit:
     log, paths = "+".join(map(str, entry.paths)), entry.paths
     name = log_name(log)
     place = out / "batch" / "results" / f"{name[:60]}-{key_of(paths, stamp)}"
-    return Task(log, name, entry.files, place, out, profile.text, profile.path, text, recipe, stamp, limit, again)
+    return Task(
+        log,
+        name,
+        entry.files,
+        place,
+        out,
+        entry.vessel or "",
+        profile.text,
+        profile.path,
+        text,
+        recipe,
+        stamp,
+        limit,
+        again,
+    )
 
 
 def _hash(text: str) -> str:
@@ -257,6 +272,11 @@ def render_batch(result: Mapping[str, Any]) -> str:
     fits = [row["fit"] for row in result["rows"] if row["fit"]]
     if fits:
         lines.append(f"  {sum(fit['accepted'] for fit in fits)} of {len(fits)} fits accepted")
+    judged = [row["evaluate"] for row in result["rows"] if row["evaluate"]]
+    ratios = [one["normalised_mse"] for one in judged if one["normalised_mse"] is not None]
+    if ratios:
+        told = f"{median(ratios):.3f} of its base model's, median of {len(ratios)} logs"
+        lines.append(f"  force MSE of {judged[0]['of']}: {told}")
     lines += [f"  {trend['says']}" for trend in result["trends"] if trend["says"]]
     peak = result["memory"]["peak_bytes"]
     bound = f"at most {memory.told_bytes(result['memory']['limit_bytes'])} allowed"

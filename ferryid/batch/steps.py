@@ -31,6 +31,8 @@ class Job:
     ----------
     log, name
         Its path and its name.
+    vessel
+        What the profile was asked for by; empty where the model brought it.
     profile, model
         The vessel, and the model to evaluate and to diagnose from; the profile's hull where None.
     recipe
@@ -45,6 +47,7 @@ class Job:
 
     log: str
     name: str
+    vessel: str
     profile: Profile
     model: Model | None
     recipe: Recipe
@@ -105,9 +108,9 @@ def _evaluated(job: Job) -> dict[str, Any]:
 def _diagnosed(job: Job) -> dict[str, Any]:
     found = diagnose([job.log], job.profile, job.tables, model=job.model, withhold=job.recipe.withhold, progress=_quiet)
     found = keep(found, job.profile, job.model, job.folder, name=job.model_name("-diagnosed"))
-    words = ["ferryid", "diagnose", job.log, "--vessel", job.profile.name]
+    words = ["ferryid", "diagnose", job.log, *(["--vessel", job.vessel] if job.vessel else [])]
     words += [word for signal in job.recipe.withhold for word in ("--withhold", signal)]
-    made = report(found, job.folder, [*words, *(["--model", job.model.label] if job.model else [])])
+    made = report(found, job.folder, [*words, *(["--model", job.recipe.model] if job.recipe.model else [])])
     told = made.json
     return {
         "report": job.below(made.report),

@@ -41,8 +41,10 @@ class Task:
         As `ferryid.batch.logs.Entry.files` has them.
     folder, tables
         For its results, and the output folder whose ``logs`` keep ingested tables; absolute.
+    vessel
+        What the profile was asked for by; empty where the model brought it.
     profile_text, profile_path
-        The vessel.
+        The profile.
     model_text
         The model to evaluate and to diagnose from, as JSON; None for the profile's hull.
     recipe
@@ -60,6 +62,7 @@ class Task:
     files: list[list[Any]]
     folder: Path
     tables: Path
+    vessel: str
     profile_text: str
     profile_path: str
     model_text: str | None
@@ -162,7 +165,7 @@ def _carry_out(task: Task, row: Row) -> None:
     row["seconds"]["read"] = time.perf_counter() - begun
     recorded = folder_of(task.tables, recording.name, recording.sha256, profile.sha256)
     del recording
-    job = Job(task.log, task.name, profile, model, task.recipe, task.folder, task.tables, recorded)
+    job = Job(task.log, task.name, task.vessel, profile, model, task.recipe, task.folder, task.tables, recorded)
     refused = {}
     for step in task.recipe.steps:
         begun = time.perf_counter()

@@ -17,7 +17,7 @@ from ferryid.identify.residual import residual
 from ferryid.identify.rows import known_rows, rows_of
 from ferryid.identify.settings import WINDOWS_S, FitSettings, check_window
 from ferryid.identify.simpls import simpls, total
-from ferryid.identify.split import purge_seconds
+from ferryid.identify.split import block_number, purge_seconds
 from ferryid.signals.smooth import Measured, longest_stretch_s, odd_rows, smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.vessel.profile import Profile
@@ -93,9 +93,15 @@ def tried(windows_s: Sequence[float], measured: Sequence[Measured]) -> tuple[flo
     for window_s in windows_s:
         check_window(window_s)
     if tuple(windows_s) in ((), WINDOWS_S):
-        longest = min(longest_stretch_s(one) for one in measured)
-        windows_s = [window_s for window_s in WINDOWS_S if window_s <= longest / _STRETCHES]
+        longest_s = min(longest_stretch_s(one) for one in measured) / _STRETCHES
+        windows_s = [w for w in WINDOWS_S if w <= longest_s and any(_divides(one, w) for one in measured)]
     return distinct(windows_s, [one.rate_hz for one in measured])
+
+
+def _divides(measured: Measured, window_s: float) -> bool:
+    """Return whether a log is long enough for blocks that train and blocks that validate at a window [s]."""
+    seconds = np.count_nonzero(measured.usable) / measured.rate_hz - window_s
+    return block_number(seconds, purge_seconds(measured.rate_hz, window_s)) >= 3
 
 
 def studied(
@@ -160,7 +166,7 @@ def pieces_of(
     motion, error = test
     every = np.ones(len(motion.t), dtype=bool) if wanted is None else wanted
     used = known_rows(motion, functions, error, error) & every
-    purge = purge_seconds(motion, reach_s)
+    purge = purge_seconds(motion.rate_hz, reach_s)
     # A block is at least two purges long, so that more of it is used than lost.
     most = max(1, int(np.count_nonzero(used) / motion.rate_hz / (2.0 * purge)))
     edges = edges_of(used, min(blocks, most), round(purge * motion.rate_hz))

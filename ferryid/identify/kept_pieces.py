@@ -108,7 +108,7 @@ def _made(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequ
     functions = basis_of(settings, [motion])
     error = residual(profile, motion, settings.scale)
     used = known_rows(motion, functions, error, error)
-    purge_s = purge_seconds(motion, max(TEST_WINDOW_S, *windows_s))
+    purge_s = purge_seconds(motion.rate_hz, max(TEST_WINDOW_S, *windows_s))
     blocks = block_number(np.count_nonzero(used) / motion.rate_hz, purge_s)
     return Kept(
         name=recording.name,

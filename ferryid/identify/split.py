@@ -142,7 +142,7 @@ def folds(
     if k < 2:
         raise FerryIdError(f"settings: cross-validation needs 2 folds or more, found {k}. Fix: give 5, which is usual")
     used = [motion.valid if rows is None else rows[i] & motion.valid for i, motion in enumerate(motions)]
-    purge_s = [purge_seconds(motion, window_s, guard_s) for motion in motions]
+    purge_s = [purge_seconds(motion.rate_hz, window_s, guard_s) for motion in motions]
     parts = [
         max(1, min(k, int(np.count_nonzero(mask) / motion.rate_hz / (2.0 * purge))))
         for motion, mask, purge in zip(motions, used, purge_s, strict=True)
@@ -197,10 +197,10 @@ def correlation_time(values: Floats, valid: Flags, rate_hz: float, longest_s: fl
     return float(longest)
 
 
-def purge_seconds(motion: Motion, window_s: float, guard_s: float = GUARD_S) -> float:
-    """Return the time [s] within which two rows of a motion share what was smoothed over `window_s`."""
+def purge_seconds(rate_hz: float, window_s: float, guard_s: float = GUARD_S) -> float:
+    """Return the time [s] within which two rows at a rate share what was smoothed over `window_s`, and a guard."""
     # The derivative reaches one row further than the window on both sides.
-    return window_s + 2.0 / motion.rate_hz + guard_s
+    return window_s + 2.0 / rate_hz + guard_s
 
 
 def _number(used: Flags, parts: int) -> NDArray[np.int64]:
@@ -225,7 +225,7 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
     training, validation, notes, purges = [], [], [], []
     short = 0
     for motion in motions:
-        purge_s = purge_seconds(motion, window_s, guard_s)
+        purge_s = purge_seconds(motion.rate_hz, window_s, guard_s)
         seconds = np.count_nonzero(motion.valid) / motion.rate_hz
         number = block_number(seconds, purge_s, blocks)
         if number < 3 and len(motions) == 1:

@@ -58,7 +58,7 @@ def render(result: Mapping[str, Any]) -> str:
         vessels=sorted({row["vessel"] for row in rows}),
         noted=any(row["note"] for row in rows),
         steps=[step for step in ("fit", "evaluate", "diagnose") if step in result["recipe"]["steps"]],
-        model=result["recipe"]["model"],
+        model=_examined(result),
         columns=_columns(result["recipe"]),
         memory=memory,
         gigabyte=1 << 30,
@@ -70,6 +70,12 @@ def _columns(recipe: Mapping[str, Any]) -> int:
     """Return how many columns tell of results."""
     steps = recipe["steps"]
     return 2 * ("diagnose" in steps) + 2 * ("fit" in steps) + (1 + bool(recipe["model"])) * ("evaluate" in steps)
+
+
+def _examined(result: Mapping[str, Any]) -> str:
+    """Return the name of the model that logs were evaluated against, empty for the hull of the profile."""
+    names = [row["evaluate"]["of"] for row in result["rows"] if row["evaluate"]]
+    return "" if not result["recipe"]["model"] else next(iter(names), result["recipe"]["model"])
 
 
 def _common(logs: Sequence[str]) -> str:
@@ -107,8 +113,8 @@ def _row(row: Mapping[str, Any]) -> dict[str, Any]:
         "time": (row["date"] or "")[:16].replace("T", " "),
         "minutes": None if row["duration_s"] is None else row["duration_s"] / 60.0,
         "verdict": (diagnosis["verdict"] if diagnosis else "").replace("_", " "),
-        "found": [{"name": _name(one), "says": one["says"]} for one in sure],
-        "perhaps": [{"name": _name(one), "says": one["says"]} for one in findings if one not in sure],
+        "found": _named(sure),
+        "perhaps": _named([one for one in findings if one not in sure]),
         "effects": list(dict.fromkeys(title(one["effect"]) for one in findings)),
         "fit": "" if fit is None else "accepted" if fit["accepted"] else "not accepted",
         "fit_mse": None if fit is None else fit["normalised_mse"],
@@ -121,9 +127,13 @@ def _row(row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _name(finding: Mapping[str, Any]) -> str:
-    name = title(finding["effect"], finding["instance"])
-    return name[:1].lower() + name[1:]
+def _named(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
+    """Return names, each once, and what is said of them."""
+    told: dict[str, list[str]] = {}
+    for one in findings:
+        name = title(one["effect"], one["instance"])
+        told.setdefault(name[:1].lower() + name[1:], []).append(one["says"])
+    return [{"name": name, "says": " ".join(says)} for name, says in told.items()]
 
 
 def _mean_error(evaluation: Mapping[str, Any]) -> dict[str, Any]:

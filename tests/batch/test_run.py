@@ -131,7 +131,9 @@ def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> No
     recipe(tmp_path, f'steps = ["evaluate"]\nmodel = "{tmp_path / model}"\n')
     evaluated, _ = run(tmp_path, logs / "day1.mcap")
     assert evaluated["rows"][0]["evaluate"]["of"] == "milliampere-day0@1"
-    assert evaluated["rows"][0]["evaluate"]["normalised_mse"] < 1.0
+    ratio = evaluated["rows"][0]["evaluate"]["normalised_mse"]
+    assert ratio < 1.0
+    assert f"force MSE of milliampere-day0@1: {ratio:.3f} of its" in running.render_batch(evaluated)
     profile = tmp_path / "boat.toml"
     from ferryid.vessel import load_profile
 
@@ -157,6 +159,7 @@ def test_a_log_is_known_by_its_content_where_it_was_touched_or_moved(tmp_path: P
     shutil.copy(logs / "moved.mcap", logs / "copy.mcap")
     third, _ = run(tmp_path, logs / "*.mcap")
     assert third["counts"]["done_before"] == 2
+    assert [row["folder"] for row in third["rows"][1:]] == [row["folder"] for row in first["rows"]]
     # As long as before, and another.
     data = bytearray((logs / "day0.mcap").read_bytes())
     data[len(data) // 2] ^= 1
@@ -326,7 +329,7 @@ def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Pat
     assert before.items() <= rows_of(tmp_path).items(), "what was done is not done again"
     assert set(statuses(second).values()) == {"done"}
     assert not abandoned.exists()
-    assert not list((tmp_path / "out").rglob(".*.part"))
+    assert not list(results(tmp_path).rglob(".*.part"))
 
     # As a run that nobody killed.
     shutil.move(tmp_path / "out", tmp_path / "killed")
@@ -425,6 +428,22 @@ def test_a_task_that_somebody_else_has_done_meanwhile_is_not_done_again(one: tas
     assert (one.folder / "row.json").stat().st_ino == state.st_ino
     changed = replace(one, files=[[one.files[0][0], 1, 1]])
     assert task.work(changed)["files"] == changed.files
+
+
+def test_what_is_begun_to_be_removed_counts_no_more(one: task.Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    task.work(one)
+    (one.folder / "reports").mkdir()
+
+    def denied(path: Path) -> None:
+        raise OSError(errno.EACCES, "no")
+
+    monkeypatch.setattr(shutil, "rmtree", denied)
+    # Whatever comes first in the folder, the row has gone before it.
+    monkeypatch.setattr(Path, "iterdir", lambda folder: iter([folder / "reports", folder / "row.json"]))
+    with pytest.raises(UnwritableError):
+        kept.clear(one.folder)
+    monkeypatch.undo()
+    assert kept.read_row(one.folder) is None
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"files": []}', "\x00" * 100])

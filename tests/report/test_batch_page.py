@@ -58,12 +58,13 @@ EVIL = '<script>alert("x")</script>'
 
 
 def hostile() -> dict[str, Any]:
+    nameless = finding("unknown")
     bad = {"fit": None, "evaluate": None, "diagnose": None, "start_ns": None, "duration_s": None}
     return result(
         row(
             f"season/{EVIL}'\".mcap", note=EVIL, findings=(finding(EVIL, EVIL, says=f'"{EVIL}', **{EVIL: 1.0}),)
         ),
-        row("season/b#1 100%?.mcap", 2, findings=(finding("unknown"), finding("wind", north=1.0, probability=0.2))),
+        row("season/b#1 100%?.mcap", 2, findings=(nameless, nameless, finding("wind", north=1.0, probability=0.2))),
         row("season/c.mcap", status="refused", reason=EVIL, **bad),
         row("season/d.mcap", status="failed", reason="a bug", **bad),
     )  # fmt: skip
@@ -133,7 +134,9 @@ def test_trends_are_drawn_and_told() -> None:
 
 @pytest.mark.parametrize("model", ["", "mine@2"])
 def test_what_was_evaluated_is_named(model: str) -> None:
-    page = render(result(row("a.mcap"), model=model))
+    made = row("a.mcap")
+    made["evaluate"]["of"] = "mine@2"
+    page = render(result(made, model="a/path/of/mine/2.json" if model else ""))
     assert f"rms error of {model or 'the hull'} [N, N, N·m]" in page
     assert ("MSE of mine@2 over base" in page) == bool(model)
 
