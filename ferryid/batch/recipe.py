@@ -114,8 +114,9 @@ class _Reader:
             if isinstance(value, bool) or not isinstance(value, types) or (types == (list,) and not _numbers(value)):
                 wanted = " or ".join(words for words, _ in allowed)
                 raise self._fault(("fit", name), f'"{name}" is {wanted}, found {value!r}. Fix: correct it')
+        settings: dict[str, Any] = {name: tuple(one) if isinstance(one, list) else one for name, one in section.items()}
         try:
-            return FitSettings(**{name: tuple(one) if isinstance(one, list) else one for name, one in section.items()})
+            return FitSettings(**settings)
         except FerryIdError as error:
             # Those that are of the wrong value are told by the names of their options.
             raise self._fault(("fit",), f"in [fit], {error}") from error

@@ -88,13 +88,18 @@ def distinct(windows_s: Iterable[float], rates_hz: Sequence[float]) -> tuple[flo
     return tuple(kept.values())
 
 
-def tried(windows_s: Sequence[float], measured: Sequence[Measured]) -> tuple[float, ...]:
-    """Return the windows to try [s], as `distinct` does; of the usual ones, where none is given, those that suit the logs."""
+def tried(windows_s: Sequence[float], measured: Sequence[Measured], *, in_blocks: bool = False) -> tuple[float, ...]:
+    """Return the windows to try [s], as `distinct` does; of the usual ones, where none is given, those that suit the logs.
+
+    With `in_blocks` those, too, that leave no log with blocks to train and blocks to validate on do not suit.
+    """
     for window_s in windows_s:
         check_window(window_s)
     if tuple(windows_s) in ((), WINDOWS_S):
         longest_s = min(longest_stretch_s(one) for one in measured) / _STRETCHES
-        windows_s = [w for w in WINDOWS_S if w <= longest_s and any(_divides(one, w) for one in measured)]
+        windows_s = [w for w in WINDOWS_S if w <= longest_s]
+        if in_blocks:
+            windows_s = [w for w in windows_s if any(_divides(one, w) for one in measured)]
     return distinct(windows_s, [one.rate_hz for one in measured])
 
 

@@ -196,7 +196,7 @@ def _windowed(profile: Profile, settings: FitSettings, opened: Sequence[Opened])
     Its split is of rows that every window knows, and to be kept: another, made for the window chosen, would validate on rows
     that took part in the choice.
     """
-    windows_s = tried(settings.windows_s, [one.measured for one in opened])
+    windows_s = tried(settings.windows_s, [one.measured for one in opened], in_blocks=settings.split == "blocks")
     longest_s = max(TEST_WINDOW_S, *windows_s)
     motions = _told_apart([smooth_measured(one.measured, longest_s) for one in opened])
     functions = basis_of(settings, motions)
