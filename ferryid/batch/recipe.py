@@ -146,5 +146,5 @@ class _Reader:
         return FerryIdError(f"{self._path}:{line_of(self._lines, place)}: {says}")
 
 
-def _numbers(values: list[Any]) -> bool:
+def _numbers(values: Any) -> bool:
     return all(isinstance(one, int | float) and not isinstance(one, bool) for one in values)
