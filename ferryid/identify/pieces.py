@@ -50,6 +50,12 @@ def edges_of(used: Flags, blocks: int, purge: int) -> Ints:
     return np.maximum.accumulate(np.clip(edges, 0, used.size))
 
 
+def together(labels: Ints) -> Flags:
+    """Return the pieces that are not near a block of another label, shape (B, 3), of the label of each block, shape (B,)."""
+    same = labels[1:] == labels[:-1]
+    return np.column_stack([np.append(True, same), np.ones(len(labels), dtype=bool), np.append(same, True)])
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """Cross-products of B blocks of one log, in three pieces each, about one shift; see `CrossProducts`.
@@ -133,10 +139,7 @@ class Pieces:
         label
             Which blocks to sum.
         """
-        chosen = labels == label
-        same = labels[1:] == labels[:-1]
-        kept = np.column_stack([np.append(True, same), np.ones(len(labels), dtype=bool), np.append(same, True)])
-        return self.summed(kept & chosen[:, None])
+        return self.summed(together(labels) & (labels == label)[:, None])
 
     def summed(self, kept: Flags) -> CrossProducts:
         """Return the cross-products of the pieces that `kept` marks, shape (B, 3), or whole blocks, shape (B, 1)."""

@@ -106,19 +106,14 @@ def sweep(
     """
     if what not in KINDS:
         raise FerryIdError(
-            f'sweep: there is nothing called "{what}" to sweep.{did_you_mean(what, KINDS)} Fix: choose one of '
-            f"{', '.join(KINDS)}"
+            f'sweep: there is nothing called "{what}" to sweep.{did_you_mean(what, (*KINDS, "basis"))} Fix: choose one of '
+            f"{', '.join(KINDS)} or basis"
         )
-    if not 2 <= folds <= 20:
-        raise FerryIdError(f"--folds: {folds} is no number of folds. Fix: give 2 to 20, {FOLDS} is usual")
+    check_folds(folds)
     if what == "components" and windows_s:
         raise FerryIdError("--windows: components are swept at one window. Fix: give --window, or sweep both")
     settings = replace(settings, windows_s=tuple(windows_s)).on(profile)
-    opened = []
-    for path in logs:
-        progress(f"reading {Path(path).name}")
-        opened.append(open_track(path, profile, out, rate_hz=settings.rate_hz))
-    refuse_twice(opened)
+    opened = read_logs(logs, profile, settings, out, progress)
     windows = tried((settings.window_s,) if what == "components" else windows_s, [one.measured for one in opened])
     if what != "components" and len(windows) < 2:
         raise FerryIdError(
@@ -138,9 +133,27 @@ def sweep(
         functions,
         windows,
         pieces,
-        [_log(one, log) for one, log in zip(opened, pieces, strict=True)],
+        [log_json(one, log) for one, log in zip(opened, pieces, strict=True)],
         folds,
     )
+
+
+def check_folds(folds: int) -> None:
+    """Refuse what is no number of folds."""
+    if not 2 <= folds <= 20:
+        raise FerryIdError(f"--folds: {folds} is no number of folds. Fix: give 2 to 20, {FOLDS} is usual")
+
+
+def read_logs(
+    logs: Sequence[str], profile: Profile, settings: FitSettings, out: Path, progress: Callable[[str], None]
+) -> list[Opened]:
+    """Return several logs before smoothing, each once; arguments and errors are those of `sweep`."""
+    opened = []
+    for path in logs:
+        progress(f"reading {Path(path).name}")
+        opened.append(open_track(path, profile, out, rate_hz=settings.rate_hz))
+    refuse_twice(opened)
+    return opened
 
 
 def judged(
@@ -175,7 +188,8 @@ def judged(
     )
 
 
-def _log(one: Opened, log: Studied) -> dict[str, Any]:
+def log_json(one: Opened, log: Studied) -> dict[str, Any]:
+    """Return name, hash and length of a log."""
     rows = int(log.test.n.sum())
     return {
         "name": one.recording.name,
