@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -27,14 +28,16 @@ from ferryid.cli.output import emit, progress
 
 
 def command(
-    what: Annotated[str, typer.Argument(help="components, window, or both at once.")],
+    what: Annotated[str, typer.Argument(help="components, window, both at once, or basis.")],
     vessel: Vessel,
     logs: MaybeLogs = None,
     windows: Annotated[
         str, typer.Option(help="Smoothing windows to try [s], as 0.5,1,2; a usual range if left out.")
     ] = "",
-    window: Annotated[float, typer.Option(help="Smoothing window [s] at which components are swept.")] = 1.0,
-    components: Annotated[str, typer.Option(help="Number of components at which windows are swept, or auto.")] = "auto",
+    window: Annotated[float, typer.Option(help="Smoothing window [s] for sweeps of components or basis.")] = 1.0,
+    components: Annotated[
+        str, typer.Option(help="Number of components for sweeps of window or basis, or auto.")
+    ] = "auto",
     folds: Annotated[int, typer.Option(help="Number of contiguous stretches that test in turn.")] = 5,
     basis: Basis = "modulus",
     structure: Structure = "decoupled",
@@ -54,8 +57,9 @@ def command(
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """Cross-validate smoothing windows and component counts, and mark which to fit with."""
+    """Cross-validate smoothing windows, component counts, or all bases in both structures, and mark which to fit with."""
     from ferryid.identify.settings import FitSettings, windows_of
+    from ferryid.report.structures_report import structures_and_report
     from ferryid.report.sweep_report import sweep_and_report
     from ferryid.vessel import load_profile
 
@@ -63,8 +67,8 @@ def command(
         basis=basis, structure=structure, components=components, window_s=window, smoother=smoother, residual=residual,
         inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta,
     )  # fmt: skip
-    outcome = sweep_and_report(
-        what,
+    run = structures_and_report if what == "basis" else partial(sweep_and_report, what)
+    outcome = run(
         logs or [] if archive else given(logs),
         load_profile(vessel),
         settings,

@@ -172,8 +172,6 @@ def bootstrap(
     for Dependent Data, chapter 2; Hesterberg (2015), The American Statistician 69, 371-386, section 5.3 (expanded
     percentiles).
     """
-    from scipy.special import ndtr, stdtrit  # a tenth of a second to import: only where it is needed
-
     stacked = blocks if isinstance(blocks, Blocks) else Blocks.stack(blocks)
     count = len(stacked.n)
     if count < 2:
@@ -185,8 +183,7 @@ def bootstrap(
     coefficients, intercepts = _draw(stacked, components, draws, seed, scale, scale_y, allowed)
     table = np.concatenate([coefficients, intercepts[:, None, :]], axis=1).transpose(2, 1, 0)
     widened = count / (count - 1)
-    tail = float(ndtr(np.sqrt(widened) * stdtrit(count - 1, (1.0 - level) / 2.0)))
-    low, high = _percentiles(table, tail)
+    low, high = percentiles(table, count, level)
     deviation = table - table.mean(axis=2, keepdims=True)
     covariance = deviation @ deviation.transpose(0, 2, 1) / max(draws - 1, 1) * widened
     return Bootstrap(
@@ -202,8 +199,14 @@ def bootstrap(
     )
 
 
-def _percentiles(table: Floats, tail: float) -> tuple[Floats, Floats]:
-    """Values at probability `tail` from either end of the last axis, linear between draws (as `numpy.quantile`)."""
+def percentiles(table: Floats, count: int, level: float = 0.95) -> tuple[Floats, Floats]:
+    """Return the ends of the interval that holds `level` of the draws along the last axis, moved out for `count` blocks.
+
+    Linear between draws, as `numpy.quantile`; Hesterberg (2015), section 5.3.
+    """
+    from scipy.special import ndtr, stdtrit  # a tenth of a second to import: only where it is needed
+
+    tail = float(ndtr(np.sqrt(count / (count - 1)) * stdtrit(count - 1, (1.0 - level) / 2.0)))
     ordered = np.sort(table, axis=-1)
     place = tail * (table.shape[-1] - 1)
     below = int(place)
@@ -353,7 +356,7 @@ def _moved(blocks: Blocks, shift: Floats) -> Floats:
     return np.asarray(blocks.products - cross - cross.transpose(0, 2, 1) + square)
 
 
-def _times_drawn(count: int, draws: int, seed: int) -> Floats:
+def times_drawn(count: int, draws: int, seed: int) -> Floats:
     """How often each of `count` blocks comes up in each draw of as many with replacement, shape (draws, count)."""
     picked = np.random.default_rng(seed).integers(0, count, (draws, count))
     flat = np.bincount((picked + count * np.arange(draws)[:, None]).ravel(), minlength=draws * count)
@@ -382,7 +385,7 @@ def _draw(
     )
     products = _moved(blocks, mean)
     count = len(blocks.n)
-    times = _times_drawn(count, draws, seed)
+    times = times_drawn(count, draws, seed)
     coefficients, intercepts = np.zeros((draws, K, m)), np.empty((draws, m))
     sums = times @ products[:, -1, K:]
     intercepts[:] = mean[K:] + sums[:, :m] / sums[:, m:]

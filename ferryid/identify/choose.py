@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.basis import Basis
-from ferryid.identify.crossed import FOLDS, MAX_COMPONENTS, MOST_GROUPS, TEST_WINDOW_S, Curves, Folds, FoldSums
+from ferryid.identify.crossed import FOLDS, MOST_GROUPS, TEST_WINDOW_S, Curves, Folds, FoldSums
 from ferryid.identify.inertia import effective_mass, unbelievable, unforced, without_inertia
 from ferryid.identify.pieces import Pieces, edges_of
 from ferryid.identify.residual import residual
@@ -197,6 +197,7 @@ def choose(
     without_force: Flags,
     *,
     before: Floats | None = None,
+    rule: Callable[[Curves], tuple[int, int]] = Curves.choice,
     where: str = "sweep",
 ) -> Choice:
     """Return the window and the component count that cross-validation cannot tell from the best and that are simplest.
@@ -211,6 +212,8 @@ def choose(
         Axes on which no actuator acts, shape (3,); see `force_free`.
     before
         Coefficients that those fitted here come on top of, shape (K, 3).
+    rule
+        Takes the window and the number of components from the errors; by default the simplest near the best.
     where
         What is fitted, for messages.
 
@@ -219,13 +222,13 @@ def choose(
     FerryIdError
         With fewer than two folds that hold rows.
     """
-    most = min(MAX_COMPONENTS, len(functions.terms))
+    most = len(functions.terms)
     fitted = functions.mask.any(axis=0)
     held = without_force & fitted if settings.inertia == "auto" else np.zeros(3, dtype=bool)
     while True:
         allowed = without_inertia(functions.mask, functions.terms, held)
         curves = folds.curves(allowed, most, where)
-        window, components = curves.choice()
+        window, components = rule(curves)
         if settings.components != "auto":
             components = min(int(settings.components), most)
             window = int(np.argmin(curves.normalised()[0][:, components - 1]))

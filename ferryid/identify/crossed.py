@@ -22,7 +22,6 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
-MAX_COMPONENTS = 21
 FOLDS = 5
 MOST_GROUPS = 10
 """Whole logs are dealt to so many folds where there are more."""
@@ -69,6 +68,12 @@ class Curves:
         near = curve <= curve[best] + band[best]
         fewest = int(np.argmax(near.any(axis=0)))
         return int(np.argmin(curve[:, fewest])), fewest + 1
+
+    def best(self) -> tuple[int, int]:
+        """Return number of window and of components (1..A) of the least error."""
+        curve = self.normalised()[0]
+        window, fewer = np.unravel_index(int(np.argmin(curve)), curve.shape)
+        return int(window), int(fewer) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +154,7 @@ class FoldSums:
         self._training: list[list[CrossProducts | None]] = [[None] * k for _ in range(windows)]
         self._test: list[CrossProducts | None] = [None] * k
 
-    def add(self, training: Sequence[Pieces], test: Pieces, used: Flags | None = None) -> None:
+    def add(self, training: Sequence[Pieces], test: Pieces, used: Flags | None = None) -> Ints:
         """Add one log.
 
         Parameters
@@ -158,18 +163,24 @@ class FoldSums:
             Its pieces at every window, and those for testing, of the same blocks.
         used
             Blocks that take part, shape (B,); all where None.
+
+        Returns
+        -------
+        ndarray
+            Number of the fold of each block, shape (B,); `OUT` of one that takes no part.
         """
         blocks = np.arange(test.blocks) if used is None else np.flatnonzero(used)
-        if not blocks.size:
-            return
-        parts = 1 if self._whole else min(self._k, blocks.size)
         labels = np.full(test.blocks, OUT)
+        if not blocks.size:
+            return labels
+        parts = 1 if self._whole else min(self._k, blocks.size)
         labels[blocks] = (np.arange(blocks.size) * parts // blocks.size + self._next) % self._k
         self._next = (self._next + parts) % self._k
         for fold in np.unique(labels[blocks]).tolist():
             for sums, pieces in zip(self._training, training, strict=True):
                 sums[fold] = _with(sums[fold], pieces.labelled(labels, fold))
             self._test[fold] = _with(self._test[fold], test.labelled(labels, fold))
+        return labels
 
     def folds(self) -> Folds:
         """Return what has been added."""

@@ -18,7 +18,7 @@ from ferryid.identify.bootstrap import Blocks, block_seconds, bootstrap
 from ferryid.identify.cautions import cautions, free_run_cautions
 from ferryid.identify.choose import Choice, choose, folds_by_blocks, force_free, studied, tried
 from ferryid.identify.cross_products import CrossProducts
-from ferryid.identify.crossed import MAX_COMPONENTS, TEST_WINDOW_S
+from ferryid.identify.crossed import TEST_WINDOW_S
 from ferryid.identify.estimate import Estimator
 from ferryid.identify.excitation import excitation
 from ferryid.identify.free_run import free_run
@@ -255,7 +255,7 @@ def regress(
         Coefficients that those fitted here come on top of, shape (K, 3); they count in the effective inertia.
     """
     already = 0.0 if before is None else before
-    most = min(MAX_COMPONENTS, len(functions.terms))
+    most = len(functions.terms)
     chosen = min(components, most)
     fitted = functions.mask.any(axis=0)
     axes = without_force & fitted if settings.inertia == "auto" else np.zeros(3, dtype=bool)

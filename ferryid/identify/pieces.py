@@ -50,6 +50,12 @@ def edges_of(used: Flags, blocks: int, purge: int) -> Ints:
     return np.maximum.accumulate(np.clip(edges, 0, used.size))
 
 
+def together(labels: Ints) -> Flags:
+    """Return the pieces that are not near a block of another label, shape (B, 3), of the label of each block, shape (B,)."""
+    same = labels[1:] == labels[:-1]
+    return np.column_stack([np.append(True, same), np.ones(len(labels), dtype=bool), np.append(same, True)])
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """Cross-products of B blocks of one log, in three pieces each, about one shift; see `CrossProducts`.
@@ -125,7 +131,7 @@ class Pieces:
 
     def separately(self, chosen: Flags) -> list[CrossProducts]:
         """Return the cross-products of each chosen block, shape (B,), without its rows near blocks that are not."""
-        kept = _apart_from_others(np.where(chosen, 0, OUT))
+        kept = together(np.where(chosen, 0, OUT))
         return [
             CrossProducts(int(n[keep].sum()), self.K, self.m, self.shift, products[keep].sum(axis=0))
             for n, products, keep, one in zip(self.n, self.products, kept, chosen, strict=True)
@@ -142,16 +148,10 @@ class Pieces:
         label
             Which blocks to sum.
         """
-        return self.summed(_apart_from_others(labels) & (labels == label)[:, None])
+        return self.summed(together(labels) & (labels == label)[:, None])
 
     def summed(self, kept: Flags) -> CrossProducts:
         """Return the cross-products of the pieces that `kept` marks, shape (B, 3), or whole blocks, shape (B, 1)."""
         pieces = np.broadcast_to(kept, self.n.shape)
         products = self.products[pieces].sum(axis=0)
         return CrossProducts(int(self.n[pieces].sum()), self.K, self.m, self.shift, products)
-
-
-def _apart_from_others(labels: Ints) -> Flags:
-    """Return the pieces that are not near a block of another label, shape (B, 3)."""
-    same = labels[1:] == labels[:-1]
-    return np.column_stack([np.append(True, same), np.ones(len(labels), dtype=bool), np.append(same, True)])

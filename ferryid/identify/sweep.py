@@ -113,11 +113,10 @@ def sweep(
     """
     if what not in KINDS:
         raise FerryIdError(
-            f'sweep: there is nothing called "{what}" to sweep.{did_you_mean(what, KINDS)} Fix: choose one of '
-            f"{', '.join(KINDS)}"
+            f'sweep: there is nothing called "{what}" to sweep.{did_you_mean(what, (*KINDS, "basis"))} Fix: choose one of '
+            f"{', '.join(KINDS)} or basis"
         )
-    if not 2 <= folds <= 20:
-        raise FerryIdError(f"--folds: {folds} is no number of folds. Fix: give 2 to 20, {FOLDS} is usual")
+    check_folds(folds)
     if what == "components" and windows_s:
         raise FerryIdError("--windows: components are swept at one window. Fix: give --window, or sweep both")
     settings = replace(settings, windows_s=tuple(windows_s)).on(profile)
@@ -160,11 +159,7 @@ def _from_logs(
     progress: Callable[[str], None],
 ) -> tuple[tuple[float, ...], Basis, Flags, dict[str, Folds], list[dict[str, Any]]]:
     """Return windows, basis, axes without force, folds by stretches and whole logs, and what is told of the logs."""
-    opened = []
-    for path in logs:
-        progress(f"reading {Path(path).name}")
-        opened.append(open_track(path, profile, out, rate_hz=settings.rate_hz))
-    refuse_twice(opened)
+    opened = read_logs(logs, profile, settings, out, progress)
     windows = tried(windows_s, [one.measured for one in opened])
     functions = basis_of(settings, [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
     pieces = []
@@ -172,11 +167,30 @@ def _from_logs(
         progress(f"cutting {one.recording.name} into pieces")
         pieces.append(studied(profile, settings, functions, one.measured, windows, blocks=folds))
     cuts = {"blocks": folds_by_blocks(pieces, folds)} | ({"logs": folds_by_logs(pieces)} if len(pieces) > 1 else {})
-    told = [_log(one, log) for one, log in zip(opened, pieces, strict=True)]
+    told = [log_json(one, log) for one, log in zip(opened, pieces, strict=True)]
     return windows, functions, force_free(pieces), cuts, told
 
 
-def _log(one: Opened, log: Studied) -> dict[str, Any]:
+def check_folds(folds: int) -> None:
+    """Refuse what is no number of folds."""
+    if not 2 <= folds <= 20:
+        raise FerryIdError(f"--folds: {folds} is no number of folds. Fix: give 2 to 20, {FOLDS} is usual")
+
+
+def read_logs(
+    logs: Sequence[str], profile: Profile, settings: FitSettings, out: Path, progress: Callable[[str], None]
+) -> list[Opened]:
+    """Return several logs before smoothing, each once; arguments and errors are those of `sweep`."""
+    opened = []
+    for path in logs:
+        progress(f"reading {Path(path).name}")
+        opened.append(open_track(path, profile, out, rate_hz=settings.rate_hz))
+    refuse_twice(opened)
+    return opened
+
+
+def log_json(one: Opened, log: Studied) -> dict[str, Any]:
+    """Return name, hash and length of a log."""
     rows = int(log.test.n.sum())
     return {
         "name": one.recording.name,

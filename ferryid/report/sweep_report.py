@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,11 +44,27 @@ def sweep_and_report(
         what, logs, profile, settings, out, windows_s=windows_s, folds=folds, archive=archive, progress=progress
     )
     progress("writing the report")
-    first = str(found.logs[0]["name"])
-    more = f"-and-{len(found.logs) - 1}-more" if len(found.logs) > 1 else ""
-    report = out / "reports" / f"sweep-{what}-{first}{more}" / "report.html"
     page, drawings = render(found)
-    plain = sweep_json(found, str(report))
+    return leave(
+        out, what, found.logs, page, drawings, lambda report: sweep_json(found, report), render_sweep(found), progress
+    )
+
+
+def leave(
+    out: Path,
+    what: str,
+    logs: Sequence[Mapping[str, Any]],
+    page: str,
+    drawings: Mapping[str, str],
+    json_of: Callable[[str], dict[str, Any]],
+    text: str,
+    progress: Callable[[str], None],
+) -> Outcome:
+    """Write page, drawings and JSON of a sweep into its folder; `json_of` returns the JSON for the page's path."""
+    first = str(logs[0]["name"])
+    more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
+    report = out / "reports" / f"sweep-{what}-{first}{more}" / "report.html"
+    plain = json_of(str(report))
     with replacing(report.parent) as temporary:
         os.makedirs(temporary)
         (temporary / "report.html").write_text(page, encoding="utf-8")
@@ -56,7 +72,7 @@ def sweep_and_report(
             (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8")
         (temporary / "sweep.json").write_text(dump_json(plain), encoding="utf-8")
     progress("")
-    return Outcome(report, plain, f"{render_sweep(found)}\nreport  {report}")
+    return Outcome(report, plain, f"{text}\nreport  {report}")
 
 
 def render(found: Sweep) -> tuple[str, dict[str, str]]:

@@ -1,0 +1,113 @@
+"""Compared structures on one HTML page: what ``ferryid sweep basis`` leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from ferryid.errors import FerryIdError
+from ferryid.identify.compared import (
+    Compared,
+    Ratios,
+    StructureSweep,
+    over_base,
+    render_structures,
+    structures_json,
+    terms,
+    verdict,
+)
+from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S
+from ferryid.identify.model import AXES
+from ferryid.identify.settings import FitSettings
+from ferryid.identify.structures import sweep_structures
+from ferryid.identify.sweep import BY
+from ferryid.report.html import template
+from ferryid.report.structures_figures import forest
+from ferryid.report.sweep_report import Outcome, leave
+from ferryid.vessel.profile import Profile
+
+
+def structures_and_report(
+    logs: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    out: Path,
+    *,
+    windows_s: Sequence[float] = (),
+    folds: int = FOLDS,
+    archive: bool = False,
+    progress: Callable[[str], None],
+) -> Outcome:
+    """Compare structures and write the page; arguments and errors are those of `sweep_structures`."""
+    if archive:
+        raise FerryIdError("--archive: what is kept of a log is of one basis. Fix: name the logs to compare bases on")
+    if windows_s:
+        raise FerryIdError("--windows: bases are compared at one window. Fix: give --window")
+    found = sweep_structures(logs, profile, settings, out, folds=folds, progress=progress)
+    progress("writing the report")
+    page, drawings = render(found)
+    text = render_structures(found)
+    return leave(
+        out, "basis", found.logs, page, drawings, lambda report: structures_json(found, report), text, progress
+    )
+
+
+def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
+    """Return the page of compared structures as HTML with the drawings inside, and the drawings (SVG) by name."""
+    drawings = {f"basis-{key}": forest(one) for key, one in found.by.items()}
+    sections = [
+        {
+            "title": f"By {BY[key]}",
+            "verdict": verdict(one),
+            "one": one,
+            "best": one.structures[0].title,
+            "simplest": one.simplest.title,
+            "svg": drawings[f"basis-{key}"],
+            "table": _rows(one),
+        }
+        for key, one in found.by.items()
+    ]
+    plain = structures_json(found)
+    page = template("structures.html").render(
+        vessel=found.vessel,
+        headline=verdict(found.by["blocks"]),
+        notes=found.notes,
+        unusable=found.unusable,
+        logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
+        sections=sections,
+        axes=AXES,
+        block_s=f"{found.block_s:.3g}",
+        window_s=f"{found.settings.window_s:g}",
+        test_window_s=f"{TEST_WINDOW_S:g}",
+        settings=plain["settings"],
+    )
+    return page, drawings
+
+
+def _rows(one: Compared) -> list[dict[str, Any]]:
+    return [
+        {
+            "basis": structure.basis,
+            "structure": structure.structure,
+            "functions": structure.functions.name,
+            "terms": terms(structure),
+            "components": structure.components,
+            "within": f"{min(structure.within)} to {max(structure.within)}",
+            "ratios": [f"{value:.4f}" for value in over_base(structure, one)],
+            "score": f"{structure.score:.4f}",
+            "p": f"{structure.p:.3f}" if structure.p >= 0.001 else "< 0.001",
+            "kept": structure.kept,
+            "chosen": structure is one.supported,
+            "best": _cells(structure.against_best),
+            "simplest": _cells(structure.against_simplest),
+        }
+        for structure in one.structures
+    ]
+
+
+def _cells(ratios: Ratios) -> list[str]:
+    return [
+        f"{value:.3g} [{low:.3g}, {high:.3g}]"
+        for value, low, high in zip(ratios.value, ratios.low, ratios.high, strict=True)
+    ]
