@@ -20,6 +20,7 @@ from sklearn.cross_decomposition import PLSRegression
 from ferryid.identify.basis import Basis, basis
 from ferryid.identify.bootstrap import Blocks, bootstrap
 from ferryid.identify.cross_products import CrossProducts, Rows
+from ferryid.identify.pieces import Pieces, edges_of
 from ferryid.identify.qr import QrFactor
 from ferryid.identify.simpls import simpls, sweep_components
 from ferryid.signals.smooth import central_difference, moving_mean, odd_rows
@@ -85,12 +86,10 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
     def ours() -> None:
         for window_s in WINDOWS_S:
             inputs, residual = prepared(nu, tau, window_s)
-            parts = np.linspace(0, len(residual), FOLDS + 1).astype(int)
-            folds = [
-                CrossProducts.of(of_motion(tuple(values[low:high] for values in inputs), residual[low:high], function))
-                for low, high in pairwise(parts)
-            ]
-            sweep_components(folds, MOST)
+            pieces = Pieces.of(
+                of_motion(inputs, residual, function), edges_of(np.ones(len(residual), dtype=bool), FOLDS, purge=0)
+            )
+            sweep_components([pieces.labelled(np.arange(FOLDS), fold) for fold in range(FOLDS)], MOST)
 
     def by_ikpls() -> None:
         for window_s in WINDOWS_S:
