@@ -112,6 +112,11 @@ def sweep(
     check_folds(folds)
     if what == "components" and windows_s:
         raise FerryIdError("--windows: components are swept at one window. Fix: give --window, or sweep both")
+    if what != "components" and settings.smoother == "kalman":
+        raise FerryIdError(
+            "--smoother: the Kalman smoother finds its window by likelihood, so that windows cannot be swept. "
+            "Fix: sweep components, or take another --smoother"
+        )
     settings = replace(settings, windows_s=tuple(windows_s)).on(profile)
     opened = read_logs(logs, profile, settings, out, progress)
     windows = tried((settings.window_s,) if what == "components" else windows_s, [one.measured for one in opened])
