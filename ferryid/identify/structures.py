@@ -285,8 +285,10 @@ def _log(profile: Profile, settings: FitSettings, measured: Measured, functions:
 
 
 def _blocks(log: _Log, block_s: float, folds: int) -> int:
-    """Return the number of blocks of a log: one a fold at least, as otherwise there is no cross-validation."""
-    return max(folds, int(np.count_nonzero(log.used) / log.test[0].rate_hz / block_s))
+    """Return the number of blocks of a log, as many in every fold: so folds are alike, and those of other sweeps."""
+    seconds = np.count_nonzero(log.used) / log.test[0].rate_hz
+    # Where the log's length is a whole number of blocks, rounding must not cost one.
+    return folds * max(1, int(seconds / block_s / folds + 1e-9))
 
 
 def _cut(log: Studied, labels: Ints) -> list[tuple[int, CrossProducts]]:
