@@ -229,6 +229,7 @@ def test_whole_logs(run: Run) -> None:
     assert (one.supported.basis, one.supported.structure) == ("second-order", "decoupled")
     assert any("these days' own" in note for note in found.notes)
     assert all(len(each.within) == 3 for each in one.structures)
+    assert run(logs_of("modulus", "decoupled", count=7, seconds=60.0)).by["logs"].folds == 7
     two = run(logs_of("second-order", "decoupled", count=2, seconds=300.0))
     assert two.by["logs"].folds == 2
     assert any(note.startswith("With two folds the number of components was chosen on both") for note in two.notes)
