@@ -265,7 +265,7 @@ def _scores(one: Compared) -> list[str]:
 
 
 def _intervals(one: Compared) -> list[str]:
-    lines = [f"  {'basis':<13}{'structure':<11}" + "".join(f"{axis:>20}" for axis in AXES)]
+    lines = [f"  {'basis':<13}{'structure':<11}" + "".join(f"{axis:>22}" for axis in AXES)]
     for structure in one.structures:
         against = structure.against_best
         cells = [
@@ -274,7 +274,7 @@ def _intervals(one: Compared) -> list[str]:
         ]
         lines.append(
             f"{_mark(structure, one)} {structure.basis:<13}{structure.structure:<11}"
-            + "".join(f"{cell:>20}" for cell in cells)
+            + "".join(f"{cell:>22}" for cell in cells)
         )
     return lines
 

@@ -193,14 +193,12 @@ def fit(
 def _windowed(profile: Profile, settings: FitSettings, opened: Sequence[Opened]) -> tuple[FitSettings, Split]:
     """Return the settings with the window, and where that is asked for the component count, that cross-validation chose.
 
-    Its split is of rows that every window knows, and to be kept: another, made for the window chosen, would validate on rows
-    that took part in the choice.
+    Its split is to be kept: another, made for the window chosen, would validate on rows that took part in the choice.
     """
     windows_s = tried(settings.windows_s, [one.measured for one in opened], in_blocks=settings.split == "blocks")
-    longest_s = max(TEST_WINDOW_S, *windows_s)
-    motions = _told_apart([smooth_measured(one.measured, longest_s) for one in opened])
+    motions = _told_apart([smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
     functions = basis_of(settings, motions)
-    parts = split(motions, settings.split, window_s=longest_s)
+    parts = split(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))
     choice = _choice(profile, settings, functions, opened, windows_s, parts.training)
     return replace(settings, window_s=choice.window_s, components=choice.components), parts
 

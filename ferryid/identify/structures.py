@@ -19,7 +19,7 @@ from ferryid.identify.bases import forms
 from ferryid.identify.basis import STRUCTURES, Basis, sized
 from ferryid.identify.bootstrap import FEW_BLOCKS, block_seconds, percentiles, times_drawn
 from ferryid.identify.choose import Studied, choose, force_free, pieces_of
-from ferryid.identify.compared import LEVEL, Compared, Ratios, Structure, StructureSweep
+from ferryid.identify.compared import LEVEL, Compared, Ratios, Structure, StructureSweep, over_base
 from ferryid.identify.confidence_set import confidence_set
 from ferryid.identify.cross_products import CrossProducts
 from ferryid.identify.crossed import FOLDS, MOST_GROUPS, TEST_WINDOW_S, Curves, Folds, FoldSums
@@ -30,7 +30,7 @@ from ferryid.identify.rows import basis_of, known_rows, rows_of
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.simpls import simpls, total
 from ferryid.identify.split import correlation_time
-from ferryid.identify.sweep import check_folds, log_json, read_logs
+from ferryid.identify.sweep import BY, check_folds, log_json, read_logs
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.vessel.profile import Profile
@@ -285,8 +285,10 @@ def _log(profile: Profile, settings: FitSettings, measured: Measured, functions:
 
 
 def _blocks(log: _Log, block_s: float, folds: int) -> int:
-    """Return the number of blocks of a log: one a fold at least, as otherwise there is no cross-validation."""
-    return max(folds, int(np.count_nonzero(log.used) / log.test[0].rate_hz / block_s))
+    """Return the number of blocks of a log, as many in every fold: so folds are alike, and those of other sweeps."""
+    seconds = np.count_nonzero(log.used) / log.test[0].rate_hz
+    # Where the log's length is a whole number of blocks, rounding must not cost one.
+    return folds * max(1, int(seconds / block_s / folds + 1e-9))
 
 
 def _cut(log: Studied, labels: Ints) -> list[tuple[int, CrossProducts]]:
@@ -315,8 +317,13 @@ def _notes(by: Mapping[str, Compared], settings: FitSettings) -> list[str]:
                 "these logs."
             )
         notes.append(
-            "Intervals by whole logs hold the scatter within these logs, not that between one day and the next."
+            "Intervals and p by whole logs hold the scatter within these logs, not that between one day and the next: what is "
+            "told apart there may be these days' own."
         )
+    for key, one in by.items():
+        least = min(float(np.nanmean(over_base(structure, one))) for structure in one.structures)
+        if least >= 1.0:
+            notes.append(f"By {BY[key]} none predicts force better than the base model does without any.")
     if blocks.blocks < FEW_BLOCKS:
         notes.append(f"Only {blocks.blocks} independent stretches to draw from: the intervals are probably too narrow.")
     if settings.components == "auto" and any(one.folds < 3 for one in by.values()):

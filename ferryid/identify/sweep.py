@@ -119,6 +119,11 @@ def sweep(
     check_folds(folds)
     if what == "components" and windows_s:
         raise FerryIdError("--windows: components are swept at one window. Fix: give --window, or sweep both")
+    if what != "components" and settings.smoother == "kalman":
+        raise FerryIdError(
+            "--smoother: the Kalman smoother finds its window by likelihood, so that windows cannot be swept. "
+            "Fix: sweep components, or take another --smoother"
+        )
     settings = replace(settings, windows_s=tuple(windows_s)).on(profile)
     if what != "window":
         settings = replace(settings, components="auto")

@@ -105,8 +105,9 @@ def refuse_twice(opened: Sequence[Opened]) -> None:
     """Refuse a log that is given twice: it would train and validate on the same data."""
     seen: dict[str, str] = {}
     for one in opened:
-        first = seen.setdefault(one.recording.sha256, one.recording.files[0])
-        if first is not one.recording.files[0]:
+        first = seen.get(one.recording.sha256)
+        if first is not None:
             raise FerryIdError(
                 f"{one.recording.files[0]}: the same log as {first}, so that it would judge itself. Fix: give it once"
             )
+        seen[one.recording.sha256] = one.recording.files[0]

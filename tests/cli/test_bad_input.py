@@ -73,6 +73,42 @@ def test_settings_that_cannot_be(ferryid, fixtures: Path, tmp_path: Path, option
     assert not (tmp_path / "models").exists()
 
 
+@pytest.mark.parametrize(
+    ("what", "options", "told"),
+    [
+        ("bases", (), 'Did you mean "basis"'),
+        ("window", ("--windows", "a,b"), "'a' is no number of seconds"),
+        ("both", ("--windows=-1,2",), "-1.0 s is no smoothing window"),
+        ("both", ("--windows", "1,1e9"), "1000000000.0 s is no smoothing window"),
+        ("window", ("--windows", "1"), "nothing to compare"),
+        ("window", ("--smoother", "kalman"), "Kalman"),
+        ("components", ("--windows", "1,2"), "at one window"),
+        ("components", ("--folds", "1"), "2 to 20"),
+        ("basis", ("--windows", "1,2"), "at one window"),
+        ("basis", ("--folds", "99"), "2 to 20"),
+        ("basis", ("--components", "0"), "number of components"),
+        ("basis", ("--window", "59"), "short"),
+    ],
+)
+def test_what_cannot_be_swept(
+    ferryid, fixtures: Path, tmp_path: Path, what: str, options: tuple[str, ...], told: str
+) -> None:
+    refused(
+        ferryid("sweep", what, fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path, *options), told
+    )
+    assert not (tmp_path / "reports").exists()
+
+
+@pytest.mark.parametrize("command", [("fit",), ("sweep", "components"), ("sweep", "basis")])
+def test_a_log_given_twice(
+    ferryid, fixtures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    # By its bare name too, of which Python keeps one copy.
+    monkeypatch.chdir(fixtures)
+    log = "short.mcap"
+    refused(ferryid(*command, log, log, "--vessel", "milliampere", "--out", tmp_path), "the same log as short.mcap")
+
+
 def profile_with(tmp_path: Path, old: str, new: str) -> Path:
     """Return a copy of the milliAmpère profile with one change."""
     from ferryid.vessel import load_profile

@@ -13,6 +13,7 @@ import jsonschema
 import pytest
 
 import ferryid.cli
+from ferryid.identify.bases import names
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = sorted(
@@ -140,6 +141,20 @@ def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, wind
     assert not re.search(r"""(src|href)\s*=\s*["'](?!#|data:)""", text), (
         "the page must not need another file or a network"
     )
+
+
+def test_sweep_structures(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    logs = [fixtures / "short.mcap", fixtures / "short.bag"]
+    run = ferryid("sweep", "basis", *logs, "--vessel", "milliampere", *SCALE, "--out", tmp_path, "--json", "-")
+    assert run.code == 0, run.err
+    found = conforms(run.out)
+    for one in found["by"].values():
+        assert len({(each["basis"], each["structure"]) for each in one["structures"]}) == 2 * len(names())
+        scores = [each["score"] for each in one["structures"]]
+        assert scores == pytest.approx(sorted(scores), rel=1e-9)
+    page = Path(found["report"])
+    assert conforms((page.parent / "sweep.json").read_text(encoding="utf-8")) == found
+    assert page.read_text(encoding="utf-8").count("<svg") == len(list(page.parent.glob("*.svg"))) == 2
 
 
 def test_fit_takes_the_window_that_it_is_told_to_choose(ferryid, fixtures: Path, tmp_path: Path) -> None:
