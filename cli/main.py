@@ -46,7 +46,8 @@ def main() -> None:
     # What NumPy cannot compute becomes NaN, and is told where it matters.
     warnings.simplefilter("ignore", RuntimeWarning)
     try:
-        code = app(standalone_mode=False)
+        # Its name does not hang on how it is run: shells ask for completion by it.
+        code = app(prog_name="ferryid", standalone_mode=False)
         sys.stdout.flush()
     except TyperException as error:
         sys.exit(_usage(error))

@@ -53,6 +53,10 @@ def read_diagnosis(path: Path, log: str) -> Mapping[str, Any]:
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise FerryIdError(
+            f"{path}: no such file, a diagnosis was to be read. Fix: give a JSON file written by ferryid diagnose --json"
+        ) from error
     except (OSError, ValueError, RecursionError) as error:
         raise FerryIdError(
             f"{path}: not readable as a diagnosis ({error}). Fix: give a JSON file written by ferryid diagnose --json"

@@ -152,7 +152,10 @@ def _constants(one: Exported) -> Iterator[Constant]:
         for j in range(3):
             if hull.M[i, j] != 0.0:
                 yield Constant(
-                    f"m{i + 1}{j + 1}", float(hull.M[i, j]), _MASS_UNITS[i][j], "mass matrix, water included"
+                    f"m{i + 1}{j + 1}",
+                    float(hull.M[i, j]),
+                    _MASS_UNITS[i][j],
+                    "mass matrix of the base model, water included",
                 )
     yield Constant("m", float(rigid[0, 0]), "kg", "mass of the rigid body")
     if rigid[1, 2] != 0.0:

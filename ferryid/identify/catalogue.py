@@ -82,25 +82,25 @@ def render_model(model: Model) -> str:
     """Return one model as text: verdict, scores, and coefficients with their intervals."""
     data = to_json(model)
     settings = model.settings
+    wide = max([14, *(len(term) + 2 for axis in AXES for term in data["coefficients"][axis])])
     lines = [
         f"{model.name}@{model.version}  {_verdict(model)}  {model.created}",
         f"a diagnosis of {settings.get('diagnosed_from')}, without terms of a fit"
         if model.diagnosed and not model.terms
-        else f"basis {settings.get('basis')}, {settings.get('structure')}, {settings.get('components')} components, "
-        f"window {settings.get('window_s')} s",
+        else fitted_with(model),
         f"trained on {', '.join(str(log['name']) for log in model.training)}",
         f"validation force MSE over the base model's: {_number(model.scores.get('normalised_mse'))} ("
         + ", ".join(f"{axis} {_number(model.scores.get('per_axis', {}).get(axis))}" for axis in AXES)
         + ")",
         "",
-        f"{'term':<14}{'axis':<7}{'value':>13}{'low':>13}{'high':>13}  unit",
+        f"{'term':<{wide}}{'axis':<7}{'value':>13}{'low':>13}{'high':>13}  unit",
     ]
     for axis in AXES:
         for term, entry in data["coefficients"][axis].items():
             if entry["value"] == 0.0 and entry["low"] == 0.0 and entry["high"] == 0.0:
                 continue
             lines.append(
-                f"{term:<14}{axis:<7}{entry['value']:>13.5g}{entry['low']:>13.5g}{entry['high']:>13.5g}  {entry['unit']}"
+                f"{term:<{wide}}{axis:<7}{entry['value']:>13.5g}{entry['low']:>13.5g}{entry['high']:>13.5g}  {entry['unit']}"
             )
     if model.hull:
         lines += ["", f"{'hull':<14}{'value':>20}{'low':>13}{'high':>13}  unit"]
@@ -111,6 +111,16 @@ def render_model(model: Model) -> str:
     for known in model.conditions:
         lines += ["", f"only in {known.log}:", *(f"  {stored.says(known.sha256)}" for stored in known.effects)]
     return "\n".join(lines)
+
+
+def fitted_with(model: Model) -> str:
+    """Return basis, structure, components and window of a fit, those that were chosen for it as well."""
+    settings = model.settings
+    count = settings.get("components")
+    return (
+        f"basis {settings.get('basis')}, {settings.get('structure')}, {count} component{'s' * (count != 1)}, "
+        f"window {settings.get('window_s')} s"
+    )
 
 
 def _verdict(model: Model) -> str:

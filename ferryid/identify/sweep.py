@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.archive import archive_folds
 from ferryid.identify.basis import Basis
@@ -214,7 +215,7 @@ def _notes(by: Mapping[str, Choice], windows_s: Sequence[float], settings: FitSe
         )
     for key, one in by.items():
         if one.held.any():
-            axes = " and ".join(axis for axis, held in zip(AXES, one.held, strict=True) if held)
+            axes = listed([axis for axis, held in zip(AXES, one.held, strict=True) if held])
             notes.append(f"By {BY[key]} the base model's inertia was held in {axes}, as a fit does.")
         if one.curves.folds < FOLDS:
             notes.append(f"Only {one.curves.folds} folds by {BY[key]}: their scatter, and so the choice, is rough.")

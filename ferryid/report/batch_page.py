@@ -38,7 +38,8 @@ def render(result: Mapping[str, Any]) -> str:
         Schema ``ferryid.batch/1``.
     """
     rows = [_row(row) for row in result["rows"]]
-    root = _common([row["log"] for row in rows])
+    # What could not be read may lie anywhere, and keeps the path that was given.
+    root = _common([row["log"] for row in rows if not row["bare"]])
     for row in rows:
         row["path"] = row["log"].removeprefix(root)
     counts, memory = result["counts"], result["memory"]
@@ -80,6 +81,8 @@ def _examined(result: Mapping[str, Any]) -> str:
 
 def _common(logs: Sequence[str]) -> str:
     """Return the folder that all logs are in, with a slash at its end, or nothing."""
+    if not logs:
+        return ""
     try:
         root = commonpath([str(PurePath(log).parent) for log in logs])
     except ValueError:  # absolute and relative ones
@@ -110,7 +113,7 @@ def _row(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         **{name: row[name] for name in ("log", "name", "status", "reason", "vessel", "note")},
         "date": (row["date"] or "")[:10],
-        "time": (row["date"] or "")[:16].replace("T", " "),
+        "time": _time(row),
         "minutes": None if row["duration_s"] is None else row["duration_s"] / 60.0,
         "verdict": (diagnosis["verdict"] if diagnosis else "").replace("_", " "),
         "found": _named(sure),
@@ -125,6 +128,12 @@ def _row(row: Mapping[str, Any]) -> dict[str, Any]:
         "seconds": sum(row["seconds"].values()),
         "peak": row["peak_bytes"],
     }
+
+
+def _time(row: Mapping[str, Any]) -> str:
+    """Return when a log begins; of a manifest that gives the day, no more than the day."""
+    time = (row["date"] or "")[:16].replace("T", " ")
+    return time.removesuffix(" 00:00") if row["date_from"] == "manifest" else time
 
 
 def _named(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:

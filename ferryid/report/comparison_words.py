@@ -19,8 +19,9 @@ MANY = 4
 ALL = "all logs"
 ABOUT_P = (
     "p: how likely a ratio this far from one is if both err alike (bootstrap of blocks of each log, in pairs), corrected for "
-    "the number of comparisons on a log (Holm). Intervals are 95 %, of each ratio by itself. They hold the scatter within "
-    "these logs, not what another day brings."
+    "the number of comparisons on a log (Holm). Intervals are 95 %, of each ratio by itself, so that of many some miss 1 by "
+    "chance. They hold the scatter within these logs, not what another day brings. Free: rms error after a "
+    "free run of so long."
 )
 
 
@@ -162,7 +163,7 @@ def score_columns(scope: Row) -> list[str]:
     return [
         *(f"rms {axis} [{unit}]" for axis, unit in zip(AXES, ("N", "N", "N·m"), strict=True)),
         *(f"R² {axis}" for axis in AXES),
-        *(f"{horizon:g} s {what}" for what in ("[m]", "[deg]")),
+        *(f"free {horizon:g} s {what}" for what in ("[m]", "[deg]")),
     ]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ferryid.files import alone, dump_json, replacing
 from ferryid.identify.archive import fit_archive
+from ferryid.identify.catalogue import fitted_with
 from ferryid.identify.fit import fit, quiet
 from ferryid.identify.result import AXES, FitResult
 from ferryid.identify.scores import free_run_plain
@@ -151,7 +152,13 @@ def as_json(result: FitResult, stored: Stored, report: Path) -> dict[str, Any]:
 def as_text(result: FitResult, stored: Stored, report: Path) -> str:
     """Return the verdict for a terminal."""
     model, scores = result.model, result.model.scores
-    lines = [headline(result), *(f"  {reason}" for reason in result.verdict.reasons), ""]
+    lines = [
+        headline(result),
+        *(f"  {reason}" for reason in result.verdict.reasons),
+        "",
+        f"fitted with {fitted_with(model)}",
+        "",
+    ]
     lines.append(f"{'on validation rows':<28}" + "".join(f"{axis:>12}" for axis in AXES))
     lines.append(f"{'':<28}" + "".join(f"{unit:>12}" for unit in ("[N]", "[N]", "[N·m]")))
     for label, part in (("base", "base"), ("new", "model")):

@@ -103,7 +103,8 @@ def _context(result: FitResult) -> dict[str, Any]:
             {
                 "file": "components",
                 "svg": figures.components(result.curve),
-                "caption": "Force error over the base model's (orange line at 1) against the number of SIMPLS components.",
+                "caption": "Force error over the base model's on the validation rows (orange line at 1) against the number of "
+                "SIMPLS components. Training rows, dotted, may hold more force, and so more error.",
             },
             {
                 "file": "coefficients",

@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import LogLocator, NullLocator
 
 from ferryid.identify.choose import Choice
 from ferryid.identify.model import AXES
@@ -25,6 +26,8 @@ def heat_map(found: Sweep, choice: Choice) -> str:
         excess = score.T - score.min()
         # The least score is nothing in excess: the scale begins at a hundredth of the band within which all count as equal.
         least = max(float(band[best]) / 10.0, 1e-4)
+        # Room at the right for the numbers and the label of the colour bar.
+        figure.subplots_adjust(right=0.9)
         image = ax.imshow(
             np.maximum(excess, least),
             aspect="auto",
@@ -40,7 +43,10 @@ def heat_map(found: Sweep, choice: Choice) -> str:
         ax.set_xlabel("smoothing window of the training rows [s]")
         ax.set_ylabel("components")
         bar = figure.colorbar(image, ax=ax, pad=0.02)
-        bar.set_label("score above the least (0: each axis at its least MSE)")
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_major_formatter("{x:g}")
+        bar.ax.yaxis.set_minor_locator(NullLocator())
+        bar.set_label("score above the least of the sweep")
         return svg_text(figure)
 
 

@@ -160,12 +160,18 @@ def test_sweep_structures(ferryid, fixtures: Path, tmp_path: Path) -> None:
 def test_fit_takes_the_window_that_it_is_told_to_choose(ferryid, fixtures: Path, tmp_path: Path) -> None:
     run = ferryid(
         "fit", fixtures / "short.mcap", "--vessel", "milliampere", *SCALE, "--window", "auto", "--out", tmp_path,
-        "--json", "-",
+        "--json", tmp_path / "fit.json",
     )  # fmt: skip
     assert run.code == 0, run.err
-    settings = conforms(run.out)["settings"]
+    settings = conforms((tmp_path / "fit.json").read_text(encoding="utf-8"))["settings"]
     assert settings["window_s"] in settings["windows_s"]
-    assert isinstance(settings["components"], int)
+    count = settings["components"]
+    assert isinstance(count, int)
+    # What was chosen is told, not left to the JSON.
+    told = (
+        f"{settings['basis']}, decoupled, {count} component{'s' if count > 1 else ''}, window {settings['window_s']} s"
+    )
+    assert f"fitted with basis {told}\n" in run.out
 
 
 def test_diagnose_one_log_and_two(ferryid, fixtures: Path, tmp_path: Path) -> None:

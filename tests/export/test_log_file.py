@@ -185,6 +185,12 @@ def test_what_is_no_diagnosis_of_this_log(tmp_path: Path, data: str, told: str) 
     assert str(path) in str(caught.value)
 
 
+def test_a_diagnosis_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(FerryIdError, match=r"gone.json: no such file, a diagnosis was to be read\. Fix: ") as caught:
+        read_diagnosis(tmp_path / "gone.json", "short")
+    assert "Errno" not in str(caught.value)
+
+
 def test_a_damaged_finding_is_told(tmp_path: Path) -> None:
     path = tmp_path / "diagnosis.json"
     with pytest.raises(FerryIdError, match="KeyError: 'says'"):

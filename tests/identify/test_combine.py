@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.identify.adapt import fit_motions
+from ferryid.identify.catalogue import render_model
 from ferryid.identify.combine import gathered, geometric_weights, mean_of_last, reference, spanned, weighted
 from ferryid.identify.estimate import estimator
 from ferryid.identify.model import Model, to_json
@@ -44,6 +45,17 @@ def test_the_force_is_the_weighted_mean_of_the_forces(parts: list[float]) -> Non
     weights = np.array(parts) / np.sum(parts)
     want = sum(w * estimator(one).of(UNSEEN) for w, one in zip(weights, MODELS, strict=True))
     np.testing.assert_allclose(estimator(weighted(MODELS, weights)).of(UNSEEN), want, rtol=1e-9, atol=1e-7)
+
+
+@pytest.mark.parametrize("basis", ["modulus", "cross-flow-5m+wind-paper"])
+def test_every_term_is_told_apart_from_its_axis(basis: str) -> None:
+    lines = render_model(model(1, basis=basis)).splitlines()
+    head = next(line for line in lines if line.startswith("term "))
+    rows = [line for line in lines[lines.index(head) + 1 :] if line]
+    assert len(rows) > 10
+    for line in rows:
+        assert line[head.index("axis") - 1] == " "
+        assert line[head.index("axis") :].split()[0] in ("surge", "sway", "yaw")
 
 
 def test_the_mean_of_the_last_takes_the_last() -> None:

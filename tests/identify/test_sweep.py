@@ -81,6 +81,8 @@ def test_notes(run: Run) -> None:
     notes = run("components", forceless).notes
     assert "By contiguous stretches of every log the base model's inertia was held in sway, as a fit does." in notes
     assert any("Only 2 folds by whole logs" in note for note in notes)
+    still = [replace(one, tau=one.tau * 0.0) for one in forceless]
+    assert any("was held in surge, sway and yaw, as" in note for note in run("components", still).notes)
     assert any("By whole logs the choice is" in note for note in notes) is (
         run("components", forceless).by["logs"].components != run("components", forceless).choice.components
     )

@@ -99,6 +99,24 @@ def test_what_rows_say() -> None:
     assert fourth["links"] == ["results/d.mcap-0123/traceback.txt"]
 
 
+def test_paths_are_told_from_the_folder_of_the_logs_that_were_read() -> None:
+    bad = {"fit": None, "evaluate": None, "diagnose": None, "start_ns": None, "duration_s": None}
+    gone = row("gone.mcap", status="refused", reason="no such file", **bad)
+    page = render(result(row("/season/may/a.mcap"), row("/season/june/b.mcap", 2), gone))
+    assert [one["cells"]["name"].strip() for one in Table(page).rows] == ["may/a.mcap", "june/b.mcap", "gone.mcap"]
+    assert "/season/</span>" in page
+    assert "Logs are in" not in render(result(gone))
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [("2024-05-03T00:00:00+00:00", "2024-05-03"), ("2024-05-03T10:30", "2024-05-03 10:30"), (None, "2024-05-01 00:00")],
+)
+def test_a_day_of_a_manifest_has_no_hour(given: str | None, told: str) -> None:
+    more = {} if given is None else {"date": given}
+    assert Table(render(result(row("a.mcap", **more)))).rows[0]["cells"]["date"] == told
+
+
 def test_filters_offer_what_there_is() -> None:
     page = render(hostile())
     assert re.findall(r"<option>(\w+)</option>", page.partition('name="status"')[2].partition("</select>")[0]) == [

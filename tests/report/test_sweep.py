@@ -80,6 +80,12 @@ def test_every_number_is_on_it(found: Sweep) -> None:
     assert all(note in html.unescape(page) for note in found.notes)
 
 
+def test_one_component_is_one(found: Sweep) -> None:
+    for count, told in ((1, "tested. Choice: 1 component at"), (2, "tested. Choice: 2 components at")):
+        by = {key: replace(choice, components=count) for key, choice in found.by.items()}
+        assert " ".join(render(replace(found, by=by))[0].split()).count(told) == 2
+
+
 def test_what_comes_from_outside_is_escaped(found: Sweep) -> None:
     evil = "<script>alert(1)</script>"
     page, _ = render(replace(found, vessel=evil, notes=(evil,), logs=({**found.logs[0], "name": evil},)))
