@@ -179,9 +179,7 @@ def _read(path: Path, key: Mapping[str, Any]) -> Kept:
     whole = np.array_equal(products[..., -1, -1], counts) and np.isfinite(packed).all()
     if not whole or shifts.shape != (len(counts), K + m) or not force.shape == base.shape == (counts.shape[1], 3, 3):
         raise FerryIdError(f"{path}: damaged. Fix: delete it, it is made anew")
-    pieces = [
-        Pieces(n, K, m, shift, one) for n, shift, one in zip(counts, shifts, products, strict=True)
-    ]
+    pieces = [Pieces(n, K, m, shift, one) for n, shift, one in zip(counts, shifts, products, strict=True)]
     windows = len(key["windows_s"])
     return Kept(
         name=told["name"],

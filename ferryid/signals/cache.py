@@ -89,7 +89,9 @@ def _is_whole(note: Any) -> bool:
         plain = note["recording"]
         texts = (note["version"], *(plain[key] for key in ("name", "sha256", "profile_name", "profile_sha256")))
         files = note["files"]
-        return note["schema"] == SCHEMA and all(isinstance(one, str) for one in texts) and all(len(f) == 4 for f in files)
+        return (
+            note["schema"] == SCHEMA and all(isinstance(one, str) for one in texts) and all(len(f) == 4 for f in files)
+        )
     except (KeyError, TypeError):
         return False
 
