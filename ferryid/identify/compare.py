@@ -181,8 +181,8 @@ def _trial(field: Field, path: str, out: Path, window_s: float, before: Sequence
     at = motion.t[rows]
     with np.errstate(over="ignore"):
         squares = np.moveaxis((motion.tau - taus) ** 2, 0, 1)[rows]
-    for one, bounded in zip(field.candidates, np.isfinite(squares).all(axis=(0, 2)), strict=True):
-        if not bounded:
+    for number, one in enumerate(field.candidates):
+        if not np.isfinite(squares[:, number]).all():
             raise FerryIdError(
                 f"{one.label}: its force on {path} is too large to be squared. Fix: fit the model again, or restore its file"
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -158,3 +159,12 @@ def test_a_log_given_twice_is_refused(run: Run, opened: Opened, monkeypatch: pyt
     monkeypatch.setattr(module, "open_track", lambda path, *_, **__: both[path])
     with pytest.raises(FerryIdError, match=r"other\.mcap: the same log as"):
         sweep("components", ["a", "b"], PROFILE, SETTINGS, Path("nowhere"), progress=quiet)
+
+
+def test_a_part_of_two_logs_is_refused() -> None:
+    part, whole = (
+        SimpleNamespace(recording=SimpleNamespace(sha256=name, files=files))
+        for name, files in (("1", ("a.bag",)), ("2", ("b.bag", "./a.bag")))
+    )
+    with pytest.raises(FerryIdError, match=r"a\.bag: is part of two logs.*Fix: "):
+        refuse_twice([part, whole])  # type: ignore[list-item]
