@@ -15,7 +15,7 @@ from ferryid.identify import sweep as module
 from ferryid.identify.fit import quiet
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweep import Sweep, headline, render_sweep, sweep, sweep_json
-from ferryid.signals.prepare import Opened, open_track
+from ferryid.signals.prepare import Opened, open_track, refuse_twice
 from ferryid.signals.smooth import Measured
 from tests.identify.rounds import PROFILE
 from tests.identify.trials import measured
@@ -36,7 +36,11 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
 
     def swept(what: str, logs: Sequence[Measured], settings: FitSettings = SETTINGS, **options: object) -> Sweep:
         ready = {
-            log.log: replace(opened, measured=log, recording=replace(opened.recording, name=log.log, sha256=log.log))
+            log.log: replace(
+                opened,
+                measured=log,
+                recording=replace(opened.recording, name=log.log, sha256=log.log, files=(log.log,)),
+            )
             for log in logs
         }
         monkeypatch.setattr(module, "open_track", lambda path, *_, **__: ready[path])
