@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import shutil
 import uuid
 from collections.abc import Iterator
@@ -106,7 +107,8 @@ def taken(path: Path) -> FerryIdError:
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one step: it is there whole, or not at all."""
     with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        # A file's name may hold bytes that are no characters.
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def check_result(path: Path) -> bool:
@@ -174,7 +176,9 @@ def alone(folder: Path, *, wait: bool = True) -> Iterator[None]:
 
 def dump_json(data: Any) -> str:
     """Return JSON text, one form for the same data everywhere; NaN and infinities become null."""
-    return json.dumps(finite(data), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json.dumps(finite(data), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    # Bytes of a file's name that are no characters, as JSON writes them down.
+    return re.sub("[\ud800-\udfff]", lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def finite(data: Any) -> Any:

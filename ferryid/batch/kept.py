@@ -19,6 +19,8 @@ from typing import Any
 from ferryid.files import dump_json, replacing, unwritable
 
 ROW = "row.json"
+CHECK = "check"
+"""Hash of the rest of a row: one that was altered or damaged counts as none."""
 ABANDONED_S = 3600.0
 """Age from which on a half-written table belongs to no process that is at work [s]."""
 
@@ -28,10 +30,14 @@ Row = dict[str, Any]
 def read_row(folder: Path) -> Row | None:
     """Return the row of a folder; None where the log is not done."""
     try:
-        row = json.loads((folder / ROW).read_text(encoding="utf-8"))
-        return row if isinstance(row, dict) and {"files", "stamp", "status", "reason", "name"} <= set(row) else None
-    except (OSError, ValueError):
+        row: Row = json.loads((folder / ROW).read_text(encoding="utf-8"))
+        return row if row.pop(CHECK) == _check(row) else None
+    except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
+
+
+def _check(row: Row) -> str:
+    return sha256(dump_json(row).encode()).hexdigest()
 
 
 def write_row(folder: Path, row: Row) -> None:
@@ -46,7 +52,7 @@ def write_row(folder: Path, row: Row) -> None:
         for path in [*folder.rglob("*"), folder]:
             _on_disk(path)
         with replacing(folder / ROW) as temporary:
-            temporary.write_text(dump_json(row), encoding="utf-8")
+            temporary.write_text(dump_json({**row, CHECK: _check(row)}), encoding="utf-8")
             _on_disk(temporary)
         _on_disk(folder)
         _on_disk(folder.parent)

@@ -85,6 +85,8 @@ def entries_of(asked: Sequence[str], vessel: str | None, tell: Callable[[str], N
     for one in asked:
         for entry in _entries(one, vessel, tell):
             found.setdefault(("+".join(map(str, entry.paths)), entry.vessel), entry)
+    if not found:
+        raise FerryIdError(f"{', '.join(asked)}: names no log. Fix: write one a line below the header")
     return list(found.values())
 
 

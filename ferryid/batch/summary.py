@@ -39,7 +39,8 @@ def lines_of(entry: Entry, vessel: str, row: Row, folder: str) -> dict[str, Any]
     """
     date, source = _date(entry, row["start_ns"])
     return {
-        "log": entry.log,
+        # Bytes of a name that are no characters cannot stand in a table.
+        "log": entry.log.encode("utf-8", "backslashreplace").decode(),
         **{name: row[name] for name in ("name", "status", "reason", "sha256")},
         "bytes": sum(file[1] for file in row["files"]),
         "date": date,

@@ -141,7 +141,7 @@ def _row(task: Task) -> Row:
     except Exception as error:  # noqa: BLE001 - whatever one log shows is told in its row, and the others go on
         row["status"], row["reason"] = _told(task, error)
         if row["status"] == FAILED:
-            (task.folder / TRACEBACK).write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+            (task.folder / TRACEBACK).write_text("".join(traceback.format_exception(error)), "utf-8", "replace")
     row["peak_bytes"] = memory.peak_bytes()
     return dict(finite(row))
 

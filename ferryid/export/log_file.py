@@ -25,6 +25,9 @@ from ferryid.simulate.recorders import write_mcap
 from ferryid.simulate.sensors import Stream
 from ferryid.vessel.profile import Floats, Profile
 
+_FORCE = "/ferryid/force/"
+_END_BYTES = 1 << 20
+"""Of a file, which hold its list of topics."""
 WINDOW_S = 1.0
 """Smoothing window without a model [s], that of a fit."""
 WORLD, BODY = "map_ned", "base_link_frd"
@@ -130,6 +133,15 @@ def _check_place(log: str, mcap: Path, *, overwrite: bool) -> None:
         if one.is_dir() and mcap.resolve().is_relative_to(one.resolve()):
             raise FerryIdError(f"{mcap}: lies in the log that it is made from, {one}. Fix: give it another place")
     check_output(mcap, overwrite=overwrite, inputs=read)
+    if mcap.is_file() and not _is_export(mcap):
+        raise FerryIdError(f"{mcap}: cannot be replaced, found no export. Fix: give --mcap another name")
+
+
+def _is_export(mcap: Path) -> bool:
+    """Tell whether a file is one of ours, by the topics listed at its end: no recording may be lost to `overwrite`."""
+    with mcap.open("rb") as file:
+        file.seek(max(0, mcap.stat().st_size - _END_BYTES))
+        return f"{_FORCE}measured".encode() in file.read()
 
 
 def _known(motion: Motion, values: Floats) -> NDArray[np.bool_]:
@@ -150,14 +162,14 @@ def _streams(motion: Motion, t0_ns: int, base: Floats, tau: Floats | None) -> li
     half = 0.5 * motion.eta[:, 2]
     pose = np.column_stack([motion.eta[:, :2], np.cos(half), np.sin(half)])
     where = ("pose.position.x", "pose.position.y", "pose.orientation.w", "pose.orientation.z")
-    made = [stream(f"/ferryid/force/{name}", "WrenchStamped", BODY, WRENCH, force) for name, force in forces.items()]
+    made = [stream(f"{_FORCE}{name}", "WrenchStamped", BODY, WRENCH, force) for name, force in forces.items()]
     made.append(stream("/ferryid/velocity", "TwistStamped", BODY, TWIST, motion.nu))
     made.append(stream("/ferryid/pose", "PoseStamped", WORLD, where, pose))
     return [one for one in made if len(one.stamp_ns)]
 
 
 def _check_any(streams: list[Stream], prepared: Prepared) -> None:
-    if not any(one.topic.startswith("/ferryid/force/") for one in streams):
+    if not any(one.topic.startswith(_FORCE) for one in streams):
         raise FerryIdError(
             f"{prepared.motion.log}: no row of it has both motion and force, so there is nothing to write. "
             "Fix: see what is missing with ferryid inspect --vessel"

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid import __version__
-from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.errors import FerryIdError
 from ferryid.identify.accept import accept
+from ferryid.identify.archived_logs import folders
 from ferryid.identify.basis import Basis, basis
 from ferryid.identify.bootstrap import bootstrap
 from ferryid.identify.cautions import general_cautions
@@ -34,8 +35,6 @@ from ferryid.identify.scores import by_axis
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import validating
 from ferryid.identify.store import checked_name
-from ferryid.signals import cache
-from ferryid.signals.recording import log_name
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
@@ -54,59 +53,6 @@ NOT_RUN = FreeRun(
     example={},
     note="not run free: a fit over an archive sees sums and no motion; ferryid evaluate runs it on a log",
 )
-
-
-def folders(out: Path, profile: Profile, names: Sequence[str] = ()) -> list[Path]:
-    """Return the folders of the logs that were ingested with a profile, each log once.
-
-    Parameters
-    ----------
-    out
-        Output folder.
-    profile
-        The vessel.
-    names
-        Names or paths of the logs to take; all where none is given.
-
-    Raises
-    ------
-    FerryIdError
-        Where there is none; for a log of the same vessel that was ingested with another profile or version of ferryid; for
-        a name that is not there.
-    """
-    fitting: dict[str, tuple[str, Path]] = {}
-    differing: dict[str, tuple[str, str]] = {}
-    for folder, note in cache.recordings(out).items():
-        plain = note["recording"]
-        if plain["profile_sha256"] == profile.sha256 and note["version"] == __version__:
-            fitting.setdefault(plain["sha256"], (plain["name"], folder))
-        elif plain["profile_name"] == profile.name:
-            by = "another profile" if plain["profile_sha256"] != profile.sha256 else f"ferryid {note['version']}"
-            differing[plain["sha256"]] = (plain["name"], by)
-    if names:
-        wanted = {log_name(name) for name in names}
-        known = {name for name, _ in (*fitting.values(), *differing.values())}
-        for name in sorted(wanted - known):
-            raise FerryIdError(
-                f"{name}: not among the logs that were ingested to {out}.{did_you_mean(name, known)} "
-                f"Fix: ferryid ingest it with --vessel {profile.name} --out {out} first"
-            )
-        fitting = {key: one for key, one in fitting.items() if one[0] in wanted}
-        differing = {key: one for key, one in differing.items() if one[0] in wanted}
-    left = {key: one for key, one in differing.items() if key not in fitting}
-    if left:
-        name, by = next(iter(left.values()))
-        more = f" (and {len(left) - 1} more)" if len(left) > 1 else ""
-        raise FerryIdError(
-            f"{name}{more}: ingested with {by} than {profile.name} as it is now, so that its sums would not add up with the "
-            f"others'. Fix: ingest it again with --vessel {profile.name} --out {out}, or name the logs to take"
-        )
-    if not fitting:
-        raise FerryIdError(
-            f"{out / 'logs'}: no log was ingested there with the profile {profile.name}. "
-            f"Fix: ferryid ingest LOG... --vessel {profile.name} --out {out} first"
-        )
-    return [folder for _, folder in sorted(fitting.values())]
 
 
 @dataclass(frozen=True, eq=False)

@@ -179,7 +179,13 @@ def _trial(field: Field, path: str, out: Path, window_s: float, before: Sequence
     taus = np.stack([prediction.tau for prediction in seen])
     rows = _common_rows(field, motion, taus)
     at = motion.t[rows]
-    squares = np.moveaxis((motion.tau - taus) ** 2, 0, 1)[rows]
+    with np.errstate(over="ignore"):
+        squares = np.moveaxis((motion.tau - taus) ** 2, 0, 1)[rows]
+    for number, one in enumerate(field.candidates):
+        if not np.isfinite(squares[:, number]).all():
+            raise FerryIdError(
+                f"{one.label}: its force on {path} is too large to be squared. Fix: fit the model again, or restore its file"
+            )
     block_s, remembered = block_seconds(squares.reshape(len(squares), -1), motion.rate_hz)
     starts, ends = starting_points(motion, rows, HORIZONS_S[0], HORIZONS_S[-1])
     steps = np.round(np.array(HORIZONS_S) * motion.rate_hz).astype(int)

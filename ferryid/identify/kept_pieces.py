@@ -23,7 +23,7 @@ from ferryid.identify.residual import residual
 from ferryid.identify.rows import basis_of, known_rows
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import block_number, purge_seconds
-from ferryid.signals.cache import load
+from ferryid.signals.cache import folder_of, load
 from ferryid.signals.parquet import read_table, write_table
 from ferryid.signals.prepare import track_of
 from ferryid.signals.smooth import smooth_measured
@@ -94,8 +94,8 @@ def kept(folder: Path, profile: Profile, settings: FitSettings, windows_s: Seque
     if path.exists():
         try:
             return _read(path, key)
-        except FerryIdError:
-            pass  # a damaged file is made anew
+        except (FerryIdError, LookupError, TypeError, ValueError, AttributeError):
+            pass  # a damaged file, or one of another log, is made anew
     made = _made(folder, profile, settings, windows_s)
     write(path, key, made)
     return made
@@ -164,7 +164,8 @@ def write(path: Path, key: Mapping[str, Any], log: Kept) -> None:
 
 def _read(path: Path, key: Mapping[str, Any]) -> Kept:
     columns, told = read_table(path)
-    if told.get("schema") != SCHEMA or told["key"] != key:
+    place = folder_of(Path(), told["name"], told["sha256"], key["profile_sha256"]).name
+    if told["schema"] != SCHEMA or told["key"] != key or path.parent.name != place:
         raise FerryIdError(f"{path}: not what was asked for. Fix: delete it, it is made anew")
     K, m = told["columns"]
     width = K + m + 1
@@ -174,9 +175,11 @@ def _read(path: Path, key: Mapping[str, Any]) -> Kept:
     packed = columns["sums"].reshape(*counts.shape, -1)
     products[..., *upper] = packed
     products[..., upper[1], upper[0]] = packed
-    pieces = [
-        Pieces(n, K, m, np.array(shift), one) for n, shift, one in zip(counts, told["shift"], products, strict=True)
-    ]
+    shifts, force, base = (np.array(told[name], dtype=np.float64) for name in ("shift", "force", "base"))
+    whole = np.array_equal(products[..., -1, -1], counts) and np.isfinite(packed).all()
+    if not whole or shifts.shape != (len(counts), K + m) or not force.shape == base.shape == (counts.shape[1], 3, 3):
+        raise FerryIdError(f"{path}: damaged. Fix: delete it, it is made anew")
+    pieces = [Pieces(n, K, m, shift, one) for n, shift, one in zip(counts, shifts, products, strict=True)]
     windows = len(key["windows_s"])
     return Kept(
         name=told["name"],
@@ -190,7 +193,7 @@ def _read(path: Path, key: Mapping[str, Any]) -> Kept:
             told["name"],
             tuple(pieces[:windows]),
             pieces[told["test"]],
-            np.array(told["force"]),
-            np.array(told["base"]),
+            force,
+            base,
         ),
     )

@@ -53,9 +53,9 @@ def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Ou
     page, drawings = render(plain, comparison.trials, made)
     with replacing(folder) as temporary:
         temporary.mkdir()
-        (temporary / file.name).write_text(page, encoding="utf-8")
+        (temporary / file.name).write_text(page, encoding="utf-8", errors="backslashreplace")
         for name, drawing in drawings.items():
-            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8")
+            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "compare.json").write_text(dump_json(plain), encoding="utf-8")
     return Outcome(file, plain, f"{as_text(plain)}\n\nreport  {file}")
 

@@ -82,9 +82,9 @@ def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = (
     plain = {**finite(as_json(diagnoses)), "report": str(file)}
     with replacing(folder) as temporary:
         temporary.mkdir()
-        (temporary / file.name).write_text(page, encoding="utf-8")
+        (temporary / file.name).write_text(page, encoding="utf-8", errors="backslashreplace")
         for name, drawing in drawings.items():
-            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8")
+            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "diagnosis.json").write_text(dump_json(plain), encoding="utf-8")
     return Outcome(file, plain, f"{as_text(diagnoses)}\nreport  {file}")
 

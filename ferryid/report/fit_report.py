@@ -101,9 +101,9 @@ def _reported(result: FitResult, out: Path, progress: Callable[[str], None]) -> 
         plain = as_json(result, stored, folder / "report.html")
         with replacing(folder) as temporary:
             temporary.mkdir()
-            (temporary / "report.html").write_text(page, encoding="utf-8")
+            (temporary / "report.html").write_text(page, encoding="utf-8", errors="backslashreplace")
             for file, drawing in drawings.items():
-                (temporary / f"{file}.svg").write_text(drawing, encoding="utf-8")
+                (temporary / f"{file}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
             (temporary / "fit.json").write_text(dump_json(plain), encoding="utf-8")
             # Last before the report takes its place: a full disk or an interrupt leaves neither without the other.
             save(result.model, out)

@@ -67,9 +67,9 @@ def leave(
     plain = json_of(str(report))
     with replacing(report.parent) as temporary:
         os.makedirs(temporary)
-        (temporary / "report.html").write_text(page, encoding="utf-8")
+        (temporary / "report.html").write_text(page, encoding="utf-8", errors="backslashreplace")
         for name, drawing in drawings.items():
-            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8")
+            (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "sweep.json").write_text(dump_json(plain), encoding="utf-8")
     progress("")
     return Outcome(report, plain, f"{text}\nreport  {report}")

@@ -78,9 +78,22 @@ def recordings(out: Path) -> dict[Path, dict[str, Any]]:
             note = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue  # an incomplete folder counts as none
-        if isinstance(note, dict) and note.get("schema") == SCHEMA:
+        if _is_whole(note):
             found[path.parent] = note
     return found
+
+
+def _is_whole(note: Any) -> bool:
+    """Tell whether a note says what a recording is, so that its folder counts."""
+    try:
+        plain = note["recording"]
+        texts = (note["version"], *(plain[key] for key in ("name", "sha256", "profile_name", "profile_sha256")))
+        files = note["files"]
+        return (
+            note["schema"] == SCHEMA and all(isinstance(one, str) for one in texts) and all(len(f) == 4 for f in files)
+        )
+    except (KeyError, TypeError):
+        return False
 
 
 def _loaded(folder: Path, paths: Sequence[Path]) -> Recording | None:
@@ -98,12 +111,8 @@ def _kept(out: Path, name: str, profile: Profile) -> Iterator[tuple[Path, dict[s
             note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue  # an incomplete folder counts as none and is replaced
-        try:
-            fits = note["schema"] == SCHEMA and note["version"] == __version__
-            fits = fits and note["recording"]["profile_sha256"] == profile.sha256
-        except (KeyError, TypeError):
-            continue
-        if fits:
+        fits = _is_whole(note) and note["version"] == __version__
+        if fits and note["recording"]["profile_sha256"] == profile.sha256:
             yield folder, note
 
 
@@ -180,6 +189,16 @@ def load(folder: Path) -> Recording:
         raise FerryIdError(
             f"{folder}: this is no recording of ferryid ({error}). Fix: run ferryid ingest on the log again"
         ) from error
+    try:
+        return _recording(folder, note)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise FerryIdError(
+            f"{folder / _NOTE}: a part of it is missing or wrong ({type(error).__name__}: {error}). "
+            "Fix: delete its folder, the next ingest writes it anew"
+        ) from error
+
+
+def _recording(folder: Path, note: Mapping[str, Any]) -> Recording:
     plain = note["recording"]
     with ThreadPoolExecutor(2) as pool:
         tables = dict(

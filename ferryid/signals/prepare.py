@@ -111,3 +111,6 @@ def refuse_twice(opened: Sequence[Opened]) -> None:
                 f"{one.recording.files[0]}: the same log as {first}, so that it would judge itself. Fix: give it once"
             )
         seen[one.recording.sha256] = one.recording.files[0]
+    files = [file for one in opened for file in {str(Path(file).resolve()) for file in one.recording.files}]
+    if shared := sorted({file for file in files if files.count(file) > 1}):
+        raise FerryIdError(f"{shared[0]}: is part of two logs, so that it would judge itself. Fix: give it once")

@@ -89,6 +89,7 @@ def test_a_log_in_text_form_is_no_list(season: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
+        ("log,date\n", r"names no log\. Fix: "),
         ("log,vesel\na.mcap,x\n", r'no manifest has a column "vesel"\. Did you mean "vessel"\?'),
         (
             "log,date\na.mcap,2024-13-01\n",

@@ -454,6 +454,32 @@ def test_a_damaged_row_is_none(one: task.Task, text: str) -> None:
     assert task.work(one)["status"] == "done"
 
 
+@pytest.mark.parametrize(
+    "altered", [{"seconds": None}, {"files": None}, {"start_ns": "x"}, {"evaluate": 5}, {"more": 1}]
+)
+def test_an_altered_row_is_none(one: task.Task, altered: dict[str, Any]) -> None:
+    task.work(one)
+    path = one.folder / "row.json"
+    whole = kept.read_row(one.folder)
+    assert whole is not None
+    path.write_text(json.dumps({**json.loads(path.read_text("utf-8")), **altered}), encoding="utf-8")
+    assert kept.read_row(one.folder) is None
+    assert task.work(one)["status"] == "done"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems take no such name")
+def test_a_name_of_bytes_that_are_no_characters(tmp_path: Path) -> None:
+    logs = archive(tmp_path, 1)
+    recipe(tmp_path, 'steps = ["fit", "evaluate", "diagnose"]\n[fit]\ndraws = 20\n')
+    (logs / "day0.mcap").rename(os.fsdecode(bytes(logs) + b"/day\xff.mcap"))
+    Path(os.fsdecode(bytes(logs) + b"/bad\xff.mcap")).write_bytes(b"")
+    result, _ = run(tmp_path, logs / "*.mcap")
+    assert statuses(result) == {"bad": "refused", "day": "done"}
+    assert [row["log"] for row in result["rows"]] == [rf"{logs}/{name}\udcff.mcap" for name in ("bad", "day")]
+    again, _ = run(tmp_path, logs / "*.mcap")
+    assert again["counts"]["done_before"] == 2
+
+
 def test_nothing_says_whose_log_it_is(tmp_path: Path) -> None:
     logs = archive(tmp_path, 1)
     recipe(tmp_path)

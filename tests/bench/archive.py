@@ -136,11 +136,13 @@ def _season(out: Path, logs: int) -> None:
     _, told = kept_pieces.read_table(path)
     long = _lengthened(one)
     for number in range(logs):
-        name, sha256 = f"day{number:04d}", f"{number:064x}"
-        place = out / "logs" / f"{name}-{sha256[-8:]}-{PROFILE.sha256[:8]}"
+        name, sha256 = f"day{number:04d}", f"{number:08x}".ljust(64, "0")
+        place = out / "logs" / f"{name}-{sha256[:8]}-{PROFILE.sha256[:8]}"
         place.mkdir()
         recording = {**note["recording"], "name": name, "sha256": sha256}
-        (place / "recording.json").write_text(json.dumps({**note, "recording": recording}), encoding="utf-8")
+        (place / "recording.json").write_text(
+            json.dumps({**note, "files": [[name, 0, number, number]], "recording": recording}), encoding="utf-8"
+        )
         kept_pieces.write(place / path.name, told["key"], replace(long, name=name, sha256=sha256))
     for file in folder.iterdir():
         file.unlink()

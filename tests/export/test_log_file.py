@@ -213,7 +213,13 @@ def test_places_that_will_not_do(tmp_path: Path) -> None:
     ):
         with pytest.raises(FerryIdError, match=told):
             export(tmp_path / mcap, log, **options)
-    export(tmp_path / "there.mcap", overwrite=True)
+    for there in (b"\x89MCAP0\r\n", LOG.read_bytes()):
+        (tmp_path / "there.mcap").write_bytes(there)
+        with pytest.raises(FerryIdError, match=r"there.mcap: cannot be replaced, found no export. Fix: "):
+            export(tmp_path / "there.mcap", overwrite=True)
+        assert (tmp_path / "there.mcap").read_bytes() == there
+    export(tmp_path / "again.mcap")
+    export(tmp_path / "again.mcap", overwrite=True)
     assert not list(tmp_path.glob(".*.part"))
     other = replace(MODEL, profile_text=load_profile("gunnerus").text)
     with pytest.raises(FerryIdError, match="says nothing about milliampere"):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +14,13 @@ import pytest
 from ferryid.errors import FerryIdError
 from ferryid.identify import archive as module
 from ferryid.identify import kept_pieces
-from ferryid.identify.archive import fit_archive, folders
+from ferryid.identify.archive import fit_archive
+from ferryid.identify.archived_logs import folders
 from ferryid.identify.fit import fit
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweep import sweep
 from ferryid.report.fit_report import fit_archive_and_report
+from ferryid.signals.parquet import read_table, write_table
 from ferryid.signals.prepare import open_track
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile, parse_profile
@@ -77,6 +81,68 @@ def test_a_damaged_file_is_made_anew(season: Path) -> None:
     for path in season.glob("logs/*/pieces-*.parquet"):
         path.write_bytes(path.read_bytes()[:-100])
     np.testing.assert_array_equal(fit_archive(PROFILE, SETTINGS, season).model.theta, whole.model.theta)
+
+
+def test_sums_that_are_another_logs_are_made_anew(season: Path, tmp_path: Path) -> None:
+    whole = fit_archive(PROFILE, SETTINGS, season)
+    shutil.copytree(season / "logs", tmp_path / "logs")
+    first, second, _ = folders(tmp_path, PROFILE)
+    for path in first.glob("pieces-*.parquet"):
+        shutil.copy(path, second)
+    again = fit_archive(PROFILE, SETTINGS, tmp_path)
+    np.testing.assert_array_equal(again.model.theta, whole.model.theta)
+    assert [log["name"] for log in again.archive] == ["day1", "day2", "day3"]
+
+
+@pytest.mark.parametrize(
+    "hurt",
+    [
+        lambda told: told.pop("n"),
+        lambda told: told["n"][0][0].__setitem__(0, 1),
+        lambda told: told.update(columns=[3, 3]),
+        lambda told: told.update(shift=[[0.0]]),
+        lambda told: told.update(force=None),
+    ],
+)
+def test_what_is_told_of_sums_wrongly_is_made_anew(season: Path, tmp_path: Path, hurt: Callable[..., object]) -> None:
+    whole = fit_archive(PROFILE, SETTINGS, season)
+    shutil.copytree(season / "logs", tmp_path / "logs")
+    for path in tmp_path.glob("logs/day1*/pieces-*.parquet"):
+        columns, told = read_table(path)
+        hurt(told)
+        write_table(path, columns, told)
+    np.testing.assert_array_equal(fit_archive(PROFILE, SETTINGS, tmp_path).model.theta, whole.model.theta)
+
+
+def test_sums_that_are_no_numbers_are_made_anew(season: Path, tmp_path: Path) -> None:
+    whole = fit_archive(PROFILE, SETTINGS, season)
+    shutil.copytree(season / "logs", tmp_path / "logs")
+    for path in tmp_path.glob("logs/day1*/pieces-*.parquet"):
+        columns, told = read_table(path)
+        write_table(path, {"sums": np.where(np.arange(columns["sums"].size) == 5, np.nan, columns["sums"])}, told)
+    np.testing.assert_array_equal(fit_archive(PROFILE, SETTINGS, tmp_path).model.theta, whole.model.theta)
+
+
+def test_two_recordings_of_one_file_are_refused(tmp_path: Path, logs: list[str]) -> None:
+    path = tmp_path / "day.mcap"
+    for log in logs[:2]:
+        shutil.copy(log, path)
+        open_track(str(path), PROFILE, tmp_path)
+    with pytest.raises(FerryIdError, match=r"day-\w+-\w+: read from .*day.mcap, as .* changed in between.*Fix: remove"):
+        folders(tmp_path, PROFILE)
+    open_track(logs[2], PROFILE, tmp_path)
+    assert [folder.name[:5] for folder in folders(tmp_path, PROFILE, ["day3"])] == ["day3-"]
+
+
+def test_a_folder_whose_note_is_damaged_is_none(season: Path, tmp_path: Path) -> None:
+    shutil.copytree(season / "logs", tmp_path / "logs")
+    (note,) = tmp_path.glob("logs/day1*/recording.json")
+    told = json.loads(note.read_text())
+    note.write_text(json.dumps({**told, "recording": {**told["recording"], "clocks": {}}}))
+    with pytest.raises(FerryIdError, match=r"recording.json: a part of it is missing or wrong .*Fix: delete"):
+        fit_archive(PROFILE, replace(SETTINGS, sigma=0.7), tmp_path)
+    note.write_text(json.dumps({**told, "recording": []}))
+    assert len(folders(tmp_path, PROFILE)) == 2
 
 
 def test_whole_logs_validate(season: Path) -> None:

@@ -164,6 +164,12 @@ def test_what_a_model_needs_and_a_log_lacks_is_named(folder: Path) -> None:
         compare(field, logs_in(folder), folder / "out", progress=quiet)
 
 
+def test_a_force_without_bounds_is_refused(folder: Path) -> None:
+    field = line_up(["ferry@1", "ferry@2"], [heavier(1, 1.1), heavier(2, 1e200)])
+    with pytest.raises(FerryIdError, match=r"ferry@2: its force on .*trial-0.mcap is too large .*Fix: "):
+        compare(field, logs_in(folder), folder / "out", progress=quiet)
+
+
 def test_a_log_is_given_once(field: Field, folder: Path) -> None:
     log = logs_in(folder)[0]
     with pytest.raises(FerryIdError, match="the same log as another"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from ferryid.identify import sweep as module
 from ferryid.identify.fit import quiet
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweep import Sweep, headline, render_sweep, sweep, sweep_json
-from ferryid.signals.prepare import Opened, open_track
+from ferryid.signals.prepare import Opened, open_track, refuse_twice
 from ferryid.signals.smooth import Measured
 from tests.identify.rounds import PROFILE
 from tests.identify.trials import measured
@@ -35,7 +36,11 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
 
     def swept(what: str, logs: Sequence[Measured], settings: FitSettings = SETTINGS, **options: object) -> Sweep:
         ready = {
-            log.log: replace(opened, measured=log, recording=replace(opened.recording, name=log.log, sha256=log.log))
+            log.log: replace(
+                opened,
+                measured=log,
+                recording=replace(opened.recording, name=log.log, sha256=log.log, files=(log.log,)),
+            )
             for log in logs
         }
         monkeypatch.setattr(module, "open_track", lambda path, *_, **__: ready[path])
@@ -160,3 +165,12 @@ def test_a_log_given_twice_is_refused(run: Run, opened: Opened, monkeypatch: pyt
     monkeypatch.setattr(module, "open_track", lambda path, *_, **__: both[path])
     with pytest.raises(FerryIdError, match=r"other\.mcap: the same log as"):
         sweep("components", ["a", "b"], PROFILE, SETTINGS, Path("nowhere"), progress=quiet)
+
+
+def test_a_part_of_two_logs_is_refused() -> None:
+    part, whole = (
+        SimpleNamespace(recording=SimpleNamespace(sha256=name, files=files))
+        for name, files in (("1", ("a.bag",)), ("2", ("b.bag", "./a.bag")))
+    )
+    with pytest.raises(FerryIdError, match=r"a\.bag: is part of two logs.*Fix: "):
+        refuse_twice([part, whole])  # type: ignore[list-item]
