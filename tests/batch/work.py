@@ -25,6 +25,10 @@ def square(item: tuple[str, int, str]) -> tuple[int, int]:
     if fate == "dies" or (fate == "dies once" and calls(Path(folder), number) == 1):
         os.kill(os.getpid(), signal.SIGKILL)
     if fate == "lingers":
+        # Until the next one is at work, however long its process takes to start, and a while more.
+        deadline = time.monotonic() + 60.0
+        while not calls(Path(folder), number + 1) and time.monotonic() < deadline:
+            time.sleep(0.05)
         time.sleep(2.0)
     if fate == "raises":
         raise KeyError(f"number {number}")
