@@ -84,9 +84,10 @@ def test_what_comes_of_an_item_that_kills_every_process_and_not_of_its_neighbour
         done = dict(workers.over(square, fates, begun=begun.append, lost=lambda item: (-item[1], 0)))
     assert {number: result for number, (result, _) in done.items()} == {0: 0, 1: -1, 2: 4, 3: 9, 4: 16}
     assert calls(tmp_path, 1) == 3
-    # Beside the one that dies it is lost once, perhaps before it has come to itself; then it goes alone.
-    assert calls(tmp_path, 0) in (1, 2)
-    assert sorted(begun) == [0, 0, 1, 1, 1, 2, 3, 4]
+    # Beside the one that dies a neighbour is lost once, if it is not done before that is noticed; then it goes alone.
+    assert max(calls(tmp_path, number) for number in (0, 2, 3, 4)) <= 2
+    assert begun.count(1) == 3
+    assert set(begun) == {0, 1, 2, 3, 4}
 
 
 def test_one_process_apart(tmp_path: Path) -> None:
