@@ -57,7 +57,11 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
         logs: Sequence[Measured], settings: FitSettings = SETTINGS, profile=PROFILE, folds: int = 5
     ) -> StructureSweep:  # type: ignore[no-untyped-def]
         ready = {
-            log.log: replace(opened, measured=log, recording=replace(opened.recording, name=log.log, sha256=log.log))
+            log.log: replace(
+                opened,
+                measured=log,
+                recording=replace(opened.recording, name=log.log, sha256=log.log, files=(log.log,)),
+            )
             for log in logs
         }
         monkeypatch.setattr(reading, "open_track", lambda path, *_, **__: ready[path])
