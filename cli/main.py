@@ -11,7 +11,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 import ferryid
-from ferryid.errors import FerryIdError
+from ferryid.errors import FerryIdError, one_line, printable
 
 if TYPE_CHECKING:
     from typer.exceptions import TyperException
@@ -65,7 +65,7 @@ def main() -> None:
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
         sys.stderr.write(
-            f"ferryid: {what}{error.strerror or error}. Fix: check the path, its permissions and the disk\n"
+            f"ferryid: {one_line(f'{what}{error.strerror or error}')}. Fix: check the path, its permissions and the disk\n"
         )
         sys.exit(2)
     except MemoryError:
@@ -97,9 +97,9 @@ def _usage(error: TyperException) -> int:
     """Show wrong use of the command line in one line; asking for nothing at all shows the help."""
     message = error.format_message() if hasattr(error, "format_message") else str(error)
     if "\n" in message:
-        sys.stderr.write(message + "\n")
+        sys.stderr.write(printable(message, keep="\n") + "\n")
         return 2
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "ferryid"
-    sys.stderr.write(f"ferryid: {message.rstrip('.')}. Fix: see {command} --help\n")
+    sys.stderr.write(f"ferryid: {one_line(message.rstrip('.'))}. Fix: see {command} --help\n")
     return 2

@@ -10,6 +10,8 @@ from typing import Any
 
 import typer
 
+from ferryid.errors import one_line, printable
+
 
 def emit(result: Mapping[str, Any], text: str, json: str | None) -> None:
     """Print `text`, or with ``--json -`` the JSON object instead; with ``--json FILE`` also write the object there."""
@@ -20,7 +22,7 @@ def emit(result: Mapping[str, Any], text: str, json: str | None) -> None:
         return
     if json is not None:
         write_result(Path(json), dump_json(dict(result)))
-    typer.echo(text)
+    typer.echo(printable(text, keep="\n"))
 
 
 def text_width() -> int:
@@ -31,11 +33,11 @@ def text_width() -> int:
 def progress(stage: str) -> None:
     """Show the present stage on a terminal, nothing when piped; an empty stage clears the line."""
     if sys.stderr.isatty():
-        sys.stderr.write(f"\r\033[K{stage}")
+        sys.stderr.write(f"\r\033[K{one_line(stage)}")
         sys.stderr.flush()
 
 
 def tell(line: str) -> None:
     """Print a line that is no result to standard error, above the present stage."""
     progress("")
-    typer.echo(line, err=True)
+    typer.echo(one_line(line), err=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
 
 _LONGEST = 2000
@@ -35,7 +36,27 @@ def one_line(message: str) -> str:
     """Return a message fit for a terminal and a single line: control characters written out, an endless one shortened."""
     if len(message) > _LONGEST:
         message = f"{message[: _LONGEST // 2]} ... {message[-_LONGEST // 2 :]}"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in message)
+    return printable(message)
+
+
+def printable(text: str, keep: str = "") -> str:
+    """Return a text with control and formatting characters escaped, which would command a terminal or reorder a page.
+
+    Parameters
+    ----------
+    text
+        Anything, such as a topic's name out of a log.
+    keep
+        Control characters that stay, such as ``"\\n"`` for a text of several lines. Spaces of every width stay in any case.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        c
+        if c.isprintable() or c in keep or unicodedata.category(c) == "Zs"
+        else c.encode("unicode_escape").decode("ascii")
+        for c in text
+    )
 
 
 def did_you_mean(name: str, options: Iterable[str]) -> str:

@@ -21,6 +21,10 @@ except ImportError:  # Windows: two fits at once into one folder may then take t
     fcntl = None  # type: ignore[assignment]
 
 
+_UNPRINTABLE = "[\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]"
+"""Control and formatting characters that JSON allows in a text."""
+
+
 @contextmanager
 def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
     """Give a temporary name beside `path` and rename it over `path` when the block ends without an error.
@@ -177,8 +181,8 @@ def alone(folder: Path, *, wait: bool = True) -> Iterator[None]:
 def dump_json(data: Any) -> str:
     """Return JSON text, one form for the same data everywhere; NaN and infinities become null."""
     text = json.dumps(finite(data), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    # Bytes of a file's name that are no characters, as JSON writes them down.
-    return re.sub("[\ud800-\udfff]", lambda found: f"\\u{ord(found[0]):04x}", text)
+    # As JSON writes them down: bytes of a file's name that are no characters, and what would command a terminal.
+    return re.sub(_UNPRINTABLE, lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def finite(data: Any) -> Any:

@@ -18,6 +18,7 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.model import Model
 from ferryid.identify.pictured import Pictured, bare_picture, bridged, pushes
 from ferryid.signals.align import align
+from ferryid.signals.prepare import doubts_of
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
 from ferryid.signals.track import Motion, Track
@@ -121,7 +122,7 @@ def scene_of(
     measured = measure(track, profile)
     motion = smooth_measured(measured, window_s)
     scene = _scene(track, measured, profile, window_s)
-    doubts = tuple(doubt.says for doubt in track.doubts)
+    doubts = doubts_of(recording, track)
     survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns)
     return scene, survey
 

@@ -32,7 +32,7 @@ from ferryid.identify.kept_pieces import Kept, kept
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.result import Excitation, FitResult, FreeRun
 from ferryid.identify.scores import by_axis
-from ferryid.identify.settings import FitSettings
+from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.split import validating
 from ferryid.identify.store import checked_name
 from ferryid.vessel.profile import Profile
@@ -167,6 +167,7 @@ def fit_archive(
     where = folders(out, profile, logs)
     sums = _Sums(len(windows_s), len(where), by_logs=settings.split == "logs")
     functions = _added(where, profile, settings, windows_s, sums.add, progress)
+    check_components(settings.components, functions)
     validation = total([log.validation for log in sums.logs])
     if not validation.n or not any(one.n for one in sums.training if one is not None):
         raise FerryIdError(

@@ -29,7 +29,7 @@ from ferryid.identify.residual import residual
 from ferryid.identify.result import ComponentCurve, FitResult, LogFit
 from ferryid.identify.rows import basis_of, grids, known_rows, rows_of
 from ferryid.identify.scores import force_scores
-from ferryid.identify.settings import FitSettings
+from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.simpls import Simpls, simpls, sse
 from ferryid.identify.split import Split, split
 from ferryid.identify.store import checked_name
@@ -94,6 +94,7 @@ def fit(
     prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
     motions = _told_apart([one.motion for one in prepared])
     functions = basis_of(settings, motions)
+    check_components(settings.components, functions)
     progress("computing the residual")
     targets = [residual(profile, motion, settings.scale, settings.residual) for motion in motions]
     measured = [residual(profile, motion, settings.scale) for motion in motions]
@@ -198,6 +199,7 @@ def _windowed(profile: Profile, settings: FitSettings, opened: Sequence[Opened])
     windows_s = tried(settings.windows_s, [one.measured for one in opened], in_blocks=settings.split == "blocks")
     motions = _told_apart([smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
     functions = basis_of(settings, motions)
+    check_components(settings.components, functions)
     parts = split(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))
     choice = _choice(profile, settings, functions, opened, windows_s, parts.training)
     return replace(settings, window_s=choice.window_s, components=choice.components), parts

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.basis import basis, sized
+from ferryid.identify.basis import Basis, basis, sized
 from ferryid.vessel.profile import Profile
 
 CHOICES = {
@@ -19,6 +19,8 @@ CHOICES = {
 
 WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
 """Smoothing windows that are usually tried [s]."""
+SHORTEST_WINDOW_S = 0.01
+"""A shorter window [s] holds a single sample at any usual rate and smooths nothing, which 0 asks for openly."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ class FitSettings:
                 )
         text = str(self.components)
         if text != "auto":
-            if not (text.isascii() and text.isdigit()) or not 1 <= int(text[:6]) <= 1000:
+            if not (text.isascii() and text.isdigit()) or int(text[:6]) < 1:
                 raise FerryIdError(
                     f"--components: {text!r} is not a number of components. Fix: give 1 or more, or auto"
                 )
@@ -126,10 +128,29 @@ class FitSettings:
         return {**plain, "windows_s": windows_s} if windows_s else plain
 
 
+def check_components(components: str | int, functions: Basis) -> None:
+    """Refuse more components than a basis has functions; ``"auto"`` is never too many.
+
+    Raises
+    ------
+    FerryIdError
+        With the largest number that is possible.
+    """
+    most = len(functions.terms)
+    if components != "auto" and int(components) > most:
+        raise FerryIdError(
+            f"--components: {components} are more than the {most} functions of the basis {functions.name}. "
+            f"Fix: give 1 to {most}, or auto"
+        )
+
+
 def check_window(window_s: float | None) -> None:
     """Refuse what is no smoothing window; None stands for a default."""
-    if window_s is not None and not 0.0 <= window_s <= 60.0:
-        raise FerryIdError(f"--window: {window_s} s is no smoothing window. Fix: give 0 to 60 s, 1.0 is usual")
+    if window_s is not None and window_s != 0.0 and not SHORTEST_WINDOW_S <= window_s <= 60.0:
+        raise FerryIdError(
+            f"--window: {window_s} s is no smoothing window. "
+            f"Fix: give {SHORTEST_WINDOW_S:g} to 60 s, 1.0 is usual, or 0 for none"
+        )
 
 
 def windows_of(text: str) -> tuple[float, ...]:

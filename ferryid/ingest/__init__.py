@@ -10,6 +10,7 @@ from pathlib import Path
 from ferryid.errors import FerryIdError
 from ferryid.ingest import formats
 from ferryid.ingest.log import Format, Reader, TableLayout
+from ferryid.ingest.printable_names import printable_names
 
 __all__ = ["existing_parts", "open_log", "supported_formats"]
 
@@ -42,6 +43,12 @@ def open_log(path: str | Path, layout: TableLayout | None = None) -> Reader:
     FerryIdError
         For a path that is missing, empty, unreadable or of no supported format.
     """
+    if not str(path).strip():
+        raise FerryIdError("LOG: the path is empty, a log was to be read. Fix: name a file or a folder")
+    return printable_names(_open(path, layout))
+
+
+def _open(path: str | Path, layout: TableLayout | None) -> Reader:
     whole = Path(path)
     if not whole.exists() and "+" in str(path):
         return _open_parts(str(path), existing_parts(str(path)), layout)

@@ -28,6 +28,7 @@ class JoinedReader:
 
     def __init__(self, parts: tuple[Reader, ...]) -> None:
         self._parts = tuple(sorted(parts, key=_start_ns))
+        _refuse_copies(self._parts)
         self.paths: tuple[Path, ...] = tuple(path for part in self._parts for path in part.paths)
         self.topics: tuple[Topic, ...] = _merged(self._parts)
         self.losses: tuple[Loss, ...] = tuple(loss for part in self._parts for loss in part.losses)
@@ -77,6 +78,24 @@ def concatenate(pieces: Sequence[Series]) -> Series:
         columns={path: np.concatenate([piece.columns[path] for piece in pieces]) for path in pieces[0].columns},
         time_column=pieces[0].time_column,
     )
+
+
+def _refuse_copies(parts: Sequence[Reader]) -> None:
+    """Refuse parts that hold the same messages, as a recording beside its copy in another format.
+
+    Two parts of one recording never hold a topic with the same number of messages between the same two times.
+    """
+    seen: dict[tuple[str, int, int, int], Reader] = {}
+    for part in parts:
+        for topic in part.topics:
+            if topic.count < 2 or topic.start_ns is None or topic.end_ns is None:
+                continue
+            first = seen.setdefault((topic.name, topic.count, topic.start_ns, topic.end_ns), part)
+            if first is not part:
+                raise FerryIdError(
+                    f"{part.paths[0]}: holds the same {topic.count} messages of {topic.name} as {first.paths[0]}, so that "
+                    "each would count twice. Fix: name one of them, or keep one of them in the folder"
+                )
 
 
 def _start_ns(part: Reader) -> tuple[int, str]:

@@ -10,6 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.errors import one_line
+
 Nanoseconds = NDArray[np.int64]
 Column = NDArray[Any]
 
@@ -52,7 +54,8 @@ class Topic:
 class Loss:
     """Something of a file that could not be read: where it was, and how much.
 
-    ``messages`` and the times [ns] are None where the damage hides them. ``what`` is one plain sentence.
+    ``messages`` and the times [ns] are None where the damage hides them. ``what`` is one plain sentence; what it quotes of
+    the file is escaped.
     """
 
     file: str
@@ -61,6 +64,12 @@ class Loss:
     messages: int | None = None
     start_ns: int | None = None
     end_ns: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("file", "what"):
+            object.__setattr__(self, name, one_line(getattr(self, name)))
+        if self.topic is not None:
+            object.__setattr__(self, "topic", one_line(self.topic))
 
     @property
     def seconds(self) -> float | None:

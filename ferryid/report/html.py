@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from jinja2 import Environment, PackageLoader, Template
+
+from ferryid.errors import printable
 
 
 def template(name: str) -> Template:
     """Return a template by its file name; whatever it shows is escaped."""
-    loader = PackageLoader("ferryid.report", "templates")
-    return Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True).get_template(name)
+    environment = Environment(
+        loader=PackageLoader("ferryid.report", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_visible,
+    )
+    return environment.get_template(name)
+
+
+def _visible(value: Any) -> Any:
+    """Escape control characters in a text; markup made by ourselves, such as a figure, passes as it is."""
+    return printable(value, keep="\n\t") if type(value) is str else value

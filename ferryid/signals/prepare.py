@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.recording import Recording, data_quality, record
@@ -25,8 +27,8 @@ class Opened:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Contradictions between its signals, as sentences."""
-        return tuple(doubt.says for doubt in self.track.doubts)
+        """Contradictions between its signals, and actuators known by their orders alone, as sentences."""
+        return doubts_of(self.recording, self.track)
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,11 @@ class Prepared:
     quality: Mapping[str, Any]
     doubts: tuple[str, ...] = ()
     track: Track | None = None
+
+
+def doubts_of(recording: Recording, track: Track) -> tuple[str, ...]:
+    """Return contradictions between a log's signals, and actuators known by their orders alone, as sentences."""
+    return (*(doubt.says for doubt in track.doubts), *recording.orders_for_feedback)
 
 
 def open_track(path: str, profile: Profile, out: Path, *, rate_hz: float | None = None, verify: bool = False) -> Opened:
@@ -114,3 +121,18 @@ def refuse_twice(opened: Sequence[Opened]) -> None:
     files = [file for one in opened for file in {str(Path(file).resolve()) for file in one.recording.files}]
     if shared := sorted({file for file in files if files.count(file) > 1}):
         raise FerryIdError(f"{shared[0]}: is part of two logs, so that it would judge itself. Fix: give it once")
+    for number, one in enumerate(opened):
+        for other in opened[:number]:
+            if _same_signals(one.measured, other.measured):
+                raise FerryIdError(
+                    f"{one.recording.files[0]}: holds the same messages as {other.recording.files[0]}, as a copy in another "
+                    "format does, so that it would judge itself. Fix: give one of them"
+                )
+
+
+def _same_signals(one: Measured, other: Measured) -> bool:
+    """True if velocities and forces of two logs are the same numbers."""
+    return all(
+        np.array_equal(values, twin, equal_nan=True)
+        for values, twin in ((one.t, other.t), (one.nu, other.nu), (one.tau, other.tau))
+    )

@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ferryid.errors import one_line
 from ferryid.ingest.log import Loss
 from ferryid.signals.data_quality import loss_sentence, named
 
@@ -66,7 +67,7 @@ def _head(result: Mapping[str, Any], width: int) -> str:
     size = sum(file["bytes"] for file in result["files"])
     start = result["start"] or "not known (times count from it)"
     lines = [
-        _cut(result["path"], width),
+        _cut(one_line(result["path"]), width),
         f"  {result['format']}, {_bytes(size)}, {result['messages']} messages in {len(result['topics'])} topic(s)",
         f"  start {start}, duration {_duration(result['duration_s'])}",
         f"  {result['sha256']}",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Nanoseconds, Topic
+from ferryid.vessel.thrusters import ROLE_PREFIX
 
 Floats = NDArray[np.float64]
 
@@ -78,6 +79,19 @@ class Recording:
     found: Mapping[str, str]
     missing: Mapping[str, str]
     notes: tuple[str, ...]
+
+    @property
+    def orders_for_feedback(self) -> tuple[str, ...]:
+        """Sentences on actuators whose mapped feedback is not in the log, so that their orders are used."""
+        sentences = []
+        for quantity, reason in self.missing.items():
+            actuator, _, role = quantity.partition(".")
+            if role in ROLE_PREFIX and f"{ROLE_PREFIX[role]}_cmd_{actuator}" in self.found:
+                sentences.append(
+                    f"{quantity}: the order is used, as the feedback is not in the log ({reason.rstrip('.')}); the actuator's "
+                    "lag stays in the residual."
+                )
+        return tuple(sentences)
 
     @property
     def start_ns(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -46,6 +47,47 @@ def test_an_empty_folder(ferryid, tmp_path: Path) -> None:
     refused(ferryid("inspect", tmp_path), str(tmp_path))
 
 
+@pytest.mark.parametrize("command", ["inspect", "fit"])
+def test_an_empty_path_reads_nothing(ferryid, command: str) -> None:
+    refused(ferryid(command, "", *(("--vessel", "milliampere") if command == "fit" else ())), "the path is empty")
+
+
+@pytest.mark.parametrize("command", ["inspect", "fit"])
+def test_a_recording_and_its_copy_in_another_format_in_one_folder(
+    ferryid, fixtures: Path, tmp_path: Path, command: str
+) -> None:
+    for name in ("short.bag", "short.mcap"):
+        shutil.copy(fixtures / name, tmp_path)
+    vessel = ("--vessel", "milliampere", "--out", tmp_path / "out") if command == "fit" else ()
+    refused(ferryid(command, tmp_path, *vessel), "short.mcap", "the same", "short.bag")
+
+
+def test_a_recording_and_its_copy_in_another_format_as_two_logs(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    logs = (fixtures / "short.bag", fixtures / "short.mcap")
+    refused(ferryid("fit", *logs, "--vessel", "milliampere", "--out", tmp_path), "the same messages", "judge itself")
+
+
+def test_a_thruster_known_by_its_orders_alone_is_said_on_the_terminal(ferryid, fixtures: Path, tmp_path: Path) -> None:
+    profile = profile_with(tmp_path, 'topic = "/thruster1/state"', 'topic = "/thruster1/stat"')
+    run = ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")
+    assert run.code == 0, run.err
+    assert "thruster1.speed: the order is used" in run.out
+    again = ferryid("evaluate", "milliampere", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")
+    assert "thruster1.angle: the order is used" in again.out
+
+
+def test_control_characters_of_a_log_never_reach_terminal_page_or_json(ferryid, tmp_path: Path) -> None:
+    path = tmp_path / "a\x1b]0;b\x07\nc\u202e.csv"
+    path.write_text(f"time,{'x' * 64},\x1b[2Ja\u202eb\x9b\n0,9,1\n1,9,3\n2,9\n", encoding="utf-8")
+    for options in ((), ("--json", "-")):
+        run = ferryid("inspect", path, *options)
+        assert run.code == 0, run.err
+        assert "\\x1b" in run.out or "\\u001b" in run.out
+        assert not set(run.out) & set("\x1b\x07\x9b\u202e")
+    missing = ferryid("inspect", tmp_path / "no\x1b.bag")
+    refused(missing, "no\\x1b.bag")
+
+
 def test_a_misspelt_vessel(ferryid, fixtures: Path) -> None:
     refused(ferryid("fit", fixtures / "short.mcap", "--vessel", "miliampere"), "milliampere")
 
@@ -58,6 +100,8 @@ def test_a_misspelt_vessel(ferryid, fixtures: Path) -> None:
         (("--smoother", "squre"), 'Did you mean "square"'),
         (("--split", "block"), 'Did you mean "blocks"'),
         (("--components", "many"), "auto"),
+        (("--components", "1000"), "more than the 21 functions of the basis modulus"),
+        (("--window", "1e-9"), "1e-09 s is no smoothing window"),
         (("--window", "-1"), "window"),
         (("--window", "50"), "short.mcap"),
         (("--rate", "0"), "rate"),
