@@ -9,6 +9,7 @@ from typing import Any
 
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
+from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.smooth import Measured, measure, smooth_measured
 from ferryid.signals.track import Motion, Track
@@ -38,6 +39,11 @@ class Prepared:
     quality: Mapping[str, Any]
     doubts: tuple[str, ...] = ()
     track: Track | None = None
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Which rows are not used and why, as sentences."""
+        return left_out_sentences(self.recording, self.motion)
 
 
 def open_track(path: str, profile: Profile, out: Path, *, rate_hz: float | None = None, verify: bool = False) -> Opened:
