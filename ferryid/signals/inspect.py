@@ -20,6 +20,7 @@ from ferryid.signals.poses import USED, pose_faults, pose_sentences
 from ferryid.signals.quality import clean
 from ferryid.signals.recording import log_name, make_recording, name_of
 from ferryid.signals.render import render_inspect
+from ferryid.signals.stream import Recording
 from ferryid.vessel.load import bundled, load_profile
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, select, survey

@@ -1,7 +1,8 @@
 """Poses that cannot be true: jumps, a lost vessel that is recorded as zeros or as its last pose, a heading turned by 180°.
 
 A pose is compared with the vessel's own speeds in the same log, as they show over a second: where two successive fixes are
-further apart than the vessel can have moved, one side of the step is wrong, or both have different origins. A slow receiver repeats its fixes; that is no loss as long as it repeats them no longer than it usually does.
+further apart than the vessel can have moved, one side of the step is wrong, or both have different origins. A slow
+receiver repeats its fixes; that is no loss as long as it repeats them no longer than it usually does.
 """
 
 from __future__ import annotations

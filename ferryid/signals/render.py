@@ -155,7 +155,9 @@ def _vessel(vessel: Mapping[str, Any], width: int) -> str:
     lines = [title]
     if rows:
         header = ["signal", "unit", "min", "max", "NaN", "held", "spikes", "jumps", "from"]
-        lines.append(table(header, rows, width, left=(0, 1, 8)))
+        if not any(signal["jumps"] for signal in signals.values()):
+            header, rows = [*header[:7], header[8]], [[*row[:7], row[8]] for row in rows]
+        lines.append(table(header, rows, width, left=(0, 1, len(header) - 1)))
     if vessel["problem"]:
         lines += _wrapped(vessel["problem"], width)
     missing: dict[str, list[str]] = {}
