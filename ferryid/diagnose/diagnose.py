@@ -151,7 +151,7 @@ def _begun(
     progress("checking the sensors against each other")
     sensors, scene = examine(scene)
     seen = windows(scene, *window_lengths(profile))
-    notes = [*survey.doubts, *_of_actuators(survey, profile)]
+    notes = [*survey.doubts, *survey.left_out, *_of_actuators(survey, profile)]
     if len(seen.starts) < FEWEST_WINDOWS:
         notes.append(
             f"Only {len(seen.starts)} stretches of {window_lengths(profile)[0]:.0f} s without a gap: too little to tell. "

@@ -18,10 +18,11 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.model import Model
 from ferryid.identify.pictured import Pictured, bare_picture, bridged, pushes
 from ferryid.signals.align import align
+from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.prepare import doubts_of
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
-from ferryid.signals.track import Motion, Track
+from ferryid.signals.track import LeftOut, Motion, Track
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Floats, Profile
 
@@ -56,6 +57,8 @@ class Survey:
         As in `ferryid.signals.prepare.Prepared`; here no doubt stops anything.
     hidden
         What was withheld, by name: shape (n, 2), NaN where it was not measured.
+    left_out
+        Which rows are not used and why, as sentences.
     t0_ns
         Absolute time of the scene's first row [ns].
     """
@@ -66,6 +69,7 @@ class Survey:
     doubts: tuple[str, ...]
     hidden: Mapping[str, Floats]
     t0_ns: int
+    left_out: tuple[str, ...]
 
 
 def quiet(_stage: str) -> None:
@@ -123,7 +127,11 @@ def scene_of(
     motion = smooth_measured(measured, window_s)
     scene = _scene(track, measured, profile, window_s)
     doubts = doubts_of(recording, track)
-    survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns)
+    # Windows of a diagnosis end at a gap, so that smoothing loses nothing beside it; but they need the pose.
+    placeless = LeftOut.of("the position or heading was not measured", measured.usable & ~scene.usable, track.rate_hz)
+    motion = replace(motion, left_out=(*measured.left_out, *placeless))
+    said = left_out_sentences(recording, motion)
+    survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns, said)
     return scene, survey
 
 

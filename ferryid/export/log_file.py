@@ -120,7 +120,7 @@ def export_log(
         "topics": [{"topic": one.topic, "type": one.type, "messages": len(one.stamp_ns)} for one in streams],
         "rows": len(motion.t),
         "rows_left_out": int((~_known(motion, motion.nu)).sum()),
-        "warnings": [*prepared.doubts, *(() if estimated is None else estimated.idle)],
+        "warnings": [*prepared.doubts, *prepared.left_out, *(() if estimated is None else estimated.idle)],
     }
 
 

@@ -41,7 +41,7 @@ def cautions(
             "aboard there ends up in the coefficients."
         )
     for one in prepared:
-        warnings.extend(f"{one.recording.name}: {doubt}" for doubt in one.doubts)
+        warnings.extend(f"{one.recording.name}: {doubt}" for doubt in (*one.doubts, *one.left_out))
         moved = max((s.clock.out_of_order + s.clock.duplicates for s in one.recording.streams.values()), default=0)
         if moved >= MANY_MOVED:
             warnings.append(

@@ -194,7 +194,7 @@ def _trial(field: Field, path: str, out: Path, window_s: float, before: Sequence
     for k, prediction in enumerate(seen):
         if len(starts) and runs_free(prediction.force, prediction.motion):
             errors[k] = single_runs(prediction.force, prediction.motion, starts, ends, HORIZONS_S)
-    warnings = [*prepared.doubts]
+    warnings = [*prepared.doubts, *prepared.left_out]
     for one in field.candidates:
         warnings += [f"{one.label}: {caution}" for caution in cautions_on(one.model, motion, rows)]
         if one.trained_on(sha256):

@@ -88,7 +88,11 @@ def evaluate(
                 },
                 **({"effects": _applied(new, prepared.recording.sha256)} if model.diagnosed else {}),
                 "outside": outside_of(model, motion, rows),
-                "warnings": [*prepared.doubts, *_warnings(prepared.recording.sha256, model, motion, rows)],
+                "warnings": [
+                    *prepared.doubts,
+                    *_warnings(prepared.recording.sha256, model, motion, rows),
+                    *prepared.left_out,
+                ],
                 "data_quality": prepared.quality,
             }
         )

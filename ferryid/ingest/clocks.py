@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.ingest.log import Nanoseconds, Series
+from ferryid.ingest.stray_times import stray_times
 
 Rows = NDArray[np.int64]
 
@@ -61,15 +62,17 @@ class ClockReport:
     duplicates
         Rows with the time of an earlier row; left out.
     dropped
-        Rows left out in all: duplicates, and stretches on the far side of a reset of the only clock.
+        Rows left out in all: duplicates, strays, and stretches on the far side of a reset of the only clock.
     replaced
-        Rows whose stamp was zero or in the future and was replaced by receive time less the median offset.
+        Rows whose stamp was zero or a stray and was replaced by receive time less the median offset.
     shift_s
         What was added to the stamps to bring them to the recorder's time base [s].
     gaps
         Start and end [ns] of every stretch without rows, longer than three periods and 0.2 s.
     notes
         Sentences for the user.
+    strays
+        Rows left out because their time contradicts that of the rows before and after.
     """
 
     source: str
@@ -86,6 +89,7 @@ class ClockReport:
     shift_s: float = 0.0
     gaps: tuple[tuple[int, int], ...] = ()
     notes: tuple[str, ...] = ()
+    strays: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report for JSON: tuples as lists, NaN as None."""
@@ -234,7 +238,7 @@ def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ..
     usual = _median(latency[~unset] if zeros else latency)
     replaced = 0
     # A stamp in the future by itself is no late message (which would be old): the sender wrote nonsense.
-    strange = unset | _alone_in_future(latency)
+    strange = unset | _alone_in_future(latency) | stray_times(stamp)
     if strange.any():
         replaced = int(np.count_nonzero(strange))
         if replaced * 100 > max(count, 200):
@@ -303,14 +307,24 @@ def _ordered(
     told = list(notes)
     count = len(times)
     rows = np.arange(count, dtype=np.int64)
-    resets, far = facts.resets, 0
+    resets = facts.resets
     steps = np.diff(times)
     lowest = int(steps.min(initial=1))
+    strays = 0
+    if drop_far_side and (stray := stray_times(times)).any():
+        strays = int(np.count_nonzero(stray))
+        told.append(
+            f"{strays} of {count} rows left out, first row {int(np.argmax(stray)) + 1}: the time contradicts that of the "
+            "rows before and after"
+        )
+        rows, times = rows[~stray], times[~stray]
+        steps = np.diff(times)
+        lowest = int(steps.min(initial=1))
     if lowest < -_STEP_NS and drop_far_side:
         start, stop, backward = _longest_stretch(times)
-        if stop - start < count:
+        if stop - start < len(times):
             resets += backward
-            far = count - (stop - start)
+            far = len(times) - (stop - start)
             told.append(
                 f"time jumps back {backward} time(s), the clock was set or several runs follow one another: only the "
                 f"longest stretch of {stop - start} rows is used, {far} rows are left out"
@@ -354,6 +368,7 @@ def _ordered(
         replaced=facts.replaced,
         gaps=gaps,
         notes=tuple(told),
+        strays=strays,
     )
     return times, rows, report
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
+from ferryid.signals.poses import MARGIN_S, USED, PoseFault, pose_faults, pose_sentences
 from ferryid.signals.quality import (
     NAVIGATION,
+    POSE,
     REFERENCE,
     VELOCITY,
     clean,
@@ -22,7 +24,7 @@ from ferryid.signals.quality import (
     stale,
     stuck,
 )
-from ferryid.signals.track import Track
+from ferryid.signals.track import LeftOut, Track
 from ferryid.vessel import actuator_columns, resolve, resolve_notes
 from ferryid.vessel.profile import Profile
 
@@ -47,6 +49,8 @@ _VELOCITY = ("u", "vel_N", "x", "psi")
 MOST_EMPTY_ROWS, MOST_SPARSE = 2_000_000, 50
 """A grid beyond both limits, the second in rows per sample, comes of wrong times, not of gaps."""
 _EXACT_S = 1e-6
+_HEADING_SHARE = 0.8
+"""A heading that was measured on this share of the rows is needed; one that was measured on fewer is left out by others."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,8 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     and the wind is interpolated as a vector. Orders hold until the next order. Actuator signals that are published
     only when they change hold too, without limit, and so does a payload; all others are missing across a gap. Streams
     much faster than the grid are averaged over each of its intervals, which keeps their noise from folding down. Isolated
-    implausible samples and stale repetitions are taken out before, and counted.
+    implausible samples and stale repetitions are taken out before, and counted; rows with a pose that cannot be true, as
+    `ferryid.signals.poses` finds it, are missing a pose and are not valid.
 
     Parameters
     ----------
@@ -94,6 +99,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     sources = [_source(stream, repairs) for stream in recording.streams.values() if _enough(stream)]
     navigation = [s for s in sources if _has(s, NAVIGATION)]
     actuators = [s for s in sources if any(is_actuator(name) or is_order(name) for name in {*s.columns} - {*REFERENCE})]
+    _refuse_standing(recording)
     for group, what in ((navigation, "navigation"), (actuators, "actuator")):
         if not group:
             raise FerryIdError(
@@ -116,9 +122,16 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     columns: dict[str, Floats] = {}
     for source in sources:
         columns.update(_on_grid(source, t0_ns, t, rate, repairs))
+    faults = pose_faults({name: (s.time_ns, s.columns[name]) for s in sources for name in USED if name in s.columns})
+    repairs.extend(pose_sentences(faults))
+    wrong = _inside(faults, t0_ns, count, rate)
+    for name in POSE:
+        if name in columns:
+            columns[name][wrong] = np.nan
     repairs.extend(resolve_notes(profile, columns))
     columns = resolve(profile, columns, rate)
-    valid = _measured(recording.name, profile, columns, count)
+    measured = _measured(recording.name, profile, columns, wrong)
+    valid = measured & ~wrong
     if not valid.any():
         raise FerryIdError(
             f"{recording.name}: velocity and actuators are never measured at the same time, found "
@@ -127,15 +140,17 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     rows = np.flatnonzero(valid)
     kept = slice(int(rows[0]), int(rows[-1]) + 1)
     columns = {name: np.ascontiguousarray(values[kept]) for name, values in columns.items()}
-    valid = valid[kept]
+    valid, measured, wrong = valid[kept], measured[kept], wrong[kept]
     t0_ns += round(int(rows[0]) * 1e9 / rate)
-    missing = int(np.count_nonzero(~valid))
-    if missing:
-        repairs.append(
-            f"{missing} of {valid.size} rows ({missing / rate:.1f} s in {len(segments(~valid))} stretches) "
-            "are not used: velocity or an actuator was not measured."
-        )
-    track = Track(recording.name, t[: valid.size], t0_ns, rate, columns, valid, tuple(repairs))
+    left_out = (
+        *LeftOut.of("velocity, heading or an actuator was not measured", ~measured & ~wrong, rate),
+        *LeftOut.of("the pose cannot be true", wrong, rate),
+    )
+    repairs.extend(
+        f"{one.rows} of {valid.size} rows ({one.seconds:.1f} s in {one.stretches} stretches) are not used: {one.reason}."
+        for one in left_out
+    )
+    track = Track(recording.name, t[: valid.size], t0_ns, rate, columns, valid, tuple(repairs), left_out=left_out)
     doubts = cross_checks(track)
     return replace(track, repairs=(*repairs, *(doubt.says for doubt in doubts)), doubts=doubts)
 
@@ -149,6 +164,27 @@ def segments(valid: Flags) -> list[slice]:
 def _enough(stream: Stream) -> bool:
     """One message is enough for what holds until the next: a payload that was weighed once."""
     return len(stream.time_ns) > 1 or (len(stream.time_ns) == 1 and all(is_load(name) for name in stream.columns))
+
+
+def _refuse_standing(recording: Recording) -> None:
+    """Refuse a log without two times in it: one row, or a clock that stands still."""
+    streams = [stream for stream in recording.streams.values() if len(stream.time_ns)]
+    if any(len(stream.time_ns) > 1 for stream in streams):
+        return
+    repeated = sum(stream.clock.duplicates for stream in streams)
+    what = (
+        f"time does not advance, found the same time on {repeated + 1} rows"
+        if repeated
+        else f"found one row in {'each of ' if len(streams) > 1 else ''}{', '.join(stream.topic for stream in streams[:3])}"
+    )
+    raise FerryIdError(
+        f"{recording.name}: a fit needs measurements over time, {what}. "
+        + (
+            "Fix: check the column or clock of the times"
+            if repeated
+            else "Fix: use a log that was recorded for minutes"
+        )
+    )
 
 
 def _usual_period(time_s: Floats) -> float:
@@ -349,8 +385,19 @@ def _overlap(log: str, navigation: list[_Source], actuators: list[_Source]) -> t
     return start, end
 
 
-def _measured(log: str, profile: Profile, columns: Mapping[str, Floats], count: int) -> Flags:
-    valid = np.ones(count, dtype=bool)
+def _inside(faults: Sequence[PoseFault], t0_ns: int, count: int, rate: float) -> Flags:
+    """True on the rows of wrong poses and within `MARGIN_S` of them, shape (count,)."""
+    inside = np.zeros(count, dtype=bool)
+    for fault in faults:
+        first = ((fault.start_ns - t0_ns) * 1e-9 - MARGIN_S) * rate
+        last = ((fault.end_ns - t0_ns) * 1e-9 + MARGIN_S) * rate
+        inside[max(0, int(np.ceil(first))) : max(0, int(np.floor(last)) + 1)] = True
+    return inside
+
+
+def _measured(log: str, profile: Profile, columns: Mapping[str, Floats], wrong: Flags) -> Flags:
+    """True where everything that the fit needs was measured; where the pose is wrong, what is derived of it is not asked."""
+    valid = np.ones(wrong.size, dtype=bool)
     for name in _needed(profile, columns):
         finite = np.isfinite(columns[name])
         if not finite.any():
@@ -359,6 +406,11 @@ def _measured(log: str, profile: Profile, columns: Mapping[str, Floats], count: 
                 "and actuators. Fix: check the field that the profile maps, or use another log"
             )
         valid &= finite
+    psi = columns.get("psi")
+    known = np.isfinite(psi[valid & ~wrong]) if psi is not None else np.empty(0, dtype=bool)
+    if psi is not None and known.size and known.mean() >= _HEADING_SHARE:
+        # Without it neither wind nor current can be turned to the vessel, and no pose can be predicted.
+        valid &= np.isfinite(psi) | wrong
     return valid
 
 

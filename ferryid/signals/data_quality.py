@@ -29,7 +29,8 @@ def data_quality(recording: Recording, track: Track | Motion | None = None) -> d
     -------
     dict
         For JSON: ``files``, ``sha256``, ``profile``, ``profile_sha256``, ``duration_s``, ``streams`` (topic to ``clock``
-        and ``signals``), ``losses``, ``found``, ``missing`` and ``remarks`` (sentences: all of it for a person).
+        and ``signals``), ``losses``, ``found``, ``missing``, ``left_out`` (rows that are not used: ``reason``, ``rows``,
+        ``stretches``, ``seconds``) and ``remarks`` (sentences: all of it for a person).
     """
     streams = {topic: stream_quality(stream) for topic, stream in recording.streams.items()}
     return {
@@ -42,6 +43,7 @@ def data_quality(recording: Recording, track: Track | Motion | None = None) -> d
         "losses": [plain_loss(loss) for loss in recording.losses],
         "found": dict(recording.found),
         "missing": dict(recording.missing),
+        "left_out": [asdict(one) for one in track.left_out] if track is not None else [],
         "remarks": remarks(recording, track.repairs if track is not None else ()),
     }
 
@@ -72,6 +74,33 @@ def remarks(recording: Recording, repairs: Sequence[str] = ()) -> list[str]:
     told += [f"{quantity} is missing: {reason}" for quantity, reason in recording.missing.items()]
     told += repairs
     return list(dict.fromkeys(told))
+
+
+def left_out_sentences(recording: Recording, track: Track | Motion) -> tuple[str, ...]:
+    """Return which rows of a log are not used, because of their times, of gaps or of faults, as sentences with numbers."""
+    said = grouped_notes({topic: _of_clock(stream) for topic, stream in recording.streams.items()})
+    if track.left_out:
+        reasons = "; ".join(
+            f"{one.rows} ({one.seconds:.1f} s in {one.stretches} stretch{'es' * (one.stretches > 1)}) because {one.reason}"
+            for one in track.left_out
+        )
+        rows, seconds = sum(one.rows for one in track.left_out), sum(one.seconds for one in track.left_out)
+        said.append(f"{rows} of {track.t.size} rows ({seconds:.1f} s) are left out: {reasons}.")
+    return tuple(said)
+
+
+def _of_clock(stream: Stream) -> list[str]:
+    clock = stream.clock
+    far = clock.dropped - clock.duplicates - clock.strays
+    counts = (
+        (clock.strays, "their time contradicts that of the rows around"),
+        (clock.duplicates, "they repeat the time of another"),
+        (far, "they are from before or after the clock was set"),
+    )
+    said = [f"{count} of {clock.count + clock.dropped} rows are left out: {why}" for count, why in counts if count]
+    if clock.replaced:
+        said.append(f"{clock.replaced} of {clock.count} rows had a senseless stamp and are put at their receive time")
+    return said
 
 
 def _counted(stream: Stream) -> list[str]:

@@ -16,8 +16,11 @@ from ferryid.ingest.clocks import ClockReport, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Reader, Series, Topic
 from ferryid.signals.data_quality import grouped_notes, plain_loss, remarks, stream_quality
+from ferryid.signals.poses import USED, pose_faults, pose_sentences
+from ferryid.signals.quality import clean
 from ferryid.signals.recording import log_name, make_recording, name_of
 from ferryid.signals.render import render_inspect
+from ferryid.signals.stream import Recording
 from ferryid.vessel.load import bundled, load_profile
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, select, survey
@@ -177,7 +180,9 @@ def _vessel(
             kept = replace(selection, wanted=wanted)
             recording = make_recording(reader, name, profile, kept, series, repaired)
             streams = {topic: stream_quality(one) for topic, one in recording.streams.items() if len(one.time_ns)}
-            told = remarks(replace(recording, losses=(), notes=selection.notes, streams={}, missing={}))
+            told = remarks(
+                replace(recording, losses=(), notes=selection.notes, streams={}, missing={}), _pose_remarks(recording)
+            )
         except FerryIdError as error:
             usable, problem = False, problem or str(error)
     return {
@@ -190,6 +195,17 @@ def _vessel(
         "streams": streams,
         "remarks": told,
     }
+
+
+def _pose_remarks(recording: Recording) -> tuple[str, ...]:
+    """Return which poses cannot be true, as sentences; a fit and a diagnosis leave them out."""
+    samples = {}
+    for stream in recording.streams.values():
+        time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
+        for name in USED:
+            if name in stream.columns:
+                samples[name] = stream.time_ns, clean(name, time_s, stream.columns[name])[0]
+    return pose_sentences(pose_faults(samples))
 
 
 def _bundled_matches(path: str | Path, reader: Reader) -> list[dict[str, Any]]:

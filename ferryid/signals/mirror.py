@@ -49,6 +49,8 @@ def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float)
     starts = starts[[bool(good[start : start + span + 1].all()) for start in starts]]
     if len(starts) < FEWEST:
         return "", ""
+    # Sums run over the whole log: what was not measured counts as nothing there, and no span holds any of it.
+    eta, nu = np.where(good[:, None], eta, 0.0), np.where(good[:, None], nu[:, :2], 0.0)
     place = eta[:, 0] + 1j * eta[:, 1]
     way = place[starts + span] - place[starts]
     if np.sqrt(np.mean(np.abs(way) ** 2)) < LEAST_M:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
+from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.smooth import Measured, measure, smooth_measured
 from ferryid.signals.track import Motion, Track
@@ -40,6 +41,11 @@ class Prepared:
     quality: Mapping[str, Any]
     doubts: tuple[str, ...] = ()
     track: Track | None = None
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Which rows are not used and why, as sentences."""
+        return left_out_sentences(self.recording, self.motion)
 
 
 def doubts_of(recording: Recording, track: Track) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 NAVIGATION = ("x", "y", "psi", "phi", "theta", "u", "v", "r", "vel_N", "vel_E")
+POSE = ("x", "y", "psi")
 VELOCITY = ("u", "v", "r", "vel_N", "vel_E")
 LOAD = ("payload_kg", "payload_x")
 WEATHER = ("wind_speed", "wind_from", "wind_N", "wind_E", "current_N", "current_E")
@@ -112,7 +113,8 @@ class ColumnQuality:
             bridged = "held over" if is_load(name) else "interpolated"
             said.append(f"{name}: {self.spikes} {of} are single implausible spikes; removed and {bridged}.")
         if self.jumps:
-            said.append(f"{name}: {self.jumps} implausible steps were found and kept.")
+            kept = "" if name in POSE else " and kept"
+            said.append(f"{name}: {self.jumps} implausible steps were found{kept}.")
         if self.held:
             share = self.held / max(1, self.count)
             which = (

@@ -15,6 +15,7 @@ _LEGEND = {
     "ppm": "drift of the sender's clock against the recorder's",
     "held": "samples that repeat the one before",
     "spikes": "single implausible samples",
+    "jumps": "other implausible steps",
 }
 
 
@@ -134,7 +135,7 @@ def _vessel(vessel: Mapping[str, Any], width: int) -> str:
     for name, source in vessel["found"].items():
         signal = signals.get(name)
         if signal is None:
-            rows.append([name, "", "", "", "", "", "", source])
+            rows.append([name, *[""] * 7, source])
             continue
         share = signal["held"] / max(1, signal["count"])
         held = "0" if share == 0 else "<1 %" if share < 0.01 else f"{100 * share:.0f} %"
@@ -147,14 +148,17 @@ def _vessel(vessel: Mapping[str, Any], width: int) -> str:
                 str(signal["missing"]),
                 held if not signal["constant"] else "constant",
                 str(signal["spikes"]),
+                str(signal["jumps"]),
                 source,
             ]
         )
     title = f"Vessel {vessel['name']}: " + ("fits" if vessel["usable"] else "does not fit")
     lines = [title]
     if rows:
-        header = ["signal", "unit", "min", "max", "NaN", "held", "spikes", "from"]
-        lines.append(table(header, rows, width, left=(0, 1, 7)))
+        header = ["signal", "unit", "min", "max", "NaN", "held", "spikes", "jumps", "from"]
+        if not any(signal["jumps"] for signal in signals.values()):
+            header, rows = [*header[:7], header[8]], [[*row[:7], row[8]] for row in rows]
+        lines.append(table(header, rows, width, left=(0, 1, len(header) - 1)))
     if vessel["problem"]:
         lines += _wrapped(vessel["problem"], width)
     missing: dict[str, list[str]] = {}

@@ -11,7 +11,7 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.align import segments
 from ferryid.signals.kalman import fit_levels, smooth_runs
 from ferryid.signals.quality import REFERENCE, require_excited
-from ferryid.signals.track import Motion, Track
+from ferryid.signals.track import LeftOut, Motion, Track
 from ferryid.vessel import applied_force, speed_doubts
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
@@ -47,6 +47,7 @@ class Measured:
     current: Floats | None
     payload: Floats | None
     repairs: tuple[str, ...]
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def smooth(track: Track, profile: Profile, window_s: float, smoother: str = "square") -> Motion:
@@ -119,8 +120,25 @@ def measure(track: Track, profile: Profile) -> Measured:
             "rows. Fix: check the actuator signals in the profile"
         )
     require_excited(track, nu, tau)
+    unknown = LeftOut.of(
+        "wind, current or payload was not measured, or no force can be had", track.valid & ~usable, track.rate_hz
+    )
+    left_out = (*track.left_out, *unknown)
     return Measured(
-        track.log, track.t, track.rate_hz, eta, nu, tau, usable, tau_d, eta_d, wind, current, payload, tuple(repairs)
+        track.log,
+        track.t,
+        track.rate_hz,
+        eta,
+        nu,
+        tau,
+        usable,
+        tau_d,
+        eta_d,
+        wind,
+        current,
+        payload,
+        tuple(repairs),
+        left_out,
     )
 
 
@@ -159,6 +177,7 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
             for name, unit, level in zip(("surge", "sway", "yaw"), ("m/s", "m/s", "rad/s"), levels, strict=True)
         )
     valid = _within(measured, half)
+    beside = LeftOut.of("the smoothing window meets such a row", _beside(measured.usable, valid), rate)
     ends = np.cumsum([part.shape[1] for part in parts.values()])[:-1]
     done = dict(zip(parts, np.hsplit(smoothed, ends), strict=True))
     return Motion(
@@ -176,7 +195,8 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
         wind=done.get("wind"),
         current=done.get("current"),
         payload=measured.payload,
-        repairs=(*measured.repairs, said),
+        repairs=(*measured.repairs, said, *(f"{one.rows} rows are not used: {one.reason}." for one in beside)),
+        left_out=(*measured.left_out, *beside),
     )
 
 
@@ -298,6 +318,19 @@ def _within(measured: Measured, half: int) -> Flags:
             f"{needed:.2f} s are needed. Fix: use a longer log or a shorter --window"
         )
     return valid
+
+
+def _beside(usable: Flags, valid: Flags) -> Flags:
+    """Return the usable rows that are lost beside others, and not only at the ends of the log."""
+    beside = usable & ~valid
+    rows = np.flatnonzero(valid)
+    inner = segments(usable)
+    first, last = int(rows[0]), int(rows[-1])
+    if inner[0].start <= first < inner[0].stop:
+        beside[:first] = False
+    if inner[-1].start <= last < inner[-1].stop:
+        beside[last + 1 :] = False
+    return beside
 
 
 def longest_stretch_s(measured: Measured) -> float:

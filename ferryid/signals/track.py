@@ -21,6 +21,35 @@ class Doubt:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """Rows of a log that are not used, for one reason.
+
+    Attributes
+    ----------
+    reason
+        What is wrong with them, to stand after "because".
+    rows
+        Number of rows.
+    stretches
+        Number of unbroken stretches of them.
+    seconds
+        Their length together [s].
+    """
+
+    reason: str
+    rows: int
+    stretches: int
+    seconds: float
+
+    @staticmethod
+    def of(reason: str, rows: Flags, rate_hz: float) -> tuple[LeftOut, ...]:
+        """Count rows that are left out; empty where there are none."""
+        count = int(np.count_nonzero(rows))
+        starts = int(np.count_nonzero(rows[1:] & ~rows[:-1])) + int(rows[:1].any())
+        return (LeftOut(reason, count, starts, count / rate_hz),) if count else ()
+
+
+@dataclass(frozen=True)
 class Track:
     """All signals of one recording on one uniform grid, in SI units, NED world frame and FRD body frame.
 
@@ -43,6 +72,8 @@ class Track:
         Counted repairs and findings, as sentences with numbers, for `inspect` and the report.
     doubts
         Contradictions between signals; their sentences stand among the repairs too.
+    left_out
+        Rows that are not valid, by reason; each row once.
     """
 
     log: str
@@ -53,6 +84,7 @@ class Track:
     valid: Flags
     repairs: tuple[str, ...] = ()
     doubts: tuple[Doubt, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,6 +124,8 @@ class Motion:
         Unsmoothed velocities, shape (n, 3).
     repairs
         Sentences carried on from the track, and those of smoothing.
+    left_out
+        Rows that are not valid because of gaps, faults and what smoothing loses beside them, by reason; each row once.
     """
 
     log: str
@@ -109,3 +143,4 @@ class Motion:
     current: Floats | None = None
     payload: Floats | None = None
     repairs: tuple[str, ...] = field(default=())
+    left_out: tuple[LeftOut, ...] = ()

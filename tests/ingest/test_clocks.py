@@ -184,6 +184,80 @@ def test_single_senseless_stamps_are_replaced_and_counted() -> None:
     np.testing.assert_array_equal(times, stamps)
 
 
+WILD = {
+    "far future": START + 10**9 * SECOND,
+    "far past": -START,
+    "zero": 0,
+    "negative": -7,
+    "near": START + 40 * SECOND,
+}
+
+
+@pytest.mark.parametrize("place", [0, 1, 560, 998, 999])
+@pytest.mark.parametrize("wild", ["far future", "far past", "zero", "negative"])
+def test_a_stray_receive_time_costs_its_own_row(wild: str, place: int) -> None:
+    receive = sender(1000)
+    receive[place] = WILD[wild]
+    times, rows, report = repair(receive, None)
+    np.testing.assert_array_equal(times, np.delete(sender(1000), place))
+    np.testing.assert_array_equal(rows, np.delete(np.arange(1000), place))
+    assert (report.strays, report.dropped, report.resets, report.out_of_order, report.gaps) == (1, 1, 0, 0, ())
+    assert any(f"1 of 1000 rows left out, first row {place + 1}" in note for note in report.notes)
+
+
+def test_a_stray_inside_the_log_is_no_late_row() -> None:
+    receive = sender(1000)
+    receive[300] = WILD["near"] + 3
+    times, _, report = repair(receive, None)
+    np.testing.assert_array_equal(times, np.delete(sender(1000), 300))
+    assert (report.strays, report.dropped, report.out_of_order) == (1, 1, 0)
+
+
+def test_a_row_written_late_fits_the_gap_that_it_left() -> None:
+    order = np.concatenate([np.delete(np.arange(400), 100), [100], np.arange(400, 1000)])
+    times, rows, report = repair(sender(1000)[order], None)
+    np.testing.assert_array_equal(times, sender(1000))
+    assert (report.strays, report.dropped, report.out_of_order) == (0, 0, 1)
+    assert rows[100] == 399
+
+
+def test_several_strays_cost_their_own_rows() -> None:
+    receive = sender(2000)
+    places = [3, 400, 401, 402, 900, 1500, 1501]
+    receive[places] = [0, START * 2, 5, -9, START - 10**6 * SECOND, START * 3, START * 3 + 10]
+    times, _, report = repair(receive, None)
+    np.testing.assert_array_equal(times, np.delete(sender(2000), places))
+    assert (report.strays, report.dropped, report.resets) == (7, 7, 0)
+
+
+def test_a_stray_beside_a_clock_that_was_set_changes_nothing_about_it() -> None:
+    receive = sender(1000)
+    receive[600:] -= 90 * SECOND
+    receive[200] += 10**8 * SECOND
+    times, _, report = repair(receive, None)
+    np.testing.assert_array_equal(times, np.delete(sender(600), 200))
+    assert (report.strays, report.dropped, report.resets) == (1, 401, 1)
+
+
+@pytest.mark.parametrize("wild", ["far future", "far past", "negative"])
+@pytest.mark.parametrize("places", [[400], [400, 401, 402], [0], [999]])
+def test_stray_stamps_are_replaced_and_counted(wild: str, places: list[int]) -> None:
+    stamps = sender(1000)
+    broken = stamps.copy()
+    broken[places] = WILD[wild]
+    times, rows, report = repair(received(stamps, 0.01), broken)
+    assert (report.source, report.replaced, report.resets) == ("stamp", len(places), 0)
+    assert len(rows) == 1000
+    assert np.abs(times - stamps).max() <= 10_000_000
+
+
+def test_a_log_with_gaps_and_a_period_of_seconds_has_no_strays() -> None:
+    slow = START + np.arange(50) * 30 * SECOND
+    slow[25:] += 7200 * SECOND
+    _, _, report = repair(slow, None)
+    assert (report.strays, report.dropped, report.count) == (0, 0, 50)
+
+
 def test_out_of_order_and_duplicate_rows() -> None:
     receive = sender(200)
     order = np.arange(200)

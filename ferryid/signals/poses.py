@@ -1,0 +1,367 @@
+"""Poses that cannot be true: jumps, a lost vessel that is recorded as zeros or as its last pose, a heading turned by 180°.
+
+A pose is compared with the vessel's own speeds in the same log, as they show over a second: where two successive fixes are
+further apart than the vessel can have moved, one side of the step is wrong, or both have different origins. A slow
+receiver repeats its fixes; that is no loss as long as it repeats them no longer than it usually does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.vessel.frames import to_world, wrap
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Nanoseconds = NDArray[np.int64]
+Samples = Mapping[str, tuple[Nanoseconds, Floats]]
+"""Canonical name to times [ns] and cleaned values, NaN where missing."""
+
+MARGIN_S = 0.5
+"""So much on either side of a bad pose is left out too: filters of the sender carry a jump on, and the grid interpolates."""
+USED = ("x", "y", "psi", "u", "v", "r", "vel_N", "vel_E")
+
+_FEWEST = 20
+_NOISES = 10.0
+"""Steps beyond this many usual ones are jumps, if no motion explains them."""
+_SPEEDS = 3.0
+"""And beyond this many times the vessel's highest usual speed."""
+_QUANTILE = 0.98
+_JUMPS_AT_MOST = 0.02
+"""With a larger share of jumps the signal is noise, and none of them is known to be wrong."""
+_AHEAD = 40
+"""So many jumps are looked past for the place where the pose comes back."""
+_BACK = 0.4
+"""A pose is back if it misses its place by less than this share of the jump, and the vessel has not moved farther itself."""
+_DRIFT = 0.2
+"""Where the velocity is measured, this share of the way is uncertain."""
+_STEPS_HELD = 5.0
+"""A fix that repeats too long was lost if the vessel is this many usual steps further afterwards."""
+_PERIODS_HELD, _LEAST_HELD_S = 4.0, 0.5
+_FLIP, _FLIP_S = np.radians(20.0), 120.0
+"""A heading that jumps by 180°, but for this [rad], and back within this [s], was turned round meanwhile."""
+
+
+@dataclass(frozen=True)
+class PoseFault:
+    """One stretch in which a position or heading is wrong.
+
+    Attributes
+    ----------
+    signal
+        ``"position"`` or ``"heading"``.
+    kind
+        ``"jump"``: a step after which the pose stays, so that the step alone is left out; ``"away"``: between a jump and the
+        one back; ``"flip"``: the same of a heading, by 180°; ``"zero"``: exactly zero; ``"held"``: repeats its last value.
+    samples
+        Wrong samples; none in a jump.
+    start_ns, end_ns
+        Times of the last right sample before and the first right one after [ns], or of the first or last of all.
+    size
+        How far the pose is off, or jumps [m or rad].
+    """
+
+    signal: str
+    kind: str
+    samples: int
+    start_ns: int
+    end_ns: int
+    size: float
+
+    @property
+    def seconds(self) -> float:
+        """Length between the right samples on either side [s]."""
+        return (self.end_ns - self.start_ns) * 1e-9
+
+
+def pose_faults(samples: Samples) -> tuple[PoseFault, ...]:
+    """Return where positions and headings cannot be true, in order of time.
+
+    Parameters
+    ----------
+    samples
+        Of the names in `USED` those that the log has.
+    """
+    found: list[PoseFault] = []
+    turning = _integral(samples, "r")
+    if "psi" in samples:
+        found += _faults("heading", *_finite(samples["psi"][0], samples["psi"][1].astype(np.complex128)), turning)
+    if "x" in samples and "y" in samples and samples["x"][1].size == samples["y"][1].size:
+        place = samples["x"][1] + 1j * samples["y"][1]
+        found += _faults("position", *_finite(samples["x"][0], place), _way(samples))
+    return tuple(sorted(found, key=lambda fault: (fault.start_ns, fault.signal)))
+
+
+def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
+    """Return what was found as sentences with numbers, one for each signal and kind."""
+    said = []
+    for signal in ("position", "heading"):
+        for kind, what in _SAYS.items():
+            those = [fault for fault in faults if fault.signal == signal and fault.kind == kind]
+            if not those:
+                continue
+            times = "once" if len(those) == 1 else f"{len(those)} times"
+            size = max(fault.size for fault in those)
+            text = f"The {signal} {what} {times}, by up to " + (
+                f"{size:.2f} m" if signal == "position" else f"{np.degrees(size):.0f}°"
+            )
+            if count := sum(fault.samples for fault in those):
+                text += f", at most for {max(fault.seconds for fault in those):.2f} s, {count} samples in all"
+            said.append(f"{text}; left out with {MARGIN_S:g} s on either side.")
+    return tuple(said)
+
+
+_SAYS = {
+    "jump": "jumps farther than the vessel can move, without a jump back,",
+    "away": "jumps farther than the vessel can move, and back,",
+    "flip": "is turned by 180° and back",
+    "zero": "is exactly zero while the vessel is elsewhere",
+    "held": "repeats its last value while the vessel moves on",
+}
+
+_Path = Callable[[Floats], tuple[Complex, Floats]]
+"""Times [s] to the integral of the velocity, and to the integral of its size."""
+
+
+def _finite(time_ns: Nanoseconds, values: Complex) -> tuple[Nanoseconds, Complex]:
+    finite = np.isfinite(values)
+    return time_ns[finite], values[finite]
+
+
+def _faults(signal: str, time_ns: Nanoseconds, values: Complex, path: _Path | None) -> list[PoseFault]:
+    """Return the faults of one signal; a heading is a complex number without imaginary part here."""
+    if time_ns.size < _FEWEST:
+        return []
+    angle = signal == "heading"
+    time_s = (time_ns - time_ns[0]) * 1e-9
+    bad = np.zeros(time_ns.size, dtype=bool)
+    limits = _Limits.of(time_s, values, path, time_ns[0], angle=angle)
+    found: list[PoseFault] = []
+    for kind, runs in (("zero", _zeros(values, limits)), ("held", _held(time_s, values, limits))):
+        for first, last in runs:
+            if not bad[first : last + 1].any():
+                bad[first : last + 1] = True
+                sides = [k for k in (first - 1, last + 1) if 0 <= k < values.size]
+                size = max(abs(complex(_difference(values[[last, k]], angle=angle)[0])) for k in sides)
+                found.append(_fault(signal, kind, time_ns, first, last, size))
+    good = np.flatnonzero(~bad)
+    for kind, first, last, size in _jumps(time_s[good], values[good], limits):
+        if last < first:
+            found.append(PoseFault(signal, kind, 0, int(time_ns[good[last]]), int(time_ns[good[first]]), size))
+        else:
+            found.append(_fault(signal, kind, time_ns, int(good[first]), int(good[last]), size))
+    return found
+
+
+def _fault(signal: str, kind: str, time_ns: Nanoseconds, first: int, last: int, size: float) -> PoseFault:
+    start, end = int(time_ns[max(first - 1, 0)]), int(time_ns[min(last + 1, time_ns.size - 1)])
+    return PoseFault(signal, kind, last - first + 1, start, end, size)
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """How far a pose can move, from the log itself: metres for positions, radians for headings."""
+
+    angle: bool
+    start_ns: int
+    period_s: float
+    step: float
+    speed: float
+    floor: float
+    path: _Path | None
+
+    @staticmethod
+    def of(time_s: Floats, values: Complex, path: _Path | None, start_ns: int, *, angle: bool) -> _Limits:
+        fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
+        interval = np.diff(time_s[fixes])
+        floor, most, least = (0.35, 2.0, 0.5) if angle else (1.0, 15.0, 1.5)
+        if interval.size == 0:
+            return _Limits(angle, int(start_ns), float("inf"), 0.0, most, floor, path)
+        move = np.abs(_difference(values[fixes], angle=angle))
+        period = _mean_interval(interval)
+        # Over a second, noise weighs little.
+        later = np.minimum(np.searchsorted(time_s, time_s + 1.0), time_s.size - 1)
+        lasts = time_s[later] - time_s
+        way = np.abs(_between(values, np.arange(time_s.size), later, angle=angle))
+        whole = (lasts > 0.5) & (lasts < 2.0)
+        speed = float(np.quantile(way[whole] / lasts[whole], _QUANTILE)) if whole.any() else most
+        return _Limits(
+            angle,
+            int(start_ns),
+            period,
+            float(np.median(move)),
+            float(np.clip(_SPEEDS * speed, least, most)),
+            floor,
+            path,
+        )
+
+    def jump(self, move: Floats, lasts: Floats) -> NDArray[np.bool_]:
+        """True where a pose moves farther than the vessel can."""
+        return np.asarray(move > np.maximum(_NOISES * self.step, self.floor + self.speed * lasts), dtype=bool)
+
+    def elsewhere(self, move: float) -> bool:
+        """True where a pose is not where noise and a usual interval may bring it."""
+        return move > max(_STEPS_HELD * self.step, self.speed * self.period_s)
+
+    def travelled(self, first_s: float, last_s: float) -> float:
+        """Return how far the velocity has brought the vessel in the meantime; 0 where that is not known."""
+        if self.path is None:
+            return 0.0
+        way = self.path(np.array([first_s, last_s]) + self.start_ns * 1e-9)[0]
+        return float(abs(way[1] - way[0])) if np.isfinite(way).all() else 0.0
+
+    def back(self, jump: float, move: complex, first_s: float, last_s: float) -> bool:
+        """True where a pose after a while is where the vessel's velocity would have brought it, and by that not anywhere.
+
+        Parameters
+        ----------
+        jump
+            How far it was off in between.
+        move
+            From the last pose before to the first one after.
+        first_s, last_s
+            Their times [s].
+        """
+        lasts = last_s - first_s
+        known = None if self.path is None else self.path(np.array([first_s, last_s]) + self.start_ns * 1e-9)
+        way, reach = 0j, self.speed / _SPEEDS * lasts
+        if known is not None and np.isfinite(known[0]).all():
+            way, reach = complex(known[0][1] - known[0][0]), _DRIFT * float(known[1][1] - known[1][0])
+        miss = move - way
+        away = abs(float(wrap(np.array([miss.real]))[0])) if self.angle else abs(miss)
+        flips = self.angle and abs(jump - np.pi) < _FLIP and lasts <= _FLIP_S
+        return away <= _BACK * jump and (flips or reach <= _BACK * jump)
+
+
+def _mean_interval(interval: Floats) -> float:
+    """Return the mean of the intervals [s] without the long ones."""
+    period = float(interval.mean())
+    for _ in range(5):
+        period = float(interval[interval <= 3.0 * period].mean())
+    return period
+
+
+def _between(values: Complex, first: NDArray[np.int64], last: NDArray[np.int64], *, angle: bool) -> Complex:
+    change = values[last] - values[first]
+    return np.asarray(wrap(change.real) + 0j if angle else change)
+
+
+def _difference(values: Complex, *, angle: bool) -> Complex:
+    change = np.diff(values)
+    return np.asarray(wrap(change.real) + 0j if angle else change)
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first and last index of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _zeros(values: Complex, limits: _Limits) -> list[tuple[int, int]]:
+    """Return runs of positions that are exactly zero in both coordinates, or headings in theirs, and left by a jump."""
+    if limits.angle:
+        return []  # a heading of zero is north; zeros between which it jumps are found as jumps
+    found = []
+    for first, last in _runs(values == 0.0):
+        sides = [abs(complex(values[k])) for k in (first - 1, last + 1) if 0 <= k < values.size]
+        # At its origin a vessel stays near it; the nearer side decides, so that a start there is none.
+        if last > first and sides and all(limits.elsewhere(side) for side in sides):
+            found.append((first, last))
+    return found
+
+
+def _held(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[int, int]]:
+    """Return runs of repeats that last longer than usual and after which the vessel is further on at once."""
+    same = np.concatenate([[False], np.diff(values) == 0.0])
+    longest = max(_PERIODS_HELD * limits.period_s, _LEAST_HELD_S)
+    found = []
+    for first, last in _runs(same):
+        if time_s[last] - time_s[first - 1] <= longest:
+            continue
+        if last + 1 == values.size:
+            lost = limits.travelled(float(time_s[first - 1]), float(time_s[last])) > _STEPS_HELD * limits.floor
+        else:
+            step = abs(complex(_difference(values[last : last + 2], angle=limits.angle)[0]))
+            lost = time_s[last + 1] - time_s[last] <= longest and limits.elsewhere(step)
+        if lost:
+            found.append((first, last))
+    return found
+
+
+def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, int, int, float]]:
+    """Return kind, first and last index, and size, of what lies between a jump and the one back.
+
+    Where there is no way back, the last index is that before the jump, and the first that after it.
+    """
+    fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
+    if fixes.size < _FEWEST:
+        return []
+    move = _difference(values[fixes], angle=limits.angle)
+    # What a slow receiver repeats was measured at its first sample, but not what repeats far beyond the usual.
+    lasts = np.minimum(np.diff(time_s[fixes]), time_s[fixes[1:]] - time_s[fixes[1:] - 1] + 2.0 * limits.period_s)
+    places = np.flatnonzero(limits.jump(np.abs(move), lasts))
+    if places.size == 0 or places.size > max(2, _JUMPS_AT_MOST * fixes.size):
+        return []
+    starts = [0, *(int(fixes[k + 1]) for k in places)]
+    ends = [*(start - 1 for start in starts[1:]), values.size - 1]
+    found = []
+    k = 0
+    while k < len(starts) - 1:
+        size = abs(complex(move[places[k]]))
+        later = range(k + 2, min(k + 2 + _AHEAD, len(starts)))
+        back = next((j for j in later if _is_back(time_s, values, ends[k], starts[j], size, limits)), None)
+        if back is not None and time_s[ends[back - 1]] - time_s[starts[k + 1]] < 0.5 * time_s[-1]:
+            kind = "flip" if limits.angle and abs(size - np.pi) < _FLIP else "away"
+            found.append((kind, starts[k + 1], ends[back - 1], size))
+            k = back
+        else:
+            found.append(("jump", starts[k + 1], ends[k], size))
+            k += 1
+    return found
+
+
+def _is_back(time_s: Floats, values: Complex, last: int, first: int, jump: float, limits: _Limits) -> bool:
+    move = complex(_between(values, np.array([last]), np.array([first]), angle=limits.angle)[0])
+    return limits.back(jump, move, float(time_s[last]), float(time_s[first]))
+
+
+def _integral(samples: Samples, name: str) -> _Path | None:
+    if name not in samples:
+        return None
+    time_ns, values = _finite(samples[name][0], samples[name][1].astype(np.complex128))
+    return _summed(time_ns, values)
+
+
+def _way(samples: Samples) -> _Path | None:
+    """Return the integral of the velocity over ground, north + i east."""
+    if "vel_N" in samples and "vel_E" in samples and samples["vel_N"][1].size == samples["vel_E"][1].size:
+        return _summed(*_finite(samples["vel_N"][0], samples["vel_N"][1] + 1j * samples["vel_E"][1]))
+    if not {"u", "v", "psi"} <= samples.keys() or samples["u"][1].size != samples["v"][1].size:
+        return None
+    time_ns, body = _finite(samples["u"][0], samples["u"][1] + 1j * samples["v"][1])
+    turned_ns, psi = _finite(samples["psi"][0], samples["psi"][1].astype(np.complex128))
+    if time_ns.size < 2 or turned_ns.size < 2:
+        return None
+    north, east = to_world(body.real, body.imag, np.interp(time_ns, turned_ns, psi.real))
+    return _summed(time_ns, north + 1j * east)
+
+
+def _summed(time_ns: Nanoseconds, rate: Complex) -> _Path | None:
+    if time_ns.size < 2:
+        return None
+    time_s = time_ns * 1e-9
+    interval = np.diff(time_ns) * 1e-9
+    middle = (rate[1:] + rate[:-1]) / 2
+    way = np.concatenate([[0.0], np.cumsum(middle * interval)])
+    length = np.concatenate([[0.0], np.cumsum(np.abs(middle) * interval)])
+
+    def path(at_s: Floats) -> tuple[Complex, Floats]:
+        along = np.interp(at_s, time_s, way.real) + 1j * np.interp(at_s, time_s, way.imag)
+        inside = (at_s >= time_s[0] - 1.0) & (at_s <= time_s[-1] + 1.0)
+        return np.where(inside, along, np.nan), np.interp(at_s, time_s, length)
+
+    return path
