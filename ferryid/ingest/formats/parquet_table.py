@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError
+from ferryid.ingest.arrow_columns import column_from_arrow
 from ferryid.ingest.log import Format, TableLayout, Topic
 from ferryid.ingest.table_time import TimePlan, guess_time
-from ferryid.ingest.tables import Rows, TableReader, column_from_arrow, plan_time, to_ns
+from ferryid.ingest.tables import Rows, TableReader, plan_time, to_ns
 
 
 @dataclass(frozen=True)
