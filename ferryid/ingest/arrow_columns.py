@@ -20,6 +20,8 @@ def column_from_arrow(chunked: Any, *, is_time: bool = False) -> Column:
     """
     import pyarrow as pa
 
+    if pa.types.is_dictionary(chunked.type):
+        chunked = chunked.cast(chunked.type.value_type)
     kind = chunked.type
     if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
         return _timestamps(chunked)
