@@ -19,6 +19,7 @@ from ferryid.identify.model import Model
 from ferryid.identify.pictured import Pictured, bare_picture, bridged, pushes
 from ferryid.signals.align import align
 from ferryid.signals.recording import Recording, data_quality, record
+from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel.hull import current_in_body
@@ -116,6 +117,7 @@ def scene_of(
         )
     progress(f"reading {Path(path).name}")
     recording = record(path, profile, out, verify=verify)
+    check_sampling(recording, profile)
     track = align(recording, profile)
     track, hidden = _without(track, withhold)
     measured = measure(track, profile)

@@ -111,7 +111,7 @@ def _series(sheet: Sheet, fields: tuple[str, ...]) -> tuple[Series, list[Loss], 
         notes.append(note)
     if not good.any():
         found = rows.columns[plan.column]
-        shown = f'"{found[0]}"' if len(found) else "no row"
+        shown = _first_cell(found) if len(found) else "no row"
         doubt = number_doubt(found, plan.unit)
         raise FerryIdError(
             f'{sheet.path}: no row has a readable time in column "{plan.column}" ({plan.unit}), found {shown}. '
@@ -159,6 +159,13 @@ def _any_to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Mask, str]
     if values.dtype.kind not in "iuf":
         return np.zeros(len(values), dtype=np.int64), np.zeros(len(values), dtype=bool), ""
     return *numbers_to_ns(values, unit), ""
+
+
+def _first_cell(values: Column) -> str:
+    """The first cell of a column in quotes, or that it is empty."""
+    first = values[0]
+    empty = first in ("", MISSING_TIME) or first != first
+    return "an empty cell" if empty else f'"{str(first)[:60]}"'
 
 
 def number_doubt(values: Column, unit: str) -> str:

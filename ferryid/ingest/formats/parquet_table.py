@@ -189,7 +189,7 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
     if plan is None:
         plan = _guess(path, file, fields, places)
         notes.append(plan.note)
-    columns, losses = _read(path, {plan.column: places[plan.column]}, {plan.column})
+    columns, _ = _read(path, {plan.column: places[plan.column]}, {plan.column})
     if not guessed:
         notes.append(number_doubt(columns[plan.column], plan.unit))
     times, good, _ = to_ns(columns[plan.column], plan.unit)
