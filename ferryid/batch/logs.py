@@ -179,7 +179,9 @@ def _refuse_without_log(path: Path, lines: Sequence[str]) -> None:
         With the columns found.
     """
     header = _cells(lines[0]) if lines else []
-    if (len(header) < 2 and ",".join(header).lower() not in _LIKE_LOG) or any(_placed_log(path, cell) for cell in header):
+    if (len(header) < 2 and ",".join(header).lower() not in _LIKE_LOG) or any(
+        _placed_log(path, cell) for cell in header
+    ):
         return
     rows = [_cells(line) for line in lines[1:20]]
     names_logs = any(_placed_log(path, cell) for row in rows for cell in row)
