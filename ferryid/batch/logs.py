@@ -17,6 +17,7 @@ COLUMNS = ("log", "vessel", "date", "note")
 """Of a manifest that is a table; `log` is what makes it one."""
 LISTS = (".csv", ".txt", ".list")
 """How files end that may be manifests."""
+_LIKE_LOG = ("logs", "path", "paths", "file", "files", "filename", "bag", "recording")
 LARGEST_BYTES = 64 << 20
 """Of a manifest; a million paths are less."""
 
@@ -84,7 +85,14 @@ def entries_of(asked: Sequence[str], vessel: str | None, tell: Callable[[str], N
     found: dict[tuple[str, str | None], Entry] = {}
     for one in asked:
         for entry in _entries(one, vessel, tell):
-            found.setdefault(("+".join(map(str, entry.paths)), entry.vessel), entry)
+            try:
+                paths = "+".join(map(str, entry.paths))
+            except (OSError, ValueError) as error:
+                raise FerryIdError(
+                    f"{one}: names what cannot be a file ({error.__class__.__name__}), found {entry.log[:80]!r}. "
+                    "Fix: correct the path"
+                ) from error
+            found.setdefault((paths, entry.vessel), entry)
     if not found:
         raise FerryIdError(f"{', '.join(asked)}: names no log. Fix: write one a line below the header")
     return list(found.values())
@@ -98,8 +106,10 @@ def _entries(one: str, vessel: str | None, tell: Callable[[str], None]) -> Itera
             yield from _table(path, text, vessel, tell)
             return
         lines = _lines(text or "")
+        if text is not None:
+            _refuse_without_log(path, lines)
         # A log in text form holds numbers, not the names of files.
-        if any(Path(line).exists() or _matches(line) for line in (_placed(path, line) for line in lines[:20])):
+        if any(_exists(Path(line)) or _matches(line) for line in (_placed(path, line) for line in lines[:20])):
             for line in lines:
                 yield from (Entry(log, vessel) for log in _logs(_placed(path, line)) or [_placed(path, line)])
             return
@@ -113,9 +123,24 @@ def _entries(one: str, vessel: str | None, tell: Callable[[str], None]) -> Itera
 
 
 def _logs(one: str) -> list[str]:
-    if Path(one).exists() or existing_parts(one):
+    if _exists(Path(one)) or _parts(one):
         return [one]
     return _matches(one)
+
+
+def _exists(path: Path) -> bool:
+    """True for what is there; a line of a table may be no path at all."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def _parts(one: str) -> list[Path]:
+    try:
+        return existing_parts(one)
+    except (OSError, ValueError):
+        return []
 
 
 def _matches(pattern: str) -> list[str]:
@@ -135,13 +160,58 @@ def _lines(text: str) -> list[str]:
 
 def _header(text: str) -> list[str]:
     first = next(iter(_lines(text)), "")
-    return [cell.strip() for cell in next(csv.reader([first]), [])]
+    return _cells(first)
+
+
+def _cells(line: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line]), [])]
+    except csv.Error:  # a cell of more than 128 KiB
+        return []
+
+
+def _refuse_without_log(path: Path, lines: Sequence[str]) -> None:
+    """Refuse a manifest whose header lacks the column `log`: one with other columns of manifests, or that names files.
+
+    Raises
+    ------
+    FerryIdError
+        With the columns found.
+    """
+    header = _cells(lines[0]) if lines else []
+    if (len(header) < 2 and ",".join(header).lower() not in _LIKE_LOG) or any(
+        _placed_log(path, cell) for cell in header
+    ):
+        return
+    rows = [_cells(line) for line in lines[1:20]]
+    names_logs = any(_placed_log(path, cell) for row in rows for cell in row)
+    of_manifest = set(COLUMNS) & set(header) and not any(_is_number(cell) for row in rows for cell in row[1:])
+    if rows and (names_logs or of_manifest):
+        near = next((name for name in header if name.lower() in _LIKE_LOG or did_you_mean(name, ("log",))), "")
+        raise FerryIdError(
+            f'{path}: a manifest needs the column "log" with the path of each log, found the columns '
+            f"{', '.join(header[:12])}. Fix: "
+            + (f'rename the column "{near}" to log' if near else "add the column log, or rename the one with the paths")
+        )
+
+
+def _placed_log(manifest: Path, cell: str) -> bool:
+    """True for a cell that names a file or folder that is there."""
+    return bool(cell) and not _is_number(cell) and _exists(Path(_placed(manifest, cell)))
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _placed(manifest: Path, log: str) -> str:
     """Return a log's path as seen from here: one that is relative begins at the manifest."""
     whole = manifest.parent / log
-    if whole.exists() or "+" not in log:
+    if _exists(whole) or "+" not in log:
         return str(whole)
     return "+".join(str(manifest.parent / part) for part in log.split("+"))
 
@@ -155,8 +225,9 @@ def _table(path: Path, text: str, vessel: str | None, tell: Callable[[str], None
     if unused:
         tell(f"{path}: columns that are not used: {', '.join(unused)}")
     rows = csv.reader(line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    next(rows)
-    for number, cells in enumerate(rows, 2):
+    for number, cells in enumerate(_parsed(path, rows), 1):
+        if number == 1:
+            continue
         if len(cells) > len(header):
             raise FerryIdError(
                 f"{path}: row {number} has {len(cells)} cells, the header {len(header)}. "
@@ -167,6 +238,13 @@ def _table(path: Path, text: str, vessel: str | None, tell: Callable[[str], None
             placed, date = _placed(path, row["log"]), _date(path, number, row.get("date", ""))
             for log in _logs(placed) or [placed]:
                 yield Entry(log, row.get("vessel") or vessel, date, row.get("note", ""))
+
+
+def _parsed(path: Path, rows: Iterator[list[str]]) -> Iterator[list[str]]:
+    try:
+        yield from rows
+    except csv.Error as error:
+        raise FerryIdError(f"{path}: the manifest cannot be read, {error}. Fix: correct its quotes") from error
 
 
 def _date(path: Path, number: int, text: str) -> str | None:

@@ -21,6 +21,7 @@ from ferryid.signals.align import align
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.prepare import doubts_of
 from ferryid.signals.recording import Recording, data_quality, record
+from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
 from ferryid.signals.track import LeftOut, Motion, Track
 from ferryid.vessel.hull import current_in_body
@@ -121,6 +122,7 @@ def scene_of(
         )
     progress(f"reading {Path(path).name}")
     recording = record(path, profile, out, verify=verify)
+    check_sampling(recording, profile)
     track = align(recording, profile)
     track, hidden = _without(track, withhold)
     measured = measure(track, profile)

@@ -50,6 +50,13 @@ def open_log(path: str | Path, layout: TableLayout | None = None) -> Reader:
 
 def _open(path: str | Path, layout: TableLayout | None) -> Reader:
     whole = Path(path)
+    try:
+        whole.exists()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FerryIdError(
+            f"{str(path)[:80]!r}: this cannot be a path ({reason}), a log was to be read. Fix: check the path"
+        ) from error
     if not whole.exists() and "+" in str(path):
         return _open_parts(str(path), existing_parts(str(path)), layout)
     if not whole.exists():

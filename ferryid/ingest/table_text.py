@@ -1,4 +1,4 @@
-"""Text tables: separator, header row and columns found or taken from a layout, rows parsed by pyarrow."""
+"""Text tables: separator, header row and columns found or taken from a layout."""
 
 from __future__ import annotations
 
@@ -10,39 +10,30 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ferryid.errors import FerryIdError
-from ferryid.ingest.log import Loss, TableLayout, Topic
+from ferryid.ingest.log import TableLayout, Topic
+from ferryid.ingest.table_rows import TextSheet, quoted
 from ferryid.ingest.table_time import TimePlan, guess_stamp, guess_time, looks_like_datetime
-from ferryid.ingest.tables import Rows, column_from_arrow, numbers_from_text, plan_time, to_ns, unique_names
+from ferryid.ingest.tables import no_time, number_doubt, numbers_from_text, plan_time, to_ns, unique_names
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab", ".prn", ".log", ".out")
 _HEAD_BYTES = 1 << 16
+_LONGEST_HEAD = 1 << 22
+_HEAD_LINES = 8
+"""The head is read on to its greatest length where it holds fewer lines."""
 _SAMPLE_LINES = 400
 _COMMA_NUMBER = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 _WORDS = {"true", "false", "nan", "inf", "-inf", "null", "none", ""}
-_BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-
-
-@dataclass(frozen=True)
-class TextSheet:
-    """One text table; `first_row` counts the lines before the first row of data, its header included."""
-
-    path: Path
-    topic: Topic
-    time: TimePlan
-    names: tuple[str, ...]
-    separator: str
-    decimal: str
-    first_row: int
-    encoding: str
-
-    def load(self, names: Sequence[str]) -> Rows:
-        """Parse the named columns of every row that has the right number of fields."""
-        return _load(self, tuple(names))
+_BOMS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_LINE_END = re.compile("\r\n|\n|\r")
 
 
 @dataclass(frozen=True)
@@ -70,12 +61,14 @@ def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> T
         raise FerryIdError(f"{path}: the file is empty (0 bytes). Fix: copy or record the log again")
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
+        if len(re.findall(rb"\r\n?|\n", head)) < _HEAD_LINES:
+            head += file.read(_LONGEST_HEAD - len(head))
         file.seek(max(0, size - _HEAD_BYTES))
         tail = file.read()
     text, encoding, told = _decode(path, head, layout)
-    lines = text.splitlines()
-    if size > len(head) and lines:
-        lines.pop()  # very likely cut in the middle
+    lines = _LINE_END.split(text)
+    if size > len(head) or not lines[-1]:
+        lines.pop()  # very likely cut in the middle, or what follows the last line's end
     shape = _stated(path, lines, layout) if layout is not None else _guessed(path, lines)
     names, renamed = unique_names(shape.names)
     notes = [*told, *shape.notes, renamed]
@@ -89,13 +82,13 @@ def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> T
             }
         )
         if plan is None:
-            raise FerryIdError(
-                f"{path}: no column of this table looks like a time, found {', '.join(names[:12])}. "
-                "Fix: name the time column as time under [table] in the profile"
-            )
+            raise FerryIdError(no_time(str(path), names))
         notes.append(plan.note)
-    elif not plan.stamp and guess_stamp(names):
-        notes.append(f'the profile maps no stamp, though column "{guess_stamp(names)[0]}" looks like one')
+    else:
+        if not plan.stamp and guess_stamp(names):
+            notes.append(f'the profile maps no stamp, though column "{guess_stamp(names)[0]}" looks like one')
+        times = numbers_from_text(np.array(sample[plan.column], dtype=object), shape.decimal)[0]
+        notes.append(number_doubt(times, plan.unit))
     fields = {name: _type_of(sample[name], shape.decimal) for name in names}
     start, end = _span(shape, names, plan, tail, encoding)
     lines_in_file = _count_lines(path, size)
@@ -120,23 +113,42 @@ def looks_like_text(head: bytes) -> bool:
 
 
 def _decode(path: Path, head: bytes, layout: TableLayout | None) -> tuple[str, str, list[str]]:
-    """Text of the head, the encoding that fits, and what to tell of it."""
+    """Text of the head, the encoding that fits, and what to report of it."""
     marked = next((name for bom, name in _BOMS if head.startswith(bom)), None)
-    if marked is None and b"\0" in head:
-        raise FerryIdError(
-            f"{path}: this is binary data, not a text table. Fix: pass a log in one of the known formats"
-        )
     wanted = marked or (layout.encoding if layout is not None else "utf-8")
+    wide = wanted.lower().replace("_", "-").startswith(("utf-16", "utf-32", "utf16", "utf32"))
+    # Zeros at the end are what a power loss leaves of a row that was not written; they cost that row only.
+    if not wide and head.rstrip(b"\0").count(b"\0") * 10 > len(head):
+        raise FerryIdError(
+            f"{path}: this is binary data, not a text table. Fix: pass a log in one of the known formats; for UTF-16 "
+            'text without a byte-order mark set encoding = "utf-16-le" under [table] in the profile'
+        )
     try:
         decoder = codecs.getincrementaldecoder(wanted)(errors="strict")
-        return decoder.decode(head), wanted, ["byte-order mark skipped"] if marked else []
-    except LookupError as error:
+        return decoder.decode(head).removeprefix("\ufeff"), wanted, ["byte-order mark skipped"] if marked else []
+    except UnicodeDecodeError:
+        if wide or (wanted.lower() in ("utf-8", "utf8", "utf-8-sig") and _mostly_utf8(head)):
+            return head.decode(wanted, errors="replace").removeprefix("\ufeff"), wanted, []
+        return head.decode("cp1252", errors="replace"), "cp1252", [f"not {wanted} text: read as cp1252"]
+    except (LookupError, ValueError, TypeError) as error:
         raise FerryIdError(
-            f'{path}: the profile\'s [table] names the encoding "{wanted}", which does not exist. '
+            f'{path}: the profile\'s [table] names the encoding "{wanted}", which cannot be used. '
             'Fix: use "utf-8", "cp1252" or another name that Python knows'
         ) from error
-    except UnicodeDecodeError:
-        return head.decode("cp1252", errors="replace"), "cp1252", [f"not {wanted} text: read as cp1252"]
+
+
+def _mostly_utf8(head: bytes) -> bool:
+    """True where more lines with characters beyond ASCII are UTF-8 than are not: the others are damaged."""
+    valid = invalid = 0
+    for line in head.splitlines()[:-1]:
+        if line.isascii():
+            continue
+        try:
+            line.decode()
+            valid += 1
+        except UnicodeDecodeError:
+            invalid += 1
+    return valid > invalid
 
 
 def _split(line: str, separator: str) -> tuple[str, ...]:
@@ -144,7 +156,10 @@ def _split(line: str, separator: str) -> tuple[str, ...]:
         return tuple(line.split())
     if '"' not in line:
         return tuple(line.split(separator))
-    return tuple(next(csv.reader([line], delimiter=separator), ()))
+    try:
+        return tuple(next(csv.reader([line], delimiter=separator), ()))
+    except csv.Error:  # a cell of more than 128 KiB
+        return tuple(line.split(separator))
 
 
 def _is_value(text: str, decimal: str) -> bool:
@@ -205,7 +220,7 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
         if len(filled) == 1 and any(len(_split(filled[0], separator)) > 1 for separator in (",", ";", "\t")):
             raise FerryIdError(f"{path}: the table holds a header and no rows. Fix: record or export the log again")
         raise FerryIdError(
-            f"{path}: this text is not a table of numbers, found {_quoted(filled[0] if filled else '')}. "
+            f"{path}: this text is not a table of numbers, found {quoted(filled[0] if filled else '')}. "
             "Fix: pass a log, or describe the table under [table] in the profile (separator, skip_rows, columns)"
         )
     _, _, width, separator, decimal, first = best
@@ -269,7 +284,7 @@ def _stated(path: Path, lines: Sequence[str], layout: TableLayout) -> _Shape:
         names = (*names, "")
     if width != len(names):
         raise FerryIdError(
-            f"{path}: {len(names)} column names but {width} fields in the rows, first {_quoted(filled[0])}. "
+            f"{path}: {len(names)} column names but {width} fields in the rows, first {quoted(filled[0])}. "
             "Fix: correct columns, separator or skip_rows under [table] in the profile"
         )
     rows = tuple(fields for fields in split if len(fields) == width)
@@ -300,8 +315,9 @@ def _span(
 ) -> tuple[int | None, int | None]:
     """Time of the first and last row [ns] as far as they can be read from the ends of the file."""
     place = names.index(plan.column)
-    text = tail.decode("utf-16-le" if encoding == "utf-16" else encoding, errors="replace")
-    last = [row for row in (_split(line, shape.separator) for line in text.splitlines()[1:]) if len(row) == len(names)]
+    text = tail[len(tail) % 4 :].decode(encoding, errors="replace")
+    lines = _LINE_END.split(text)[1:]
+    last = [row for row in (_split(line, shape.separator) for line in lines) if len(row) == len(names)]
     cells = np.array([row[place].strip() for row in (*shape.rows[:1], *last[-1:])], dtype=object)
     values = cells if plan.unit == "datetime" else numbers_from_text(cells, shape.decimal)[0]
     times, good, _ = to_ns(values, plan.unit)
@@ -311,136 +327,13 @@ def _span(
 
 
 def _count_lines(path: Path, size: int) -> int:
-    """Lines with something on them; a last line without an end counts."""
+    """Lines of a file, empty ones included; a last line without an end counts."""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as whole:
+        end = b"\n" if whole.find(b"\n") >= 0 else b"\r"
         count, place, ended = 0, 0, True
         while place < size:
             block = whole[place : place + (1 << 24)]
-            count += block.count(b"\n")
+            count += block.count(end)
             place += len(block)
-            ended = block.endswith((b"\n", b"\n\0"))
+            ended = block.rstrip(b"\0").endswith(end)
         return count + (not ended)
-
-
-def _load(sheet: TextSheet, names: tuple[str, ...]) -> Rows:
-    import pyarrow as pa
-    import pyarrow.csv as arrow_csv
-
-    wrong: list[tuple[int | None, int, str]] = []
-
-    def skip(row: Any) -> str:
-        wrong.append((row.number, row.actual_columns, row.text))
-        return "skip"
-
-    source, delimiter, cut = _source(sheet)
-    texts = {sheet.time.column: pa.string()} if sheet.time.unit == "datetime" else {}
-    try:
-        table = arrow_csv.read_csv(
-            source,
-            read_options=arrow_csv.ReadOptions(column_names=list(sheet.names), use_threads=False, block_size=1 << 22),
-            parse_options=arrow_csv.ParseOptions(delimiter=delimiter, invalid_row_handler=skip),
-            convert_options=arrow_csv.ConvertOptions(
-                include_columns=list(names),
-                column_types=texts,
-                decimal_point=sheet.decimal,
-                strings_can_be_null=True,
-                null_values=["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "-nan", "-NaN"],
-            ),
-        )
-    except pa.ArrowInvalid as error:
-        raise FerryIdError(
-            f"{sheet.path}: the rows cannot be parsed ({str(error).splitlines()[0]}). "
-            "Fix: correct separator, encoding or skip_rows under [table] in the profile"
-        ) from error
-    losses: list[Loss] = []
-    columns = {}
-    for name in names:
-        values = column_from_arrow(table.column(name))
-        if values.dtype.kind == "O" and name not in texts:
-            values, unreadable = numbers_from_text(values, sheet.decimal)
-            if unreadable:
-                what = f'{unreadable} cells of column "{name}" are not numbers and count as missing'
-                losses.append(Loss(str(sheet.path), what, sheet.topic.name))
-        columns[name] = values
-    losses += _wrong_rows(sheet, wrong, cut)
-    return Rows(columns, tuple(losses))
-
-
-def _wrong_rows(sheet: TextSheet, wrong: list[tuple[int | None, int, str]], cut: bool) -> list[Loss]:
-    """Losses for rows with the wrong number of fields; a last row cut in mid-line is told apart."""
-    losses = []
-    if cut and wrong and wrong[-1][0] is not None and len(wrong[-1][2]) > 0 and wrong[-1][1] < len(sheet.names):
-        text = wrong.pop()[2]
-        what = f"the file ends in the middle of a row ({_quoted(text)}): the last row was left out"
-        losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=1))
-    if wrong:
-        number, fields, text = wrong[0]
-        line = "" if number is None else f" near line {number + sheet.first_row}"
-        what = (
-            f"{len(wrong)} rows without {len(sheet.names)} fields were left out "
-            f"(the first{line} has {fields}: {_quoted(text)})"
-        )
-        losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=len(wrong)))
-    return losses
-
-
-def _source(sheet: TextSheet) -> tuple[Any, str, bool]:
-    """The rows as UTF-8 with a one-character separator, that character, and whether the last line lacks its end."""
-    import pyarrow as pa
-
-    plain = sheet.encoding.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig", "ascii")
-    if plain:
-        buffer = pa.memory_map(str(sheet.path)).read_buffer()
-    else:
-        data = sheet.path.read_bytes()
-        buffer = pa.py_buffer(data.decode(sheet.encoding, errors="replace").encode())
-    raw = np.frombuffer(buffer, dtype=np.uint8)
-    start = _after_lines(raw, sheet.first_row)
-    cut = len(raw) > 0 and raw[-1] not in (10, 13)
-    if sheet.separator != "whitespace":
-        return pa.BufferReader(buffer.slice(start)), sheet.separator, cut
-    return pa.BufferReader(pa.py_buffer(_single_tabs(raw[start:]))), "\t", cut
-
-
-def _after_lines(raw: np.ndarray[Any, np.dtype[np.uint8]], lines: int) -> int:
-    """Place of the first byte after so many lines."""
-    place = 0
-    for _ in range(lines):
-        ends = np.flatnonzero(raw[place : place + (1 << 20)] == 10)
-        if len(ends) == 0:
-            return len(raw)
-        place += int(ends[0]) + 1
-    return place
-
-
-def _single_tabs(raw: np.ndarray[Any, np.dtype[np.uint8]]) -> bytes:
-    """Replace every run of blanks by one tab, none at the ends of a line."""
-    blank = (raw == 32) | (raw == 9)
-    end = (raw == 10) | (raw == 13)
-    after = np.empty(len(raw), dtype=bool)  # the next byte is a blank or ends the line
-    after[:-1] = blank[1:] | end[1:]
-    after[-1:] = True
-    first = np.empty(len(raw), dtype=bool)  # a line starts here
-    first[:1] = True
-    first[1:] = end[:-1]
-    # Of each run the last blank stays, unless nothing but blanks comes before it on its line.
-    keep = ~blank | ~after
-    leading = blank & first
-    if leading.any():
-        starts = np.flatnonzero(first)
-        solid = np.flatnonzero(~blank)
-        following = np.searchsorted(solid, starts)
-        stops = np.where(following < len(solid), solid[np.minimum(following, max(len(solid) - 1, 0))], len(raw))
-        edges = np.zeros(len(raw) + 1, dtype=np.int64)
-        np.add.at(edges, starts, 1)
-        np.add.at(edges, stops, -1)
-        keep &= np.cumsum(edges[:-1]) == 0
-        keep |= ~blank
-    tabbed = np.where(blank, np.uint8(9), raw)
-    return bytes(tabbed[keep].tobytes())
-
-
-def _quoted(text: str) -> str:
-    """A line of the file in quotes, cut to 60 characters."""
-    bare = " ".join(text.split())
-    return f'"{bare[:57]}..."' if len(bare) > 60 else f'"{bare}"'

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,36 @@ _UNIT_OF_WORD = {
     **dict.fromkeys(("us", "usec", "micros"), "us"),
     **dict.fromkeys(("ns", "nsec", "nanos"), "ns"),
 }
+_TIME_WORDS = frozenset(
+    [
+        "t",
+        "tid",
+        "zeit",
+        "temps",
+        "tiempo",
+        "tempo",
+        "time",
+        "stamp",
+        "sec",
+        "secs",
+        "second",
+        "seconds",
+        "clock",
+        "utc",
+        "epoch",
+        "tow",
+    ]
+)
+_PARTS = frozenset(["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds", "usec", "usecs"])
+_NO_TIME = frozenset(["zone", "timezone", "timeout", "constant", "delay", "latency", "period", "rate", "step", "dt"])
+"""Words that make a column with a word for time something else."""
+_UNIT_NAMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+_EARLIEST_S, _LATEST_S = 5e8, 4.2e9
+"""Times since 1970 lie between these (1985 and 2103)."""
+_SLOWEST_S, _FASTEST_S = 5.0, 5e-5
+"""Usual time between rows that is doubted outside these limits where another unit of time fits better."""
+_LONGEST_DATE = 64
+"""Characters; a longer cell is no date."""
 _STAMP_SECONDS = re.compile(r"(.*stamp.*?)([._ ]?)(secs?|seconds)$")
 
 
@@ -55,6 +85,10 @@ def looks_like_datetime(text: str) -> bool:
 def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
     """Guess the time column from names and a sample of the rows, None where nothing looks like one.
 
+    A name that is no more than a word for time comes first, then a column of dates, then a rising column with such a word
+    somewhere in its name, and last a rising first column without a name. Other columns of the third kind are listed in
+    the note.
+
     Parameters
     ----------
     sample
@@ -68,18 +102,94 @@ def guess_time(sample: Mapping[str, Sequence[str]]) -> TimePlan | None:
             return _plan(sample, name, "datetime", "date and time")
         numbers = _rising(values, strict=False)
         if numbers is not None:
-            unit = _UNIT_OF_WORD.get(word) or _unit_of_size(numbers)
-            return _plan(sample, name, unit, unit)
+            return _plan(sample, name, *_unit_of(word, numbers))
     for name, values in sample.items():
         if _are_datetimes(values):
             return _plan(sample, name, "datetime", "date and time")
+    found = {
+        name: numbers
+        for name, values in sample.items()
+        if has_time_word(name) and (numbers := _rising(values, strict=False)) is not None and np.ptp(numbers) > 0.0
+    }
+    if found:
+        name, others = next(iter(found)), list(found)[1:]
+        plan = _plan(sample, name, *_unit_of(_without_unit(name)[1], found[name]))
+        if not others:
+            return plan
+        listed = ", ".join(f'"{other}"' for other in others[:6])
+        return replace(plan, note=f"{plan.note}, though {listed} may be it too: set time under [table] in the profile")
     # Without a name the first column may be the time; one with a name says that it is something else.
     name = next((one for one in sample if one == "column 1"), "")
-    numbers = _rising(sample.get(name, ()), strict=True)
+    rising = _rising(sample.get(name, ()), strict=True)
     # A row counter also rises: an unnamed first column of whole numbers from 0 or 1 in steps of one is no time.
-    if numbers is None or (np.all(np.diff(numbers) == 1.0) and numbers[0] in (0.0, 1.0)):
+    if rising is None or (np.all(np.diff(rising) == 1.0) and rising[0] in (0.0, 1.0)):
         return None
-    return _plan(sample, name, _unit_of_size(numbers), _unit_of_size(numbers) + ", the first column and rising")
+    unit, why = _unit_of("", rising)
+    return _plan(sample, name, unit, why + ", the first column and rising")
+
+
+def unit_doubt(numbers: NDArray[np.float64], unit: str) -> str:
+    """Return what speaks against a stated unit of time, as a sentence with its remedy, or an empty string.
+
+    Parameters
+    ----------
+    numbers
+        Sample of the time column in the order of the rows, shape (n,).
+    unit
+        ``"s"``, ``"ms"``, ``"us"`` or ``"ns"``.
+    """
+    likely = guess_unit(numbers)
+    if UNIT_NS[likely] == UNIT_NS[unit]:
+        return ""
+    scale = UNIT_NS[unit] * 1e-9
+    step = _usual_step(numbers) * scale
+    size = float(np.abs(numbers).max(initial=0.0)) * scale
+    remedy = f'these look like {_UNIT_NAMES[likely]}, so set time_unit = "{likely}" under [table] in the profile'
+    if size > _LATEST_S:
+        return f'times of {size:.3g} s with time_unit = "{unit}": {remedy}'
+    if UNIT_NS[likely] < UNIT_NS[unit] and step > _SLOWEST_S:
+        return f'rows {step:.4g} s apart with time_unit = "{unit}": {remedy}'
+    if UNIT_NS[likely] > UNIT_NS[unit] and 0.0 < step < _FASTEST_S:
+        return f'rows {step:.2g} s apart with time_unit = "{unit}": {remedy}'
+    return ""
+
+
+def guess_unit(numbers: NDArray[np.float64]) -> str:
+    """Guess the unit of times from their size, where they count from 1970, or else from the steps between rows."""
+    size = float(np.abs(numbers).max(initial=0.0))
+    step = _usual_step(numbers)
+    for unit, nanoseconds in UNIT_NS.items():
+        scale = 1e9 / nanoseconds
+        if _EARLIEST_S * scale < size < _LATEST_S * scale and not step > 100.0 * scale:
+            return unit
+    if math.isnan(step):
+        return "s"
+    return next((unit for unit, nanoseconds in UNIT_NS.items() if step * nanoseconds * 1e-9 <= _SLOWEST_S), "ns")
+
+
+def _usual_step(numbers: NDArray[np.float64]) -> float:
+    """Median of the steps forward, NaN where there is none."""
+    steps = np.diff(numbers[np.isfinite(numbers)])
+    steps = steps[steps > 0.0]
+    return float(np.median(steps)) if len(steps) else math.nan
+
+
+def _unit_of(word: str, numbers: NDArray[np.float64]) -> tuple[str, str]:
+    """Unit of a time column by the word in its name, else by its numbers, and what to report of it."""
+    if word in _UNIT_OF_WORD:
+        return _UNIT_OF_WORD[word], _UNIT_OF_WORD[word]
+    unit, step = guess_unit(numbers), _usual_step(numbers)
+    if unit == "s" or not step > _SLOWEST_S or float(np.abs(numbers).max()) > _EARLIEST_S * 1e9 / UNIT_NS[unit]:
+        return unit, unit
+    return unit, f"{unit}, since steps of {step:.6g} are too long for seconds"
+
+
+def has_time_word(name: str) -> bool:
+    """True for a name with a word for time in it that does not count parts of a second (``stamp_nsecs``)."""
+    words = re.findall(r"[a-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).lower())
+    if any(word in _PARTS or word in _NO_TIME for word in words):
+        return False
+    return any(word in _TIME_WORDS or "time" in word or "stamp" in word for word in words)
 
 
 def guess_stamp(names: Sequence[str]) -> tuple[str, ...]:
@@ -106,7 +216,9 @@ def numbers_to_ns(values: Column, unit: str) -> tuple[Nanoseconds, NDArray[np.bo
     """
     scale = UNIT_NS[unit]
     if values.dtype.kind in "iu":
-        return values.astype(np.int64) * np.int64(scale), np.ones(len(values), dtype=bool)
+        most = np.iinfo(np.int64).max // scale
+        fits = (values >= -most) & (values <= most) if values.dtype.kind == "i" else values <= most
+        return np.where(fits, values, 0).astype(np.int64) * np.int64(scale), fits
     seconds = values.astype(np.float64)
     with np.errstate(invalid="ignore"):
         good = np.abs(seconds) < 9.2e18 / scale
@@ -120,7 +232,8 @@ def stamps_to_ns(seconds: Column, nanoseconds: Column) -> tuple[Nanoseconds, NDA
     """Join columns of whole seconds and of nanoseconds; same returns as `numbers_to_ns`."""
     whole, good = numbers_to_ns(seconds, "s")
     part, also = numbers_to_ns(nanoseconds, "ns")
-    return np.where(good & also, whole + part, 0), good & also
+    good &= also & (np.abs(whole) < 1 << 62) & (np.abs(part) < 1 << 62)
+    return np.where(good, whole + part, 0), good
 
 
 def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_], str]:
@@ -136,11 +249,12 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
         repair, or an empty string.
     """
     rows = len(texts)
-    width = max((len(text) for text in texts), default=0)
+    width = min(max((len(text) for text in texts), default=0), _LONGEST_DATE)
     if rows == 0 or width < 19:
         return np.zeros(rows, dtype=np.int64), np.zeros(rows, dtype=bool), ""
     # Characters outside ASCII become "?", which no field of a date accepts.
-    raw = np.array([text.strip().encode("ascii", "replace") for text in texts], dtype=f"S{width}")
+    plain = (text.strip() for text in texts)
+    raw = np.array([t.encode("ascii", "replace") if len(t) <= width else b"" for t in plain], dtype=f"S{width}")
     code = raw.view(np.uint8).reshape(rows, width).astype(np.int16)
     digit = code - ord("0")
     is_digit = (digit >= 0) & (digit <= 9)
@@ -158,8 +272,10 @@ def datetimes_to_ns(texts: Sequence[str]) -> tuple[Nanoseconds, NDArray[np.bool_
     good &= (code[:, 13] == ord(":")) & (code[:, 16] == ord(":"))
     month, day = number(5, 2), number(8, 2)
     hour, minute, second = number(11, 2), number(14, 2), number(17, 2)
+    year = number(0, 4)
+    good &= (year > 1677) & (year < 2262)  # what 64 bits of nanoseconds hold
     good &= (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31) & (hour < 24) & (minute < 60) & (second <= 60)
-    months = (np.where(good, number(0, 4), 1970) - 1970) * 12 + np.where(good, month, 1) - 1
+    months = (np.where(good, year, 1970) - 1970) * 12 + np.where(good, month, 1) - 1
     first_day = months.astype("datetime64[M]").astype("datetime64[D]")
     days = first_day.astype(np.int64) + np.where(good, day, 1) - 1
     good &= (days.astype("datetime64[D]").astype("datetime64[M]").astype(np.int64)) == months
@@ -250,15 +366,6 @@ def _float_or_nan(text: str) -> float:
 def _are_datetimes(values: Sequence[str]) -> bool:
     readable = sum(looks_like_datetime(value) for value in values)
     return readable > 0 and readable >= _READABLE * len(values)
-
-
-def _unit_of_size(numbers: NDArray[np.float64]) -> str:
-    """Unit of a time by its size: an epoch of this century tells, anything smaller is taken as seconds."""
-    size = float(np.abs(numbers).max(initial=0.0))
-    for unit, scale in (("ns", 1e9), ("us", 1e6), ("ms", 1e3)):
-        if size > 5e8 * scale:
-            return unit
-    return "s"
 
 
 def _plan(sample: Mapping[str, Sequence[str]], column: str, unit: str, says: str) -> TimePlan:

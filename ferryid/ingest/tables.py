@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.ingest.arrow_columns import MISSING_TIME
 from ferryid.ingest.log import Column, Loss, Series, TableLayout, Topic
-from ferryid.ingest.table_time import TimePlan, datetimes_to_ns, numbers_to_ns, stamps_to_ns
+from ferryid.ingest.table_time import (
+    UNIT_NS,
+    TimePlan,
+    datetimes_to_ns,
+    has_time_word,
+    numbers_to_ns,
+    stamps_to_ns,
+    unit_doubt,
+)
 
 Mask = NDArray[np.bool_]
+FARTHEST_NS = 1 << 62
+"""Times further from 1970 (146 years) count as unreadable: the difference of two of them would not fit into 64 bits."""
+_WHOLE = re.compile(r"\s*([+-]?[0-9]{1,18}|[+-]?[0-8][0-9]{18})\s*$")
 
 
 @dataclass(frozen=True)
@@ -98,10 +111,16 @@ def _series(sheet: Sheet, fields: tuple[str, ...]) -> tuple[Series, list[Loss], 
         notes.append(note)
     if not good.any():
         found = rows.columns[plan.column]
-        shown = f'"{found[0]}"' if len(found) else "no row"
+        shown = _first_cell(found) if len(found) else "no row"
+        doubt = number_doubt(found, plan.unit)
         raise FerryIdError(
             f'{sheet.path}: no row has a readable time in column "{plan.column}" ({plan.unit}), found {shown}. '
-            "Fix: name the time column and its time_unit under [table] in the profile; dates are read year first"
+            + (
+                f"Fix: {doubt}"
+                if doubt
+                else "Fix: name the time column and its time_unit under [table] in the profile; "
+            )
+            + ("" if doubt else "dates are read year first")
         )
     stamp_ns = None
     if plan.stamp:
@@ -124,9 +143,15 @@ def _series(sheet: Sheet, fields: tuple[str, ...]) -> tuple[Series, list[Loss], 
 
 def to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Mask, str]:
     """Convert a time column of numbers or of text to nanoseconds: times, readable mask, sentence on a repair."""
+    times, good, note = _any_to_ns(values, unit)
+    good &= np.abs(np.where(good, times, 0)) <= FARTHEST_NS
+    return np.where(good, times, 0), good, note
+
+
+def _any_to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Mask, str]:
     if values.dtype.kind == "M":
         good = ~np.isnat(values)
-        return np.where(good, values.astype("datetime64[ns]").astype(np.int64), 0), good, ""
+        return values.astype("datetime64[ns]").astype(np.int64), good, ""
     if unit == "datetime":
         if values.dtype.kind != "O":
             return np.zeros(len(values), dtype=np.int64), np.zeros(len(values), dtype=bool), ""
@@ -134,6 +159,21 @@ def to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Mask, str]:
     if values.dtype.kind not in "iuf":
         return np.zeros(len(values), dtype=np.int64), np.zeros(len(values), dtype=bool), ""
     return *numbers_to_ns(values, unit), ""
+
+
+def _first_cell(values: Column) -> str:
+    """The first cell of a column in quotes, or that it is empty."""
+    first = values[0]
+    empty = first in ("", MISSING_TIME) or first != first
+    return "an empty cell" if empty else f'"{str(first)[:60]}"'
+
+
+def number_doubt(values: Column, unit: str) -> str:
+    """Return what speaks against the stated unit of a time column, see `unit_doubt`; "" where it holds no numbers."""
+    if unit not in UNIT_NS or values.dtype.kind not in "iuf":
+        return ""
+    numbers = values[:1000].astype(np.float64)
+    return unit_doubt(numbers[np.isfinite(numbers) & (numbers != float(MISSING_TIME))], unit)
 
 
 def _untimed(sheet: Sheet, topic: str, time_ns: NDArray[np.int64], good: Mask) -> Loss:
@@ -180,6 +220,16 @@ def plan_time(where: str, names: Sequence[str], layout: TableLayout, *, typed: b
     return TimePlan(layout.time, layout.time_unit, layout.stamp)
 
 
+def no_time(where: str, names: Sequence[str]) -> str:
+    """Return the message for a table in which no column looks like a time."""
+    likely = [name for name in names if has_time_word(name)]
+    found = f"{_listed(likely)} of {len(names)} columns, whose values do not rise" if likely else _listed(names)
+    return (
+        f"{where}: no column of this table looks like a time, found {found}. "
+        "Fix: name the time column as time under [table] in the profile, and its time_unit"
+    )
+
+
 def unique_names(names: Sequence[str]) -> tuple[tuple[str, ...], str]:
     """Name nameless columns after their place, and number repeated names; the sentence tells which, or is empty."""
     taken: set[str] = set()
@@ -199,61 +249,14 @@ def unique_names(names: Sequence[str]) -> tuple[tuple[str, ...], str]:
     return tuple(result), note
 
 
-def column_from_arrow(chunked: Any) -> Column:
-    """Copy a pyarrow column to NumPy without importing pandas, which pyarrow's own ``to_numpy`` does.
-
-    Integers and booleans with missing cells become floats with NaN; text and anything else becomes objects, "" where
-    missing.
-    """
-    import pyarrow as pa
-
-    kind = chunked.type
-    if pa.types.is_timestamp(kind):
-        whole = _buffer_values(chunked.cast(pa.timestamp("ns", kind.tz)), np.dtype(np.int64)).view("datetime64[ns]")
-        return _with_missing(chunked, whole, np.datetime64("NaT", "ns"))
-    if pa.types.is_floating(kind):
-        numbers = _buffer_values(chunked.cast(pa.float64()), np.dtype(np.float64))
-        return _with_missing(chunked, numbers, np.nan)
-    if pa.types.is_integer(kind):
-        if chunked.null_count:
-            return _with_missing(
-                chunked, _buffer_values(chunked.cast(pa.float64(), safe=False), np.dtype("f8")), np.nan
-            )
-        return _buffer_values(chunked, np.dtype(str(kind)))
-    if pa.types.is_boolean(kind) or pa.types.is_null(kind):
-        if chunked.null_count == 0:
-            return np.array(chunked.to_pylist(), dtype=bool)
-        return np.array([np.nan if value is None else float(value) for value in chunked.to_pylist()], dtype=np.float64)
-    texts = np.empty(len(chunked), dtype=object)
-    texts[:] = ["" if value is None else str(value) for value in chunked.to_pylist()]
-    return texts
-
-
-def _buffer_values(chunked: Any, dtype: np.dtype[Any]) -> Column:
-    parts = [
-        np.frombuffer(chunk.buffers()[1], dtype=dtype, count=len(chunk), offset=chunk.offset * dtype.itemsize)
-        for chunk in chunked.chunks
-        if len(chunk)
-    ]
-    return np.concatenate(parts) if parts else np.empty(0, dtype=dtype)
-
-
-def _with_missing(chunked: Any, values: Column, missing: Any) -> Column:
-    if chunked.null_count == 0:
-        return values
-    filled = values.copy()
-    filled[np.array(chunked.is_null().to_pylist(), dtype=bool)] = missing
-    return filled
-
-
-def numbers_from_text(texts: Column, decimal: str) -> tuple[Column, int]:
+def numbers_from_text(texts: Column, decimal: str, *, is_time: bool = False) -> tuple[Column, int]:
     """Turn a text column into numbers where most of it is numbers, and count the cells that are not.
 
     Returns
     -------
     tuple
         The numbers with NaN for unreadable cells, and their count; or the texts unchanged and 0 where fewer than half
-        are numbers.
+        are numbers. A time column of whole numbers stays one, with `MISSING_TIME`.
     """
     numbers = np.full(len(texts), np.nan)
     unreadable = empty = 0
@@ -268,9 +271,19 @@ def numbers_from_text(texts: Column, decimal: str) -> tuple[Column, int]:
             numbers[row] = float(bare)
         except ValueError:
             unreadable += 1
+            continue
+        if "_" in bare or not bare.isascii():  # Python takes these, no other reader does
+            numbers[row] = np.nan
+            unreadable += 1
     filled = len(texts) - empty
     if filled == 0 or unreadable * 2 > filled:
         return texts, 0
+    if is_time:
+        matches = [_WHOLE.match(text) for text in texts]
+        if all(match or not finite for match, finite in zip(matches, np.isfinite(numbers), strict=True)):
+            return np.array(
+                [MISSING_TIME if match is None else int(match[1]) for match in matches], np.int64
+            ), unreadable
     return numbers, unreadable
 
 

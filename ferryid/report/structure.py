@@ -49,7 +49,8 @@ def spectrum(log: LogFit, name: str, j: int) -> tuple[Floats, Floats]:
     values = _stretch(log, name, j)
     if values.size < 16:
         return np.empty(0), np.empty(0)
-    frequency, density = welch(values, fs=log.motion.rate_hz, nperseg=min(values.size, int(51.2 * log.motion.rate_hz)))
+    rows = min(values.size, max(16, int(51.2 * log.motion.rate_hz)))
+    frequency, density = welch(values, fs=log.motion.rate_hz, nperseg=rows)
     return frequency, density
 
 

@@ -15,7 +15,7 @@ from ferryid.errors import FerryIdError
 from ferryid.files import replacing, write_text
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
-from ferryid.signals.parquet import TIME_COLUMNS, read_table, unit_of, write_table
+from ferryid.signals.parquet import TIME_COLUMNS, read_table, table_checksum, unit_of, write_table
 from ferryid.signals.stream import Recording, Stream
 from ferryid.vessel.profile import Profile
 
@@ -139,6 +139,7 @@ def store(out: Path, recording: Recording, files: list[list[Any]], *, verify: bo
             "verified": verify,
             "files": files,
             "tables": tables,
+            "checksums": {name: table_checksum(draft / name) for name in tables.values()},
             "recording": _plain(recording),
         }
         (draft / _NOTE).write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
@@ -199,10 +200,14 @@ def load(folder: Path) -> Recording:
 
 
 def _recording(folder: Path, note: Mapping[str, Any]) -> Recording:
-    plain = note["recording"]
+    plain, checksums = note["recording"], note["checksums"]
     with ThreadPoolExecutor(2) as pool:
         tables = dict(
-            zip(note["tables"], pool.map(lambda name: read_table(folder / name), note["tables"].values()), strict=True)
+            zip(
+                note["tables"],
+                pool.map(lambda name: read_table(folder / name, checksums[name]), note["tables"].values()),
+                strict=True,
+            )
         )
     streams = {}
     for topic, (columns, _) in tables.items():

@@ -20,6 +20,7 @@ from ferryid.signals.poses import USED, pose_faults, pose_sentences
 from ferryid.signals.quality import clean
 from ferryid.signals.recording import log_name, make_recording, name_of
 from ferryid.signals.render import render_inspect
+from ferryid.signals.sampling import check_sampling
 from ferryid.signals.stream import Recording
 from ferryid.vessel.load import bundled, load_profile
 from ferryid.vessel.profile import Profile
@@ -65,7 +66,7 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
         repaired = repair_all(series)
         vessel = None
         if profile is not None and selection is not None:
-            vessel = _vessel(reader, log_name(path), profile, selection, series, repaired)
+            vessel = _vessel(reader, log_name(path), profile, selection, series, repaired, problems)
         sha256 = hashing.result()
     topics = [
         _topic(topic, repaired[topic.name][2] if topic.name in repaired else None, problems)
@@ -165,6 +166,7 @@ def _vessel(
     selection: Selection,
     series: Mapping[str, Series],
     repaired: Mapping[str, Any],
+    problems: Mapping[str, str],
 ) -> dict[str, Any]:
     """What the profile makes of the log: signals with their ranges, and why it would refuse the log, if it would."""
     usable, problem = True, ""
@@ -175,6 +177,9 @@ def _vessel(
     streams: dict[str, Any] = {}
     told: list[str] = []
     wanted = {topic: fields for topic, fields in selection.wanted.items() if topic in series}
+    if not wanted and usable:
+        unread = next((problems[topic] for topic in selection.wanted if topic in problems), "")
+        usable, problem = not unread, unread
     if wanted:
         try:
             kept = replace(selection, wanted=wanted)
@@ -183,6 +188,7 @@ def _vessel(
             told = remarks(
                 replace(recording, losses=(), notes=selection.notes, streams={}, missing={}), _pose_remarks(recording)
             )
+            check_sampling(recording, profile)
         except FerryIdError as error:
             usable, problem = False, problem or str(error)
     return {

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.errors import FerryIdError
+from ferryid.errors import FerryIdError, one_line
+from ferryid.ingest.checksum import crc32
 
 TIME_COLUMNS = ("time_ns", "receive_ns", "stamp_ns")
 METADATA_KEY = b"ferryid"
@@ -85,8 +86,20 @@ def write_table(path: Path, columns: Mapping[str, NDArray[Any]], metadata: Mappi
     )
 
 
-def read_table(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+def table_checksum(path: Path) -> int:
+    """CRC-32 of a whole file: the checksums of its pages cover neither their headers nor the footer."""
+    return crc32(path.read_bytes())
+
+
+def read_table(path: Path, checksum: int | None = None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Read a file of `write_table`: its columns and its metadata.
+
+    Parameters
+    ----------
+    path
+        File to read. The checksums of its pages are checked.
+    checksum
+        `table_checksum` of the file when it was written, None where it is not known.
 
     Raises
     ------
@@ -97,20 +110,28 @@ def read_table(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     import pyarrow.parquet as parquet
 
     try:
-        table = parquet.ParquetFile(path, page_checksum_verification=True).read()
+        data = path.read_bytes()
+        if checksum is not None and crc32(data) != checksum:
+            raise ValueError("its checksum differs")
+        table = parquet.ParquetFile(pa.BufferReader(data), page_checksum_verification=True).read()
         metadata: dict[str, Any] = json.loads(table.schema.metadata[METADATA_KEY])
-    except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
+        columns = {name: _values(table.column(name)) for name in table.column_names}
+    except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, MemoryError) as error:
         raise FerryIdError(
-            f"{path}: this table of the log cache cannot be read ({str(error).splitlines()[0]}). "
+            f"{path}: this table of the log cache cannot be read ({one_line(str(error))}). "
             "Fix: delete its folder, the next ingest writes it anew"
         ) from error
-    columns: dict[str, NDArray[Any]] = {}
-    for name in table.column_names:
-        dtype = np.dtype(np.int64) if table.column(name).type == pa.int64() else np.dtype(np.float64)
-        parts = [
-            np.frombuffer(chunk.buffers()[1], dtype=dtype, count=len(chunk), offset=chunk.offset * dtype.itemsize)
-            for chunk in table.column(name).chunks
-            if len(chunk)
-        ]
-        columns[name] = parts[0] if len(parts) == 1 else np.concatenate([np.empty(0, dtype=dtype), *parts])
     return columns, metadata
+
+
+def _values(column: Any) -> NDArray[Any]:
+    kind = {"int64": np.int64, "double": np.float64}.get(str(column.type))
+    if kind is None or column.null_count:
+        raise ValueError(f"a column of {column.type}, {column.null_count} cells of it missing")
+    dtype = np.dtype(kind)
+    parts = [
+        np.frombuffer(chunk.buffers()[1], dtype=dtype, count=len(chunk), offset=chunk.offset * dtype.itemsize)
+        for chunk in column.chunks
+        if len(chunk)
+    ]
+    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0, dtype=dtype), *parts])

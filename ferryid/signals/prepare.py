@@ -13,6 +13,7 @@ from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.recording import Recording, data_quality, record
+from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, smooth_measured
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel.profile import Profile
@@ -60,6 +61,7 @@ def open_track(path: str, profile: Profile, out: Path, *, rate_hz: float | None 
 
 def track_of(recording: Recording, profile: Profile, rate_hz: float | None = None) -> Opened:
     """Align a recording and reconstruct its forces; arguments and errors are those of `prepare`."""
+    check_sampling(recording, profile)
     track = align(recording, profile, rate_hz)
     for doubt in track.doubts:
         if doubt.certain:

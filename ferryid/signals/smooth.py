@@ -296,6 +296,8 @@ def _columns(measured: Measured) -> dict[str, Floats]:
 
 
 def _told(smoother: str, rows: int, window_s: float, rate_hz: float) -> str:
+    if rows == 1 and window_s > 0.0:
+        return f"Smoothing: none, a window of {window_s:g} s holds one row at {rate_hz:g} Hz."
     if rows == 1:
         return "Smoothing: none (window 0)."
     said = f"Smoothing: {smoother} window of {rows} rows, {rows / rate_hz:.3g} s at {rate_hz:g} Hz"

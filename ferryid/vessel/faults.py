@@ -10,6 +10,11 @@ from typing import Any
 from ferryid.errors import did_you_mean, one_line
 from ferryid.vessel.toml_lines import KeyPath, line_of
 
+LARGEST = 1e15
+"""No quantity of a vessel in SI units is larger; products of a few such numbers stay within a float."""
+_SMALLEST = 1e-12
+"""A quantity that must be above zero and is smaller is a mistake."""
+
 
 @dataclass(frozen=True)
 class Fault:
@@ -122,9 +127,13 @@ class TableReader:
         above: float = -math.inf,
         at_least: float = -math.inf,
         at_most: float = math.inf,
+        within: float = LARGEST,
         needs: str = "",
     ) -> float:
-        """Return a finite number within its limits; the default where it is missing or does not fit."""
+        """Return a finite number within its limits; the default where it is missing or does not fit.
+
+        `within` is the largest size that is plausible on any vessel.
+        """
         value = self._take(key, required=required, needs=needs)
         if value is None:
             return default
@@ -138,9 +147,11 @@ class TableReader:
             limit = " and ".join(limits) or "finite"
             self.fault(f'"{key}" must be {limit}, found {value:g}. Fix: give a number that is {limit}', key)
             return default
-        return float(value)
+        return float(value) if self._is_plausible(key, value, within, positive=above >= 0.0) else default
 
-    def numbers(self, key: str, count: int | None = None, *, required: bool = False) -> tuple[float, ...]:
+    def numbers(
+        self, key: str, count: int | None = None, *, required: bool = False, within: float = LARGEST
+    ) -> tuple[float, ...]:
         """Return an array of finite numbers, of `count` entries where that is given."""
         value = self._take(key, required=required)
         if value is None:
@@ -153,16 +164,31 @@ class TableReader:
         if count is not None and len(value) != count:
             self.fault(f'"{key}" must hold {count} numbers, found {len(value)}. Fix: give {count}', key)
             return ()
+        if not all(self._is_plausible(key, entry, within) for entry in value):
+            return ()
         return tuple(float(entry) for entry in value)
 
-    def whole(self, key: str, default: int, *, at_least: int = 0) -> int:
+    def _is_plausible(self, key: str, value: float, within: float, *, positive: bool = False) -> bool:
+        """Tell whether a number can be a vessel's, and note a fault where it cannot."""
+        if abs(value) <= within and not (positive and value < _SMALLEST):
+            return True
+        limit = f"at most {within:g} in size" if abs(value) > within else f"at least {_SMALLEST:g}"
+        self.fault(
+            f'"{key}" = {value:g} is not plausible for any vessel, it must be {limit}. '
+            "Fix: correct the number or convert its unit",
+            key,
+        )
+        return False
+
+    def whole(self, key: str, default: int, *, at_least: int = 0, at_most: int = 2**63 - 1) -> int:
         """Return a whole number."""
         value = self._take(key, required=False)
         if value is None:
             return default
-        if not isinstance(value, int) or isinstance(value, bool) or value < at_least:
+        if not isinstance(value, int) or isinstance(value, bool) or not at_least <= value <= at_most:
+            limit = f" and at most {at_most}" if at_most < 2**63 - 1 else ""
             self.fault(
-                f'"{key}" must be a whole number of at least {at_least}, found {value!r:.40}. Fix: give one', key
+                f'"{key}" must be a whole number of at least {at_least}{limit}, found {value!r:.40}. Fix: give one', key
             )
             return default
         return value

@@ -168,14 +168,16 @@ def _parse_table(reader: TableReader | None) -> TableLayout | None:
     time_unit = reader.text("time_unit", "s", options=("s", "ms", "us", "ns", "datetime"))
     stamp = reader.texts("stamp")
     columns = reader.texts("columns")
-    skip_rows = reader.whole("skip_rows", 0)
+    skip_rows = reader.whole("skip_rows", 0, at_most=10**9)
     separator = reader.text("separator", ",")
     if separator not in (",", ";", "\t", "|", "whitespace"):
         reader.fault(f'"separator" cannot be {separator!r}. Fix: use ",", ";", "\\t", "|" or "whitespace"', "separator")
     encoding = reader.text("encoding", "utf-8")
     try:
-        "".encode(encoding)
-    except LookupError:
+        known = "0,a\n".encode(encoding).decode(encoding) == "0,a\n"
+    except (LookupError, ValueError):
+        known = False
+    if not known:
         reader.fault(f'unknown text encoding "{encoding}". Fix: use utf-8, cp1252 or latin-1', "encoding")
     if columns and len(set(columns)) < len(columns):
         twice = next(column for column in columns if columns.count(column) > 1)

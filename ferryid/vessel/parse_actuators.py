@@ -8,10 +8,14 @@ import re
 import numpy as np
 
 from ferryid.vessel.faults import TableReader
+from ferryid.vessel.parse_hull import MOST_AREA_M2, MOST_LENGTH_M, MOST_RATIO
 from ferryid.vessel.profile import Actuator, Hull, ThrustCurve
 from ferryid.vessel.thrusters import thrust
 
 KINDS = ("azimuth", "propeller", "propeller_rudder", "tunnel", "force")
+
+MOST_SPEED, MOST_FORCE_N, MOST_POWERS = 1e6, 1e9, 20
+"""Beyond any propeller: rpm or rps, force, and coefficients of a polynomial."""
 
 CURVES = ("polynomial", "table", "quadratic", "open_water")
 
@@ -50,8 +54,8 @@ def _actuator(reader: TableReader) -> Actuator:
             "name",
         )
     kind = reader.text("kind", required=True, options=KINDS)
-    position = reader.numbers("position_m", 2, required=True) or (math.nan, math.nan)
-    count = reader.whole("count", 1, at_least=1)
+    position = reader.numbers("position_m", 2, required=True, within=MOST_LENGTH_M) or (math.nan, math.nan)
+    count = reader.whole("count", 1, at_least=1, at_most=1000)
     angle_rad = 0.0
     if kind == "tunnel":
         angle_rad = 0.5 * math.pi
@@ -98,7 +102,7 @@ def _inflow(reader: TableReader, kind: str) -> dict[str, float]:
             inflow[key] = reader.number(key, 0.0, at_least=low, at_most=high)
     for key in ("diameter_m", "water_density"):
         if reader.has(key):
-            inflow[key] = reader.number(key, 1.0, above=0.0)
+            inflow[key] = reader.number(key, 1.0, above=0.0, within=1e4)
     if kind == "force" and inflow:
         reader.fault(f'a force given directly takes no "{next(iter(inflow))}"', next(iter(inflow)))
     return inflow
@@ -106,21 +110,21 @@ def _inflow(reader: TableReader, kind: str) -> dict[str, float]:
 
 def _rudder(reader: TableReader) -> dict[str, float]:
     rudder = {
-        "area_m2": reader.number("area_m2", required=True, above=0.0),
-        "x_m": reader.number("x_m", required=True),
-        "a_H": reader.number("a_H", 0.0, at_least=0.0),
-        "x_H_m": reader.number("x_H_m", 0.0),
+        "area_m2": reader.number("area_m2", required=True, above=0.0, within=MOST_AREA_M2),
+        "x_m": reader.number("x_m", required=True, within=MOST_LENGTH_M),
+        "a_H": reader.number("a_H", 0.0, at_least=0.0, within=MOST_RATIO),
+        "x_H_m": reader.number("x_H_m", 0.0, within=MOST_LENGTH_M),
         "t_R": reader.number("t_R", 0.0, at_least=0.0, at_most=1.0),
-        "epsilon": reader.number("epsilon", 1.0, above=0.0),
-        "kappa": reader.number("kappa", 0.5, at_least=0.0),
+        "epsilon": reader.number("epsilon", 1.0, above=0.0, within=MOST_RATIO),
+        "kappa": reader.number("kappa", 0.5, at_least=0.0, within=MOST_RATIO),
         "eta": reader.number("eta", 1.0, at_least=0.0, at_most=1.0),
-        "gamma_R": reader.number("gamma_R", 1.0, at_least=0.0),
+        "gamma_R": reader.number("gamma_R", 1.0, at_least=0.0, within=MOST_RATIO),
     }
     rudder["gamma_R_minus"] = reader.number("gamma_R_minus", rudder["gamma_R"], at_least=0.0)
     rudder["l_R_m"] = reader.number("l_R_m", rudder["x_m"])
     slope, aspect = reader.has("f_alpha"), reader.has("aspect_ratio")
-    f_alpha = reader.number("f_alpha", above=0.0)
-    ratio = reader.number("aspect_ratio", above=0.0)
+    f_alpha = reader.number("f_alpha", above=0.0, within=MOST_RATIO)
+    ratio = reader.number("aspect_ratio", above=0.0, within=MOST_RATIO)
     if slope == aspect:
         reader.fault(
             "the rudder needs its lift slope once. Fix: give either f_alpha or aspect_ratio (then f_alpha = "
@@ -147,8 +151,8 @@ def _curve(reader: TableReader | None) -> ThrustCurve | None:
         if coefficients:
             curve = ThrustCurve(kind, unit, valid or (-math.inf, math.inf), coefficients=coefficients)
     elif kind == "quadratic":
-        ahead = reader.number("ahead", required=True, above=0.0)
-        astern = reader.number("astern", ahead, at_least=0.0)
+        ahead = reader.number("ahead", required=True, above=0.0, within=MOST_FORCE_N)
+        astern = reader.number("astern", ahead, at_least=0.0, within=MOST_FORCE_N)
         curve = ThrustCurve(kind, unit, valid or (-math.inf, math.inf), ahead=ahead, astern=astern)
     else:
         curve = _table_curve(reader, unit, valid)
@@ -157,12 +161,15 @@ def _curve(reader: TableReader | None) -> ThrustCurve | None:
         key = "coefficients" if kind == "polynomial" else "force"
         reader.fault("the thrust curve is zero everywhere. Fix: give its coefficients or forces [N]", key)
     elif curve is not None and kind == "polynomial" and valid:
+        if len(curve.coefficients) > MOST_POWERS:
+            reader.fault(f"a thrust curve of {len(curve.coefficients)} powers. Fix: give a few", "coefficients")
+            return None
         _check_monotone(reader, curve)
     return curve
 
 
 def _valid(reader: TableReader, *, required: bool) -> tuple[float, float] | None:
-    valid = reader.numbers("valid", 2, required=required)
+    valid = reader.numbers("valid", 2, required=required, within=MOST_SPEED)
     if not valid:
         return None
     if valid[0] >= valid[1]:
@@ -175,9 +182,9 @@ def _valid(reader: TableReader, *, required: bool) -> tuple[float, float] | None
 
 
 def _table_curve(reader: TableReader, unit: str, valid: tuple[float, float] | None) -> ThrustCurve | None:
-    speeds = reader.numbers("speed", required=True)
-    forces = reader.numbers("force", required=True)
-    per = reader.whole("measured_on", 1, at_least=1)
+    speeds = reader.numbers("speed", required=True, within=MOST_SPEED)
+    forces = reader.numbers("force", required=True, within=MOST_FORCE_N)
+    per = reader.whole("measured_on", 1, at_least=1, at_most=1000)
     if not speeds or not forces:
         return None
     if len(speeds) != len(forces) or len(speeds) < 2:
@@ -218,9 +225,9 @@ def _table_curve(reader: TableReader, unit: str, valid: tuple[float, float] | No
 def _open_water(reader: TableReader) -> ThrustCurve | None:
     """Read K_T over J for ahead, and one coefficient for astern."""
     valid = _valid(reader, required=False) or (-math.inf, math.inf)
-    advance = reader.numbers("J", required=True)
-    k_t = reader.numbers("K_T", required=True)
-    astern = reader.number("K_T_astern", 0.0, at_least=0.0)
+    advance = reader.numbers("J", required=True, within=MOST_RATIO)
+    k_t = reader.numbers("K_T", required=True, within=MOST_RATIO)
+    astern = reader.number("K_T_astern", 0.0, at_least=0.0, within=MOST_RATIO)
     reader.close()
     if not advance or not k_t:
         return None
@@ -233,6 +240,14 @@ def _open_water(reader: TableReader) -> ThrustCurve | None:
 def _check_monotone(reader: TableReader, curve: ThrustCurve) -> None:
     speeds = np.linspace(curve.valid[0], curve.valid[1], 401) * (1.0 if curve.input_unit == "rpm" else 60.0)
     force = thrust(curve, speeds)[0]
+    if np.abs(force).max() > MOST_FORCE_N:
+        at = speeds[np.argmax(np.abs(force))]
+        reader.fault(
+            f"the thrust curve gives {np.abs(force).max():.3g} N at {at:.0f} rpm, more than any propeller. "
+            "Fix: check the coefficients, lowest power first, and the unit of input",
+            "coefficients",
+        )
+        return
     wrong = np.sign(force) * np.sign(speeds) < 0
     if np.any(wrong):
         at = speeds[np.argmax(np.abs(np.where(wrong, force, 0.0)))]

@@ -6,8 +6,12 @@ import math
 
 import numpy as np
 
-from ferryid.vessel.faults import TableReader
+from ferryid.vessel.faults import LARGEST, TableReader
 from ferryid.vessel.profile import Hull, WindAreas
+
+MOST_LENGTH_M, MOST_AREA_M2, MOST_MASS_KG = 1e3, 1e5, 1e9
+"""Beyond the largest ships; `MOST_RATIO` is for coefficients without a unit."""
+MOST_RATIO = 1e3
 
 DAMPING_TERMS = (
     "X_u",
@@ -45,11 +49,11 @@ def parse_hull(reader: TableReader | None) -> Hull | None:
     """Read ``[hull]`` with its mass matrix and damping; None, with faults noted, where it cannot be used."""
     if reader is None:
         return None
-    length_m = reader.number("length_m", above=0.0)
-    beam_m = reader.number("beam_m", above=0.0)
-    draught_m = reader.number("draught_m", above=0.0)
-    mass_kg = reader.number("mass_kg", required=True, above=0.0)
-    x_g_m = reader.number("x_g_m", 0.0)
+    length_m = reader.number("length_m", above=0.0, within=MOST_LENGTH_M)
+    beam_m = reader.number("beam_m", above=0.0, within=MOST_LENGTH_M)
+    draught_m = reader.number("draught_m", above=0.0, within=MOST_LENGTH_M)
+    mass_kg = reader.number("mass_kg", required=True, above=0.0, within=MOST_MASS_KG)
+    x_g_m = reader.number("x_g_m", 0.0, within=MOST_LENGTH_M)
     inertia_z = _inertia(reader, mass_kg, x_g_m)
     rigid = rigid_mass(mass_kg, x_g_m, inertia_z)
     total = _mass_matrix(reader.table("M"), rigid)
@@ -76,12 +80,12 @@ def parse_wind(reader: TableReader | None) -> WindAreas | None:
     if reader is None:
         return None
     areas = WindAreas(
-        frontal_m2=reader.number("frontal_m2", required=True, above=0.0),
-        lateral_m2=reader.number("lateral_m2", required=True, above=0.0),
-        length_m=reader.number("length_m", required=True, above=0.0),
-        S_L_m=reader.number("S_L_m", 0.0),
-        CD_t=reader.number("CD_t", required=True, above=0.0),
-        CD_l_AF=reader.number("CD_l_AF", required=True, above=0.0),
+        frontal_m2=reader.number("frontal_m2", required=True, above=0.0, within=MOST_AREA_M2),
+        lateral_m2=reader.number("lateral_m2", required=True, above=0.0, within=MOST_AREA_M2),
+        length_m=reader.number("length_m", required=True, above=0.0, within=MOST_LENGTH_M),
+        S_L_m=reader.number("S_L_m", 0.0, within=MOST_LENGTH_M),
+        CD_t=reader.number("CD_t", required=True, above=0.0, within=MOST_RATIO),
+        CD_l_AF=reader.number("CD_l_AF", required=True, above=0.0, within=MOST_RATIO),
         delta=reader.number("delta", required=True, at_least=0.0, at_most=1.0),
     )
     reader.close()
@@ -93,7 +97,7 @@ def _inertia(reader: TableReader, mass_kg: float, x_g_m: float) -> float:
     given = reader.has("inertia_z")
     radius_given = reader.has("k_zz_m")
     inertia_z = reader.number("inertia_z", above=0.0)
-    k_zz_m = reader.number("k_zz_m", above=0.0)
+    k_zz_m = reader.number("k_zz_m", above=0.0, within=MOST_LENGTH_M)
     if given and radius_given:
         reader.fault('"inertia_z" and "k_zz_m" say the same thing. Fix: keep one of them', "k_zz_m")
     if not given and not radius_given:
@@ -117,7 +121,10 @@ def _mass_matrix(
 ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     if reader is None:
         return rigid
-    m11, m22, m33 = (reader.number(key, required=True, above=0.0) for key in ("m11", "m22", "m33"))
+    m11, m22, m33 = (
+        reader.number(key, required=True, above=0.0, within=most)
+        for key, most in (("m11", 1e11), ("m22", 1e11), ("m33", LARGEST))
+    )
     m23, m32 = (reader.number(key, 0.0) for key in ("m23", "m32"))
     reader.close()
     total = np.array([[m11, 0.0, 0.0], [0.0, m22, m23], [0.0, m32, m33]])

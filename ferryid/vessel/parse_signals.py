@@ -57,7 +57,7 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         fields, unit = _payload_fields(table, options)
         sign, offset = _sign(table), table.number("offset", 0.0)
         if len(fields) == 1:
-            mount_m = (table.number("x_m", 0.0), 0.0)
+            mount_m = (table.number("x_m", 0.0, within=1e3), 0.0)
     elif quantity in ("heading", "heading_d") and table.has("quaternion"):
         fields, unit = table.texts("quaternion", 4), "quaternion"
         frame = _frame(table, WORLD_FRAMES, quantity)
@@ -164,7 +164,7 @@ def _actuator_signal(quantity: str, table: TableReader, actuators: dict[str, Act
     full_rpm = 0.0
     if role == "speed" and table.data.get("unit") in ("%", "fraction"):
         unit = table.text("unit")
-        full_rpm = table.number("full_rpm", required=True, above=0.0, needs="the speed at full throttle")
+        full_rpm = table.number("full_rpm", required=True, above=0.0, within=1e6, needs="the speed at full throttle")
     else:
         unit = _unit(table, ROLE_KINDS[role])
     sign, offset = _sign(table), table.number("offset", 0.0)
@@ -228,7 +228,7 @@ def _degrees_offset(table: TableReader) -> float:
 
 
 def _mount(table: TableReader) -> tuple[float, float]:
-    place = table.numbers("mount_m", 2)
+    place = table.numbers("mount_m", 2, within=1e3)
     return (place[0], place[1]) if place else (0.0, 0.0)
 
 

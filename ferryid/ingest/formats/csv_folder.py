@@ -8,7 +8,8 @@ from pathlib import Path
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Format, Loss, TableLayout
-from ferryid.ingest.table_text import TextSheet, open_text
+from ferryid.ingest.table_rows import TextSheet
+from ferryid.ingest.table_text import open_text
 from ferryid.ingest.tables import TableReader
 
 _BAG_SUFFIXES = (".bag", ".bag.active", ".mcap", ".mcap.zstd", ".db3", ".db3.zstd")

@@ -1,42 +1,137 @@
-"""One Parquet table: one topic named ``table``, only the wanted columns are read."""
+"""One Parquet table: one topic named ``table``, only the wanted columns are read, the checksums of their pages checked."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ferryid.errors import FerryIdError
-from ferryid.ingest.log import Format, TableLayout, Topic
+import numpy as np
+
+from ferryid.errors import FerryIdError, one_line
+from ferryid.ingest.arrow_columns import column_from_arrow
+from ferryid.ingest.log import Column, Format, Loss, TableLayout, Topic
 from ferryid.ingest.table_time import TimePlan, guess_time
-from ferryid.ingest.tables import Rows, TableReader, column_from_arrow, plan_time, to_ns
+from ferryid.ingest.tables import Rows, TableReader, no_time, number_doubt, plan_time, to_ns, unique_names
+
+_LARGE_BYTES = 1 << 30
+_MOST_TIMES_LARGER = 100
+"""Columns of more than `_LARGE_BYTES` in memory that need this many times the size of their file are not read."""
 
 
 @dataclass(frozen=True)
 class ParquetSheet:
-    """One Parquet file; members of structs are columns named ``struct.member``."""
+    """One Parquet file; members of structs are columns named ``struct.member``.
+
+    `places` maps a column to its name in the file and its place among the columns of that name.
+    """
 
     path: Path
     topic: Topic
     time: TimePlan
+    places: Mapping[str, tuple[str, int]]
 
     def load(self, names: Sequence[str]) -> Rows:
-        """Read the named columns and no others."""
-        table = _read(self.path, names)
-        return Rows({name: column_from_arrow(table.column(name)) for name in names})
+        """Read the named columns and no others; row groups that are damaged are left out and counted."""
+        times = {self.time.column, *self.time.stamp}
+        columns, losses = _read(self.path, {name: self.places[name] for name in names}, times)
+        return Rows(columns, losses)
 
 
-def _read(path: Path, names: Sequence[str]) -> Any:
+def _failures() -> tuple[type[Exception], ...]:
+    """Exceptions that pyarrow raises for damaged files."""
     import pyarrow as pa
+
+    return (pa.ArrowException, OSError, ValueError, LookupError, TypeError, MemoryError, OverflowError)
+
+
+def _open_file(path: Path) -> Any:
     import pyarrow.parquet as parquet
 
     try:
-        # A dotted name selects the member of a struct; the struct comes back and is flattened.
-        table = parquet.ParquetFile(path).read(columns=list(names))
-    except (pa.ArrowInvalid, OSError) as error:
+        return parquet.ParquetFile(path, page_checksum_verification=True)
+    except _failures() as error:
         raise _damaged(path, error) from error
-    return _flat(table)
+
+
+def _read(
+    path: Path, places: Mapping[str, tuple[str, int]], times: set[str]
+) -> tuple[dict[str, Column], tuple[Loss, ...]]:
+    """Read columns by their places; where the file is damaged, each row group by itself."""
+    file = _open_file(path)
+    raw = list(dict.fromkeys(name for name, _ in places.values()))
+    rows, size = file.metadata.num_rows, path.stat().st_size
+    needed = max(8 * rows * len(places), _claimed_bytes(path, file, raw))
+    if rows < 0 or needed > max(_LARGE_BYTES, _MOST_TIMES_LARGER * size):
+        raise FerryIdError(
+            f"{path}: the Parquet file claims {rows} rows that need {needed / 1e6:.0f} MB, found {size} bytes, which "
+            "cannot hold them. Fix: export or copy the table again"
+        )
+    try:
+        # A dotted name selects the member of a struct; the struct comes back and is flattened.
+        columns = _columns(file.read(columns=raw), places, times)
+        _check_count(columns, rows)
+        return columns, ()
+    except _failures() as error:
+        if file.num_row_groups < 2:
+            raise _damaged(path, error) from error
+        first = error
+    return _read_groups(path, file, raw, places, times, first)
+
+
+def _claimed_bytes(path: Path, file: Any, names: Sequence[str]) -> int:
+    """Size in memory of the pages of columns, as the footer claims it."""
+    try:
+        footer = file.metadata
+        paths = [footer.schema.column(index).path for index in range(footer.num_columns)]
+        wanted = [i for i, one in enumerate(paths) if any(one == name or one.startswith(f"{name}.") for name in names)]
+        groups = [footer.row_group(group) for group in range(footer.num_row_groups)]
+        return sum(group.column(index).total_uncompressed_size for group in groups for index in wanted)
+    except _failures() as error:
+        raise _damaged(path, error) from error
+
+
+def _read_groups(
+    path: Path, file: Any, raw: list[str], places: Mapping[str, tuple[str, int]], times: set[str], first: Exception
+) -> tuple[dict[str, Column], tuple[Loss, ...]]:
+    """Read the row groups that can be read; the rows of the others are lost."""
+    parts: list[dict[str, Column]] = []
+    lost, groups = 0, 0
+    for group in range(file.num_row_groups):
+        count = file.metadata.row_group(group).num_rows
+        try:
+            columns = _columns(file.read_row_group(group, columns=raw), places, times)
+            _check_count(columns, count)
+            parts.append(columns)
+        except _failures():
+            lost += max(0, count)
+            groups += 1
+    if not parts or not groups:
+        raise _damaged(path, first) from first
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in places}
+    what = (
+        f"{lost} rows in {groups} of {file.num_row_groups} row groups are damaged and were left out ({_reason(first)})"
+    )
+    return joined, (Loss(str(path), what, "table", messages=lost),)
+
+
+def _columns(table: Any, places: Mapping[str, tuple[str, int]], times: set[str]) -> dict[str, Column]:
+    table = _flat(table)
+    table.validate(full=True)
+    found: dict[str, list[int]] = {}
+    for index, field in enumerate(table.schema):
+        found.setdefault(field.name, []).append(index)
+    return {
+        name: column_from_arrow(table.column(found[raw][place]), is_time=name in times)
+        for name, (raw, place) in places.items()
+    }
+
+
+def _check_count(columns: Mapping[str, Column], rows: int) -> None:
+    wrong = next((len(values) for values in columns.values() if len(values) != rows), None)
+    if wrong is not None:
+        raise ValueError(f"{wrong} rows where the file's footer counts {rows}")
 
 
 def _flat(table: Any) -> Any:
@@ -47,35 +142,57 @@ def _flat(table: Any) -> Any:
     return table
 
 
+def _reason(error: Exception) -> str:
+    return one_line(str(error) or type(error).__name__)[:300]
+
+
 def _damaged(path: Path, error: Exception) -> FerryIdError:
+    if "ncrypt" in str(error):
+        return FerryIdError(f"{path}: the Parquet file is encrypted. Fix: export the table without encryption")
     return FerryIdError(
-        f"{path}: the Parquet file cannot be read ({str(error).splitlines()[0]}). Fix: export or copy the table again"
+        f"{path}: the Parquet file cannot be read ({_reason(error)}). Fix: export or copy the table again"
     )
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return path.is_file() and (head[:4] == b"PAR1" or path.suffix.lower() in (".parquet", ".pq"))
+    return path.is_file() and (head[:4] in (b"PAR1", b"PARE") or path.suffix.lower() in (".parquet", ".pq"))
 
 
 def _open(path: Path, layout: TableLayout | None) -> TableReader:
-    import pyarrow as pa
-    import pyarrow.parquet as parquet
-
+    file = _open_file(path)
     try:
-        file = parquet.ParquetFile(path)
-    except (pa.ArrowInvalid, OSError) as error:
+        schema = _flat(file.schema_arrow.empty_table()).schema
+        count = file.metadata.num_rows
+        kinds = [(field.name, _kind(field.type), str(field.type)) for field in schema]
+    except _failures() as error:
         raise _damaged(path, error) from error
-    schema = _flat(file.schema_arrow.empty_table()).schema
-    fields = {field.name: kind for field in schema if (kind := _kind(field.type))}
-    count = file.metadata.num_rows
     if count == 0:
         raise FerryIdError(f"{path}: the table holds columns and no rows. Fix: record or export the log again")
-    notes = []
+    names, renamed = unique_names([name for name, _, _ in kinds])
+    seen: dict[str, int] = {}
+    places: dict[str, tuple[str, int]] = {}
+    fields: dict[str, str] = {}
+    unread = []
+    for name, (raw, kind, full) in zip(names, kinds, strict=True):
+        if kind:
+            fields[name] = kind
+            places[name] = (raw, seen.get(raw, 0))
+        else:
+            unread.append(f'"{name}" ({full[:40]})')
+        seen[raw] = seen.get(raw, 0) + 1
+    notes = [renamed]
+    if unread:
+        more = f" and {len(unread) - 6} more" if len(unread) > 6 else ""
+        notes.append(f"columns of these types are not read: {', '.join(unread[:6])}{more}")
     plan = plan_time(str(path), tuple(fields), layout) if layout is not None else None
+    guessed = plan is None
     if plan is None:
-        plan = _guess(path, file, fields)
+        plan = _guess(path, file, fields, places)
         notes.append(plan.note)
-    times, good, _ = to_ns(column_from_arrow(_read(path, [plan.column]).column(plan.column)), plan.unit)
+    columns, _ = _read(path, {plan.column: places[plan.column]}, {plan.column})
+    if not guessed:
+        notes.append(number_doubt(columns[plan.column], plan.unit))
+    times, good, _ = to_ns(columns[plan.column], plan.unit)
     topic = Topic(
         name="table",
         type="table",
@@ -84,9 +201,9 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
         start_ns=int(times[good].min()) if good.any() else None,
         end_ns=int(times[good].max()) if good.any() else None,
         fields=fields,
-        note="; ".join(notes),
+        note="; ".join(note for note in notes if note),
     )
-    return TableReader([ParquetSheet(path, topic, plan)])
+    return TableReader([ParquetSheet(path, topic, plan, places)])
 
 
 def _kind(kind: Any) -> str:
@@ -97,28 +214,39 @@ def _kind(kind: Any) -> str:
         return "bool"
     if pa.types.is_floating(kind) or pa.types.is_integer(kind):
         return {"halffloat": "float16", "float": "float32", "double": "float64"}.get(str(kind), str(kind))
-    if pa.types.is_timestamp(kind):
+    if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
         return "datetime"
-    if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_dictionary(kind):
+    if pa.types.is_string(kind) or pa.types.is_large_string(kind):
         return "string"
+    if pa.types.is_dictionary(kind):
+        return _kind(kind.value_type)
+    if pa.types.is_decimal(kind) or pa.types.is_null(kind):
+        return "float64"
     return ""
 
 
-def _guess(path: Path, file: Any, fields: dict[str, str]) -> TimePlan:
+def _guess(path: Path, file: Any, fields: Mapping[str, str], places: Mapping[str, tuple[str, int]]) -> TimePlan:
     """The first timestamp column, or the one that a text table would take."""
-    import pyarrow as pa
-
     for name, kind in fields.items():
         if kind == "datetime":
             return TimePlan(name, "datetime", note=f'time guessed: column "{name}" (timestamps)')
-    rows = _flat(pa.Table.from_batches([next(file.iter_batches(batch_size=200))]))
-    plan = guess_time({name: [str(value) for value in rows.column(name).to_pylist()] for name in fields})
+    plan = None
+    try:
+        batch = next((one for one in file.iter_batches(batch_size=200) if one.num_rows), None)
+        if batch is not None:
+            columns = _columns(_table_of(batch), places, set(fields))
+            plan = guess_time({name: [str(value) for value in columns[name].tolist()] for name in fields})
+    except _failures() as error:
+        raise _damaged(path, error) from error
     if plan is None:
-        raise FerryIdError(
-            f"{path}: no column of this table looks like a time, found {', '.join(list(fields)[:12])}. "
-            "Fix: name the time column as time under [table] in the profile"
-        )
+        raise FerryIdError(no_time(str(path), tuple(fields)))
     return plan
+
+
+def _table_of(batch: Any) -> Any:
+    import pyarrow as pa
+
+    return pa.Table.from_batches([batch])
 
 
 FORMAT = Format(name="Parquet table", matches=_matches, open=_open, order=20)

@@ -1,0 +1,90 @@
+"""Whether a log samples the motion often enough to identify it, and whether its time goes on at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite, sqrt
+
+import numpy as np
+
+from ferryid.errors import FerryIdError
+from ferryid.signals.quality import NAVIGATION, is_actuator, is_order
+from ferryid.signals.stream import Recording, Stream
+from ferryid.vessel.profile import Profile
+
+GRAVITY = 9.81
+_SLOWEST_PERIOD = 2.0
+"""Longest sampling period in parts of sqrt(L/g): sway and yaw of a vessel of length L settle within several of these."""
+_LEAD = ("u", "vel_N", "x", "psi")
+_UNITS = (("ms", "milliseconds", 1e3), ("us", "microseconds", 1e6), ("ns", "nanoseconds", 1e9))
+_SURE_S = 20.0
+"""Rows further apart than this are of another unit of time rather than recorded so slowly."""
+_USUAL_HZ = (0.5, 2000.0)
+"""Rates at which logs are recorded."""
+
+
+def check_sampling(recording: Recording, profile: Profile) -> None:
+    """Refuse a recording whose time stands still, or whose motion is sampled too slowly for the vessel.
+
+    Raises
+    ------
+    FerryIdError
+        Where all navigation or all actuator signals have fewer than two times, and where the samples of the velocity
+        (or the position) are further apart than 2 sqrt(L/g).
+    """
+    streams = list(recording.streams.values())
+    navigation = [stream for stream in streams if set(stream.columns) & set(NAVIGATION)]
+    actuators = [stream for stream in streams if any(is_actuator(name) or is_order(name) for name in stream.columns)]
+    for group in (navigation, actuators):
+        if group and all(len(stream.time_ns) < 2 for stream in group):
+            raise FerryIdError(_standing(recording, group))
+    lead = next((one for name in _LEAD for one in navigation if name in one.columns and len(one.time_ns) > 1), None)
+    if lead is None:
+        return
+    period_s = float(np.median(np.diff(lead.time_ns))) * 1e-9
+    length_m = _length(profile)
+    if period_s <= _SLOWEST_PERIOD * sqrt(length_m / GRAVITY):
+        return
+    least_hz = 1.0 / (_SLOWEST_PERIOD * sqrt(length_m / GRAVITY))
+    raise FerryIdError(
+        f"{_file(recording)}: the motion is sampled too slowly for a fit, found a row of {lead.topic} every "
+        f"{period_s:.4g} s, where a vessel of {length_m:.3g} m needs at least {least_hz:.2g} Hz. "
+        f"Fix: {_remedy(recording, lead, period_s)}"
+    )
+
+
+def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
+    is_table = any(topic.encoding == "table" and topic.name == lead.topic for topic in recording.topics)
+    if is_table:
+        for unit, name, scale in _UNITS:
+            if _USUAL_HZ[0] <= scale / period_s <= _USUAL_HZ[1]:
+                setting = f'set time_unit = "{unit}" under [table] in the profile'
+                if period_s < _SURE_S:
+                    return f"record the navigation at a higher rate, or {setting} if these are {name}"
+                return f"these look like {name}, so {setting}"
+    return "record the navigation at a higher rate"
+
+
+def _standing(recording: Recording, streams: Sequence[Stream]) -> str:
+    stream = max(streams, key=lambda one: one.clock.count + one.clock.dropped)
+    rows = stream.clock.count + stream.clock.dropped
+    if rows < 2:
+        found = "one row only" if rows else "no row"
+        return f"{_file(recording)}: {stream.topic} holds {found}, and motion needs many. Fix: use a longer log"
+    return (
+        f"{_file(recording)}: time does not advance, found {rows} rows of {stream.topic} with the same time. "
+        "Fix: name another time column under [table] in the profile, or record the log again"
+        if any(topic.encoding == "table" for topic in recording.topics)
+        else f"{_file(recording)}: time does not advance, found {rows} messages on {stream.topic} with the same time. "
+        "Fix: record the log again with a running clock"
+    )
+
+
+def _length(profile: Profile) -> float:
+    """Length of the hull [m]; where the profile does not give it, four radii of gyration."""
+    hull = profile.hull
+    return hull.length_m if isfinite(hull.length_m) else 4.0 * sqrt(hull.inertia_z / hull.mass_kg)
+
+
+def _file(recording: Recording) -> str:
+    return recording.files[0] if recording.files else recording.name
