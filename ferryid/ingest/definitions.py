@@ -374,7 +374,7 @@ class FieldList:
             Where a definition leads to too many of them.
         """
         self._visits += 1
-        if self._visits > 4 * MAX_FIELDS:
+        if self._visits > 2 * MAX_FIELDS:
             raise DefinitionError(f"has more than {MAX_FIELDS} fields")
 
     def add(self, path: str, primitive: str) -> None:

@@ -95,9 +95,13 @@ def protobuf_fields(definition: bytes, name: str) -> dict[str, str]:
         return {}
 
 
+@lru_cache(maxsize=1024)
 def _listed(descriptor: Descriptor) -> dict[str, str]:
     found = FieldList()
-    return found.collect(_leaves(descriptor, "", (), found))
+    try:
+        return found.collect(_leaves(descriptor, "", (), found))
+    except DefinitionError:
+        return {}
 
 
 def _leaves(descriptor: Descriptor, prefix: str, above: tuple[str, ...], found: FieldList) -> Iterator[tuple[str, str]]:
@@ -229,10 +233,7 @@ def _resolve(descriptor: Descriptor, path: str, where: str) -> tuple[_Getter, st
     """Return the steps to a leaf and its primitive type; FerryIdError where there is no such leaf."""
 
     def fault(found: str) -> FerryIdError:
-        try:
-            leaves = [leaf.replace("[]", "[0]") for leaf in _listed(root)]
-        except DefinitionError:
-            leaves = []
+        leaves = [leaf.replace("[]", "[0]") for leaf in _listed(root)]
         return FerryIdError(
             f"{where}: no field {path!r} of {root.full_name}, found {found}. "
             f"Fix: name one of its fields.{did_you_mean(path, leaves)}"
