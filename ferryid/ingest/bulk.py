@@ -14,6 +14,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys.base import normalize_fieldname
 
 from ferryid.errors import FerryIdError
+from ferryid.ingest.definitions import PARSER_ERRORS
 from ferryid.ingest.fixed import Fixed
 from ferryid.ingest.layout import (
     LayoutError,
@@ -32,6 +33,9 @@ __all__ = ["Decoder", "decoder_for", "leaf_fields"]
 SCRATCH_ROWS = 2048
 SCRATCH_BYTES = 4 << 20
 FIRST_ROWS = 64
+# A larger message is decoded by rosbags only if it holds no more values than this: each becomes an object of Python.
+COUNTED_BYTES = 1 << 20
+MAX_VALUES = 1_000_000
 # A type whose messages have more lengths or layouts than this gains nothing from bulk.
 MAX_GROUPS = 512
 MAX_LAYOUTS = 1024
@@ -92,6 +96,13 @@ def decoder_for(
             f"{said}: the messages cannot be decoded, the log holds no definition of {msgtype}. "
             "Fix: record again with definitions, or map another topic"
         )
+    try:
+        typestore.get_msgdef(msgtype)
+    except PARSER_ERRORS as error:
+        raise FerryIdError(
+            f"{said}: the messages cannot be decoded, found an incomplete definition of {msgtype} "
+            f"({type(error).__name__}: {error}). Fix: record again with complete definitions, or map another topic"
+        ) from error
     wanted = targets(typestore, msgtype, paths, said)
     stamp = stamp_path(typestore, msgtype)
     times = targets(typestore, msgtype, [f"{stamp}.sec", f"{stamp}.nanosec"], said) if stamp else ()
@@ -102,6 +113,7 @@ class _Unpacker:
     """Takes the wanted values out of one message with rosbags' own decoder."""
 
     def __init__(self, cdr: bool, typestore: Any, msgtype: str, wanted: Sequence[Target]) -> None:
+        self._typestore, self._cdr = typestore, cdr
         self._decode = typestore.deserialize_cdr if cdr else typestore.deserialize_ros1
         self._msgtype = msgtype
         self._wanted = [
@@ -115,8 +127,10 @@ class _Unpacker:
     def values(self, data: bytes) -> dict[str, Any] | None:
         """Return path to value, without the paths that the message lacks; None for a corrupt message."""
         try:
+            if len(data) > COUNTED_BYTES:
+                Walk(self._typestore, data, self._cdr, {}, MAX_VALUES).count(self._msgtype)
             message = self._decode(data, self._msgtype)
-        except (SerdeError, IndexError, OverflowError, MemoryError):
+        except (SerdeError, LayoutError, IndexError, OverflowError, MemoryError):
             return None
         found: dict[str, Any] = {}
         for path, steps in self._wanted:

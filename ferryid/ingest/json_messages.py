@@ -10,21 +10,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.ingest.definitions import DefinitionError, FieldList
 from ferryid.ingest.log import Loss, Nanoseconds, Series
-from ferryid.ingest.row_columns import NS_PER_S, RowColumns, Step, path_steps
+from ferryid.ingest.row_columns import INT64, NS_PER_S, RowColumns, Step, path_steps
 
 STAMP_PATHS: tuple[tuple[str, ...], ...] = (("header", "stamp"), ("timestamp",), ("stamp",))
 _SECONDS = ("sec", "secs", "seconds")
 _NANOSECONDS = ("nsec", "nanosec", "nsecs", "nanos", "nanoseconds")
 _TYPES = {"number": "float64", "integer": "int64", "boolean": "bool", "string": "string"}
 MAX_DEPTH = 20
+MAX_SCHEMA_BYTES = 4 << 20
+MAX_MESSAGE_BYTES = 16 << 20
+"""One message; parsed it needs up to thirty times as much memory."""
+# What json.loads raises for a text that is no JSON, is nested too deep or holds a number of too many digits.
+JSON_ERRORS = (ValueError, RecursionError, MemoryError)
 
 
 def schema_fields(schema: bytes) -> dict[str, str]:
-    """List the fields that a JSON schema declares, as `Topic.fields` has them; empty where it declares none."""
+    """List the fields that a JSON schema declares, as `Topic.fields` has them.
+
+    Empty where it declares none, or more than can be listed.
+    """
+    if len(schema) > MAX_SCHEMA_BYTES:
+        return {}
     try:
-        return dict(_declared(json.loads(schema), "", 0))
-    except (ValueError, RecursionError):
+        return FieldList().collect(_declared(json.loads(schema), "", 0))
+    except (DefinitionError, *JSON_ERRORS):
         return {}
 
 
@@ -34,10 +45,13 @@ def _declared(schema: Any, prefix: str, depth: int) -> Iterator[tuple[str, str]]
     kind = schema.get("type")
     if isinstance(kind, list):
         kind = next((one for one in kind if one != "null"), None)
+    if not isinstance(kind, str):
+        kind = None
     properties = schema.get("properties")
     if isinstance(properties, Mapping):
         for name, inner in properties.items():
-            yield from _declared(inner, f"{prefix}.{name}" if prefix else str(name), depth + 1)
+            name = _text(name)
+            yield from _declared(inner, f"{prefix}.{name}" if prefix else name, depth + 1)
     elif kind == "array":
         yield from _declared(schema.get("items"), f"{prefix}[]", depth + 1)
     elif kind in _TYPES and prefix:
@@ -45,11 +59,29 @@ def _declared(schema: Any, prefix: str, depth: int) -> Iterator[tuple[str, str]]
 
 
 def sample_fields(message: bytes) -> dict[str, str]:
-    """List the fields of one message, for a topic without a schema."""
+    """List the fields of one message, for a topic without a schema; empty where they are more than can be listed."""
     try:
-        return dict(_present(json.loads(message), "", 0))
-    except (ValueError, RecursionError):
+        return _listed(_parsed(message))
+    except JSON_ERRORS:
         return {}
+
+
+def _parsed(message: bytes) -> Any:
+    if len(message) > MAX_MESSAGE_BYTES:
+        raise ValueError(f"larger than {MAX_MESSAGE_BYTES} bytes")
+    return json.loads(message)
+
+
+def _listed(message: Any) -> dict[str, str]:
+    try:
+        return FieldList().collect(_present(message, "", 0))
+    except DefinitionError:
+        return {}
+
+
+def _text(value: str) -> str:
+    """Return a text without halves of surrogate pairs, which JSON can write down but no file or terminal takes."""
+    return value if value.isascii() else value.encode(errors="replace").decode()
 
 
 def _present(value: Any, prefix: str, depth: int) -> Iterator[tuple[str, str]]:
@@ -57,6 +89,7 @@ def _present(value: Any, prefix: str, depth: int) -> Iterator[tuple[str, str]]:
         return
     if isinstance(value, dict):
         for name, inner in value.items():
+            name = _text(name)
             yield from _present(inner, f"{prefix}.{name}" if prefix else name, depth + 1)
     elif isinstance(value, list):
         if value:
@@ -96,7 +129,7 @@ class JsonDecoder:
                 )
             self._wanted[path] = steps
         self._rows = RowColumns(topic, paths, {})
-        self._fields: dict[str, str] = {}
+        self._fields: dict[str, str] | None = None
 
     def add(self, buffer: Any, starts: NDArray[np.int64], sizes: NDArray[np.int64], receive_ns: Nanoseconds) -> None:
         """Take the messages that lie in `buffer` at `starts` with `sizes` [bytes]; the buffer is not kept."""
@@ -104,14 +137,18 @@ class JsonDecoder:
         for start, size, time in zip(starts.tolist(), sizes.tolist(), receive_ns.tolist(), strict=True):
             data = bytes(view[start : start + size])
             try:
-                message = json.loads(data)
-            except (ValueError, RecursionError):
+                message = _parsed(data)
+            except JSON_ERRORS:
                 self._rows.corrupt(time)
                 continue
-            if not self._fields:
-                self._fields = sample_fields(data)
+            stamp_ns = _stamp_ns(message)
+            if stamp_ns is not None and not INT64.min <= stamp_ns <= INT64.max:
+                self._rows.corrupt(time)
+                continue
+            if self._fields is None:
+                self._fields = _listed(message)
             values = {path: _leaf(message, steps) for path, steps in self._wanted.items()}
-            self._rows.row(time, _stamp_ns(message), values)
+            self._rows.row(time, stamp_ns, values)
 
     def finish(self) -> Series:
         """Return the columns of every message that could be decoded.
@@ -123,8 +160,9 @@ class JsonDecoder:
         """
         for path in self._wanted:
             if len(self._rows) and not self._rows.seen(path):
-                shown = ", ".join(list(self._fields)[:8]) or "no fields"
-                plain = [name.replace("[]", "[0]") for name in self._fields]
+                fields = list(self._fields or ())
+                shown = ", ".join(fields[:8]) or "no fields"
+                plain = [name.replace("[]", "[0]") for name in fields]
                 raise FerryIdError(
                     f"{self._where}: no JSON message has a value at {path!r}, found {shown}. "
                     f"Fix: name one of the fields.{did_you_mean(path, plain)}"
@@ -146,6 +184,8 @@ def _leaf(message: Any, steps: Sequence[Step]) -> Any:
             if not isinstance(message, dict):
                 return None
             message = message.get(step)
+    if isinstance(message, str):
+        return _text(message)
     return None if isinstance(message, (dict, list)) else message
 
 

@@ -146,7 +146,7 @@ def _target(typestore: Any, msgtype: str, path: str, where: str) -> Target:
     steps: list[Step] = []
     parts = path.split(".")
     for position, part in enumerate(parts):
-        match = re.fullmatch(r"(\w+)(?:\[(\d+)\])?", part)
+        match = re.fullmatch(r"(\w+)(?:\[([0-9]{1,10})\])?", part)
         fields = dict(typestore.fielddefs[current][1])
         if match is None or match[1] not in fields:
             shown = ", ".join(name for name in list(fields)[:8] if name != EMPTY_MEMBER)
@@ -202,6 +202,7 @@ class Walk:
     data: bytes
     cdr: bool
     wanted: Mapping[Any, Any]
+    most_steps: int = MAX_STEPS
     position: int = 0
     steps: int = 0
     places: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -217,18 +218,29 @@ class Walk:
             Where the sample does not fit its schema, or is not little-endian plain CDR.
         """
         size = len(self.data)
-        if self.cdr:
-            # Identifiers 0x0000 and 0x0001 are plain CDR; ROS2 has no other, and only the little-endian one is fast.
-            if self.data[:2] != b"\x00\x01":
-                raise LayoutError("not little-endian CDR")
-            self.position = 4
-        self._message(msgtype, self.wanted, 0)
+        self.count(msgtype)
         # CDR messages may carry up to three bytes of padding behind the last field.
         if not self.position <= size <= self.position + (3 if self.cdr else 0):
             raise LayoutError(f"{size} bytes, the schema takes {self.position}")
         if len(self.lengths) > MAX_CHECKS:
             raise LayoutError("too many lengths to check")
         return Layout(size, self.places, tuple(self.lengths), tuple(self.zeros))
+
+    def count(self, msgtype: str) -> int:
+        """Walk all fields and return how many values, strings and messages there are, arrays of numbers as one.
+
+        Raises
+        ------
+        LayoutError
+            For more than `most_steps`, and where the sample does not fit its schema or is not little-endian plain CDR.
+        """
+        if self.cdr:
+            # Identifiers 0x0000 and 0x0001 are plain CDR; ROS2 has no other, and only the little-endian one is fast.
+            if self.data[:2] != b"\x00\x01":
+                raise LayoutError("not little-endian CDR")
+            self.position = 4
+        self._message(msgtype, self.wanted, 0)
+        return self.steps
 
     def _align(self, size: int) -> None:
         if self.cdr:
@@ -274,7 +286,7 @@ class Walk:
 
     def _one(self, kind: Nodetype, inner: Any, wanted: Any, depth: int) -> None:
         self.steps += 1
-        if self.steps > MAX_STEPS:
+        if self.steps > self.most_steps:
             raise LayoutError("too many elements to walk")
         if kind == Nodetype.NAME:
             self._message(inner, wanted, depth + 1)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import lru_cache
 from typing import Any, Literal
 
 from mcap.records import Channel, Schema
-from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.msg import normalize_msgtype
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
+from ferryid.ingest.definitions import DefinitionError, parse_definition, typestore_of
 from ferryid.ingest.json_messages import JsonDecoder, sample_fields, schema_fields
 from ferryid.ingest.layout import EMPTY_MEMBER
 from ferryid.ingest.protobuf import ProtobufDecoder, protobuf_fields
@@ -27,7 +27,6 @@ _SCHEMA_ENCODINGS = {
     "json": ("jsonschema", ""),
 }
 _SERVICE = re.compile(rb"^---\s*$", re.MULTILINE)
-_IDL_FILE = re.compile(r"^=+\r?\nIDL: [^\n]*\n", re.MULTILINE)
 
 
 class LazyFields(Mapping[str, str]):
@@ -56,10 +55,6 @@ class LazyFields(Mapping[str, str]):
 
     def __reduce__(self) -> tuple[type[dict[str, str]], tuple[dict[str, str]]]:
         return dict, (dict(self._loaded()),)
-
-
-class DefinitionError(ValueError):
-    """A message definition that rosbags cannot parse."""
 
 
 def type_name(channel: Channel, schema: Schema | None) -> str:
@@ -104,25 +99,16 @@ def _bundled(channel: Channel, schema: Schema) -> Definition:
     return define(type_name(channel, schema), None, channel.metadata.get("topic_type_hash", ""), "")
 
 
-@cache
+@lru_cache(maxsize=4096)
 def _typestore(name: str, schema_encoding: str, definition: bytes) -> Any:
-    """Return a rosbags Typestore that holds one schema alone, so that equal names in other schemas cannot clash."""
-    store = get_typestore(Stores.EMPTY)
+    """Return a rosbags Typestore that holds one schema alone, or the fault of that schema as a text."""
     try:
-        text = definition.decode()
-        if schema_encoding in ("ros2idl", "omgidl"):
-            types: dict[str, Any] = {}
-            for part in _IDL_FILE.split(text):
-                if part.strip():
-                    types.update(get_types_from_idl(part))
-        else:
-            types = dict(get_types_from_msg(text, name))
-        store.register(types)
-    except (TypesysError, ValueError, KeyError, AssertionError, RecursionError) as error:
-        raise DefinitionError(f"the definition of {name} cannot be parsed") from error
-    if name not in store.fielddefs:
-        raise DefinitionError(f"the definition of {name} describes other types")
-    return store
+        store = typestore_of(parse_definition(definition.decode(), name, schema_encoding))
+    except UnicodeDecodeError:
+        return f"the definition of {name} is not UTF-8"
+    except DefinitionError as error:
+        return f"the definition of {name} {error}"
+    return store if name in store.fielddefs else f"the definition of {name} describes other types"
 
 
 def fields_of(channel: Channel, schema: Schema | None, first: Callable[[], bytes]) -> Mapping[str, str]:
@@ -146,13 +132,12 @@ def _ros_definition(channel: Channel, schema: Schema | None) -> Definition:
     bundled = _bundled(channel, schema) if not schema.data and channel.message_encoding == "cdr" else None
     if bundled is not None and bundled.fields:
         return bundled
-    try:
-        store = _typestore(name, schema.encoding, schema.data)
-    except DefinitionError as error:
+    store = _typestore(name, schema.encoding, schema.data)
+    if isinstance(store, str):
         bundled = _bundled(channel, schema)
         if channel.message_encoding == "cdr" and bundled.typestore is not None:
-            return replace(bundled, note=f"{error}; {bundled.note}")
-        return Definition(None, {}, str(error))
+            return replace(bundled, note=f"{store}; {bundled.note}")
+        return Definition(None, {}, store)
     fields = leaf_fields(store, name)
     members = [member for member, _ in store.fielddefs[name][1] if member != EMPTY_MEMBER]
     if members and not fields:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,9 @@ from google.protobuf.message_factory import GetMessageClass
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.ingest.definitions import DefinitionError, FieldList
 from ferryid.ingest.log import Loss, Nanoseconds, Series
-from ferryid.ingest.row_columns import NS_PER_S, RowColumns, Step, path_steps
+from ferryid.ingest.row_columns import INT64, NS_PER_S, RowColumns, Step, path_steps
 
 TIMESTAMP = "google.protobuf.Timestamp"
 # The package's own Descriptor and that of its C implementation have no common type.
@@ -42,19 +43,26 @@ _TYPES = {
 }
 
 
-class DefinitionError(ValueError):
-    """A schema that does not define its message."""
+MAX_DEFINITION_BYTES = 16 << 20
+"""Descriptors of one schema; they need about ten times as much memory."""
+MAX_MESSAGE_BYTES = 64 << 20
+"""One message; decoded it needs up to thirteen times as much memory."""
+MAX_NESTED = 100
+"""Messages nested in one another, as deep as protobuf itself decodes them."""
+_INTEGERS = frozenset({FieldDescriptor.TYPE_INT64, FieldDescriptor.TYPE_INT32})
 
 
-@cache
+@lru_cache(maxsize=1024)
 def message_class(definition: bytes, name: str) -> type[Message]:
     """Build the class of a message from the FileDescriptorSet in its schema.
 
     Raises
     ------
     DefinitionError
-        Where the set is damaged, incomplete or lacks the message.
+        Where the set is damaged, incomplete, too large or lacks the message.
     """
+    if len(definition) > MAX_DEFINITION_BYTES:
+        raise DefinitionError(f"is larger than {MAX_DEFINITION_BYTES >> 20} MiB")
     try:
         files = {file.name: file for file in FileDescriptorSet.FromString(definition).file}
         pool = DescriptorPool()
@@ -71,29 +79,44 @@ def message_class(definition: bytes, name: str) -> type[Message]:
         for file_name in files:
             add(file_name)
         made: type[Message] = GetMessageClass(pool.FindMessageTypeByName(name))
-    except (DecodeError, KeyError, TypeError, ValueError, RecursionError) as error:
-        raise DefinitionError(f"the protobuf definition of {name} cannot be used ({error})") from error
+    except (DecodeError, KeyError, TypeError, ValueError, RecursionError, MemoryError) as error:
+        raise DefinitionError(f"cannot be used ({error})") from error
     return made
 
 
 def protobuf_fields(definition: bytes, name: str) -> dict[str, str]:
-    """List the fields of a message, as `Topic.fields` has them; empty where the definition cannot be used."""
+    """List the fields of a message, as `Topic.fields` has them.
+
+    Empty where the definition cannot be used, or has more fields than can be listed.
+    """
     try:
-        return dict(_leaves(message_class(definition, name).DESCRIPTOR, "", ()))
+        return _listed(message_class(definition, name).DESCRIPTOR)
     except DefinitionError:
         return {}
 
 
-def _leaves(descriptor: Descriptor, prefix: str, above: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+@lru_cache(maxsize=1024)
+def _listed(descriptor: Descriptor) -> dict[str, str]:
+    found = FieldList()
+    try:
+        return found.collect(_leaves(descriptor, "", (), found))
+    except DefinitionError:
+        return {}
+
+
+def _leaves(descriptor: Descriptor, prefix: str, above: tuple[str, ...], found: FieldList) -> Iterator[tuple[str, str]]:
     if descriptor.full_name in above:
         return
+    if len(above) > MAX_NESTED:
+        raise DefinitionError(f"is nested more than {MAX_NESTED} deep")
     for field in descriptor.fields:
+        found.visit()
         inner = field.message_type
         if inner is not None and inner.GetOptions().map_entry:
             continue
         path = prefix + field.name + ("[]" if field.is_repeated else "")
         if inner is not None:
-            yield from _leaves(inner, path + ".", (*above, descriptor.full_name))
+            yield from _leaves(inner, path + ".", (*above, descriptor.full_name), found)
         elif field.type == FieldDescriptor.TYPE_BYTES:
             yield path + "[]", "uint8"
         else:
@@ -128,7 +151,8 @@ class ProtobufDecoder:
             self._class = message_class(definition, name)
         except DefinitionError as error:
             raise FerryIdError(
-                f"{where}: {error}, its fields were asked for. Fix: record again with definitions, or map another topic"
+                f"{where}: the protobuf definition of {name} {error}, its fields were asked for. "
+                "Fix: record again with definitions, or map another topic"
             ) from error
         descriptor = self._class.DESCRIPTOR
         resolved = {path: _resolve(descriptor, path, where) for path in dict.fromkeys(paths)}
@@ -139,24 +163,32 @@ class ProtobufDecoder:
     def add(self, buffer: Any, starts: NDArray[np.int64], sizes: NDArray[np.int64], receive_ns: Nanoseconds) -> None:
         """Take the messages that lie in `buffer` at `starts` with `sizes` [bytes]; the buffer is not kept."""
         view = memoryview(buffer).cast("B")
+        # Methods of the class: a field may have the name of one.
+        parse: Any = self._class.ParseFromString
         for start, size, time in zip(starts.tolist(), sizes.tolist(), receive_ns.tolist(), strict=True):
             message = self._class()
             try:
-                message.ParseFromString(bytes(view[start : start + size]))
-            except DecodeError:
+                if size > MAX_MESSAGE_BYTES:
+                    raise DecodeError(f"larger than {MAX_MESSAGE_BYTES} bytes")
+                parse(message, bytes(view[start : start + size]))
+                values = {path: _value(message, steps) for path, steps in self._wanted.items()}
+                stamp_ns = self._stamp_ns(message)
+            except (DecodeError, MemoryError, UnicodeDecodeError):
                 self._rows.corrupt(time)
                 continue
-            values = {path: _value(message, steps) for path, steps in self._wanted.items()}
-            self._rows.row(time, self._stamp_ns(message), values)
+            self._rows.row(time, stamp_ns, values)
 
     def _stamp_ns(self, message: Any) -> int | None:
         if self._stamp is None:
             return None
         for name in self._stamp:
-            if not message.HasField(name):
+            if not type(message).HasField(message, name):
                 return None
             message = getattr(message, str(name))
-        return int(message.seconds) * NS_PER_S + int(message.nanos)
+        stamp_ns = int(message.seconds) * NS_PER_S + int(message.nanos)
+        if not INT64.min <= stamp_ns <= INT64.max:
+            raise DecodeError(f"a time of {stamp_ns} ns")
+        return stamp_ns
 
     def finish(self) -> Series:
         """Return the columns of every message that could be decoded."""
@@ -176,10 +208,13 @@ def _value(message: Any, steps: _Getter) -> Any:
             if step >= len(message):
                 return None
             message = message[step]
-        elif tells_absence and not message.HasField(step):
+        elif tells_absence and not type(message).HasField(message, step):
             return None
         else:
             message = getattr(message, step)
+    if isinstance(message, bytes):
+        # What the package returns for a string that is not UTF-8; of a field of bytes, single ones are taken.
+        raise DecodeError("a string is not UTF-8")
     return message
 
 
@@ -189,14 +224,16 @@ def _is_timestamp(descriptor: Descriptor, path: str) -> bool:
         if field is None or field.is_repeated or field.message_type is None:
             return False
         descriptor = field.message_type
-    return bool(descriptor.full_name == TIMESTAMP)
+    fields = [descriptor.fields_by_name.get(name) for name in ("seconds", "nanos")]
+    plain = all(field is not None and not field.is_repeated and field.type in _INTEGERS for field in fields)
+    return plain and bool(descriptor.full_name == TIMESTAMP)
 
 
 def _resolve(descriptor: Descriptor, path: str, where: str) -> tuple[_Getter, str]:
     """Return the steps to a leaf and its primitive type; FerryIdError where there is no such leaf."""
 
     def fault(found: str) -> FerryIdError:
-        leaves = [leaf.replace("[]", "[0]") for leaf, _ in _leaves(root, "", ())]
+        leaves = [leaf.replace("[]", "[0]") for leaf in _listed(root)]
         return FerryIdError(
             f"{where}: no field {path!r} of {root.full_name}, found {found}. "
             f"Fix: name one of its fields.{did_you_mean(path, leaves)}"

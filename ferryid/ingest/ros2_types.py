@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
 
-from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 
+from ferryid.ingest.definitions import DefinitionError, parse_definition, typestore_of
 from ferryid.ingest.layout import EMPTY_MEMBER, leaf_fields
 
 # Newest first; the common message types hardly ever change between them.
@@ -96,14 +97,10 @@ def _parsed(msgtype: str, recorded: RecordedText) -> tuple[Any, str]:
     """Return a typestore with the recorded type alone, or None and what is wrong with the text."""
     if recorded.encoding not in ("ros2msg", "ros2idl"):
         return None, f"the log's definition is in {recorded.encoding or 'no'} format"
-    typestore = get_typestore(Stores.EMPTY)
     try:
-        if recorded.encoding == "ros2idl":
-            typestore.register(get_types_from_idl(recorded.text))
-        else:
-            typestore.register(get_types_from_msg(recorded.text, msgtype))
-    except TypesysError:
-        return None, "the log's definition is not valid"
+        typestore = typestore_of(parse_definition(recorded.text, msgtype, recorded.encoding))
+    except DefinitionError as error:
+        return None, f"the log's definition {error}"
     if msgtype not in typestore.fielddefs:
         return None, f"the log's definition does not describe {msgtype}"
     members = [name for name, _ in typestore.fielddefs[msgtype][1] if name != EMPTY_MEMBER]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from ferryid.ingest.log import Column, Loss, Series
 
 NS_PER_S = 1_000_000_000
+INT64 = np.iinfo(np.int64)
 Step = str | int
 _NOT_FINITE = {"NaN": np.nan, "Infinity": np.inf, "-Infinity": -np.inf}
 """How JSON writers spell the numbers that JSON does not have."""
@@ -20,11 +22,11 @@ def path_steps(path: str) -> tuple[Step, ...] | None:
     """Split ``"pose.covariance[3].x"`` into names and indices; None for a path that is not one."""
     steps: list[Step] = []
     for part in path.split("."):
-        match = re.fullmatch(r"([^\[\]]+)((?:\[\d+\])*)", part)
+        match = re.fullmatch(r"([^\[\]]+)((?:\[[0-9]{1,10}\])*)", part)
         if match is None:
             return None
         steps.append(match[1])
-        steps.extend(int(index) for index in re.findall(r"\d+", match[2]))
+        steps.extend(int(index) for index in re.findall(r"[0-9]+", match[2]))
     return tuple(steps)
 
 
@@ -92,8 +94,21 @@ def _column(values: list[Any], primitive: str | None) -> Column:
     if primitive is None:
         if not absent and all(isinstance(value, bool) for value in present):
             return np.array(values, np.bool_)
-        whole = all(isinstance(value, int) and -(1 << 63) <= value < 1 << 63 for value in present)
-        return np.array(values, np.int64 if whole and not absent else np.float64)
+        whole = all(isinstance(value, int) and INT64.min <= value <= INT64.max for value in present)
+        try:
+            return np.array(values, np.int64 if whole and not absent else np.float64)
+        except OverflowError:
+            # An integer beyond what a float holds, which as 1e400 would have been infinite too.
+            return np.array([_nearest_float(value) for value in values], np.float64)
     if absent:
         return np.array(values, np.float32 if primitive == "float32" else np.float64)
     return np.array(values, np.bool_ if primitive == "bool" else np.dtype(primitive))
+
+
+def _nearest_float(value: Any) -> float:
+    if value is None:
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
-from ferryid.ingest.unpack import MAGIC, unpack_file, working_folder
+from ferryid.ingest.unpack import codec_of, unpack_file, working_folder
 
 _SUFFIXES = (".zstd", ".zst", ".lz4")
 
@@ -21,12 +22,22 @@ class UnpackedLog:
         from ferryid.ingest import open_log
 
         self.paths = (path,)
-        unpacked, self._lost = unpack_file(path, working_folder(self))
-        self._inner_path = unpacked
+        folder = working_folder(self)
         try:
-            self._inner: Reader = open_log(unpacked, layout)
-        except FerryIdError as error:
-            raise FerryIdError(self._told(str(error))) from error
+            self._inner_path, self._lost = unpack_file(path, folder)
+            with self._inner_path.open("rb") as file:
+                if codec_of(file.read(64)):
+                    raise FerryIdError(
+                        f"{path}: a compressed file in a compressed file, found nothing to read. Fix: unpack it by hand"
+                    )
+            try:
+                self._inner: Reader = open_log(self._inner_path, layout)
+            except FerryIdError as error:
+                raise FerryIdError(self._told(str(error))) from error
+        except BaseException:
+            # An exception keeps this object, and with it the folder, for as long as it is kept itself.
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
         self.topics: tuple[Topic, ...] = self._inner.topics
 
     @property
@@ -54,7 +65,7 @@ class UnpackedLog:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return head[:4] in MAGIC and path.name.endswith(_SUFFIXES)
+    return codec_of(head) is not None and path.name.endswith(_SUFFIXES)
 
 
 # After SQLite, which unpacks its own files.

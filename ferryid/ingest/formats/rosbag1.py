@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.base import TypesysError
 from rosbags.typesys.msg import normalize_msgtype
 
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
+from ferryid.ingest.definitions import DefinitionError, parse_definition
 from ferryid.ingest.layout import EMPTY_MEMBER, stamp_path
 from ferryid.ingest.log import Format, Loss, Series, TableLayout, Topic
 from ferryid.ingest.rosbag1_records import (
@@ -215,8 +216,8 @@ class Rosbag1Reader:
         if key not in self._definitions:
             parsed: Mapping[str, Any]
             try:
-                parsed = get_types_from_msg(connection.definition, normalize_msgtype(connection.msgtype))
-            except TypesysError:
+                parsed = parse_definition(connection.definition, normalize_msgtype(connection.msgtype), "ros1msg")
+            except DefinitionError:
                 parsed = {}
             self._definitions[key] = parsed
         return self._definitions[key]

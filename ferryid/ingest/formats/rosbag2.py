@@ -10,8 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ferryid.errors import FerryIdError
 from ferryid.ingest.bulk import Decoder
 from ferryid.ingest.formats.mcap import McapLog
@@ -20,7 +18,7 @@ from ferryid.ingest.formats.sqlite3_bag import matches as is_sqlite
 from ferryid.ingest.join import join
 from ferryid.ingest.log import Format, Loss, Nanoseconds, Reader, Series, TableLayout, Topic
 from ferryid.ingest.rosbag2_metadata import KEY, NAME, File, Metadata, read_metadata
-from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file
+from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file, unpacked_batches
 
 ENDINGS = tuple(end + packed for end in (".db3", ".mcap") for packed in ("", *FORMATS.values()))
 
@@ -214,15 +212,13 @@ class _Unpacking:
 
     def add(self, buffer: Any, starts: Any, sizes: Any, receive_ns: Nanoseconds) -> None:
         view = memoryview(buffer)
-        blobs = [
-            self._unpack(bytes(view[start : start + size]))
-            for start, size in zip(starts.tolist(), sizes.tolist(), strict=True)
-        ]
-        sound = [blob for blob in blobs if blob is not None]
-        kept = np.array([blob is not None for blob in blobs], bool)
-        lengths = np.array([len(blob) for blob in sound], np.int64)
-        self._decoder.add(b"".join(sound), np.cumsum(lengths) - lengths, lengths, receive_ns[kept])
-        self._lost += len(blobs) - len(sound)
+        messages = (
+            bytes(view[start : start + size]) for start, size in zip(starts.tolist(), sizes.tolist(), strict=True)
+        )
+        self._lost += len(starts)
+        for batch, places, lengths, numbers in unpacked_batches(self._unpack, messages):
+            self._decoder.add(batch, places, lengths, receive_ns[numbers])
+            self._lost -= len(numbers)
 
     def losses(self, file: str) -> tuple[Loss, ...]:
         """Say what could not be unpacked or decoded."""

@@ -24,7 +24,7 @@ from ferryid.ingest.sqlite_pages import (
     find_rows,
     read_runs,
 )
-from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file, working_folder
+from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file, unpacked_batches, working_folder
 
 DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
 MESSAGE_COLUMNS = ["id", "topic_id", "timestamp", "data"]
@@ -301,15 +301,12 @@ class Sqlite3Log:
 
     def _add_one_by_one(self, pages: Pages, rows: Rows, decoder: Decoder) -> int:
         """Give messages to a decoder that are compressed or lie on several pages; return how many are lost."""
-        unpack = message_unpacker(self._storage.codec) if self._storage.codec else None
-        blobs = [pages.blob(rows, i) for i in range(len(rows))]
-        if unpack is not None:
-            blobs = [None if blob is None else unpack(blob) for blob in blobs]
-        sound = [blob for blob in blobs if blob is not None]
-        sizes = np.array([len(blob) for blob in sound], np.int64)
-        kept = np.array([blob is not None for blob in blobs], bool)
-        decoder.add(b"".join(sound), np.cumsum(sizes) - sizes, sizes, rows.time_ns[kept])
-        return len(blobs) - len(sound)
+        unpack = message_unpacker(self._storage.codec) if self._storage.codec else bytes
+        lost = len(rows)
+        for batch, starts, sizes, numbers in unpacked_batches(unpack, (pages.blob(rows, i) for i in range(len(rows)))):
+            decoder.add(batch, starts, sizes, rows.time_ns[numbers])
+            lost -= len(numbers)
+        return lost
 
     def _integrity(self) -> list[Loss]:
         try:
