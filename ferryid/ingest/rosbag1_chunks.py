@@ -258,11 +258,29 @@ def replaced(data: Any, chunk: Chunk, allowance: Allowance, *, intact: bool) -> 
         counts = {number: len(one) for number, one in entries.items()}
         if counts != chunk.indexed and not (intact and chunk.counts is None):
             return None
-        # A time that differs between index and message may be damaged in either of them.
-        for number, one in entries.items():
-            listed = [tuple(row) for row in chunk.entries(data, number).tolist()]
-            known, places = set(listed), {row[2] for row in listed}
-            bad = np.array([tuple(row) not in known and row[2] in places for row in one.tolist()], np.bool_)
-            if bad.any():
-                doubtful[number], entries[number] = one[bad], one[~bad]
+        for number, rows in _contradicted(data, chunk, entries).items():
+            entries[number], doubtful[number] = entries[number][~rows], entries[number][rows]
     return Replaced(replace(chunk, walked=entries), content.buffer, doubtful)
+
+
+def _contradicted(data: Any, chunk: Chunk, walked: dict[int, Entries]) -> dict[int, NDArray[np.bool_]]:
+    """Return which messages of each connection have another time in the index, and that may be the right one.
+
+    The time of either may be damaged. Where the times of most messages differ the index records are another chunk's.
+    """
+    doubtful: dict[int, NDArray[np.bool_]] = {}
+    for number, entries in walked.items():
+        listed = {tuple(row) for row in chunk.entries(data, number).tolist()}
+        if chunk.start_ns is not None and chunk.end_ns is not None:
+            within = range(chunk.start_ns, chunk.end_ns + 1)
+        else:
+            within = range(2**63)
+        places = {place for seconds, ns, place in listed if seconds * 1_000_000_000 + ns in within}
+        rows = [
+            (seconds, ns, place) not in listed and (place in places or seconds * 1_000_000_000 + ns not in within)
+            for seconds, ns, place in entries.tolist()
+        ]
+        if any(rows):
+            doubtful[number] = np.array(rows, np.bool_)
+    count = sum(int(np.count_nonzero(rows)) for rows in doubtful.values())
+    return doubtful if 2 * count < sum(len(one) for one in walked.values()) or count == 1 else {}

@@ -39,6 +39,7 @@ from ferryid.ingest.rosbag1_records import (
 # information this many in all; that of a connection has its topic too.
 BEFORE_KIND = 64
 MAX_SHORT_HEADER = 1024
+NOT_LISTED = "no chunk information agrees with them"
 
 
 @dataclass
@@ -99,8 +100,12 @@ def walk(records: Records) -> Walked:
             following = record.end
             if record.op == CHUNK:
                 chunk = chunk_of(record)
+                stated = chunk.end
                 following = _end_of_chunk(finder, chunk)
                 found.chunks.append(chunk)
+                if chunk.end != stated:
+                    # The index records found there may be another chunk's.
+                    found.doubts[position] = "its stated length is damaged, or they are"
             elif record.op == BAG_HEADER and position == len(MAGIC):
                 following = finder.next(record.start, (CHUNK, CHUNK_INFO, CONNECTION))
             elif record.op == INDEX and found.chunks:
@@ -127,13 +132,44 @@ def walk(records: Records) -> Walked:
         position = following
     for number in doubtful:
         del found.connections[number]
-    _assign(data, found, infos)
+    infos = list({(info.chunk, info.start_ns, info.end_ns, *info.counts.items()): info for info in infos}.values())
     _drop_repeats(data, found)
+    left = _assign_all(data, found, infos)
+    if any(not any(first <= info.chunk < end for first, end in found.gaps) for info in left):
+        # No damage accounts for what these records list: chunks may have index records of others behind them.
+        for chunk in found.chunks:
+            chunk.counts = chunk.start_ns = chunk.end_ns = None
+            found.doubts.setdefault(chunk.position, NOT_LISTED)
+        left = _assign_all(data, found, infos)
+    by_place = {chunk.position: chunk for chunk in found.chunks}
+    for info in left:
+        chunk_there = by_place.get(info.chunk)
+        if chunk_there is None:
+            found.missing.append(info)
+        elif chunk_there.counts is None:
+            info.note_on(chunk_there)
+    return found
+
+
+def _assign_all(data: Any, found: Walked, infos: list[ChunkInfo]) -> list[ChunkInfo]:
+    """Give chunks their information records, after a look into those in doubt; returns the records that are left."""
+    sure = [chunk for chunk in found.chunks if chunk.position not in found.doubts]
+    left = _assign(data, sure, infos, moved=False)
+    unlisted = [chunk for chunk in sure if chunk.counts is None]
+    if _assign(data, unlisted, left, moved=True):
+        # Records are left over: index records may stand behind a chunk that is not theirs.
+        for chunk in unlisted:
+            chunk.counts = chunk.start_ns = chunk.end_ns = None
+            if chunk.index:
+                found.doubts[chunk.position] = NOT_LISTED
+    else:
+        left = []
     if found.chunks and found.chunks[-1].counts is None:
         # The file may end between the index records of its last chunk.
         found.chunks[-1].index.clear()
     _walk_chunks(data, found)
-    return found
+    left = _assign(data, found.chunks, left, moved=False)
+    return _assign(data, found.chunks, left, moved=True)
 
 
 def _end_of_chunk(finder: _Finder, chunk: Chunk) -> int:
@@ -201,43 +237,34 @@ def _complete(data: Any, record: Record) -> int:
     return record.op
 
 
-def _assign(data: Any, found: Walked, infos: list[ChunkInfo]) -> None:
-    """Give each chunk its information record: by its place, or where bytes went missing or came in by what it states."""
-    by_place = {chunk.position: chunk for chunk in found.chunks}
-    left: list[ChunkInfo] = []
-    taken: dict[int, ChunkInfo] = {}
-    for info in infos:
-        chunk = by_place.get(info.chunk)
-        if chunk is None or (chunk.index and chunk.indexed != info.counts and _content(data, chunk) is not None):
-            left.append(info)
-        elif info.chunk not in taken:
-            taken[info.chunk] = info
-            info.note_on(chunk)
-        elif taken[info.chunk]._replace(position=info.position) != info:
-            left.append(info)
-    free: dict[Any, list[Chunk]] = {}
-    for chunk in found.chunks if left else ():
+def _assign(data: Any, chunks: list[Chunk], infos: list[ChunkInfo], *, moved: bool) -> list[ChunkInfo]:
+    """Give chunks without an information record the one that states what they hold; returns the records that are left.
+
+    The record must be of a chunk at that place, or with `moved` of any: where bytes went missing or came in, all chunks
+    behind them have moved.
+    """
+    free: dict[Any, dict[int, Chunk]] = {}
+    for chunk in chunks if infos else ():
         if chunk.counts is None:
-            free.setdefault(_content(data, chunk), []).append(chunk)
-    for info in left:
-        same = free.get((info.start_ns, info.end_ns, frozenset(info.counts.items())))
-        if same:
-            info.note_on(same.pop(0))
-            continue
-        chunk = by_place.get(info.chunk)
-        if chunk is not None and chunk.counts is None:
-            info.note_on(chunk)
-        elif chunk is None:
-            found.missing.append(info)
+            free.setdefault(_content(data, chunk), {})[chunk.position] = chunk
+    left: list[ChunkInfo] = []
+    for info in infos:
+        same = free.get((info.start_ns, info.end_ns, frozenset(info.counts.items())), {})
+        place = next(iter(same), -1) if moved else info.chunk
+        if place in same:
+            info.note_on(same.pop(place))
+        else:
+            left.append(info)
+    return left
 
 
 def _content(data: Any, chunk: Chunk) -> tuple[int, int, frozenset[tuple[int, int]]] | None:
-    """Return what a chunk information record of a chunk would state, by its index records."""
-    entries = [chunk.entries(data, number) for number in chunk.indexed]
-    if not entries:
+    """Return what a chunk information record of a chunk would state, by its index records or the walk over it."""
+    counts = {number: chunk.count(number) for number in chunk.connections if chunk.count(number)}
+    if not counts:
         return None
-    times = np.concatenate([nanoseconds(one) for one in entries])
-    return int(times.min()), int(times.max()), frozenset(chunk.indexed.items())
+    times = np.concatenate([nanoseconds(chunk.entries(data, number)) for number in counts])
+    return int(times.min()), int(times.max()), frozenset(counts.items())
 
 
 def _drop_repeats(data: Any, found: Walked) -> None:
@@ -258,13 +285,12 @@ def _drop_repeats(data: Any, found: Walked) -> None:
 
 
 def _walk_chunks(data: Any, found: Walked) -> None:
-    """Look into the chunks whose index records are lost or contradict what else is known, or of unknown connections."""
+    """Look into the chunks whose index records are lost or in doubt, or of unknown connections."""
     allowance = Allowance.of_file(len(data))
     for chunk in found.chunks:
-        if chunk.index and chunk.counts is not None and chunk.indexed != chunk.counts:
-            found.doubts.setdefault(chunk.position, "the counts of the chunk differ")
         trusted = chunk.index and chunk.position not in found.doubts
-        if trusted and all(number in found.connections for number in chunk.index):
+        known = all(number in found.connections for number in chunk.index)
+        if chunk.walked is not None or (trusted and known):
             continue
         content = decompressed(data, chunk, allowance, exact=True)
         walked = walk_chunk(content.buffer)
@@ -337,9 +363,8 @@ def _add_chunks(data: Any, found: Walked, add: Callable[..., None]) -> None:
         else:
             what = f"the chunk at byte {chunk.position} is damaged, {fault}: {kept} messages of it are intact"
         counts = chunk.counts
-        # Where index records contradict the counts nobody knows how many messages the chunk held.
-        known = counts is not None and (not chunk.index or chunk.indexed == counts)
-        add(what, sum(max(0, n - chunk.count(one)) for one, n in counts.items()) if counts and known else None)
+        lost = None if counts is None else sum(max(0, n - chunk.count(one)) for one, n in counts.items())
+        add(what, lost, chunk.start_ns, chunk.end_ns)
 
 
 def _estimate(data: Any, chunks: Sequence[Chunk], index: int) -> tuple[str, None, int | None, int | None]:

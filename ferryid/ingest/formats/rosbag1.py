@@ -284,7 +284,14 @@ class Rosbag1Reader:
                 f"{file}: topic {name} cannot be decoded, found no readable definition of {topic.type}. "
                 "Fix: copy the bag from the recorder again"
             )
-        if connection.md5sum not in ("*", store.generate_msgdef(topic.type)[1]):
+        try:
+            md5sum = store.generate_msgdef(topic.type)[1]
+        except TypesysError as error:
+            raise FerryIdError(
+                f"{file}: topic {name} cannot be decoded, found no definition of a type that {topic.type} is made of "
+                f"({str(error).splitlines()[0]}). Fix: copy the bag from the recorder again"
+            ) from error
+        if connection.md5sum not in ("*", md5sum):
             what = f"the definition of {topic.type} does not match its checksum: values of {name} may be misread"
             lost.append(Loss(str(file), what, name, 0))
         return decoder_for("ros1", store, topic.type, name, paths, topic.count, where=str(file))
