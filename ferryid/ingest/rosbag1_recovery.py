@@ -2,178 +2,383 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import hashlib
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from ferryid.ingest.log import Loss
+from ferryid.ingest.rosbag1_chunks import Allowance, decompressed, walk_chunk
 from ferryid.ingest.rosbag1_records import (
+    BAG_HEADER,
     CHUNK,
     CHUNK_INFO,
     COMPRESSIONS,
     CONNECTION,
     INDEX,
     MAGIC,
-    MESSAGE,
+    MAX_CHUNKS,
+    MAX_CONNECTIONS,
     Chunk,
+    ChunkInfo,
     Connection,
-    Entries,
     Record,
     RecordError,
     Records,
     chunk_of,
     connection_of,
-    decompressed,
-    note_chunk_info,
+    info_of,
+    nanoseconds,
     note_index,
 )
 
-
-class Missing(NamedTuple):
-    """A chunk that the index tells of and that is not there; times [ns] None where the record has none."""
-
-    position: int
-    messages: int
-    start_ns: int | None
-    end_ns: int | None
+# Fields before the kind of a record in its header take up to this many bytes, and the header of a chunk, its index or its
+# information this many in all; that of a connection has its topic too.
+BEFORE_KIND = 64
+MAX_SHORT_HEADER = 1024
+NOT_LISTED = "no chunk information agrees with them"
 
 
 @dataclass
 class Walked:
-    """What a walk over the records found: `gaps` are stretches of bytes that are no records."""
+    """What a walk over the records found.
+
+    Attributes
+    ----------
+    connections, chunks
+        Connections by number, and chunks in file order.
+    gaps
+        Stretches of bytes that are no records.
+    missing
+        Chunk information records of chunks that are not there any more.
+    doubts
+        Byte of a chunk to what was wrong with its index records: it was walked in their place.
+    faults
+        Byte of a chunk that was walked to what is wrong with the chunk itself.
+    repeats
+        Byte of a chunk that was left out to the byte of the same chunk before it.
+    index
+        First byte behind the chunks and their index records, None where nothing is left behind them.
+    """
 
     connections: dict[int, Connection] = field(default_factory=dict)
     chunks: list[Chunk] = field(default_factory=list)
     gaps: list[tuple[int, int]] = field(default_factory=list)
-    missing: list[Missing] = field(default_factory=list)
+    missing: list[ChunkInfo] = field(default_factory=list)
+    doubts: dict[int, str] = field(default_factory=dict)
+    faults: dict[int, str] = field(default_factory=dict)
+    repeats: dict[int, int] = field(default_factory=dict)
+    index: int | None = None
 
     def gap(self, first: int, end: int) -> None:
         """Note bytes that are no records."""
         self.gaps.append((first, end))
         # They may hold index records of the chunk before them: what it holds is then to be seen in itself alone.
-        if self.chunks and first >= self.chunks[-1].end:
+        if self.chunks and first >= self.chunks[-1].end and self.index is None:
             self.chunks[-1].index.clear()
 
 
 def walk(records: Records) -> Walked:
-    """Walk over the records of a bag without an index, past damaged stretches, to the end of what is there."""
+    """Walk over the records of a bag without an index, past damaged stretches, to the end of what is there.
+
+    Raises
+    ------
+    RecordError
+        For more connections or chunks than a recorder writes.
+    """
     data = records.data
-    found = Walked()
+    found, finder = Walked(), _Finder(records)
+    infos: list[ChunkInfo] = []
+    doubtful: set[int] = set()
     position = len(MAGIC)
-    by_position: dict[int, Chunk] = {}
     while position < len(data):
         try:
             record = records.at(position)
+            following = record.end
             if record.op == CHUNK:
                 chunk = chunk_of(record)
+                stated = chunk.end
+                following = _end_of_chunk(finder, chunk)
                 found.chunks.append(chunk)
-                by_position[position] = chunk
-            elif record.end > len(data):
-                raise RecordError(f"the file ends in the record at byte {position}")
+                if chunk.end != stated:
+                    # The index records found there may be another chunk's.
+                    found.doubts[position] = "its stated length is damaged, or they are"
+            elif record.op == BAG_HEADER and position == len(MAGIC):
+                following = finder.next(record.start, (CHUNK, CHUNK_INFO, CONNECTION))
             elif record.op == INDEX and found.chunks:
-                note_index(data, found.chunks[-1], record)
+                duplicate = note_index(data, found.chunks[-1], record)
+                if duplicate:
+                    found.doubts[found.chunks[-1].position] = duplicate
             elif record.op == CONNECTION:
                 connection = connection_of(data, record)
-                found.connections[connection.number] = connection
+                if found.connections.setdefault(connection.number, connection) != connection:
+                    doubtful.add(connection.number)
+                found.index = found.index or position
             elif record.op == CHUNK_INFO:
-                _note_info(records, found, by_position, record)
-            following = record.end
+                infos.append(info_of(data, record))
+                found.index = found.index or position
+            else:
+                raise RecordError(f"no record outside a chunk at byte {position}")
         except RecordError:
-            following = _next_chunk(records, position + 1)
+            following = finder.next(position + 1, (CHUNK,))
+            if following == len(data):
+                following = finder.next(position + 1, (CHUNK_INFO, CONNECTION))
             found.gap(position, following)
-        # A chunk whose length is damaged would swallow those behind it: its successor must be a record too.
-        if following < len(data) and not _is_record(records, following):
-            resumed = _next_chunk(records, position + 1)
-            if resumed < following:
-                found.gap(position, resumed)
-                following = resumed
+        if len(found.connections) > MAX_CONNECTIONS or len(found.chunks) > MAX_CHUNKS:
+            raise RecordError(f"it holds more than {MAX_CONNECTIONS} connections or {MAX_CHUNKS} chunks")
         position = following
-    if found.chunks:
-        # The file may end between the index records of its last chunk.
-        found.chunks[-1].index.clear()
-    _walk_chunks(data, found)
+    for number in doubtful:
+        del found.connections[number]
+    infos = list({(info.chunk, info.start_ns, info.end_ns, *info.counts.items()): info for info in infos}.values())
+    _drop_repeats(data, found)
+    left = _assign_all(data, found, infos)
+    if any(not any(first <= info.chunk < end for first, end in found.gaps) for info in left):
+        # No damage accounts for what these records list: chunks may have index records of others behind them.
+        for chunk in found.chunks:
+            chunk.counts = chunk.start_ns = chunk.end_ns = None
+            found.doubts.setdefault(chunk.position, NOT_LISTED)
+        left = _assign_all(data, found, infos)
+    by_place = {chunk.position: chunk for chunk in found.chunks}
+    for info in left:
+        chunk_there = by_place.get(info.chunk)
+        if chunk_there is None:
+            found.missing.append(info)
+        elif chunk_there.counts is None:
+            info.note_on(chunk_there)
     return found
 
 
-def _note_info(records: Records, found: Walked, chunks: dict[int, Chunk], record: Record) -> None:
-    position = record.number(b"chunk_pos")
-    chunk = chunks.get(position)
-    if chunk is not None:
-        note_chunk_info(chunk, record)
-        return
-    if record.end - record.start < 8 * record.number(b"count"):
-        raise RecordError(f"chunk information of another size at byte {record.position}")
-    absent = Chunk(position, 0, 0, "", 0)
-    note_chunk_info(absent, record)
-    counts = np.frombuffer(records.data, "<u4", 2 * record.number(b"count"), record.start)[1::2]
-    found.missing.append(Missing(position, int(counts.sum()), absent.start_ns, absent.end_ns))
+def _assign_all(data: Any, found: Walked, infos: list[ChunkInfo]) -> list[ChunkInfo]:
+    """Give chunks their information records, after a look into those in doubt; returns the records that are left."""
+    sure = [chunk for chunk in found.chunks if chunk.position not in found.doubts]
+    left = _assign(data, sure, infos, moved=False)
+    unlisted = [chunk for chunk in sure if chunk.counts is None]
+    if _assign(data, unlisted, left, moved=True):
+        # Records are left over: index records may stand behind a chunk that is not theirs.
+        for chunk in unlisted:
+            chunk.counts = chunk.start_ns = chunk.end_ns = None
+            if chunk.index:
+                found.doubts[chunk.position] = NOT_LISTED
+    else:
+        left = []
+    if found.chunks and found.chunks[-1].counts is None:
+        # The file may end between the index records of its last chunk.
+        found.chunks[-1].index.clear()
+    _walk_chunks(data, found)
+    left = _assign(data, found.chunks, left, moved=False)
+    return _assign(data, found.chunks, left, moved=True)
+
+
+def _end_of_chunk(finder: _Finder, chunk: Chunk) -> int:
+    """Correct the end of a chunk whose stored length is damaged, from the record that must follow; returns the end."""
+    size = len(finder.records.data)
+    kind = _kind(finder.records, chunk.end)
+    if (
+        chunk.end == size
+        or kind in (INDEX, CHUNK)
+        or (kind in (CONNECTION, CHUNK_INFO) and chunk.compression != "none")
+    ):
+        return chunk.end
+    end = finder.next(chunk.start, (INDEX, CHUNK))
+    if end < size:
+        chunk.end = end
+    return min(chunk.end, size)
+
+
+def _kind(records: Records, position: int) -> int:
+    """Return the kind of the record at a byte, 0 where none is."""
+    try:
+        return records.at(position).op
+    except RecordError:
+        return 0
+
+
+class _Finder:
+    """Finds where records begin. Once there is none of some kinds up to the end, it does not look for them again."""
+
+    def __init__(self, records: Records) -> None:
+        self.records = records
+        self._absent: dict[tuple[int, ...], int] = {}
+
+    def next(self, position: int, kinds: tuple[int, ...]) -> int:
+        """Return the byte at which the next record of some kinds begins; the end of the data when there is none."""
+        data = self.records.data
+        if position >= self._absent.get(kinds, len(data)):
+            return len(data)
+        for marker in re.compile(b"\x04\x00\x00\x00op=[" + re.escape(bytes(kinds)) + b"]").finditer(data, position):
+            place = marker.start()
+            # The header's fields come in any order, so its length lies up to the other fields' length before the marker.
+            for start in range(max(position, place - 4 - BEFORE_KIND), place - 3):
+                # Only a header of a few fields that reaches past the marker is worth parsing.
+                if place - start < int.from_bytes(data[start : start + 4], "little") <= MAX_SHORT_HEADER:
+                    try:
+                        if _complete(data, self.records.at(start)) in kinds:
+                            return start
+                    except RecordError:
+                        continue
+        self._absent[kinds] = position
+        return len(data)
+
+
+def _complete(data: Any, record: Record) -> int:
+    """Return the kind of a record outside chunks that has all that one of its kind must have."""
+    if record.op == CHUNK:
+        if chunk_of(record).compression not in COMPRESSIONS:
+            raise RecordError(f"a chunk of unknown compression at byte {record.position}")
+    elif record.op == INDEX:
+        note_index(data, Chunk(0, 0, 0, "", 0), record)
+    elif record.op == CHUNK_INFO:
+        info_of(data, record)
+    elif record.op == CONNECTION:
+        connection_of(data, record)
+    return record.op
+
+
+def _assign(data: Any, chunks: list[Chunk], infos: list[ChunkInfo], *, moved: bool) -> list[ChunkInfo]:
+    """Give chunks without an information record the one that states what they hold; returns the records that are left.
+
+    The record must be of a chunk at that place, or with `moved` of any: where bytes went missing or came in, all chunks
+    behind them have moved.
+    """
+    free: dict[Any, dict[int, Chunk]] = {}
+    for chunk in chunks if infos else ():
+        if chunk.counts is None:
+            free.setdefault(_content(data, chunk), {})[chunk.position] = chunk
+    left: list[ChunkInfo] = []
+    for info in infos:
+        same = free.get((info.start_ns, info.end_ns, frozenset(info.counts.items())), {})
+        place = next(iter(same), -1) if moved else info.chunk
+        if place in same:
+            info.note_on(same.pop(place))
+        else:
+            left.append(info)
+    return left
+
+
+def _content(data: Any, chunk: Chunk) -> tuple[int, int, frozenset[tuple[int, int]]] | None:
+    """Return what a chunk information record of a chunk would state, by its index records or the walk over it."""
+    counts = {number: chunk.count(number) for number in chunk.connections if chunk.count(number)}
+    if not counts:
+        return None
+    times = np.concatenate([nanoseconds(chunk.entries(data, number)) for number in counts])
+    return int(times.min()), int(times.max()), frozenset(counts.items())
+
+
+def _drop_repeats(data: Any, found: Walked) -> None:
+    """Leave out chunks that repeat another byte by byte."""
+    alike: dict[tuple[int, int], list[Chunk]] = {}
+    for chunk in found.chunks:
+        alike.setdefault((chunk.size, chunk.end - chunk.start), []).append(chunk)
+    for group in alike.values():
+        seen: dict[bytes, Chunk] = {}
+        for chunk in group if len(group) > 1 else ():
+            digest = hashlib.blake2b(memoryview(data)[chunk.start : chunk.end]).digest()
+            first = seen.setdefault(digest, chunk)
+            if first is not chunk and chunk.end > chunk.start:
+                found.repeats[chunk.position] = first.position
+                if first.counts is None:
+                    first.counts = chunk.counts
+    found.chunks = [chunk for chunk in found.chunks if chunk.position not in found.repeats]
 
 
 def _walk_chunks(data: Any, found: Walked) -> None:
-    """Look into the chunks that have no index records, or messages of a connection not seen yet."""
+    """Look into the chunks whose index records are lost or in doubt, or of unknown connections."""
+    allowance = Allowance.of_file(len(data))
     for chunk in found.chunks:
-        if chunk.index and all(number in found.connections for number in chunk.index):
+        trusted = chunk.index and chunk.position not in found.doubts
+        known = all(number in found.connections for number in chunk.index)
+        if chunk.walked is not None or (trusted and known):
             continue
-        buffer, _ = decompressed(data, chunk, exact=True)
-        connections, entries = walk_chunk(buffer)
-        found.connections = {**connections, **found.connections}
-        if not chunk.index:
-            chunk.walked = entries
+        content = decompressed(data, chunk, allowance, exact=True)
+        walked = walk_chunk(content.buffer)
+        found.connections = {**walked.connections, **found.connections}
+        if not trusted:
+            chunk.walked = walked.entries
+            if not (content.whole and walked.whole):
+                found.faults[chunk.position] = content.fault or "its records are damaged"
 
 
-def _is_record(records: Records, position: int) -> bool:
+def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss]:
+    """Return what a walk found to be lost, and what it read in spite of damage, of a bag whose index failed."""
+    size = len(data)
+    lost: list[Loss] = []
+
+    def add(what: str, messages: int | None, start_ns: int | None = None, end_ns: int | None = None) -> None:
+        lost.append(Loss(file, what, None, messages, start_ns, end_ns))
+
+    count = sum(chunk.count(number) for chunk in found.chunks for number in chunk.connections)
+    add(f"the index cannot be used ({error}): a walk over all records found {count} messages without it", 0)
+    _add_chunks(data, found, add)
     try:
-        records.at(position)
+        announced = Records(data).at(len(MAGIC)).number(b"index_pos")
     except RecordError:
-        return False
-    return True
+        announced = 0
+    # An index that is there shows that only its announced place is damaged, not that the file was cut.
+    cut = found.index is None and announced > size
+    if cut:
+        add(*_estimate(data, found.chunks, announced))
+    for info in found.missing:
+        messages = sum(info.counts.values())
+        what = f"the chunk at byte {info.chunk} is damaged: its {messages} messages are lost"
+        add(what, messages, info.start_ns, info.end_ns)
+    reported = {info.chunk for info in found.missing}
+    complete = found.index is not None and all(chunk.counts is not None for chunk in found.chunks)
+    for first, end in found.gaps:
+        # Damage to the index itself, the end of a cut file and chunks with a count are in the list already.
+        if first in reported or (found.index is not None and first >= found.index) or (end >= size and cut):
+            continue
+        if complete:
+            add(f"bytes {first} to {end} are damaged: every chunk that the index lists was found without them", 0)
+        else:
+            add(f"bytes {first} to {end} are damaged: what they held is lost", None)
+    return lost
 
 
-def _next_chunk(records: Records, position: int) -> int:
-    """Find where the next chunk record begins; the end of the data when there is none."""
-    data = records.data
-    marker = b"\x04\x00\x00\x00op=\x05"
-    place = data.find(marker, position)
-    while place != -1:
-        # The header's fields come in any order, so its length lies up to the other fields' length before the marker.
-        for start in range(max(position, place - 64), place - 3):
-            try:
-                record = records.at(start)
-                if record.op == CHUNK and chunk_of(record).compression in COMPRESSIONS:
-                    return start
-            except RecordError:
-                continue
-        place = data.find(marker, place + 1)
-    return len(data)
+def _add_chunks(data: Any, found: Walked, add: Callable[..., None]) -> None:
+    """Report what each chunk lost, and in one line the chunks that were read in spite of their index records."""
+    walked = [chunk for chunk in found.chunks if chunk.position in found.doubts and chunk.position not in found.faults]
+    if walked:
+        first = walked[0].position
+        more = f" and {len(walked) - 1} more" if len(walked) > 1 else ""
+        add(
+            f"the index records of the chunk at byte {first}{more} are damaged ({found.doubts[first]}): "
+            "its messages were read from the chunk itself",
+            0,
+        )
+    for position, first in found.repeats.items():
+        add(f"the chunk at byte {position} repeats that at byte {first}: its messages are taken once", 0)
+    for chunk in found.chunks:
+        fault = found.faults.get(chunk.position)
+        if fault is None:
+            continue
+        kept = sum(chunk.count(number) for number in chunk.connections)
+        if chunk.end > len(data):
+            what = (
+                f"the file ends in the chunk at byte {chunk.position}, which has {len(data) - chunk.start} of its "
+                f"{chunk.end - chunk.start} bytes: {kept} messages of it are intact"
+            )
+        else:
+            what = f"the chunk at byte {chunk.position} is damaged, {fault}: {kept} messages of it are intact"
+        counts = chunk.counts
+        lost = None if counts is None else sum(max(0, n - chunk.count(one)) for one, n in counts.items())
+        add(what, lost, chunk.start_ns, chunk.end_ns)
 
 
-def walk_chunk(buffer: Any) -> tuple[dict[int, Connection], dict[int, Entries]]:
-    """List the connections and the message records of one decompressed chunk, up to its first damaged byte."""
-    connections: dict[int, Connection] = {}
-    entries: dict[int, list[tuple[int, int, int]]] = {}
-    for record in _records(buffer):
-        try:
-            if record.op == CONNECTION:
-                connection = connection_of(buffer, record)
-                connections[connection.number] = connection
-            elif record.op == MESSAGE:
-                time = record.number(b"time")
-                entry = (time & 0xFFFFFFFF, time >> 32, record.position)
-                entries.setdefault(record.number(b"conn"), []).append(entry)
-        except RecordError:
-            break
-    return connections, {number: np.array(found, np.uint32) for number, found in entries.items()}
-
-
-def _records(buffer: Any) -> Iterator[Record]:
-    position, records = 0, Records(buffer)
-    while position < len(buffer):
-        try:
-            record = records.at(position)
-        except RecordError:
-            return
-        if record.end > len(buffer):
-            return
-        yield record
-        position = record.end
+def _estimate(data: Any, chunks: Sequence[Chunk], index: int) -> tuple[str, None, int | None, int | None]:
+    """Estimate how much of a bag is missing behind the end of the file, from the bytes that its header announces."""
+    times = [
+        nanoseconds(entries)
+        for chunk in chunks
+        for entries in (chunk.entries(data, number) for number in chunk.connections)
+        if len(entries)
+    ]
+    size, part = len(data), (index - len(data)) / len(data)
+    what = f"the file ends at byte {size} of more than {index}: about {100 * (index - size) / index:.0f} % is lost at the end"
+    if not times:
+        return what, None, None, None
+    first, last = min(int(one.min()) for one in times), max(int(one.max()) for one in times)
+    messages, seconds = part * sum(len(one) for one in times), part * (last - first) * 1e-9
+    return f"{what}, by the rate before it {messages:.0f} messages in {seconds:.1f} s", None, last, None

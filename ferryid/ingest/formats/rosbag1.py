@@ -23,21 +23,30 @@ from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
 from ferryid.ingest.definitions import DefinitionError, parse_definition
 from ferryid.ingest.layout import EMPTY_MEMBER, stamp_path
 from ferryid.ingest.log import Format, Loss, Series, TableLayout, Topic
+from ferryid.ingest.rosbag1_chunks import (
+    FREE_CHUNK,
+    Allowance,
+    Content,
+    covers,
+    decompressed,
+    distinct,
+    replaced,
+)
+from ferryid.ingest.rosbag1_messages import Messages
 from ferryid.ingest.rosbag1_records import (
     MAGIC,
+    NO_ENTRIES,
     Chunk,
     Connection,
     Entries,
-    Messages,
     RecordError,
     Records,
-    decompressed,
+    nanoseconds,
     read_index,
 )
-from ferryid.ingest.rosbag1_recovery import walk
+from ferryid.ingest.rosbag1_recovery import losses, walk
 
 SUFFIXES = (".bag", ".bag.active")
-NS = 1_000_000_000
 SEVERAL_TYPES = "recorded with different message types or definitions: cannot be read as one topic"
 # Chunks decompressed ahead in threads where decompression is slow (bz2).
 AHEAD = 4
@@ -64,15 +73,31 @@ FORMAT = Format(name="ROS1 bag (.bag)", matches=matches, open=open_bag, order=20
 
 @dataclass
 class _Tally:
-    """Messages lost in one place, with the receive times known of them."""
+    """Messages lost in one chunk, with the receive times known of them, and what was found of its index records.
+
+    Attributes
+    ----------
+    count, others
+        Lost messages of the wanted topics, and of the others.
+    times
+        Receive times of the first and the last of some of them [ns].
+    repaired
+        Whether the messages were read from the chunk in place of its index records.
+    hidden
+        Whether there may be messages that no index record lists.
+    """
 
     count: int = 0
+    others: int = 0
     times: list[int] = field(default_factory=list)
+    repaired: bool = False
+    hidden: bool = False
 
-    def add(self, receive_ns: NDArray[np.int64]) -> None:
+    def add(self, receive_ns: NDArray[np.int64], *, wanted: bool) -> None:
         """Count the messages received at these times."""
         if len(receive_ns):
-            self.count += len(receive_ns)
+            self.count += len(receive_ns) if wanted else 0
+            self.others += 0 if wanted else len(receive_ns)
             self.times += [int(receive_ns.min()), int(receive_ns.max())]
 
 
@@ -90,6 +115,11 @@ class Rosbag1Reader:
             connections, chunks = self._recovered(error)
         self._chunks = chunks
         self._note_strangers({connection.number for connection in connections})
+        self._chunks_of: dict[int, list[Chunk]] = {}
+        for chunk in chunks:
+            for number in chunk.connections:
+                if chunk.count(number):
+                    self._chunks_of.setdefault(number, []).append(chunk)
         self._by_topic: dict[str, list[Connection]] = {}
         for connection in connections:
             self._by_topic.setdefault(connection.topic, []).append(connection)
@@ -115,41 +145,18 @@ class Rosbag1Reader:
 
     def _recovered(self, error: RecordError) -> tuple[list[Connection], list[Chunk]]:
         """Read the bag without its index, and note what is not there any more."""
-        path, size = self.paths[0], len(self._data)
-        records = Records(self._data)
+        path = self.paths[0]
         try:
-            index = records.at(len(MAGIC)).number(b"index_pos")
-        except RecordError:
-            index = 0
-        found = walk(records)
+            found = walk(Records(self._data))
+        except RecordError as excess:
+            raise FerryIdError(
+                f"{path}: the bag cannot be read, {excess}. Fix: copy it from the recorder again"
+            ) from excess
         if not found.connections:
             raise FerryIdError(
                 f"{path}: no message can be recovered from the bag, {error}. Fix: copy it from the recorder again"
             ) from error
-
-        def lost(
-            what: str, messages: int | None = None, start_ns: int | None = None, end_ns: int | None = None
-        ) -> None:
-            self._opening.append(Loss(str(path), what, None, messages, start_ns, end_ns))
-
-        count = sum(chunk.count(number) for chunk in found.chunks for number in chunk.connections)
-        lost(f"the index cannot be used ({error}): a walk over all records found {count} messages without it", 0)
-        for chunk in found.chunks:
-            if chunk.end > size:
-                kept = sum(len(entries) for entries in chunk.walked.values())
-                lost(
-                    f"the file ends in the chunk at byte {chunk.position}, which has {size - chunk.start} of its "
-                    f"{chunk.end - chunk.start} bytes: {kept} messages of it are intact"
-                )
-        if index > size:
-            lost(*_estimate(self._data, found.chunks, index))
-        for place, messages, start_ns, end_ns in found.missing:
-            lost(f"the chunk at byte {place} is damaged: its {messages} messages are lost", messages, start_ns, end_ns)
-        told = {place for place, *_ in found.missing}
-        for first, end in found.gaps:
-            # Damage to the index itself, the end of a cut file and chunks with a count have been told already.
-            if first not in told and not 0 < index <= first and not (end >= size and index > size):
-                lost(f"bytes {first} to {end} are damaged: what they held is lost")
+        self._opening += losses(str(path), self._data, found, error)
         return list(found.connections.values()), found.chunks
 
     def _note_strangers(self, known: set[int]) -> None:
@@ -182,7 +189,7 @@ class Rosbag1Reader:
             name=name,
             type=", ".join(msgtypes),
             encoding="ros1",
-            count=sum(chunk.count(number) for chunk in self._chunks for number in numbers),
+            count=sum(chunk.count(number) for number in numbers for chunk in self._chunks_of.get(number, ())),
             start_ns=start_ns,
             end_ns=end_ns,
             fields=fields,
@@ -190,8 +197,8 @@ class Rosbag1Reader:
         )
 
     def _times(self, numbers: set[int]) -> tuple[int | None, int | None]:
-        """First and last receive time of some connections, from as few index records as tell."""
-        chunks = [chunk for chunk in self._chunks if any(chunk.count(number) for number in numbers)]
+        """First and last receive time of some connections, from as few index records as needed."""
+        chunks = [chunk for number in numbers for chunk in self._chunks_of.get(number, ())]
         first: int | None = None
         for chunk in sorted(chunks, key=lambda one: one.start_ns or 0):
             # A chunk that begins later than what was found cannot hold anything earlier.
@@ -208,7 +215,7 @@ class Rosbag1Reader:
         return first, last
 
     def _receive_ns(self, chunk: Chunk, numbers: set[int]) -> NDArray[np.int64]:
-        return np.concatenate([_nanoseconds(chunk.entries(self._data, number)) for number in numbers])
+        return np.concatenate([nanoseconds(chunk.entries(self._data, number)) for number in numbers])
 
     def _parsed(self, connection: Connection) -> Mapping[str, Any]:
         """Return the definitions of a connection's type and of those it is made of; empty if unreadable."""
@@ -230,29 +237,42 @@ class Rosbag1Reader:
         FerryIdError
             For a topic or field that the bag does not have, or a topic whose definition cannot be used.
         """
-        losses = list(self._opening)
-        decoders = {name: self._decoder(name, paths, losses) for name, paths in wanted.items()}
-        numbers = {name: [one.number for one in self._by_topic[name]] for name in wanted}
-        every = {number for group in numbers.values() for number in group}
-        chunks = [chunk for chunk in self._chunks if verify or not every.isdisjoint(chunk.connections)]
+        lost = list(self._opening)
+        described = {topic.name: topic for topic in self.topics}
+        decoders = {name: self._decoder(name, paths, described, lost) for name, paths in wanted.items()}
+        topic_of = {one.number: name for name in wanted for one in self._by_topic[name]}
+        # Without chunk information nothing but the chunk itself shows whether its index records are all there.
+        unsure = {chunk.position for chunk in self._chunks if chunk.counts is None and chunk.walked is None}
+        chunks = [
+            chunk
+            for chunk in self._chunks
+            if verify or chunk.position in unsure or not topic_of.keys().isdisjoint(chunk.connections)
+        ]
         messages = Messages()
-        for chunk, (buffer, fault) in zip(chunks, self._decompressed(chunks, verify), strict=True):
-            tally = self._decode(chunk, buffer, messages, decoders, numbers)
-            # That a chunk is cut off by the end of the file was noted at opening.
-            if tally.count or (fault and chunk.end <= len(self._data)):
-                losses.append(self._loss(chunk, fault, tally))
+        repaired: list[Chunk] = []
+        for chunk, content in zip(chunks, self._decompressed(chunks, verify, unsure), strict=True):
+            check = verify or chunk.position in unsure
+            tally = self._decode(chunk, content, messages, decoders, topic_of, check=check)
+            if tally.repaired:
+                repaired.append(chunk)
+            # What is wrong with a chunk that was walked was noted at opening.
+            fault = content.fault if chunk.walked is None else ""
+            if tally.count or tally.others or tally.hidden or (fault and not tally.repaired):
+                lost.append(self._loss(chunk, fault, tally))
+        if repaired:
+            lost.append(self._repair(repaired))
         path = str(self.paths[0])
-        self.losses = (*losses, *(loss for decoder in decoders.values() for loss in decoder.losses(path)))
+        self.losses = (*lost, *(loss for decoder in decoders.values() for loss in decoder.losses(path)))
         return {name: decoder.finish() for name, decoder in decoders.items()}
 
-    def _decoder(self, name: str, paths: Sequence[str], losses: list[Loss]) -> Decoder:
+    def _decoder(self, name: str, paths: Sequence[str], described: Mapping[str, Topic], lost: list[Loss]) -> Decoder:
         file = self.paths[0]
         if name not in self._by_topic:
             raise FerryIdError(
                 f"{file}: no topic {name}, found {len(self._by_topic)} others. "
                 f"Fix: name a topic of the bag.{did_you_mean(name, self._by_topic)}"
             )
-        topic = next(topic for topic in self.topics if topic.name == name)
+        topic = described[name]
         connection = self._by_topic[name][0]
         if topic.note == SEVERAL_TYPES:
             raise FerryIdError(
@@ -265,9 +285,16 @@ class Rosbag1Reader:
                 f"{file}: topic {name} cannot be decoded, found no readable definition of {topic.type}. "
                 "Fix: copy the bag from the recorder again"
             )
-        if connection.md5sum not in ("*", store.generate_msgdef(topic.type)[1]):
+        try:
+            md5sum = store.generate_msgdef(topic.type)[1]
+        except TypesysError as error:
+            raise FerryIdError(
+                f"{file}: topic {name} cannot be decoded, found no definition of a type that {topic.type} is made of "
+                f"({str(error).splitlines()[0]}). Fix: copy the bag from the recorder again"
+            ) from error
+        if connection.md5sum not in ("*", md5sum):
             what = f"the definition of {topic.type} does not match its checksum: values of {name} may be misread"
-            losses.append(Loss(str(file), what, name, 0))
+            lost.append(Loss(str(file), what, name, 0))
         return decoder_for("ros1", store, topic.type, name, paths, topic.count, where=str(file))
 
     def _registered(self, connection: Connection, topic: Topic) -> Any:
@@ -287,100 +314,132 @@ class Rosbag1Reader:
                 f"valid message ({str(error).splitlines()[0]}). Fix: correct the message file and record again"
             ) from error
 
-    def _decompressed(self, chunks: Sequence[Chunk], verify: bool) -> Iterator[tuple[Any, str]]:
+    def _decompressed(self, chunks: Sequence[Chunk], verify: bool, unsure: set[int]) -> Iterator[Content]:
         """Yield what each chunk holds, and what is wrong with it."""
+        allowance = Allowance.of_file(len(self._data))
 
-        def load(chunk: Chunk) -> tuple[Any, str]:
-            return decompressed(self._data, chunk, exact=verify or bool(chunk.walked))
+        def load(chunk: Chunk) -> Content:
+            exact = verify or chunk.walked is not None or chunk.position in unsure
+            return decompressed(self._data, chunk, allowance, exact=exact)
 
-        if not any(chunk.compression == "bz2" for chunk in chunks):
+        slow = any(chunk.compression == "bz2" for chunk in chunks)
+        # Chunks ahead of their turn are held in memory too.
+        if not slow or any(chunk.size > FREE_CHUNK and chunk.compression != "none" for chunk in chunks):
             yield from map(load, chunks)
             return
+        allowance.most = FREE_CHUNK
         with ThreadPoolExecutor(AHEAD) as pool:
-            queued: deque[Future[tuple[Any, str]]] = deque()
+            queued: deque[Future[Content]] = deque()
             rest = iter(chunks)
             queued.extend(pool.submit(load, chunk) for chunk in islice(rest, AHEAD))
             while queued:
                 yield queued.popleft().result()
                 queued.extend(pool.submit(load, chunk) for chunk in islice(rest, 1))
 
-    def _decode(
-        self,
-        chunk: Chunk,
-        buffer: Any,
-        messages: Messages,
-        decoders: Mapping[str, Decoder],
-        numbers: Mapping[str, Sequence[int]],
-    ) -> _Tally:
-        """Hand the wanted messages of one chunk to their decoders; returns those that are damaged."""
-        tally = _Tally()
-        parts: list[tuple[str, Entries, NDArray[np.int64]]] = []
-        for name, group in numbers.items():
-            pieces = [(number, chunk.entries(self._data, number)) for number in group if chunk.count(number)]
-            if not pieces:
-                continue
+    def _parts(
+        self, chunk: Chunk, topic_of: Mapping[int, str], *, check: bool
+    ) -> list[tuple[str | None, Entries, NDArray[np.int64]]]:
+        """Return topic, index entries and their connections for each wanted topic; with `check` those of None, the others."""
+        groups: dict[str | None, list[int]] = {}
+        for number in sorted(chunk.connections):
+            name = topic_of.get(number)
+            if (check or name is not None) and chunk.count(number):
+                groups.setdefault(name, []).append(number)
+        parts: list[tuple[str | None, Entries, NDArray[np.int64]]] = []
+        for name, group in groups.items():
+            pieces = [(number, chunk.entries(self._data, number)) for number in group]
             entries = np.concatenate([piece for _, piece in pieces]) if len(pieces) > 1 else pieces[0][1]
             owners = np.concatenate([np.full(len(piece), number) for number, piece in pieces])
             if len(pieces) > 1:
                 order = np.argsort(entries[:, 2], kind="stable")
                 entries, owners = entries[order], owners[order]
             parts.append((name, entries, owners))
-        if not parts:
+        return parts
+
+    def _decode(
+        self,
+        chunk: Chunk,
+        content: Content,
+        messages: Messages,
+        decoders: Mapping[str, Decoder],
+        topic_of: Mapping[int, str],
+        *,
+        check: bool,
+    ) -> _Tally:
+        """Hand the wanted messages of one chunk to their decoders; returns those that are damaged.
+
+        With `check` the messages of the other topics are looked for too, and every byte of the chunk must belong to a
+        record that its index records list.
+        """
+        tally = _Tally()
+        parts = self._parts(chunk, topic_of, check=check)
+        if not parts and not check:
             return tally
-        together = np.concatenate([entries for _, entries, _ in parts])
-        starts, sizes, intact = messages.locate(buffer, together, np.concatenate([owners for _, _, owners in parts]))
-        receive_ns = _nanoseconds(together)
+        together = np.concatenate([NO_ENTRIES, *(entries for _, entries, _ in parts)])
+        owners = np.concatenate([np.empty(0, np.int64), *(owners for _, _, owners in parts)])
+        buffer = content.buffer
+        starts, sizes, intact = messages.locate(buffer, together, owners)
+        bounds = set(np.cumsum([len(entries) for _, entries, _ in parts]).tolist())
+        unique = distinct(starts, bounds)
+        covered = not check or (intact is None and covers(buffer, together[:, 2].astype(np.int64), starts + sizes))
+        if chunk.walked is None and not (intact is None and unique and covered):
+            allowance = Allowance.of_file(len(self._data))
+            better = replaced(self._data, chunk, allowance, intact=intact is None and unique)
+            if better is not None:
+                whole = Content(better.buffer, "", True)
+                tally = self._decode(better.chunk, whole, messages, decoders, topic_of, check=False)
+                doubtful = sum(len(one) for number, one in better.doubtful.items() if check or number in topic_of)
+                # Messages whose time is in doubt are lost, not repaired.
+                tally.repaired = intact is None or not unique or np.count_nonzero(~intact) != doubtful
+                for number, entries in better.doubtful.items():
+                    if check or number in topic_of:
+                        tally.add(nanoseconds(entries), wanted=number in topic_of)
+                return tally
+            intact = np.ones(len(starts), np.bool_) if intact is None else intact
+            first_rows = np.unique(starts, return_index=True)[1]
+            intact &= np.isin(np.arange(len(starts)), first_rows)
+            tally.hidden = chunk.counts is None
+        receive_ns = nanoseconds(together)
         first = 0
         for name, entries, _ in parts:
             here = slice(first, first + len(entries))
             first += len(entries)
+            if intact is not None:
+                tally.add(receive_ns[here][~intact[here]], wanted=name is not None)
+            if name is None:
+                continue
             if intact is None:
                 decoders[name].add(buffer, starts[here], sizes[here], receive_ns[here])
             else:
                 good = intact[here]
                 decoders[name].add(buffer, starts[here][good], sizes[here][good], receive_ns[here][good])
-                tally.add(receive_ns[here][~good])
         return tally
 
     def _loss(self, chunk: Chunk, fault: str, tally: _Tally) -> Loss:
         known = f"messages of the wanted topics lost in it: {tally.count}"
-        # Without index records nothing tells how many messages lay behind the damage.
-        hidden = bool(fault) and not chunk.index
+        if tally.others:
+            known += f", of the others: {tally.others}"
+        if tally.hidden:
+            known += ", and perhaps others that no index record lists"
         return Loss(
             file=str(self.paths[0]),
-            what=f"the chunk at byte {chunk.position} is damaged"
-            + (f", {fault}" if fault else "")
-            + (": the messages behind the damage are lost" if hidden else f": {known}"),
-            messages=None if hidden else tally.count,
+            what=f"the chunk at byte {chunk.position} is damaged" + (f", {fault}" if fault else "") + f": {known}",
+            messages=None if tally.hidden else tally.count + tally.others,
             start_ns=min(tally.times, default=None),
             end_ns=max(tally.times, default=None),
         )
 
+    def _repair(self, chunks: Sequence[Chunk]) -> Loss:
+        more = f" and {len(chunks) - 1} more" if len(chunks) > 1 else ""
+        what = (
+            f"the index records of the chunk at byte {chunks[0].position}{more} contradict it: "
+            "its messages were read from the chunk itself"
+        )
+        return Loss(str(self.paths[0]), what, None, 0)
+
 
 def _is_empty(store: Any, msgtype: str) -> bool:
     return msgtype in store.fielddefs and all(name == EMPTY_MEMBER for name, _ in store.fielddefs[msgtype][1])
-
-
-def _estimate(data: Any, chunks: Sequence[Chunk], index: int) -> tuple[str, None, int | None]:
-    """Say how much of a bag is missing behind the end of the file, from the bytes that its header announces."""
-    times = [
-        _nanoseconds(entries)
-        for chunk in chunks
-        for entries in (chunk.entries(data, number) for number in chunk.connections)
-        if len(entries)
-    ]
-    size, part = len(data), (index - len(data)) / len(data)
-    what = f"the file ends at byte {size} of more than {index}: about {100 * (index - size) / index:.0f} % is lost at the end"
-    if not times:
-        return what, None, None
-    first, last = min(int(one.min()) for one in times), max(int(one.max()) for one in times)
-    messages, seconds = part * sum(len(one) for one in times), part * (last - first) * 1e-9
-    return f"{what}, by the rate before it {messages:.0f} messages in {seconds:.1f} s", None, last
-
-
-def _nanoseconds(entries: Entries) -> NDArray[np.int64]:
-    times: NDArray[np.int64] = entries[:, 0].astype(np.int64) * NS + entries[:, 1]
-    return times
 
 
 def _mapped(path: Path) -> mmap.mmap:
