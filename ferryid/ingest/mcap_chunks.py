@@ -22,6 +22,8 @@ from ferryid.ingest.log import Loss
 from ferryid.ingest.mcap_index import (
     CHANNEL,
     MESSAGE,
+    MESSAGE_FIELDS,
+    MESSAGE_HEADER,
     RECORD_HEADER,
     SCHEMA,
     Bytes,
@@ -156,18 +158,21 @@ def load_carefully(
         table, others, end = walk_table(data, chunk)
     except DamagedRecord as error:
         return Loaded(whole_file[:0], {}, tuple(_lost(file, chunk, wanted, name, topics, str(error))))
-    kept = table.by_channel(wanted)
+    distinct = without_copies(data, table)
+    kept = distinct.by_channel(wanted)
     indexed = chunk.counts()
     sound = end == len(data) and not chunk.truncated and all(kind in (SCHEMA, CHANNEL) for kind, _, _ in others)
     if sound:
-        # Without a checksum, the index may be right where it has more messages.
-        doubtful = not crc and any(indexed.get(key, 0) > len(kept.get(key, ())) for key in wanted)
+        # The index may be right where it has more messages.
+        doubtful = any(indexed.get(key, 0) > len(kept.get(key, ())) for key in wanted)
         losses = [_loss(name, f"{reason}; the chunk was walked instead", chunk, None if doubtful else 0)]
     elif any(len(messages) > indexed.get(key, 0) for key, messages in kept.items()):
         losses = [_loss(name, reason, chunk, None)]
     else:
         losses = _lost(file, chunk, wanted, name, topics, reason, kept) or [_loss(name, reason, chunk, None)]
     kept, late = representable(kept, name, topics)
+    if len(distinct) < len(table):
+        losses.append(copies_lost(name, len(table) - len(distinct)))
     return Loaded(data, kept, (*losses, *late))
 
 
@@ -240,6 +245,32 @@ def walk_table(data: Bytes, chunk: Chunk) -> tuple[Messages, list[tuple[int, int
     return table, others, end
 
 
+def without_copies(buffer: Bytes, messages: Messages) -> Messages:
+    """Return the messages without those that are the same, byte for byte, as an earlier one of the same number.
+
+    Recorders that do not number the messages of a channel give them all the sequence number 0: those are kept.
+    """
+    if len(messages) < 2 or (messages.log_ns[1:] > messages.log_ns[:-1]).all():
+        return messages
+    headers = np.ndarray((len(buffer) - MESSAGE_HEADER + 1,), f"V{MESSAGE_HEADER}", buffer, strides=(1,))
+    fields = headers[messages.starts - MESSAGE_HEADER].view(MESSAGE_FIELDS)
+    order = np.lexsort((fields["length"], fields["sequence"], messages.log_ns, messages.channels))
+    fields = fields[order]
+    numbered = np.isin(fields["channel"], fields["channel"][fields["sequence"] != 0])
+    same = (fields[1:] == fields[:-1]) & numbered[1:]
+    keep = np.ones(len(messages), np.bool_)
+    starts, ends = messages.starts[order].tolist(), (messages.starts + messages.sizes)[order].tolist()
+    for row in np.flatnonzero(same).tolist():
+        first, second = slice(starts[row], ends[row]), slice(starts[row + 1], ends[row + 1])
+        keep[order[row + 1]] = not np.array_equal(buffer[first], buffer[second])
+    return messages.take(keep)
+
+
+def copies_lost(name: str, count: int) -> Loss:
+    """Return the loss that reports copies left out."""
+    return Loss(name, f"{count} messages are in the file twice, byte for byte; the copies were left out", messages=0)
+
+
 def check_covered(data: Bytes, offsets: NDArray[np.int64]) -> list[tuple[int, int, int]]:
     """Check that the messages that an index names, and definitions between them, are all that a chunk holds.
 
@@ -302,13 +333,16 @@ def walk_chunk(
         reached = int(table.log_ns.max()) if len(table) else chunk.start_ns
         what = "the file ends inside a chunk" if chunk.truncated else "a chunk's records are damaged"
         loss = Loss(name, what, None, None, min(max(reached, 0), chunk.end_ns), chunk.end_ns)
+    distinct = without_copies(data, table)
+    if loss is None and len(distinct) < len(table):
+        loss = copies_lost(name, len(table) - len(distinct))
     view = data.data
     definitions = [
         (opcode, view[start + RECORD_HEADER : start + RECORD_HEADER + length])
         for opcode, start, length in others
         if opcode in (SCHEMA, CHANNEL)
     ]
-    return replace(chunk, table=table), definitions, loss
+    return replace(chunk, table=distinct), definitions, loss
 
 
 def _loss(name: str, what: str, chunk: Chunk, messages: int | None) -> Loss:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from mcap.records import Channel, Schema
 
 from ferryid.ingest.log import Loss
-from ferryid.ingest.mcap_chunks import MAX_CHUNK, walk_chunk
+from ferryid.ingest.mcap_chunks import MAX_CHUNK, copies_lost, walk_chunk, without_copies
 from ferryid.ingest.mcap_index import (
     LATEST_NS,
-    MESSAGE_FIELDS,
     MESSAGE_HEADER,
+    RECORD_HEADER,
     Bytes,
     DamagedRecord,
     Index,
-    Messages,
 )
 from ferryid.ingest.mcap_scan import scan
-from ferryid.ingest.mcap_summary import read_summary
+from ferryid.ingest.mcap_summary import read_summary, summary_start
 
 
 def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
@@ -39,13 +40,20 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
         index, reason = None, str(error)
     if index is not None:
         _check_statistics(index, len(file), name)
-    if index is None or reason is not None or _needs_walk(index):
+    if index is not None and reason is None and not _needs_walk(index):
+        _walk_chunks(index, file, whole_file, name)
+    if index is None or not index.complete:
         summary, index = index, scan(file, name)
+        if summary is None:
+            summary = _moved_summary(file, index.data_end, name)
         if summary is not None:
             _merge(index, summary)
-    _walk_chunks(index, file, whole_file, name)
-    if not index.complete:
-        _leave_out_copies(index, whole_file, name)
+        _walk_chunks(index, file, whole_file, name)
+        if not index.complete:
+            _check_loose(index, whole_file, name)
+    if index.complete:
+        # All messages that were ever written are there.
+        index.losses = [loss if loss.messages else replace(loss, messages=0) for loss in index.losses]
     if reason is not None:
         found = sum(index.counts().values())
         what = f"{reason}; the index was rebuilt by walking the whole file, which found {found} messages"
@@ -57,6 +65,22 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
         what = f"{late} chunks state times of 2**63 ns or later, which cannot be represented"
         index.losses.append(Loss(name, what, messages=0))
     return index
+
+
+def _moved_summary(file: memoryview, data_end: int, name: str) -> Index | None:
+    """Return the summary that stands behind the data, in a file whose footer has it elsewhere; None if there is none."""
+    place = data_end + RECORD_HEADER + 4
+    try:
+        _, start, _ = summary_start(file)
+        summary = read_summary(file, place) if start and place < len(file) else None
+    except DamagedRecord:
+        return None
+    if summary is not None:
+        moved = f"{abs(start - place)} bytes {'before' if place < start else 'behind'} where the footer has it"
+        what = f"the summary stands {moved}: bytes of the file are missing or were added"
+        summary.losses.append(Loss(name, what))
+        _check_statistics(summary, len(file), name)
+    return summary
 
 
 def _check_statistics(index: Index, size: int, name: str) -> None:
@@ -137,38 +161,28 @@ def _walk_into(index: Index, number: int, file: memoryview, whole_file: Bytes, n
         return
     index.chunks[number] = walked
     if loss is None and chunk.indexed is not None:
+        counts = walked.counts()
+        fewer = any(counts.get(channel, 0) < count for channel, count in chunk.counts().items())
         what = "the message index of a chunk and its messages disagree; the chunk was walked instead"
-        loss = Loss(name, what, None, 0, chunk.start_ns, chunk.end_ns)
+        loss = Loss(name, what, None, None if fewer else 0, chunk.start_ns, chunk.end_ns)
     if loss is not None:
         index.losses.append(loss)
 
 
-def _leave_out_copies(index: Index, whole_file: Bytes, name: str) -> None:
-    """Leave out loose messages that are copies of earlier ones, in a file whose statistics do not count them.
-
-    Copies have the same sequence number, but for 0, which many recorders give to all messages.
-    """
+def _check_loose(index: Index, whole_file: Bytes, name: str) -> None:
+    """Leave out copies of messages outside chunks, and what can hardly be a message, where no statistics count them."""
     if index.loose is None:
         return
     kept = without_copies(whole_file, index.loose)
-    left_out = len(index.loose) - len(kept)
-    if left_out:
-        index.loose = kept
-        what = f"{left_out} messages are in the file twice, byte for byte; the copies were left out"
-        index.losses.append(Loss(name, what, messages=0))
-        index.complete = _confirmed(index)
-
-
-def without_copies(buffer: Bytes, messages: Messages) -> Messages:
-    """Return the messages without those that are the same, byte for byte, as an earlier one with a sequence number."""
-    headers = np.ndarray((len(buffer) - MESSAGE_HEADER + 1,), f"V{MESSAGE_HEADER}", buffer, strides=(1,))
-    fields = headers[messages.starts - MESSAGE_HEADER].view(MESSAGE_FIELDS)
-    order = np.lexsort((fields["length"], fields["sequence"], messages.log_ns, messages.channels))
-    fields = fields[order]
-    same = (fields[1:] == fields[:-1]) & (fields["sequence"][1:] != 0)
-    keep = np.ones(len(messages), np.bool_)
-    starts, ends = messages.starts[order].tolist(), (messages.starts + messages.sizes)[order].tolist()
-    for row in np.flatnonzero(same).tolist():
-        first, second = slice(starts[row], ends[row]), slice(starts[row + 1], ends[row + 1])
-        keep[order[row + 1]] = not np.array_equal(buffer[first], buffer[second])
-    return messages.take(keep)
+    if len(kept) < len(index.loose):
+        index.losses.append(copies_lost(name, len(index.loose) - len(kept)))
+    defined = np.isin(kept.channels, list(index.channels))
+    times = kept.log_ns[defined]
+    if len(times):
+        odd = ~defined & ((kept.log_ns < times.min()) | (kept.log_ns > times.max()))
+        if odd.any():
+            what = f"{int(odd.sum())} records that look like messages of unknown channels at other times were left out"
+            index.losses.append(Loss(name, what))
+            kept = kept.take(~odd)
+    index.loose = kept
+    index.complete = _confirmed(index)

@@ -267,6 +267,7 @@ def _records_at(file: memoryview, position: int) -> bool:
 def _chunks(file: memoryview, found: _Found, odd: list[Record], index: Index, name: str) -> list[Chunk]:
     """Put the chunks of a walk together with the message indexes that follow each of them."""
     groups: list[tuple[Chunk, list[Record]]] = []
+    indexes: dict[bytes, memoryview] = {}
     behind = 0
     for record in found.records:
         opcode, start, length = record
@@ -274,7 +275,12 @@ def _chunks(file: memoryview, found: _Found, odd: list[Record], index: Index, na
             chunk = found.chunks.get(start) or chunk_at(file, start)[0]
             held = min(chunk.compressed_size, len(file) - chunk.data_offset)
             groups.append((replace(chunk, compressed_size=held, truncated=chunk.compressed_size > held), []))
+            indexes = {}
         elif opcode == MESSAGE_INDEX and start == behind:
+            content = file[start + RECORD_HEADER : start + RECORD_HEADER + length]
+            if indexes.setdefault(bytes(content[:2]), content) != content:
+                # Another index for the same channel: that of a chunk that is not there.
+                odd.append(record)
             groups[-1][1].append(record)
         else:
             if opcode == MESSAGE_INDEX:

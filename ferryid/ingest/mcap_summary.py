@@ -37,8 +37,30 @@ _BETWEEN = frozenset({HEADER, SCHEMA, CHANNEL, ATTACHMENT, METADATA, DATA_END})
 """Records that may stand between chunks without a message in them."""
 
 
-def read_summary(file: memoryview) -> Index | None:
+def summary_start(file: memoryview) -> tuple[int, int, int]:
+    """Return where the footer stands, where it has the summary (0 for none) and the checksum of that (0 for none).
+
+    Raises
+    ------
+    DamagedRecord
+        Where the file does not end as a finished file does.
+    """
+    footer = len(file) - FOOTER_SIZE
+    if footer < len(MAGIC) or file[-len(MAGIC) :] != MAGIC or record_header(file, footer) != (FOOTER, 20):
+        raise DamagedRecord("the end of the file is missing")
+    start, _, crc = struct.unpack_from("<QQI", file, footer + RECORD_HEADER)
+    return footer, start, crc
+
+
+def read_summary(file: memoryview, moved_to: int | None = None) -> Index | None:
     """Read the summary section.
+
+    Parameters
+    ----------
+    file
+        The bytes of the file.
+    moved_to
+        Where it begins, in a file whose footer has it elsewhere.
 
     Returns
     -------
@@ -50,12 +72,10 @@ def read_summary(file: memoryview) -> Index | None:
     DamagedRecord
         Where the file does not end as a finished file does, or the summary is damaged.
     """
-    footer = len(file) - FOOTER_SIZE
-    if footer < len(MAGIC) or file[-len(MAGIC) :] != MAGIC or record_header(file, footer) != (FOOTER, 20):
-        raise DamagedRecord("the end of the file is missing")
-    start, _, crc = struct.unpack_from("<QQI", file, footer + RECORD_HEADER)
+    footer, start, crc = summary_start(file)
     if start == 0:
         return None
+    start = start if moved_to is None else moved_to
     if not len(MAGIC) <= start <= footer:
         raise DamagedRecord("the footer points nowhere")
     if crc and crc32(file[start : footer + RECORD_HEADER + 16]) != crc:
@@ -71,7 +91,11 @@ def read_summary(file: memoryview) -> Index | None:
             if opcode in (SCHEMA, CHANNEL):
                 index.define(opcode, content)
             elif opcode == CHUNK_INDEX:
-                chunk, extent = _chunk_from_index(content)
+                try:
+                    chunk, extent = _chunk_from_index(content)
+                except DamagedRecord as error:
+                    index.contradiction = str(error)
+                    continue
                 index.chunks.append(chunk)
                 extents.append(extent)
             elif opcode == STATISTICS:
@@ -82,7 +106,7 @@ def read_summary(file: memoryview) -> Index | None:
     except (struct.error, UnicodeDecodeError) as error:
         raise DamagedRecord(f"a record of the summary cannot be parsed ({error})") from error
     index.chunks.sort(key=lambda chunk: chunk.offset)
-    index.contradiction = _contradiction(file, start, sorted(extents))
+    index.contradiction = index.contradiction or _contradiction(file, start, sorted(extents))
     return index
 
 
