@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.ingest.log import Loss
 from ferryid.ingest.mcap_chunks import Loaded, Unpacker, check_covered, content, load_carefully, representable
 from ferryid.ingest.mcap_index import (
     MESSAGE,
@@ -21,6 +22,7 @@ from ferryid.ingest.mcap_index import (
     Index,
     Messages,
     chunk_at,
+    definition,
     index_entries,
     message_table,
     record_header,
@@ -106,13 +108,13 @@ def batches(
 
     def run(batch: Sequence[_Plan], room: Bytes) -> list[Loaded]:
         try:
-            return [_load(file, whole_file, batch, room)]
+            return [_load(file, whole_file, batch, room, index, name)]
         except DamagedRecord:
             return [each for plan in batch for each in one(plan)]
 
     def one(plan: _Plan) -> list[Loaded]:
         try:
-            return [_load(file, whole_file, [plan], None)]
+            return [_load(file, whole_file, [plan], None, index, name)]
         except DamagedRecord as error:
             return [carefully(plan.chunk, str(error))]
 
@@ -236,10 +238,7 @@ def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], thorough: boo
         raise DamagedRecord("a message index points outside its chunk")
     every = None
     if thorough and chunk.indexed is not None and chunk.table is None:
-        parts = [
-            entries[key] if key in entries else index_entries(file, key, *chunk.indexed[key]) for key in chunk.indexed
-        ]
-        every = np.sort(np.concatenate([rows[:, 1] for rows in parts]))
+        every = chunk.every(file)
     whole = thorough or chunk.truncated
     # The last message of an uncompressed chunk says nothing of how much of it is wanted.
     whole = whole or (chunk.compression != "" and last >= WHOLE_FROM * chunk.uncompressed_size)
@@ -247,7 +246,9 @@ def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], thorough: boo
     return _Plan(chunk, crc, entries, last, whole, sum(map(len, entries.values())), every)
 
 
-def _load(file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Bytes | None) -> Loaded:
+def _load(
+    file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Bytes | None, index: Index, name: str
+) -> Loaded:
     """Load the chunks of one batch, decompressed behind one another in `room`; DamagedRecord if anything is wrong.
 
     Without `room` the batch is one chunk, which brings its own memory.
@@ -255,6 +256,7 @@ def _load(file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Byt
     buffer = whole_file if batch[0].plain else whole_file[:0]
     bases: list[int] = []
     limits: list[int] = []
+    losses: list[Loss] = []
     used = 0
     for plan in batch:
         if plan.plain:
@@ -275,8 +277,13 @@ def _load(file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Byt
             content(file, whole_file, plan.chunk, plan.crc)
     for plan, first, stop in zip(batch, bases, limits, strict=True):
         if plan.every is not None:
-            check_covered(buffer[first:stop], plan.every)
-    return Loaded(buffer, messages, ())
+            data = buffer[first:stop]
+            for kind, start, length in check_covered(data, plan.every):
+                found = definition(kind, data[start + RECORD_HEADER : start + RECORD_HEADER + length])
+                conflict = index.conflict(found)
+                if conflict:
+                    losses.append(Loss(name, conflict, None, None, plan.chunk.start_ns, plan.chunk.end_ns))
+    return Loaded(buffer, messages, tuple(losses))
 
 
 def _unpacked(file: memoryview, whole_file: Bytes, plan: _Plan, room: Bytes | None) -> Bytes:

@@ -158,9 +158,9 @@ def load_carefully(
         table, others, end = walk_table(data, chunk)
     except DamagedRecord as error:
         return Loaded(whole_file[:0], {}, tuple(_lost(file, chunk, wanted, name, topics, str(error))))
-    distinct = without_copies(data, table)
-    kept = distinct.by_channel(wanted)
     indexed = chunk.counts()
+    distinct = without_copies(data, table, len(table) > sum(indexed.values()))
+    kept = distinct.by_channel(wanted)
     sound = end == len(data) and not chunk.truncated and all(kind in (SCHEMA, CHANNEL) for kind, _, _ in others)
     if sound:
         # The index may be right where it has more messages.
@@ -245,10 +245,11 @@ def walk_table(data: Bytes, chunk: Chunk) -> tuple[Messages, list[tuple[int, int
     return table, others, end
 
 
-def without_copies(buffer: Bytes, messages: Messages) -> Messages:
+def without_copies(buffer: Bytes, messages: Messages, surplus: bool = False) -> Messages:
     """Return the messages without those that are the same, byte for byte, as an earlier one of the same number.
 
-    Recorders that do not number the messages of a channel give them all the sequence number 0: those are kept.
+    Recorders that do not number the messages of a channel give them all the sequence number 0: those are kept, unless
+    there is a `surplus` of messages.
     """
     if len(messages) < 2 or (messages.log_ns[1:] > messages.log_ns[:-1]).all():
         return messages
@@ -257,7 +258,7 @@ def without_copies(buffer: Bytes, messages: Messages) -> Messages:
     order = np.lexsort((fields["length"], fields["sequence"], messages.log_ns, messages.channels))
     fields = fields[order]
     numbered = np.isin(fields["channel"], fields["channel"][fields["sequence"] != 0])
-    same = (fields[1:] == fields[:-1]) & numbered[1:]
+    same = (fields[1:] == fields[:-1]) & (surplus | numbered[1:])
     keep = np.ones(len(messages), np.bool_)
     starts, ends = messages.starts[order].tolist(), (messages.starts + messages.sizes)[order].tolist()
     for row in np.flatnonzero(same).tolist():
@@ -333,7 +334,7 @@ def walk_chunk(
         reached = int(table.log_ns.max()) if len(table) else chunk.start_ns
         what = "the file ends inside a chunk" if chunk.truncated else "a chunk's records are damaged"
         loss = Loss(name, what, None, None, min(max(reached, 0), chunk.end_ns), chunk.end_ns)
-    distinct = without_copies(data, table)
+    distinct = without_copies(data, table, chunk.indexed is not None and len(table) > sum(chunk.counts().values()))
     if loss is None and len(distinct) < len(table):
         loss = copies_lost(name, len(table) - len(distinct))
     view = data.data

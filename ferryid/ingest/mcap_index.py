@@ -130,6 +130,17 @@ class Chunk:
             return self.table.count()
         return {key: count for key, (_, count) in (self.indexed or {}).items()}
 
+    def every(self, file: memoryview) -> NDArray[np.int64]:
+        """Return where the message indexes have the messages of all channels in the chunk, ascending, shape (n,).
+
+        Raises
+        ------
+        DamagedRecord
+            Where a MessageIndex record is damaged.
+        """
+        parts = [index_entries(file, key, *place)[:, 1] for key, place in (self.indexed or {}).items()]
+        return np.sort(np.concatenate([*parts, np.empty(0, np.int64)]))
+
 
 @dataclass
 class Index:
@@ -177,22 +188,33 @@ class Index:
         DamagedRecord
             Where the content does not make such a record.
         """
-        self.add(parsed(Schema.read if opcode == SCHEMA else Channel.read, content))
+        self.add(definition(opcode, content))
 
     def add(self, definition: Schema | Channel) -> None:
         """Take a definition; one that contradicts an earlier one of the same id is noted in `conflicts`."""
+        conflict = self.conflict(definition)
+        if conflict:
+            self.conflicts.append(conflict)
+        elif isinstance(definition, Schema):
+            self.schemas.setdefault(definition.id, definition)
+        else:
+            self.channels.setdefault(definition.id, definition)
+
+    def conflict(self, definition: Schema | Channel) -> str:
+        """Say what in a definition contradicts the known one of the same id; an empty string where nothing does."""
         if isinstance(definition, Schema):
-            schema = self.schemas.setdefault(definition.id, definition)
-            if schema != definition:
-                self.conflicts.append(f"schema {schema.id} is defined as {schema.name!r} and as {definition.name!r}")
-            return
-        channel = self.channels.setdefault(definition.id, definition)
-        stated = channel.topic, channel.schema_id, channel.message_encoding
-        if stated != (definition.topic, definition.schema_id, definition.message_encoding):
-            self.conflicts.append(
-                f"channel {channel.id} is defined as {channel.topic!r} with schema {channel.schema_id} and as "
-                f"{definition.topic!r} with schema {definition.schema_id}"
-            )
+            schema = self.schemas.get(definition.id, definition)
+            if schema == definition:
+                return ""
+            known, new = repr(schema.name), repr(definition.name)
+        else:
+            channel = self.channels.get(definition.id, definition)
+            stated = [(one.topic, one.schema_id, one.message_encoding) for one in (channel, definition)]
+            if stated[0] == stated[1]:
+                return ""
+            known, new = (f"{topic!r} with schema {schema} in {encoding!r}" for topic, schema, encoding in stated)
+        kind = "schema" if isinstance(definition, Schema) else "channel"
+        return f"{kind} {definition.id} is defined as {known} and as {new}: the first stands, for all messages"
 
     def counts(self) -> dict[int, int]:
         """Return the number of messages per channel id that the chunks and the walk show."""
@@ -204,6 +226,19 @@ class Index:
             for key, count in self.loose.count().items():
                 total[key] = total.get(key, 0) + count
         return total
+
+
+def definition(opcode: int, content: Bytes | memoryview) -> Schema | Channel:
+    """Parse a Schema or Channel record.
+
+    Raises
+    ------
+    DamagedRecord
+        Where the content does not make one.
+    """
+    if opcode == SCHEMA:
+        return parsed(Schema.read, content)
+    return parsed(Channel.read, content)
 
 
 def parsed(read: Callable[[ReadDataStream], Definition], content: Bytes | memoryview) -> Definition:

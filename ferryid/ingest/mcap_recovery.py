@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from mcap.records import Channel, Schema
 
 from ferryid.ingest.log import Loss
-from ferryid.ingest.mcap_chunks import MAX_CHUNK, copies_lost, walk_chunk, without_copies
+from ferryid.ingest.mcap_chunks import MAX_CHUNK, check_covered, content, copies_lost, walk_chunk, without_copies
 from ferryid.ingest.mcap_index import (
     LATEST_NS,
     MESSAGE_HEADER,
@@ -16,9 +17,13 @@ from ferryid.ingest.mcap_index import (
     Bytes,
     DamagedRecord,
     Index,
+    stored_crc,
 )
 from ferryid.ingest.mcap_scan import scan
 from ferryid.ingest.mcap_summary import read_summary, summary_start
+
+FIRST_CHUNK = 8 << 20
+"""A first chunk up to this size [bytes] is read when a file is opened."""
 
 
 def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
@@ -42,6 +47,7 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
         _check_statistics(index, len(file), name)
     if index is not None and reason is None and not _needs_walk(index):
         _walk_chunks(index, file, whole_file, name)
+        _check_definitions(index, file, whole_file)
     if index is None or not index.complete:
         summary, index = index, scan(file, name)
         if summary is None:
@@ -59,12 +65,23 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
         what = f"{reason}; the index was rebuilt by walking the whole file, which found {found} messages"
         index.losses.insert(0, Loss(name, what, messages=0))
     for conflict in dict.fromkeys(index.conflicts):
-        index.losses.append(Loss(name, f"{conflict}: the first stands, for all messages"))
+        index.losses.append(Loss(name, conflict))
     late = sum(chunk.end_ns == LATEST_NS for chunk in index.chunks)
     if late:
         what = f"{late} chunks state times of 2**63 ns or later, which cannot be represented"
         index.losses.append(Loss(name, what, messages=0))
     return index
+
+
+def _check_definitions(index: Index, file: memoryview, whole_file: Bytes) -> None:
+    """Hold the definitions of the summary against those in the first chunk, unless that is large."""
+    for chunk in index.chunks[:1]:
+        if chunk.indexed is not None and chunk.table is None and chunk.uncompressed_size <= FIRST_CHUNK:
+            # A damaged chunk is reported when it is read.
+            with suppress(DamagedRecord):
+                data = content(file, whole_file, chunk, stored_crc(file, chunk.offset))
+                for kind, start, length in check_covered(data, chunk.every(file)):
+                    index.define(kind, data[start + RECORD_HEADER : start + RECORD_HEADER + length])
 
 
 def _moved_summary(file: memoryview, data_end: int, name: str) -> Index | None:
@@ -152,9 +169,9 @@ def _walk_into(index: Index, number: int, file: memoryview, whole_file: Bytes, n
     """Walk a chunk: take its definitions, and its messages where its index has others."""
     chunk = index.chunks[number]
     walked, definitions, loss = walk_chunk(file, whole_file, chunk, name)
-    for opcode, content in definitions:
+    for opcode, text in definitions:
         try:
-            index.define(opcode, content)
+            index.define(opcode, text)
         except DamagedRecord as error:
             index.losses.append(Loss(name, str(error), None, None, chunk.start_ns, chunk.end_ns))
     if walked.counts() == chunk.counts():
