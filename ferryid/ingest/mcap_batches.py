@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.ingest.mcap_chunks import Loaded, Unpacker, content, load_carefully
+from ferryid.ingest.log import Loss
+from ferryid.ingest.mcap_chunks import Loaded, Unpacker, check_covered, content, load_carefully, representable
 from ferryid.ingest.mcap_index import (
     MESSAGE,
     MESSAGE_HEADER,
@@ -21,6 +22,7 @@ from ferryid.ingest.mcap_index import (
     Index,
     Messages,
     chunk_at,
+    definition,
     index_entries,
     message_table,
     record_header,
@@ -37,6 +39,8 @@ WHOLE_FROM = 0.75
 """A compressed chunk wanted up to this part of its length is read to its end: in one pass, and with its checksum."""
 CHECKED_FROM = 0.25
 """The checksum of an uncompressed chunk is taken where at least this part of its bytes is wanted."""
+AHEAD_BYTES = 128 << 20
+"""Decompressed bytes that are held at a time, but for a single chunk that is larger."""
 SMALL = 64 << 10
 """A chunk up to this size [bytes] is always read to its end and checked: that costs next to nothing."""
 
@@ -45,7 +49,8 @@ SMALL = 64 << 10
 class _Plan:
     """What to take of one chunk: per channel (log time [ns], offset in the chunk), shape (n, 2), and up to where.
 
-    `count` is the number of messages wanted.
+    `count` is the number of messages wanted. `every` has the offsets of the messages of all channels, ascending, where
+    the chunk is to be held against its whole index.
     """
 
     chunk: Chunk
@@ -54,6 +59,7 @@ class _Plan:
     last: int
     whole: bool
     count: int
+    every: NDArray[np.int64] | None = None
 
     @property
     def plain(self) -> bool:
@@ -92,53 +98,61 @@ def batches(
     name, topics
         File name and topic per channel id, for losses.
     verify
-        Read every chunk to its end and check its checksum, whatever is wanted.
+        Read every chunk to its end, check its checksum and hold it against its whole index, whatever is wanted. So it is
+        done in any case where the file's statistics do not confirm the index.
     """
+    thorough = verify or not index.complete
 
     def carefully(chunk: Chunk, reason: str) -> Loaded:
         return load_carefully(file, whole_file, chunk, wanted, name, topics, reason)
 
     def run(batch: Sequence[_Plan], room: Bytes) -> list[Loaded]:
         try:
-            return [_load(file, whole_file, batch, room)]
+            return [_load(file, whole_file, batch, room, index, name)]
         except DamagedRecord:
             return [each for plan in batch for each in one(plan)]
 
     def one(plan: _Plan) -> list[Loaded]:
         try:
-            return [_load(file, whole_file, [plan], None)]
+            return [_load(file, whole_file, [plan], None, index, name)]
         except DamagedRecord as error:
             return [carefully(plan.chunk, str(error))]
 
     rooms: deque[Bytes] = deque()
-    pending: deque[tuple[Future[list[Loaded]], Bytes]] = deque()
+    pending: deque[tuple[Future[list[Loaded]], Bytes, int]] = deque()
     with ThreadPoolExecutor(LOADERS) as pool:
         try:
-            for item in _gathered(file, index, wanted, verify):
+            for item in _gathered(file, index, wanted, thorough):
                 if isinstance(item, list):
+                    size = sum(plan.size for plan in item)
+                    while pending and sum(held for _, _, held in pending) + size > AHEAD_BYTES:
+                        future, room, _ = pending.popleft()
+                        yield from future.result()
+                        rooms.append(room)
                     room = rooms.popleft() if rooms else np.empty(2 * BATCH_BYTES, np.uint8)
-                    pending.append((pool.submit(run, item, room), room))
+                    pending.append((pool.submit(run, item, room), room, size))
                     if len(pending) <= AHEAD:
                         continue
-                    future, room = pending.popleft()
+                    future, room, _ = pending.popleft()
                     yield from future.result()
                     rooms.append(room)
                     continue
                 while pending:
                     yield from pending.popleft()[0].result()
                 if isinstance(item, Messages):
-                    yield _loose(whole_file, item, wanted)
+                    kept, late = representable(item.by_channel(wanted), name, topics)
+                    yield Loaded(whole_file, kept, tuple(late))
                 else:
                     yield carefully(*item)
             while pending:
                 yield from pending.popleft()[0].result()
         finally:
-            for future, _ in pending:
+            for future, _, _ in pending:
                 future.cancel()
 
 
 def _gathered(
-    file: memoryview, index: Index, wanted: Collection[int], verify: bool
+    file: memoryview, index: Index, wanted: Collection[int], thorough: bool
 ) -> Iterator[list[_Plan] | Messages | tuple[Chunk, str]]:
     """Yield batches of plans, loose messages, and chunks whose index is damaged with the reason, in file order."""
     batch: list[_Plan] = []
@@ -150,10 +164,10 @@ def _gathered(
                 batch, size, count = [], 0, 0
             yield item
             continue
-        if not (verify or _holds(item, wanted)):
+        if not (thorough or _holds(item, wanted)):
             continue
         try:
-            plan = _plan(file, item, wanted, verify)
+            plan = _plan(file, item, wanted, thorough)
         except DamagedRecord as error:
             if batch:
                 yield batch
@@ -199,12 +213,7 @@ def _holds(chunk: Chunk, wanted: Collection[int]) -> bool:
     return chunk.indexed is not None and any(channel in wanted for channel in chunk.indexed)
 
 
-def _loose(buffer: Bytes, messages: Messages, wanted: Collection[int]) -> Loaded:
-    rows = {channel: messages.take(messages.channels == channel) for channel in wanted}
-    return Loaded(buffer, {channel: found for channel, found in rows.items() if len(found)}, ())
-
-
-def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], verify: bool) -> _Plan:
+def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], thorough: bool) -> _Plan:
     """Look up the wanted messages of a chunk; DamagedRecord where header and index disagree."""
     header, crc, _ = chunk_at(file, chunk.offset)
     stated = header.compression, header.data_offset, header.uncompressed_size, header.start_ns, header.end_ns
@@ -218,10 +227,8 @@ def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], verify: bool)
         raise DamagedRecord("a chunk's header and its index disagree")
     entries: dict[int, NDArray[np.int64]] = {}
     if chunk.table is not None:
-        for channel in wanted:
-            rows = chunk.table.take(chunk.table.channels == channel)
-            if len(rows):
-                entries[channel] = np.stack([rows.log_ns, rows.starts - MESSAGE_HEADER], axis=1)
+        for channel, rows in chunk.table.by_channel(wanted).items():
+            entries[channel] = np.stack([rows.log_ns, rows.starts - MESSAGE_HEADER], axis=1)
     else:
         for channel, (offset, count) in (chunk.indexed or {}).items():
             if count and channel in wanted:
@@ -229,14 +236,19 @@ def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], verify: bool)
     last = max((int(rows[:, 1].max()) for rows in entries.values()), default=0)
     if not 0 <= last < chunk.uncompressed_size or chunk.data_offset + chunk.compressed_size > len(file):
         raise DamagedRecord("a message index points outside its chunk")
-    whole = verify or chunk.truncated
+    every = None
+    if thorough and chunk.indexed is not None and chunk.table is None:
+        every = chunk.every(file)
+    whole = thorough or chunk.truncated
     # The last message of an uncompressed chunk says nothing of how much of it is wanted.
     whole = whole or (chunk.compression != "" and last >= WHOLE_FROM * chunk.uncompressed_size)
     whole = whole or chunk.uncompressed_size <= SMALL
-    return _Plan(chunk, crc, entries, last, whole, sum(map(len, entries.values())))
+    return _Plan(chunk, crc, entries, last, whole, sum(map(len, entries.values())), every)
 
 
-def _load(file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Bytes | None) -> Loaded:
+def _load(
+    file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Bytes | None, index: Index, name: str
+) -> Loaded:
     """Load the chunks of one batch, decompressed behind one another in `room`; DamagedRecord if anything is wrong.
 
     Without `room` the batch is one chunk, which brings its own memory.
@@ -244,6 +256,7 @@ def _load(file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Byt
     buffer = whole_file if batch[0].plain else whole_file[:0]
     bases: list[int] = []
     limits: list[int] = []
+    losses: list[Loss] = []
     used = 0
     for plan in batch:
         if plan.plain:
@@ -262,7 +275,15 @@ def _load(file: memoryview, whole_file: Bytes, batch: Sequence[_Plan], room: Byt
     for plan, size in zip(batch, taken.tolist(), strict=True):
         if plan.plain and (plan.whole or size >= CHECKED_FROM * plan.chunk.uncompressed_size):
             content(file, whole_file, plan.chunk, plan.crc)
-    return Loaded(buffer, messages, ())
+    for plan, first, stop in zip(batch, bases, limits, strict=True):
+        if plan.every is not None:
+            data = buffer[first:stop]
+            for kind, start, length in check_covered(data, plan.every):
+                found = definition(kind, data[start + RECORD_HEADER : start + RECORD_HEADER + length])
+                conflict = index.conflict(found)
+                if conflict:
+                    losses.append(Loss(name, conflict, None, None, plan.chunk.start_ns, plan.chunk.end_ns))
+    return Loaded(buffer, messages, tuple(losses))
 
 
 def _unpacked(file: memoryview, whole_file: Bytes, plan: _Plan, room: Bytes | None) -> Bytes:
@@ -307,13 +328,14 @@ def _located(
     channel_of = np.repeat(np.array([channel for channel, _, _ in parts], np.uint16), lengths)
     entries = np.concatenate([rows for _, _, rows in parts])
     table, opcodes = message_table(buffer, entries[:, 1] + np.repeat(bases[owners], lengths))
-    ends = table.starts + table.sizes
+    room = np.repeat(limits[owners], lengths) - table.starts
     if (
         (opcodes != MESSAGE).any()
         or (table.channels != channel_of).any()
         or (table.log_ns != entries[:, 0]).any()
         or (table.sizes < 0).any()
-        or (ends > np.repeat(limits[owners], lengths)).any()
+        or (table.log_ns < 0).any()
+        or (table.sizes > room).any()
     ):
         raise DamagedRecord("a message index and its messages disagree")
     firsts = np.cumsum([0, *lengths[:-1]])
@@ -322,8 +344,15 @@ def _located(
     bounds = np.searchsorted(channel_of, channels).tolist()
     for channel, first, stop in zip(channels, bounds, [*bounds[1:], len(channel_of)], strict=True):
         one = table.take(slice(first, stop))
-        if (one.starts[1:] < one.starts[:-1]).any():
+        if _overlapping(one):
             # Some writers sort a message index by time; the file's order is that of the records.
             one = one.take(np.argsort(one.starts))
+            if _overlapping(one):
+                raise DamagedRecord("a message index names a message twice")
         messages[channel] = one
     return messages, taken
+
+
+def _overlapping(messages: Messages) -> bool:
+    """Tell whether a message begins before the one listed before it ends."""
+    return bool((messages.starts[1:] < (messages.starts + (messages.sizes + MESSAGE_HEADER))[:-1]).any())

@@ -1,4 +1,9 @@
-"""The content of one MCAP chunk: decompressed as far as needed, checked, walked, and what is damaged told."""
+"""The content of one MCAP chunk: decompressed as far as needed, checked, walked, and what is damaged reported.
+
+Memory: a chunk is decompressed only up to the size that it states, and not at all where that is more than `MAX_CHUNK`.
+A walk takes at most one message per byte that the chunk takes up in the file (`LEAST_WALK` at least): no recorder
+reaches that, as every message has its own time.
+"""
 
 from __future__ import annotations
 
@@ -10,23 +15,32 @@ from typing import Any
 import lz4.frame
 import numpy as np
 import zstandard
+from numpy.typing import NDArray
 
 from ferryid.ingest.checksum import crc32
 from ferryid.ingest.log import Loss
 from ferryid.ingest.mcap_index import (
+    CHANNEL,
+    MESSAGE,
+    MESSAGE_FIELDS,
+    MESSAGE_HEADER,
     RECORD_HEADER,
+    SCHEMA,
     Bytes,
     Chunk,
     DamagedRecord,
     Messages,
-    chunk_at,
     index_entries,
     message_table,
+    stored_crc,
     walk,
 )
 
-MAX_CHUNK = 4 << 30
-"""A chunk that claims more bytes than this is damaged (the mcap package has the same limit)."""
+MAX_CHUNK = 256 << 20
+"""A compressed chunk that states more bytes than this is not read. Recorders write chunks of 1 to 8 MiB, and none larger
+than this unless a single message is; an uncompressed chunk needs no memory and has no limit."""
+LEAST_WALK = 4096
+"""Records of a chunk that are walked whatever its size in the file."""
 _thread = threading.local()
 
 
@@ -37,7 +51,9 @@ class Unpacker:
         if chunk.compression not in ("zstd", "lz4"):
             raise DamagedRecord(f"a chunk has the unknown compression {chunk.compression!r}")
         if chunk.uncompressed_size > MAX_CHUNK:
-            raise DamagedRecord("a chunk claims an impossible size")
+            raise DamagedRecord(
+                f"a chunk states {chunk.uncompressed_size} bytes when decompressed, more than the {MAX_CHUNK} that are read"
+            )
         self._source = file[chunk.data_offset : chunk.data_offset + chunk.compressed_size]
         self._size = chunk.uncompressed_size
         self._room = room
@@ -65,7 +81,7 @@ class Unpacker:
         try:
             if self._room is None and self._lz4 is not None and self._have == 0 and size == self._size:
                 # The whole chunk in the memory that lz4 allocates: no copy.
-                piece, _, _ = lz4.frame.decompress_chunk(self._lz4, self._source, max_length=size)
+                piece, self._taken, _ = lz4.frame.decompress_chunk(self._lz4, self._source, max_length=size)
                 self._room = np.frombuffer(piece, np.uint8)
                 self._have = len(piece)
             if self._room is None:
@@ -78,6 +94,19 @@ class Unpacker:
         except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError) as error:
             raise DamagedRecord("a chunk cannot be decompressed") from error
         return self._room[: min(size, self._have)]
+
+    def has_more(self) -> bool:
+        """Tell whether anything is left behind the size that the chunk states, after all of that was read."""
+        rest = np.empty(1, np.uint8)
+        try:
+            if self._zstd is not None:
+                return int(self._zstd.readinto(rest.data)) > 0
+            if self._taken >= len(self._source):
+                return False
+            piece, _, _ = lz4.frame.decompress_chunk(self._lz4, self._source[self._taken :], max_length=1)
+            return len(piece) > 0
+        except (zstandard.ZstdError, RuntimeError, ValueError, EOFError):
+            return True
 
     def _more(self, room: Bytes, size: int) -> int:
         if self._zstd is not None:
@@ -123,24 +152,46 @@ def load_carefully(
     reason
         What is wrong with the chunk.
     """
-    try:
-        crc = 0 if chunk.truncated else chunk_at(file, chunk.offset)[1]
-    except DamagedRecord:
-        # The summary repeats all of the header but the checksum.
-        crc = 0
+    crc = 0 if chunk.truncated else stored_crc(file, chunk.offset)
     try:
         data = content(file, whole_file, chunk, crc)
+        table, others, end = walk_table(data, chunk)
     except DamagedRecord as error:
         return Loaded(whole_file[:0], {}, tuple(_lost(file, chunk, wanted, name, topics, str(error))))
-    table, _, end = walk_table(data)
-    kept = {channel: table.take(table.channels == channel) for channel in wanted}
-    kept = {channel: messages for channel, messages in kept.items() if len(messages)}
-    losses = _lost(file, chunk, wanted, name, topics, reason, kept)
-    if not losses and end == len(data):
-        losses = [_loss(name, f"{reason}; the chunk was walked instead", chunk, 0)]
-    elif not losses:
+    indexed = chunk.counts()
+    distinct = without_copies(data, table, len(table) > sum(indexed.values()))
+    kept = distinct.by_channel(wanted)
+    sound = end == len(data) and not chunk.truncated and all(kind in (SCHEMA, CHANNEL) for kind, _, _ in others)
+    if sound:
+        # The index may be right where it has more messages.
+        doubtful = any(indexed.get(key, 0) > len(kept.get(key, ())) for key in wanted)
+        losses = [_loss(name, f"{reason}; the chunk was walked instead", chunk, None if doubtful else 0)]
+    elif any(len(messages) > indexed.get(key, 0) for key, messages in kept.items()):
         losses = [_loss(name, reason, chunk, None)]
-    return Loaded(data, kept, tuple(losses))
+    else:
+        losses = _lost(file, chunk, wanted, name, topics, reason, kept) or [_loss(name, reason, chunk, None)]
+    kept, late = representable(kept, name, topics)
+    if len(distinct) < len(table):
+        losses.append(copies_lost(name, len(table) - len(distinct)))
+    return Loaded(data, kept, (*losses, *late))
+
+
+def representable(
+    messages: Mapping[int, Messages], name: str, topics: Mapping[int, str]
+) -> tuple[dict[int, Messages], list[Loss]]:
+    """Leave out the messages whose log time is 2**63 ns or more; returns the others and what was left out."""
+    kept: dict[int, Messages] = {}
+    losses = []
+    for channel, found in messages.items():
+        possible = found.log_ns >= 0
+        if possible.all():
+            kept[channel] = found
+            continue
+        what = "messages with a log time of 2**63 ns or later, which cannot be represented, were left out"
+        losses.append(Loss(name, what, topics.get(channel), int((~possible).sum())))
+        if possible.any():
+            kept[channel] = found.take(possible)
+    return kept, losses
 
 
 def content(file: memoryview, whole_file: Bytes, chunk: Chunk, crc: int, room: Bytes | None = None) -> Bytes:
@@ -154,7 +205,10 @@ def content(file: memoryview, whole_file: Bytes, chunk: Chunk, crc: int, room: B
     if chunk.compression == "":
         data = whole_file[chunk.data_offset : chunk.data_offset + chunk.compressed_size]
     else:
-        data = Unpacker(file, chunk, room).upto(chunk.uncompressed_size)
+        unpacker = Unpacker(file, chunk, room)
+        data = unpacker.upto(chunk.uncompressed_size)
+        if not crc and not chunk.truncated and unpacker.has_more():
+            raise DamagedRecord("a chunk is not of the size that it states")
     if chunk.truncated:
         return data
     if len(data) != chunk.uncompressed_size:
@@ -175,43 +229,121 @@ def check(data: Bytes, crc: int) -> None:
         raise DamagedRecord("the checksum of a chunk is wrong")
 
 
-def walk_table(data: Bytes) -> tuple[Messages, list[tuple[int, int, int]], int]:
-    """Walk the records of a chunk; returns its messages, its other records and where the walk ended."""
-    offsets, others, end = walk(data.data, 0, len(data))
+def walk_table(data: Bytes, chunk: Chunk) -> tuple[Messages, list[tuple[int, int, int]], int]:
+    """Walk the records of a chunk; returns its messages, its other records and where the walk ended.
+
+    Raises
+    ------
+    DamagedRecord
+        Where it holds more records than bytes in the file.
+    """
+    limit = max(LEAST_WALK, chunk.compressed_size)
+    offsets, others, end = walk(data.data, 0, len(data), limit)
+    if end < len(data) and len(offsets) + len(others) >= limit:
+        raise DamagedRecord("a chunk holds more records than it has bytes in the file, which no recorder writes")
     table, _ = message_table(data, np.array(offsets, np.int64))
     return table, others, end
+
+
+def without_copies(buffer: Bytes, messages: Messages, surplus: bool = False) -> Messages:
+    """Return the messages without those that are the same, byte for byte, as an earlier one of the same number.
+
+    Recorders that do not number the messages of a channel give them all the sequence number 0: those are kept, unless
+    there is a `surplus` of messages.
+    """
+    if len(messages) < 2 or (messages.log_ns[1:] > messages.log_ns[:-1]).all():
+        return messages
+    headers = np.ndarray((len(buffer) - MESSAGE_HEADER + 1,), f"V{MESSAGE_HEADER}", buffer, strides=(1,))
+    fields = headers[messages.starts - MESSAGE_HEADER].view(MESSAGE_FIELDS)
+    order = np.lexsort((fields["length"], fields["sequence"], messages.log_ns, messages.channels))
+    fields = fields[order]
+    numbered = np.isin(fields["channel"], fields["channel"][fields["sequence"] != 0])
+    same = (fields[1:] == fields[:-1]) & (surplus | numbered[1:])
+    keep = np.ones(len(messages), np.bool_)
+    starts, ends = messages.starts[order].tolist(), (messages.starts + messages.sizes)[order].tolist()
+    for row in np.flatnonzero(same).tolist():
+        first, second = slice(starts[row], ends[row]), slice(starts[row + 1], ends[row + 1])
+        keep[order[row + 1]] = not np.array_equal(buffer[first], buffer[second])
+    return messages.take(keep)
+
+
+def copies_lost(name: str, count: int) -> Loss:
+    """Return the loss that reports copies left out."""
+    return Loss(name, f"{count} messages are in the file twice, byte for byte; the copies were left out", messages=0)
+
+
+def check_covered(data: Bytes, offsets: NDArray[np.int64]) -> list[tuple[int, int, int]]:
+    """Check that the messages that an index names, and definitions between them, are all that a chunk holds.
+
+    Parameters
+    ----------
+    data
+        The whole content of the chunk.
+    offsets
+        Where the index has the messages of all channels, ascending, shape (n,).
+
+    Returns
+    -------
+    list
+        (opcode, offset, content length) of the definitions.
+
+    Raises
+    ------
+    DamagedRecord
+        Where two entries name one message, or something else is in the chunk.
+    """
+    table, opcodes = message_table(data, offsets)
+    begins = np.concatenate([offsets, [len(data)]])
+    if (opcodes != MESSAGE).any() or (table.sizes < 0).any() or (table.sizes > begins[1:] - table.starts).any():
+        raise DamagedRecord("the message indexes of a chunk and its messages disagree")
+    ends = np.concatenate([[0], table.starts + table.sizes])
+    definitions: list[tuple[int, int, int]] = []
+    for gap in np.flatnonzero(begins > ends).tolist():
+        messages, others, reached = walk(data.data, int(ends[gap]), int(begins[gap]))
+        if messages or reached != begins[gap] or any(kind not in (SCHEMA, CHANNEL) for kind, _, _ in others):
+            raise DamagedRecord("a chunk holds records that its message indexes leave out")
+        definitions += others
+    return definitions
 
 
 def walk_chunk(
     file: memoryview, whole_file: Bytes, chunk: Chunk, name: str
 ) -> tuple[Chunk, list[tuple[int, memoryview]], Loss | None]:
-    """Find the messages of a chunk that has no index by walking it.
+    """Find the messages of a chunk that has no index, or a doubtful one, by walking it.
 
     Returns
     -------
     tuple
-        The chunk with its table, (opcode, content) of the schemas and channels in it, and what was lost.
+        The chunk with its table, (opcode, content) of the schemas and channels in it, and what was lost. A chunk that
+        cannot be read keeps its index, where it has one, and is reported when its messages are read.
     """
     loss = None
+    crc = 0 if chunk.truncated else stored_crc(file, chunk.offset)
     try:
-        crc = 0 if chunk.truncated else chunk_at(file, chunk.offset)[1]
         data = content(file, whole_file, chunk, crc)
+        table, others, end = walk_table(data, chunk)
     except DamagedRecord as error:
+        if chunk.indexed is not None:
+            return chunk, [], None
         return (
             replace(chunk, table=message_table(whole_file[:0], np.empty(0, np.int64))[0]),
             [],
             Loss(name, str(error), None, None, chunk.start_ns, chunk.end_ns),
         )
-    table, others, end = walk_table(data)
-    if chunk.truncated or end != len(data):
+    if chunk.truncated or end != len(data) or any(kind not in (SCHEMA, CHANNEL) for kind, _, _ in others):
         reached = int(table.log_ns.max()) if len(table) else chunk.start_ns
         what = "the file ends inside a chunk" if chunk.truncated else "a chunk's records are damaged"
-        loss = Loss(name, what, None, None, min(reached, chunk.end_ns), chunk.end_ns)
+        loss = Loss(name, what, None, None, min(max(reached, 0), chunk.end_ns), chunk.end_ns)
+    distinct = without_copies(data, table, chunk.indexed is not None and len(table) > sum(chunk.counts().values()))
+    if loss is None and len(distinct) < len(table):
+        loss = copies_lost(name, len(table) - len(distinct))
     view = data.data
     definitions = [
-        (opcode, view[start + RECORD_HEADER : start + RECORD_HEADER + length]) for opcode, start, length in others
+        (opcode, view[start + RECORD_HEADER : start + RECORD_HEADER + length])
+        for opcode, start, length in others
+        if opcode in (SCHEMA, CHANNEL)
     ]
-    return replace(chunk, table=table), definitions, loss
+    return replace(chunk, table=distinct), definitions, loss
 
 
 def _loss(name: str, what: str, chunk: Chunk, messages: int | None) -> Loss:
@@ -239,7 +371,7 @@ def _lost(
         if chunk.indexed is not None:
             try:
                 times = index_entries(file, channel, *chunk.indexed[channel])[:, 0]
-                start_ns, end_ns = int(times.min()), int(times.max())
+                start_ns, end_ns = max(int(times.min()), 0), max(int(times.max()), 0)
             except (DamagedRecord, ValueError):
                 pass
         if missing > 0:

@@ -1,4 +1,4 @@
-"""What the summary section of an MCAP file says: schemas, channels, chunks and their message indexes.
+"""Records of an MCAP file: their layouts, chunks and message indexes, and what is known of a file before it is read.
 
 Record layouts are those of the MCAP specification, version 0 (https://mcap.dev/spec).
 """
@@ -6,7 +6,8 @@ Record layouts are those of the MCAP specification, version 0 (https://mcap.dev/
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from array import array
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any, TypeVar
@@ -17,14 +18,15 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Schema, Statistics
 from numpy.typing import NDArray
 
-from ferryid.ingest.checksum import crc32
 from ferryid.ingest.log import Loss, Nanoseconds
 
 MAGIC = b"\x89MCAP0\r\n"
 # Opcodes of the specification.
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 1, 2, 3, 4, 5, 6, 7, 8
-STATISTICS, DATA_END = 0x0B, 0x0F
+ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(9, 16)
 LAST_OPCODE = 0x0F
+PRIVATE = 0x80
+"""Kinds of records from here on belong to applications."""
 RECORD_HEADER = 9
 """Opcode and length before the content of every record [bytes]."""
 MESSAGE_HEADER = 31
@@ -40,6 +42,10 @@ MESSAGE_FIELDS = np.dtype(
     ]
 )
 FOOTER_SIZE = RECORD_HEADER + 20 + len(MAGIC)
+# Least content of every kind of record [bytes], by opcode. No record has the opcode 0; unknown kinds may be empty.
+_LEAST = (1 << 64, 8, 20, 14, 16, 22, 40, 6, 64, 36, 48, 46, 8, 20, 17, 4, *[0] * 240)
+LATEST_NS = (1 << 63) - 1
+"""Times are unsigned in the file; from 2**63 ns on (the year 2262) they cannot be represented here."""
 
 record_header: Callable[..., tuple[int, int]] = struct.Struct("<BQ").unpack_from
 _chunk_fields: Callable[..., tuple[int, int, int, int]] = struct.Struct("<QQQI").unpack_from
@@ -50,7 +56,7 @@ Definition = TypeVar("Definition")
 
 
 class DamagedRecord(ValueError):
-    """A record that contradicts itself or its index; told to the user as a Loss, never raised out of the reader."""
+    """A record that contradicts itself or its index; reported to the user as a Loss, never raised out of the reader."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +75,22 @@ class Messages:
         """Return the selected rows (mask, slice or indices)."""
         return Messages(self.starts[rows], self.sizes[rows], self.channels[rows], self.log_ns[rows])
 
+    def by_channel(self, wanted: Collection[int]) -> dict[int, Messages]:
+        """Return the messages of the wanted channels that have any, each in the order of this table."""
+        rows = np.flatnonzero(np.isin(self.channels, list(wanted)))
+        if not len(rows):
+            return {}
+        rows = rows[np.argsort(self.channels[rows], kind="stable")]
+        ids, firsts = np.unique(self.channels[rows], return_index=True)
+        return {
+            channel: self.take(part) for channel, part in zip(ids.tolist(), np.split(rows, firsts[1:]), strict=True)
+        }
+
+    def count(self) -> dict[int, int]:
+        """Return the number of messages per channel id."""
+        ids, counts = np.unique(self.channels, return_counts=True)
+        return dict(zip(ids.tolist(), counts.tolist(), strict=True))
+
 
 @dataclass(frozen=True)
 class Chunk:
@@ -79,7 +101,7 @@ class Chunk:
     offset
         Where the chunk record begins in the file.
     start_ns, end_ns
-        Log times of its first and last message [ns].
+        Log times of its first and last message [ns], at most `LATEST_NS`.
     compression, data_offset, compressed_size, uncompressed_size
         How and where its records are stored. `compressed_size` is what the file holds, less than stated in a
         truncated chunk.
@@ -105,14 +127,47 @@ class Chunk:
     def counts(self) -> dict[int, int]:
         """Return the number of messages per channel id, as far as it is known without reading the chunk."""
         if self.table is not None:
-            ids, counts = np.unique(self.table.channels, return_counts=True)
-            return {int(key): int(count) for key, count in zip(ids, counts, strict=True)}
+            return self.table.count()
         return {key: count for key, (_, count) in (self.indexed or {}).items()}
+
+    def every(self, file: memoryview) -> NDArray[np.int64]:
+        """Return where the message indexes have the messages of all channels in the chunk, ascending, shape (n,).
+
+        Raises
+        ------
+        DamagedRecord
+            Where a MessageIndex record is damaged.
+        """
+        parts = [index_entries(file, key, *place)[:, 1] for key, place in (self.indexed or {}).items()]
+        return np.sort(np.concatenate([*parts, np.empty(0, np.int64)]))
 
 
 @dataclass
 class Index:
-    """Everything known of a file before a message is decoded; filled by `read_summary` or `scan`."""
+    """Everything known of a file before a message is decoded; filled by `read_summary` or `scan`.
+
+    Attributes
+    ----------
+    schemas, channels
+        Definitions by id.
+    chunks
+        In file order.
+    loose
+        Messages outside chunks, in file order; None where there are none.
+    statistics
+        The Statistics record, where it is possible.
+    losses
+        What is known to be lost or contradictory.
+    data_end
+        Where the DataEnd record, or the summary, begins [bytes].
+    conflicts
+        Ids that are defined in several ways, as sentences.
+    complete
+        True where the statistics count exactly the messages that were found; otherwise every chunk is held against
+        its index when it is read.
+    contradiction
+        In what the chunks that the summary lists and the file contradict each other, None where they agree.
+    """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
@@ -121,15 +176,45 @@ class Index:
     statistics: Statistics | None = None
     losses: list[Loss] = field(default_factory=list)
     data_end: int = 0
+    conflicts: list[str] = field(default_factory=list)
+    complete: bool = False
+    contradiction: str | None = None
 
     def define(self, opcode: int, content: Bytes | memoryview) -> None:
-        """Take a Schema or Channel record; the first definition of an id stands."""
-        if opcode == SCHEMA:
-            schema = parsed(Schema.read, content)
-            self.schemas.setdefault(schema.id, schema)
+        """Take a Schema or Channel record; the first definition of an id stands.
+
+        Raises
+        ------
+        DamagedRecord
+            Where the content does not make such a record.
+        """
+        self.add(definition(opcode, content))
+
+    def add(self, definition: Schema | Channel) -> None:
+        """Take a definition; one that contradicts an earlier one of the same id is noted in `conflicts`."""
+        conflict = self.conflict(definition)
+        if conflict:
+            self.conflicts.append(conflict)
+        elif isinstance(definition, Schema):
+            self.schemas.setdefault(definition.id, definition)
         else:
-            channel = parsed(Channel.read, content)
-            self.channels.setdefault(channel.id, channel)
+            self.channels.setdefault(definition.id, definition)
+
+    def conflict(self, definition: Schema | Channel) -> str:
+        """Say what in a definition contradicts the known one of the same id; an empty string where nothing does."""
+        if isinstance(definition, Schema):
+            schema = self.schemas.get(definition.id, definition)
+            if schema == definition:
+                return ""
+            known, new = repr(schema.name), repr(definition.name)
+        else:
+            channel = self.channels.get(definition.id, definition)
+            stated = [(one.topic, one.schema_id, one.message_encoding) for one in (channel, definition)]
+            if stated[0] == stated[1]:
+                return ""
+            known, new = (f"{topic!r} with schema {schema} in {encoding!r}" for topic, schema, encoding in stated)
+        kind = "schema" if isinstance(definition, Schema) else "channel"
+        return f"{kind} {definition.id} is defined as {known} and as {new}: the first stands, for all messages"
 
     def counts(self) -> dict[int, int]:
         """Return the number of messages per channel id that the chunks and the walk show."""
@@ -138,10 +223,22 @@ class Index:
             for key, count in chunk.counts().items():
                 total[key] = total.get(key, 0) + count
         if self.loose is not None:
-            ids, counts = np.unique(self.loose.channels, return_counts=True)
-            for key, count in zip(ids.tolist(), counts.tolist(), strict=True):
+            for key, count in self.loose.count().items():
                 total[key] = total.get(key, 0) + count
         return total
+
+
+def definition(opcode: int, content: Bytes | memoryview) -> Schema | Channel:
+    """Parse a Schema or Channel record.
+
+    Raises
+    ------
+    DamagedRecord
+        Where the content does not make one.
+    """
+    if opcode == SCHEMA:
+        return parsed(Schema.read, content)
+    return parsed(Channel.read, content)
 
 
 def parsed(read: Callable[[ReadDataStream], Definition], content: Bytes | memoryview) -> Definition:
@@ -158,34 +255,61 @@ def parsed(read: Callable[[ReadDataStream], Definition], content: Bytes | memory
         raise DamagedRecord(f"a record cannot be parsed ({error or type(error).__name__})") from error
 
 
-def walk(data: memoryview, start: int, stop: int) -> tuple[list[int], list[tuple[int, int, int]], int]:
+def walk(
+    data: memoryview, start: int, stop: int, limit: int | None = None
+) -> tuple[array[int], list[tuple[int, int, int]], int]:
     """Step from record to record.
+
+    Parameters
+    ----------
+    data
+        Bytes that hold records.
+    start, stop
+        Where the first record begins and the last one ends at most.
+    limit
+        Records after which the walk ends; by default as many as there are.
 
     Returns
     -------
     tuple
         Offsets of the message records, (opcode, offset, content length) of all others, and where the walk ended: `stop`
-        unless something there is no record.
+        unless something there is no record. Neighbouring records of unknown kinds are given as one.
     """
-    messages: list[int] = []
+    messages = array("q")
     others: list[tuple[int, int, int]] = []
     found = messages.append
     position = start
-    while position + RECORD_HEADER <= stop:
+    last = stop - RECORD_HEADER
+    for _ in range((stop - start) // RECORD_HEADER if limit is None else limit):
+        if position > last:
+            break
         opcode, length = record_header(data, position)
         behind = position + RECORD_HEADER + length
-        if behind > stop:
+        if behind > stop or length < _LEAST[opcode]:
             break
         if opcode == MESSAGE:
-            if length < MESSAGE_HEADER - RECORD_HEADER:
-                break
             found(position)
-        elif opcode == 0:
+        elif opcode == CHUNK and not sound_chunk(data, position):
             break
+        elif opcode > LAST_OPCODE and others and others[-1][0] > LAST_OPCODE and _end(others[-1]) == position:
+            others[-1] = (*others[-1][:2], behind - others[-1][1] - RECORD_HEADER)
         else:
             others.append((opcode, position, length))
         position = behind
     return messages, others, position
+
+
+def _end(record: tuple[int, int, int]) -> int:
+    return record[1] + RECORD_HEADER + record[2]
+
+
+def sound_chunk(data: memoryview, offset: int) -> bool:
+    """Tell whether the header of a chunk at `offset` agrees with itself."""
+    try:
+        chunk_at(data, offset)
+    except DamagedRecord:
+        return False
+    return True
 
 
 def message_table(buffer: Bytes, offsets: NDArray[np.int64]) -> tuple[Messages, NDArray[np.uint8]]:
@@ -240,96 +364,71 @@ def chunk_at(file: memoryview, offset: int) -> tuple[Chunk, int, int]:
     DamagedRecord
         Where the header contradicts itself.
     """
-    if offset + RECORD_HEADER + 40 > len(file):
-        raise DamagedRecord("a chunk's header is cut")
-    opcode, length = record_header(file, offset)
-    start_ns, end_ns, size, crc = _chunk_fields(file, offset + RECORD_HEADER)
-    (name_length,) = struct.unpack_from("<I", file, offset + 37)
-    data_offset = offset + 49 + name_length
-    if opcode != CHUNK or name_length > 64 or data_offset > len(file):
-        raise DamagedRecord("a chunk's header is damaged")
-    (stored,) = struct.unpack_from("<Q", file, data_offset - 8)
-    name = bytes(file[offset + 41 : offset + 41 + name_length])
-    if length != 40 + name_length + stored or not name.isascii() or max(start_ns, end_ns) >= 1 << 63:
+    chunk = lenient_chunk(file, offset)
+    end = chunk.data_offset + chunk.compressed_size
+    if record_header(file, offset)[1] != end - offset - RECORD_HEADER:
         raise DamagedRecord("a chunk's header contradicts itself")
-    chunk = Chunk(offset, start_ns, end_ns, name.decode("ascii"), data_offset, stored, size, None)
-    return chunk, crc, data_offset + stored
+    return chunk, stored_crc(file, offset), end
 
 
-def _chunk_from_index(content: memoryview) -> Chunk:
-    """Parse a ChunkIndex record. The lengths of the message indexes follow from where the next one begins."""
-    start_ns, end_ns, offset, length, size = _chunk_index_fields(content, 0)
-    places = sorted((place, channel) for channel, place in struct.iter_unpack("<HQ", content[36 : 36 + size]))
-    index_length, name_length = struct.unpack_from("<QI", content, 36 + size)
-    name = bytes(content[48 + size : 48 + size + name_length]).decode("ascii")
-    stored, unpacked = struct.unpack_from("<QQ", content, 48 + size + name_length)
-    ends = [place for place, _ in [*places, (offset + length + index_length, 0)][1:]]
-    indexed = {channel: (place, (end - place - 15) // 16) for (place, channel), end in zip(places, ends, strict=True)}
-    if length != 49 + name_length + stored or any(count < 0 for _, count in indexed.values()):
-        raise DamagedRecord("a chunk index contradicts itself")
-    return Chunk(offset, start_ns, end_ns, name, offset + 49 + name_length, stored, unpacked, indexed or None)
-
-
-def read_summary(file: memoryview) -> Index | None:
-    """Read the summary section.
-
-    Returns
-    -------
-    Index or None
-        None where a finished file simply has no summary.
+def lenient_chunk(file: memoryview, offset: int) -> Chunk:
+    """Parse the header of a chunk record that may state two different sizes.
 
     Raises
     ------
     DamagedRecord
-        Where the file does not end as a finished file does, or the summary is damaged.
+        Where no such header can be there.
     """
-    footer = len(file) - FOOTER_SIZE
-    if footer < len(MAGIC) or file[-len(MAGIC) :] != MAGIC or record_header(file, footer) != (FOOTER, 20):
-        raise DamagedRecord("the end of the file is missing")
-    start, _, crc = struct.unpack_from("<QQI", file, footer + RECORD_HEADER)
-    if start == 0:
-        return None
-    if not len(MAGIC) <= start <= footer:
-        raise DamagedRecord("the footer points nowhere")
-    if crc and crc32(file[start : footer + RECORD_HEADER + 16]) != crc:
-        raise DamagedRecord("the checksum of the summary is wrong")
-    messages, others, end = walk(file, start, footer)
-    if end != footer or messages:
-        raise DamagedRecord("the summary is damaged")
-    index = Index(data_end=start)
-    try:
-        for opcode, position, length in others:
-            content = file[position + RECORD_HEADER : position + RECORD_HEADER + length]
-            if opcode in (SCHEMA, CHANNEL):
-                index.define(opcode, content)
-            elif opcode == CHUNK_INDEX:
-                index.chunks.append(_chunk_from_index(content))
-            elif opcode == STATISTICS:
-                index.statistics = parsed(Statistics.read, content)
-    except (struct.error, UnicodeDecodeError) as error:
-        raise DamagedRecord(f"a record of the summary cannot be parsed ({error})") from error
-    index.chunks.sort(key=lambda chunk: chunk.offset)
-    return index
+    if offset + RECORD_HEADER + 40 > len(file):
+        raise DamagedRecord("a chunk's header is cut")
+    start_ns, end_ns, size, _ = _chunk_fields(file, offset + RECORD_HEADER)
+    (name_length,) = struct.unpack_from("<I", file, offset + 37)
+    data_offset = offset + 49 + name_length
+    if file[offset] != CHUNK or name_length > 64 or data_offset > len(file):
+        raise DamagedRecord("a chunk's header is damaged")
+    (stored,) = struct.unpack_from("<Q", file, data_offset - 8)
+    name = bytes(file[offset + 41 : offset + 41 + name_length])
+    if not name.isascii():
+        raise DamagedRecord("a chunk's header is damaged")
+    times = min(start_ns, LATEST_NS), min(end_ns, LATEST_NS)
+    return Chunk(offset, *times, name.decode("ascii"), data_offset, stored, size, None)
+
+
+def stored_crc(file: memoryview, offset: int) -> int:
+    """Return the checksum that the chunk at `offset` states, whatever else of its header is damaged; 0 for none."""
+    if offset + RECORD_HEADER + 28 > len(file) or file[offset] != CHUNK:
+        return 0
+    return _chunk_fields(file, offset + RECORD_HEADER)[3]
 
 
 def spans(index: Index, file: memoryview, channels: Iterable[int]) -> dict[int, tuple[int, int]]:
     """Return the first and last log time [ns] of each channel, from as few message indexes as possible."""
+    known: dict[int, list[NDArray[np.int64]]] = {channel: [] for channel in channels}
+    holding: dict[int, list[Chunk]] = {}
+    tables = [] if index.loose is None else [index.loose]
+    for chunk in index.chunks:
+        if chunk.table is not None:
+            tables.append(chunk.table)
+        else:
+            for channel in chunk.indexed or ():
+                holding.setdefault(channel, []).append(chunk)
+    for table in tables:
+        for channel, messages in table.by_channel(known).items():
+            known[channel].append(messages.log_ns)
     found: dict[int, tuple[int, int]] = {}
-    by_start = sorted(index.chunks, key=lambda chunk: chunk.start_ns)
-    by_end = sorted(index.chunks, key=lambda chunk: -chunk.end_ns)
-    for channel in channels:
-        first = last = None
-        if index.loose is not None:
-            times = index.loose.log_ns[index.loose.channels == channel]
-            if len(times):
-                first, last = int(times.min()), int(times.max())
-        for chunk in by_start:
+    for channel, parts in known.items():
+        chunks = holding.get(channel, [])
+        times = np.concatenate([*parts, np.empty(0, np.int64)])
+        times = times[times >= 0]
+        first = int(times.min()) if len(times) else None
+        last = int(times.max()) if len(times) else None
+        for chunk in sorted(chunks, key=lambda chunk: chunk.start_ns):
             if first is not None and chunk.start_ns >= first:
                 break
             times = _times(chunk, file, channel)
             if len(times):
                 first = int(times.min()) if first is None else min(first, int(times.min()))
-        for chunk in by_end:
+        for chunk in sorted(chunks, key=lambda chunk: -chunk.end_ns):
             if last is not None and chunk.end_ns <= last:
                 break
             times = _times(chunk, file, channel)
@@ -341,15 +440,14 @@ def spans(index: Index, file: memoryview, channels: Iterable[int]) -> dict[int, 
 
 
 def _times(chunk: Chunk, file: memoryview, channel: int) -> Nanoseconds:
-    if chunk.table is not None:
-        return chunk.table.take(chunk.table.channels == channel).log_ns
+    """Return the log times of a channel's messages in a chunk that was not walked, without those past `LATEST_NS`."""
     offset, count = (chunk.indexed or {}).get(channel, (0, 0))
     if not count:
         return np.empty(0, np.int64)
     try:
         entries = index_entries(file, channel, offset, count)
     except DamagedRecord:
-        # Found again, and told, when the chunk is read.
+        # Found again, and reported, when the chunk is read.
         return np.array([chunk.start_ns, chunk.end_ns], np.int64)
     times: Nanoseconds = entries[:, 0]
-    return times
+    return times[times >= 0]

@@ -1,51 +1,35 @@
-"""The index of an MCAP file that has none, or a damaged one: records found by walking, gaps passed over and told."""
+"""The index of an MCAP file: its summary, or what walking finds where that is missing, damaged or contradicted."""
 
 from __future__ import annotations
 
-import re
-import struct
-from collections.abc import Collection, Container, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
+from mcap.records import Channel, Schema
 
 from ferryid.ingest.log import Loss
-from ferryid.ingest.mcap_chunks import walk_chunk
+from ferryid.ingest.mcap_chunks import MAX_CHUNK, check_covered, content, copies_lost, walk_chunk, without_copies
 from ferryid.ingest.mcap_index import (
-    CHANNEL,
-    CHUNK,
-    DATA_END,
-    LAST_OPCODE,
-    MAGIC,
-    MESSAGE,
+    LATEST_NS,
     MESSAGE_HEADER,
-    MESSAGE_INDEX,
     RECORD_HEADER,
-    SCHEMA,
     Bytes,
-    Chunk,
     DamagedRecord,
     Index,
-    chunk_at,
-    message_table,
-    read_summary,
-    record_header,
-    walk,
+    stored_crc,
 )
+from ferryid.ingest.mcap_scan import scan
+from ferryid.ingest.mcap_summary import read_summary, summary_start
 
-# A message or chunk record of less than 1 TiB may begin here; the look-ahead lets candidates overlap.
-_CANDIDATE = re.compile(rb"[\x05\x06](?=.{5}\x00{3})", re.DOTALL)
-_CHAIN = 3
-"""Records behind a candidate that must look like records too."""
-_SUSPECTS = 4
-"""Messages before a damaged place whose length may have led there."""
-_DAMAGE = 0
-"""Stands among the opcodes of a walk where the walk was broken."""
+FIRST_CHUNK = 8 << 20
+"""A first chunk up to this size [bytes] is read when a file is opened."""
 
 
 def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
     """Return the index of a file, from its summary or else by walking the file.
+
+    Where its statistics and its index disagree the file is walked, and where that does not explain it, its chunks are.
 
     Parameters
     ----------
@@ -56,206 +40,166 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
     """
     try:
         index = read_summary(file)
-        reason = None
+        reason = None if index is None else index.contradiction
     except DamagedRecord as error:
         index, reason = None, str(error)
-    if index is None or _needs_walk(index):
+    if index is not None:
+        _check_statistics(index, len(file), name)
+    if index is not None and reason is None and not _needs_walk(index):
+        _walk_chunks(index, file, whole_file, name)
+        _check_definitions(index, file, whole_file)
+    if index is None or not index.complete:
         summary, index = index, scan(file, name)
+        if summary is None:
+            summary = _moved_summary(file, index.data_end, name)
         if summary is not None:
-            index.statistics = summary.statistics
-            index.schemas.update(summary.schemas)
-            index.channels.update(summary.channels)
-    index = _walked(index, file, whole_file, name)
+            _merge(index, summary)
+        _walk_chunks(index, file, whole_file, name)
+        if not index.complete:
+            _check_loose(index, whole_file, name)
+    if index.complete:
+        # All messages that were ever written are there.
+        index.losses = [loss if loss.messages else replace(loss, messages=0) for loss in index.losses]
     if reason is not None:
         found = sum(index.counts().values())
         what = f"{reason}; the index was rebuilt by walking the whole file, which found {found} messages"
         index.losses.insert(0, Loss(name, what, messages=0))
+    for conflict in dict.fromkeys(index.conflicts):
+        index.losses.append(Loss(name, conflict))
+    late = sum(chunk.end_ns == LATEST_NS for chunk in index.chunks)
+    if late:
+        what = f"{late} chunks state times of 2**63 ns or later, which cannot be represented"
+        index.losses.append(Loss(name, what, messages=0))
     return index
+
+
+def _check_definitions(index: Index, file: memoryview, whole_file: Bytes) -> None:
+    """Hold the definitions of the summary against those in the first chunk, unless that is large."""
+    for chunk in index.chunks[:1]:
+        if chunk.indexed is not None and chunk.table is None and chunk.uncompressed_size <= FIRST_CHUNK:
+            # A damaged chunk is reported when it is read.
+            with suppress(DamagedRecord):
+                data = content(file, whole_file, chunk, stored_crc(file, chunk.offset))
+                for kind, start, length in check_covered(data, chunk.every(file)):
+                    index.define(kind, data[start + RECORD_HEADER : start + RECORD_HEADER + length])
+
+
+def _moved_summary(file: memoryview, data_end: int, name: str) -> Index | None:
+    """Return the summary that stands behind the data, in a file whose footer has it elsewhere; None if there is none."""
+    place = data_end + RECORD_HEADER + 4
+    try:
+        _, start, _ = summary_start(file)
+        summary = read_summary(file, place) if start and place < len(file) else None
+    except DamagedRecord:
+        return None
+    if summary is not None:
+        moved = f"{abs(start - place)} bytes {'before' if place < start else 'behind'} where the footer has it"
+        what = f"the summary stands {moved}: bytes of the file are missing or were added"
+        summary.losses.append(Loss(name, what))
+        _check_statistics(summary, len(file), name)
+    return summary
+
+
+def _check_statistics(index: Index, size: int, name: str) -> None:
+    """Drop statistics that cannot be true: a message takes at least 31 bytes of the file or of a chunk."""
+    if index.statistics is None:
+        return
+    stated = index.statistics.message_count
+    counts = index.statistics.channel_message_counts
+    possible = (size + sum(min(chunk.uncompressed_size, MAX_CHUNK) for chunk in index.chunks)) // MESSAGE_HEADER
+    if stated > possible or (counts and sum(counts.values()) != stated):
+        what = (
+            f"the file's own statistics cannot be true ({stated} messages, {sum(counts.values())} when added up by "
+            "channel) and were not used"
+        )
+        index.losses.append(Loss(name, what, messages=0))
+        index.statistics = None
 
 
 def _needs_walk(index: Index) -> bool:
     """Tell whether messages lie outside the indexed chunks, or the summary does not list all chunks."""
     if index.statistics is None or index.statistics.chunk_count != len(index.chunks):
         return True
-    indexed = sum(index.counts().values())
-    return index.statistics.message_count > indexed and all(chunk.indexed is not None for chunk in index.chunks)
+    return all(chunk.indexed is not None for chunk in index.chunks) and not _confirmed(index)
 
 
-def _walked(index: Index, file: memoryview, whole_file: Bytes, name: str) -> Index:
-    """Walk the chunks that have no message index, or that hold channels defined nowhere else."""
-    complete = index.statistics is not None and sum(index.counts().values()) == index.statistics.message_count
+def _confirmed(index: Index) -> bool:
+    """Tell whether the statistics count exactly the messages that were found, on every channel."""
+    if index.statistics is None:
+        return False
+    found = {channel: count for channel, count in index.counts().items() if count}
+    stated = {channel: count for channel, count in index.statistics.channel_message_counts.items() if count}
+    return sum(found.values()) == index.statistics.message_count and stated in ({}, found)
+
+
+def _merge(index: Index, summary: Index) -> None:
+    """Add what the summary has to the index found by walking; the definitions of the summary come first."""
+    index.statistics = summary.statistics
+    index.losses[:0] = summary.losses
+    index.conflicts += summary.conflicts
+    walked: list[Schema | Channel] = [*index.schemas.values(), *index.channels.values()]
+    index.schemas, index.channels = dict(summary.schemas), dict(summary.channels)
+    for definition in walked:
+        index.add(definition)
+
+
+def _walk_chunks(index: Index, file: memoryview, whole_file: Bytes, name: str) -> None:
+    """Walk the chunks that have no message index or define what is known from nowhere else, all if counts disagree."""
+    index.complete = _confirmed(index)
     for number, chunk in enumerate(index.chunks):
         unknown = any(channel not in index.channels for channel in chunk.indexed or ())
-        if (chunk.indexed is None and not complete) or unknown:
-            index.chunks[number] = _walk_into(index, chunk, file, whole_file, name, unknown)
-    for chunk in index.chunks:
-        if all(channel.schema_id in (0, *index.schemas) for channel in index.channels.values()):
+        if unknown or (chunk.indexed is None and not index.complete):
+            _walk_into(index, number, file, whole_file, name)
+    missing = {channel.schema_id for channel in index.channels.values()} - index.schemas.keys() - {0}
+    for number, chunk in enumerate(index.chunks):
+        if not missing:
             break
-        if chunk.indexed is not None:
-            _walk_into(index, chunk, file, whole_file, name, True)
-    return index
+        if chunk.table is None:
+            _walk_into(index, number, file, whole_file, name)
+            missing -= index.schemas.keys()
+    index.complete = _confirmed(index)
+    if index.statistics is not None and not index.complete:
+        for number, chunk in enumerate(index.chunks):
+            if chunk.table is None:
+                _walk_into(index, number, file, whole_file, name)
+        index.complete = _confirmed(index)
 
 
-def _walk_into(
-    index: Index, chunk: Chunk, file: memoryview, whole_file: Bytes, name: str, definitions_only: bool
-) -> Chunk:
+def _walk_into(index: Index, number: int, file: memoryview, whole_file: Bytes, name: str) -> None:
+    """Walk a chunk: take its definitions, and its messages where its index has others."""
+    chunk = index.chunks[number]
     walked, definitions, loss = walk_chunk(file, whole_file, chunk, name)
-    for opcode, content in definitions:
-        if opcode in (SCHEMA, CHANNEL):
-            try:
-                index.define(opcode, content)
-            except DamagedRecord as error:
-                index.losses.append(Loss(name, str(error), None, None, chunk.start_ns, chunk.end_ns))
-    if definitions_only and chunk.indexed is not None:
-        return chunk
+    for opcode, text in definitions:
+        try:
+            index.define(opcode, text)
+        except DamagedRecord as error:
+            index.losses.append(Loss(name, str(error), None, None, chunk.start_ns, chunk.end_ns))
+    if walked.counts() == chunk.counts():
+        return
+    index.chunks[number] = walked
+    if loss is None and chunk.indexed is not None:
+        counts = walked.counts()
+        fewer = any(counts.get(channel, 0) < count for channel, count in chunk.counts().items())
+        what = "the message index of a chunk and its messages disagree; the chunk was walked instead"
+        loss = Loss(name, what, None, None if fewer else 0, chunk.start_ns, chunk.end_ns)
     if loss is not None:
         index.losses.append(loss)
-    return walked
 
 
-def scan(file: memoryview, name: str) -> Index:
-    """Walk the records of a file from its beginning, and on behind every damaged stretch.
-
-    Returns
-    -------
-    Index
-        With the messages outside chunks in `loose`, and the stretches that are no records among the losses.
-    """
-    index = Index(data_end=len(file))
-    offsets: list[int] = []
-    records: list[tuple[int, int, int]] = []
-    gaps: list[tuple[int, int]] = []
-    position: int | None = len(MAGIC)
-    while position is not None:
-        messages, others, end = walk(file, position, len(file))
-        position = None
-        finished = [start for opcode, start, _ in others if opcode == DATA_END]
-        index.data_end = min(finished, default=len(file))
-        # What follows the data repeats it, and is damaged where the file had to be walked.
-        others = [record for record in others if record[1] < index.data_end]
-        _define(index, file, others)
-        if not finished and _sane_chunk(file, end):
-            # The file ends inside this chunk.
-            others += [(CHUNK, end, len(file) - end - RECORD_HEADER), (_DAMAGE, end, 0)]
-        elif not finished:
-            end = _end_of_sound_records(messages, others, end)
-            for suspect in messages[-_SUSPECTS:]:
-                reach = suspect + RECORD_HEADER + record_header(file, suspect)[1]
-                position = _next_record(file, suspect + 1, reach, index.channels)
-                if position is not None:
-                    # The length of that message is wrong: it reaches past the record found in it.
-                    end = suspect
-                    messages = [start for start in messages if start < end]
-                    others = [record for record in others if record[1] < end]
-                    break
-            else:
-                position = _next_record(file, end + 1, len(file), index.channels)
-            others.append((_DAMAGE, end, 0))
-            gaps.append((end, len(file) if position is None else position))
-        offsets += messages
-        records += others
-    index.chunks = _chunks(file, records)
-    if offsets:
-        index.loose, _ = message_table(np.frombuffer(file, np.uint8), np.array(offsets, np.int64))
-    index.losses += [_gap(index, start, stop, len(file), name) for start, stop in gaps]
-    return index
-
-
-def _end_of_sound_records(messages: list[int], others: list[tuple[int, int, int]], end: int) -> int:
-    """Take records of an unknown kind just before a damaged place for a part of the damage."""
-    while others and others[-1][0] > LAST_OPCODE and (not messages or others[-1][1] > messages[-1]):
-        end = others.pop()[1]
-    return end
-
-
-def _define(index: Index, file: memoryview, records: Collection[tuple[int, int, int]]) -> None:
-    for opcode, start, length in records:
-        if opcode in (SCHEMA, CHANNEL):
-            # A damaged definition stands again in the summary or a chunk; if not, its messages are reported lost.
-            with suppress(DamagedRecord):
-                index.define(opcode, file[start + RECORD_HEADER : start + RECORD_HEADER + length])
-
-
-def _sane_chunk(file: memoryview, offset: int) -> bool:
-    try:
-        chunk_at(file, offset)
-    except DamagedRecord:
-        return False
-    return True
-
-
-def _next_record(file: memoryview, start: int, stop: int, channels: Container[int]) -> int | None:
-    """Return where the first chunk, or message of a known channel, begins between `start` and `stop`."""
-    for match in _CANDIDATE.finditer(file, start):
-        if match.start() >= stop:
-            return None
-        position = match.start()
-        if len(file) - position < MESSAGE_HEADER:
-            return None
-        if file[position] == CHUNK:
-            if _sane_chunk(file, position):
-                return position
-        elif _leads_on(file, position, channels):
-            return position
-    return None
-
-
-def _leads_on(file: memoryview, position: int, channels: Container[int]) -> bool:
-    """Tell whether a complete message record stands at `position` and what follows looks like records."""
-    for link in range(_CHAIN):
-        room = len(file) - position
-        if room < MESSAGE_HEADER:
-            return link > 0
-        opcode, length = record_header(file, position)
-        if not 0 < opcode <= LAST_OPCODE or (link == 0 and length > room - RECORD_HEADER):
-            return False
-        if opcode == MESSAGE:
-            (channel,) = struct.unpack_from("<H", file, position + RECORD_HEADER)
-            if channel not in channels or length < MESSAGE_HEADER - RECORD_HEADER:
-                return False
-        if length > room - RECORD_HEADER:
-            return True
-        position += RECORD_HEADER + length
-    return True
-
-
-def _chunks(file: memoryview, records: Sequence[tuple[int, int, int]]) -> list[Chunk]:
-    """Put the chunks of a walk together with the message indexes that follow each of them."""
-    chunks: list[Chunk] = []
-    following = False
-    for opcode, start, length in records:
-        if opcode == MESSAGE_INDEX and following:
-            channel, size = struct.unpack_from("<HI", file, start + RECORD_HEADER) if length >= 6 else (0, 0)
-            indexed = {**(chunks[-1].indexed or {}), channel: (start, size // 16)}
-            chunks[-1] = replace(chunks[-1], indexed=indexed)
-        elif opcode == CHUNK:
-            try:
-                chunk, _, end = chunk_at(file, start)
-            except DamagedRecord:
-                # Its inner lengths contradict the record's: what it holds cannot be trusted.
-                following = False
-                continue
-            held = min(chunk.compressed_size, len(file) - chunk.data_offset)
-            chunks.append(replace(chunk, compressed_size=held, truncated=end > len(file)))
-            following = True
-        else:
-            if opcode == _DAMAGE and following:
-                # Some of its message indexes may be missing.
-                chunks[-1] = replace(chunks[-1], indexed=None)
-            following = False
-    return chunks
-
-
-def _gap(index: Index, start: int, stop: int, size: int, name: str) -> Loss:
-    """Say what a damaged stretch of bytes took away: the time between its neighbours."""
-    before = [chunk.end_ns for chunk in index.chunks if chunk.offset < start]
-    after = [chunk.start_ns for chunk in index.chunks if chunk.offset >= stop]
-    if index.loose is not None:
-        before += index.loose.log_ns[index.loose.starts <= start][-1:].tolist()
-        after += index.loose.log_ns[index.loose.starts > stop][:1].tolist()
-    last = max(before, default=None)
-    if stop == size:
-        what = "the file ends without its end record, and whatever followed is missing"
-        return Loss(name, what, None, None, last, None)
-    what = f"{stop - start} damaged bytes from byte {start} were passed over"
-    return Loss(name, what, None, None, last, min(after, default=None))
+def _check_loose(index: Index, whole_file: Bytes, name: str) -> None:
+    """Leave out copies of messages outside chunks, and what can hardly be a message, where no statistics count them."""
+    if index.loose is None:
+        return
+    kept = without_copies(whole_file, index.loose)
+    if len(kept) < len(index.loose):
+        index.losses.append(copies_lost(name, len(index.loose) - len(kept)))
+    defined = np.isin(kept.channels, list(index.channels))
+    times = kept.log_ns[defined]
+    if len(times):
+        odd = ~defined & ((kept.log_ns < times.min()) | (kept.log_ns > times.max()))
+        if odd.any():
+            what = f"{int(odd.sum())} records that look like messages of unknown channels at other times were left out"
+            index.losses.append(Loss(name, what))
+            kept = kept.take(~odd)
+    index.loose = kept
+    index.complete = _confirmed(index)

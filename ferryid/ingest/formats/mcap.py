@@ -64,7 +64,7 @@ class McapLog:
         self.losses: tuple[Loss, ...] = self._opening
 
     def _undefined(self) -> tuple[Loss, ...]:
-        """Say which messages belong to channels whose definition is nowhere in the file."""
+        """Report which messages belong to channels whose definition is nowhere in the file."""
         return tuple(
             Loss(
                 self._name,
@@ -117,12 +117,13 @@ class McapLog:
         )
 
     def _counts(self) -> dict[int, int]:
-        """Return messages per channel as the statistics record has them, else as the indexes and the walk do."""
+        """Return messages per channel: as many as the statistics record has, or the indexes and the walk if more."""
         found = self._index.counts()
         statistics = self._index.statistics
-        if statistics is None:
-            return found
-        return {**found, **statistics.channel_message_counts}
+        if statistics is not None:
+            for channel, count in statistics.channel_message_counts.items():
+                found[channel] = max(count, found.get(channel, 0))
+        return found
 
     def _by_topic(self) -> dict[str, list[Channel]]:
         topics: dict[str, list[Channel]] = {}
@@ -231,23 +232,36 @@ class McapLog:
         return [Loss(self._name, "the checksum of the whole data section is wrong: a part of the file is damaged")]
 
     def _shortfall(self, found: Mapping[int, int], losses: Sequence[Loss]) -> list[Loss]:
-        """Say where the statistics count more messages than were found and told as lost."""
-        if self._index.statistics is None:
+        """Report where the statistics do not count the messages that were found or reported as lost.
+
+        Messages that they count beyond those are only counted as lost where damage was found that may have held them;
+        otherwise the statistics may as well be wrong.
+        """
+        if self._index.statistics is None or self._index.complete:
             return []
-        short = []
-        told: dict[str | None, int] = {}
-        for loss in losses:
-            told[loss.topic] = told.get(loss.topic, 0) + (loss.messages or 0)
-        by_topic: dict[str, int] = {}
+        known = [*self._opening, *losses]
+        damaged = any(loss.messages is None for loss in known)
+        reported: dict[str | None, int] = {}
+        for loss in known:
+            reported[loss.topic] = reported.get(loss.topic, 0) + (loss.messages or 0)
+        differences: dict[str, int] = {}
         for channel, count in found.items():
             stated = self._index.statistics.channel_message_counts.get(channel, 0)
             topic = self._topic_of[channel]
-            by_topic[topic] = by_topic.get(topic, 0) + stated - count
-        for topic, missing in by_topic.items():
-            missing -= told.get(topic, 0)
+            differences[topic] = differences.get(topic, 0) + stated - count
+        short = []
+        for topic, difference in differences.items():
+            missing = difference - reported.get(topic, 0)
+            # Messages lost from an unknown topic may be of this one.
+            explained = min(max(missing, 0), reported.get(None, 0))
+            reported[None] = reported.get(None, 0) - explained
+            missing -= explained
             if missing > 0:
-                what = "the file's own statistics count more messages than are in it"
-                short.append(Loss(self._name, what, topic, missing))
+                what = f"the file's own statistics count {missing} messages more than are in it"
+                short.append(Loss(self._name, what, topic, missing if damaged else None))
+            elif difference < 0:
+                what = f"the file's own statistics count {-difference} messages fewer than are in it"
+                short.append(Loss(self._name, what, topic, 0))
         return short
 
 
@@ -293,7 +307,7 @@ def _one_series(pieces: Sequence[Series]) -> Series:
 
 
 def _joined(losses: Sequence[Loss]) -> list[Loss]:
-    """Make one loss of neighbouring ones of the same kind, so that a file of bad chunks is not told chunk by chunk."""
+    """Make one loss of neighbouring ones of the same kind, so that not every one of many bad chunks is reported."""
     joined: list[Loss] = []
     last: dict[tuple[str | None, str], int] = {}
     for loss in losses:
