@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import weakref
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +12,7 @@ import lz4.frame
 import zstandard
 
 from ferryid.errors import FerryIdError
+from ferryid.files import scratch_folder
 from ferryid.ingest.log import Loss
 
 PIECE_BYTES = 1 << 20
@@ -49,7 +49,7 @@ def message_unpacker(codec: str) -> Callable[[bytes], bytes | None]:
 
 def working_folder(owner: object) -> Path:
     """Make a temporary folder that is removed together with its owner."""
-    folder = Path(tempfile.mkdtemp(prefix="ferryid-"))
+    folder = scratch_folder()
     weakref.finalize(owner, shutil.rmtree, folder, ignore_errors=True)
     return folder
 
