@@ -24,7 +24,7 @@ from ferryid.batch.remaining import Remaining, told_time
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import unwritable
 from tests.batch.archive import archive, deadly, recipe, rows_of, run, same
-from tests.batch.work import children_of, ended, environment
+from tests.batch.work import children_of, default_interrupts, ended, environment
 
 FIT = 'steps = ["fit"]\n[fit]\ndelta = 0.4\nsigma = 0.4\ndraws = 20\n'
 
@@ -298,6 +298,7 @@ main()
     return subprocess.Popen(
         [sys.executable, "-c", code, *words, "--out", str(folder / "out"), *options],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, env=environment(),
+        preexec_fn=default_interrupts,
     )  # fmt: skip
 
 
