@@ -1,4 +1,9 @@
-"""Writing results so that nothing is ever half-written."""
+"""Writing results so that nothing is ever half-written, whatever ends the process or the power.
+
+A result is written under a temporary name beside its place, synced to disk, renamed, and its folder synced. What a process
+that was killed left under temporary names is removed by the next one that writes there: beside each lies a file that is
+locked for as long as its process lives.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +12,12 @@ import json
 import os
 import re
 import shutil
+import stat
+import tempfile
+import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +28,40 @@ try:
 except ImportError:  # Windows: two fits at once into one folder may then take the same number
     fcntl = None  # type: ignore[assignment]
 
+ABANDONED_S = 3600.0
+"""Age from which on a temporary file belongs to no process that is at work, where the file system has no locks [s]."""
+_NOT_SUPPORTED = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.ENOLCK, errno.EPERM)
+_TEMPORARY = re.compile(r"\.(?P<name>.+)\.(?P<key>[0-9a-f]{32})\.(?P<part>part|part\.d|old|lock)", re.DOTALL)
+
+
+class _Draft:
+    """Temporary names beside the place of a result, and the lock that shows that their process lives.
+
+    ``.NAME.KEY.part`` is the new result, ``.NAME.KEY.old`` a folder that it replaces, ``.NAME.KEY.lock`` the lock.
+    """
+
+    def __init__(self, path: Path, key: str) -> None:
+        self.path = path
+        self.new, self.holder, self.old, self.lock = (
+            path.parent / f".{path.name}.{key}.{part}" for part in ("part", "part.d", "old", "lock")
+        )
+
+    def remove(self) -> None:
+        """Remove what is there under the temporary names; a folder moved aside goes back where nothing took its place."""
+        if self.old.exists() and not self.path.exists():
+            with suppress(OSError):
+                os.rename(self.old, self.path)
+        for path in (self.new, self.holder, self.old, self.lock):
+            with suppress(OSError):
+                _remove(path)
+
+
+_unfinished: dict[str, _Draft] = {}
+"""Drafts of this process by their keys."""
+_scratch: set[Path] = set()
+_swept: set[Path] = set()
+"""Folders that this process has looked through for what others left."""
+
 
 _UNPRINTABLE = "[\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]"
 """Control and formatting characters that JSON allows in a text."""
@@ -29,7 +71,8 @@ _UNPRINTABLE = "[\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\u
 def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
     """Give a temporary name beside `path` and rename it over `path` when the block ends without an error.
 
-    The block may create a file or a folder under the temporary name. An interrupt or an error removes it.
+    The block may create a file or a folder under the temporary name. An interrupt or an error removes it. At the end the
+    result is on disk, and a loss of power leaves it or what was there before.
 
     Parameters
     ----------
@@ -43,20 +86,146 @@ def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
     FerryIdError
         When the place cannot be written or is taken, or the disk is full.
     """
-    temporary = path.parent / f".{path.name}.{uuid.uuid4().hex}.part"
+    key = uuid.uuid4().hex
+    draft = _Draft(path, key)
+    lock: int | None = None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
+        make_folder(path.parent)
+        if path.parent not in _swept:
+            _swept.add(path.parent)
+            remove_abandoned(path.parent)
+        _unfinished[key] = draft
+        lock = _locked(draft.lock)
+        yield draft.new
+        _sync_all(draft.new)
         if new:
-            _put(temporary, path)
-        elif temporary.is_dir() and path.is_dir():
-            _replace_folder(temporary, path)
+            _put(draft.new, path)
+        elif draft.new.is_dir() and path.is_dir():
+            _replace_folder(draft, path)
         else:
-            os.replace(temporary, path)
+            os.replace(draft.new, path)
+        sync(path.parent)
     except OSError as error:
         raise unwritable(path, error) from error
     finally:
-        _remove(temporary)
+        draft.remove()
+        _unfinished.pop(key, None)
+        if lock is not None:
+            os.close(lock)
+
+
+def _locked(path: Path) -> int:
+    """Create a file and lock it; return its descriptor."""
+    while True:
+        number = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
+        _lock(number, wait=True)
+        # Another process may have taken it for abandoned before it was locked.
+        if os.path.exists(path):
+            return number
+        os.close(number)
+
+
+def _lock(number: int, *, wait: bool) -> bool | None:
+    """Lock an open file: True where that is done, False where another process holds it, None without locks."""
+    locked: bool | None = None
+    if fcntl is not None:
+        with suppress(OSError):  # a file system without locks
+            try:
+                fcntl.flock(number, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+                locked = True
+            except BlockingIOError:
+                locked = False
+    return locked
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove what processes that were killed left under temporary names in a folder, and nothing of one that lives."""
+    try:
+        found = [_TEMPORARY.fullmatch(name) for name in os.listdir(folder)]
+    except OSError:
+        return
+    for name, key in {(one["name"], one["key"]) for one in found if one is not None}:
+        if key in _unfinished:
+            continue
+        draft = _Draft(folder / name, key)
+        with suppress(OSError):
+            _remove_if_abandoned(draft)
+
+
+def _remove_if_abandoned(draft: _Draft) -> None:
+    try:
+        lock = os.open(draft.lock, os.O_RDWR)
+    except FileNotFoundError:  # removed before the rest by a process that was killed then
+        draft.remove()
+        return
+    try:
+        free = _lock(lock, wait=False)
+        if free is None:
+            free = time.time() - os.stat(draft.lock).st_mtime > ABANDONED_S
+        if free:
+            draft.remove()
+    finally:
+        os.close(lock)
+
+
+def remove_unfinished() -> None:
+    """Remove all temporary files of this process, which is about to end without returning from where it is."""
+    for draft in list(_unfinished.values()):
+        draft.remove()
+    for folder in list(_scratch):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def scratch_folder() -> Path:
+    """Make a folder for temporary files, which whoever asked for it removes."""
+    folder = Path(tempfile.mkdtemp(prefix="ferryid-"))
+    _scratch.add(folder)
+    return folder
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it that are missing, and sync each to disk."""
+    missing = []
+    while not path.is_dir():
+        missing.append(path)
+        if path == path.parent:
+            break
+        path = path.parent
+    for one in reversed(missing):
+        one.mkdir(exist_ok=True)
+        sync(one.parent)
+
+
+def sync(path: Path) -> None:
+    """Wait until a file's content, or the names in a folder, are on disk, where the system can tell."""
+    folder = path.is_dir()
+    if os.name == "nt" and folder:  # Windows cannot, and need not
+        return
+    try:
+        number = os.open(path, os.O_RDONLY if os.name != "nt" else os.O_RDWR)
+    except PermissionError:
+        if folder:  # it may be written but not read
+            return
+        raise
+    try:
+        os.fsync(number)
+    except OSError as error:
+        if error.errno not in _NOT_SUPPORTED:
+            raise
+    finally:
+        os.close(number)
+
+
+def _sync_all(path: Path) -> None:
+    """Sync a file, or a folder and all that is in it."""
+    if not path.is_dir():
+        sync(path)
+        return
+    for folder, _, names in os.walk(path, topdown=False):
+        for name in names:
+            if stat.S_ISREG(os.lstat(os.path.join(folder, name)).st_mode):
+                sync(Path(folder, name))
+        sync(Path(folder))
 
 
 def _put(finished: Path, path: Path) -> None:
@@ -65,7 +234,13 @@ def _put(finished: Path, path: Path) -> None:
         if finished.is_dir():
             # A folder takes the place of an empty one alone.
             os.rename(finished, path)
-        else:
+            return
+        try:
+            os.link(finished, path)
+        except OSError as error:
+            if error.errno not in _NOT_SUPPORTED:
+                raise
+            # A file system without links: a process killed in between leaves an empty file.
             os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
             os.replace(finished, path)
     except OSError as error:
@@ -74,25 +249,22 @@ def _put(finished: Path, path: Path) -> None:
         raise
 
 
-def _replace_folder(finished: Path, path: Path) -> None:
+def _replace_folder(draft: _Draft, path: Path) -> None:
     # A folder that holds something cannot be replaced in one step: the old one is moved aside first.
-    old = path.parent / f".{path.name}.{uuid.uuid4().hex}.part"
-    os.rename(path, old)
+    os.rename(path, draft.old)
     try:
-        os.rename(finished, path)
+        os.rename(draft.new, path)
     except OSError as error:
         # Another process finished the same result meanwhile: one is as good as the other.
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
             raise
-    finally:
-        _remove(old)
 
 
 def _remove(path: Path) -> None:
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
-    elif os.path.lexists(path):
-        path.unlink()
+    else:
+        path.unlink(missing_ok=True)
 
 
 def unwritable(path: Path, error: OSError) -> UnwritableError:
@@ -163,18 +335,15 @@ def alone(folder: Path, *, wait: bool = True) -> Iterator[None]:
         When the folder cannot be written, or another process is in it and `wait` is False.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         lock = (folder / ".lock").open("w")
     except OSError as error:
         raise unwritable(folder, error) from error
     with lock:
-        if fcntl is not None:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise FerryIdError(
-                    f"{folder}: another process is at work in it. Fix: wait for it, or choose another folder with --out"
-                ) from error
+        if _lock(lock.fileno(), wait=wait) is False:
+            raise FerryIdError(
+                f"{folder}: another process is at work in it. Fix: wait for it, or choose another folder with --out"
+            )
         yield
 
 

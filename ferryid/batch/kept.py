@@ -8,22 +8,17 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ferryid.files import dump_json, replacing, unwritable
+from ferryid.files import dump_json, sync, unwritable, write_text
 
 ROW = "row.json"
 CHECK = "check"
 """Hash of the rest of a row: one that was altered or damaged counts as none."""
-ABANDONED_S = 3600.0
-"""Age from which on a half-written table belongs to no process that is at work [s]."""
-
 Row = dict[str, Any]
 
 
@@ -41,39 +36,21 @@ def _check(row: Row) -> str:
 
 
 def write_row(folder: Path, row: Row) -> None:
-    """Make the results in a folder count; on disk before their row is, so that no loss of power can part them.
+    """Make the results in a folder count; all of them are on disk already, so that no loss of power can part them.
 
     Raises
     ------
     UnwritableError
         Where the disk is full.
     """
-    try:
-        for path in [*folder.rglob("*"), folder]:
-            _on_disk(path)
-        with replacing(folder / ROW) as temporary:
-            temporary.write_text(dump_json({**row, CHECK: _check(row)}), encoding="utf-8")
-            _on_disk(temporary)
-        _on_disk(folder)
-        _on_disk(folder.parent)
-    except OSError as error:
-        raise unwritable(folder, error) from error
-
-
-def _on_disk(path: Path) -> None:
-    if os.name == "nt" and path.is_dir():  # Windows cannot, and need not
-        return
-    number = os.open(path, os.O_RDONLY if os.name != "nt" else os.O_RDWR)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)
+    write_text(folder / ROW, dump_json({**row, CHECK: _check(row)}))
 
 
 def clear(folder: Path) -> None:
     """Remove the results in a folder, its row first: what was begun to be removed does not count any more."""
     try:
         (folder / ROW).unlink(missing_ok=True)
+        sync(folder)
         for path in folder.iterdir():
             # The lock is held by whoever calls this.
             if path.is_dir() and not path.is_symlink():
@@ -82,14 +59,6 @@ def clear(folder: Path) -> None:
                 path.unlink()
     except OSError as error:
         raise unwritable(folder, error) from error
-
-
-def sweep_tables(out: Path) -> None:
-    """Remove tables that a killed process left half-written a good while ago."""
-    for path in (out / "logs").glob(".*.part"):
-        with suppress(FileNotFoundError):  # finished meanwhile
-            if time.time() - path.stat().st_mtime > ABANDONED_S:
-                shutil.rmtree(path, ignore_errors=True)
 
 
 def key_of(paths: Sequence[Path], stamp: Mapping[str, str]) -> str:

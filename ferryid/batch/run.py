@@ -19,7 +19,7 @@ from typing import Any
 
 from ferryid import __version__
 from ferryid.batch import memory
-from ferryid.batch.kept import Kept, Row, key_of, sweep_tables
+from ferryid.batch.kept import Kept, Row, key_of
 from ferryid.batch.logs import Entry, entries_of
 from ferryid.batch.recipe import Recipe, load_recipe
 from ferryid.batch.remaining import Remaining, told_time
@@ -28,7 +28,7 @@ from ferryid.batch.summary import lines_of, table_of, write_table
 from ferryid.batch.task import DONE, STATUSES, Task, lost, work
 from ferryid.batch.trend import trends_of
 from ferryid.errors import FerryIdError, one_line
-from ferryid.files import alone, dump_json, finite, write_text
+from ferryid.files import alone, dump_json, finite, remove_abandoned, write_text
 from ferryid.identify.model import Model, to_json
 from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
@@ -98,7 +98,7 @@ def batch(
     patients = _patients(entries, chosen, out)
     folder = (out / "batch").resolve()
     with alone(folder, wait=False):
-        sweep_tables(out)
+        remove_abandoned(out / "logs")
         kept = Kept(folder / "results")
         tasks = [_task(entry, patients[entry.vessel], chosen, limit, again, out.resolve()) for entry in entries]
         rows: dict[int, tuple[Path, Row]] = {}

@@ -10,8 +10,8 @@ import logging
 import multiprocessing
 import os
 import re
-import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -21,11 +21,14 @@ from multiprocessing import connection
 from typing import Any, Protocol, TypeVar
 
 from ferryid.errors import FerryIdError
+from ferryid.interrupts import end_at_once
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 MOST_PROCESSES = 64
+TERMINATE_S = 0.5
+"""How long a process may take to remove its temporary files before it is killed [s]."""
 LOSSES = 3
 """An item whose process died so often is given up."""
 ANSWER_S = 10.0
@@ -179,14 +182,20 @@ class _Pool:
         if pool is None:
             return
         pool.shutdown(wait=False, cancel_futures=True)
-        while self._workers:
-            self._workers.pop().terminate()
+        workers, self._workers = self._workers, set()
+        for worker in workers:
+            worker.terminate()
+        deadline = time.monotonic() + TERMINATE_S
+        while (left := [w for w in workers if not connection.wait([w.sentinel], 0.0)]) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        for worker in left:
+            worker.kill()
         pool.shutdown(wait=True)
 
 
 def _begin() -> None:
     """Leave interrupts to the process that started this one, and end with it, however it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_at_once()
     parent = multiprocessing.parent_process()
 
     def end_with() -> None:

@@ -17,7 +17,7 @@ from ferryid.batch import memory
 from ferryid.batch.kept import Row, clear, read_row, write_row
 from ferryid.batch.recipe import Recipe
 from ferryid.errors import FerryIdError, UnwritableError, one_line
-from ferryid.files import alone, finite, unwritable
+from ferryid.files import alone, finite, unwritable, write_text
 
 # Heavy packages are imported by the work itself, so that what it needs of memory is counted.
 
@@ -141,7 +141,7 @@ def _row(task: Task) -> Row:
     except Exception as error:  # noqa: BLE001 - whatever one log shows is told in its row, and the others go on
         row["status"], row["reason"] = _told(task, error)
         if row["status"] == FAILED:
-            (task.folder / TRACEBACK).write_text("".join(traceback.format_exception(error)), "utf-8", "replace")
+            write_text(task.folder / TRACEBACK, "".join(traceback.format_exception(error)))
     row["peak_bytes"] = memory.peak_bytes()
     return dict(finite(row))
 

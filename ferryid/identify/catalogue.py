@@ -8,28 +8,43 @@ from typing import Any
 
 from ferryid.effects import effects
 from ferryid.identify.model import AXES, Model, to_json
-from ferryid.identify.store import stored_models
+from ferryid.identify.store import Stored, Unreadable, problems, stored_models
 from ferryid.identify.stored_effect import StoredEffect
 
 
 def listing(out: Path) -> dict[str, Any]:
     """Return all stored models for ``ferryid models``."""
+    found = problems(out)
     return {
         "schema": "ferryid.models/1",
-        "models": [
-            {
-                "name": stored.model.name,
-                "version": stored.model.version,
-                "current": stored.current,
-                "accepted": stored.model.accepted,
-                "created": stored.model.created,
-                "normalised_mse": stored.model.scores.get("normalised_mse"),
-                "logs": [str(log["name"]) for log in stored.model.training],
-                "path": str(stored.path),
-                **_effects_of(stored.model),
-            }
-            for stored in stored_models(out)
-        ],
+        "models": [_row(stored) for stored in stored_models(out)],
+        **({"problems": found} if found else {}),
+    }
+
+
+def _row(stored: Stored | Unreadable) -> dict[str, Any]:
+    if isinstance(stored, Unreadable):
+        return {
+            "name": stored.path.parent.name,
+            "version": int(stored.path.stem),
+            "current": stored.current,
+            "accepted": False,
+            "created": "",
+            "normalised_mse": None,
+            "logs": [],
+            "path": str(stored.path),
+            "unreadable": stored.reason,
+        }
+    return {
+        "name": stored.model.name,
+        "version": stored.model.version,
+        "current": stored.current,
+        "accepted": stored.model.accepted,
+        "created": stored.model.created,
+        "normalised_mse": stored.model.scores.get("normalised_mse"),
+        "logs": [str(log["name"]) for log in stored.model.training],
+        "path": str(stored.path),
+        **_effects_of(stored.model),
     }
 
 
@@ -61,15 +76,27 @@ def render_listing(result: dict[str, Any], out: Path) -> str:
         score = model["normalised_mse"]
         lines.append(
             f"{mark} {model['name'] + '@' + str(model['version']):<28}"
-            f"{'accepted' if model['accepted'] else 'diagnosed' if 'conditions' in model else 'rejected':<12}"
+            f"{_state(model):<12}"
             f"{'-' if score is None else format(score, '9.3f'):>9}  {model['created']:<22}{_some(model['logs'])}"
         )
+        if "unreadable" in model:
+            lines.append(f"      {model['unreadable']}")
         lines += [f"      vessel: {told}" for told in model.get("vessel_effects", ())]
         for log, shown in model.get("conditions", {}).items():
             lines += [f"      {_some([log])}: {told}" for told in shown]
     if any(model["current"] for model in result["models"]):
         lines.append("* current")
+    lines += [
+        f"{problem}. Fix: fit again, a model that is accepted becomes the current one"
+        for problem in result.get("problems", ())
+    ]
     return "\n".join(lines)
+
+
+def _state(row: dict[str, Any]) -> str:
+    if "unreadable" in row:
+        return "unreadable"
+    return "accepted" if row["accepted"] else "diagnosed" if "conditions" in row else "rejected"
 
 
 def _some(names: Sequence[str]) -> str:

@@ -7,7 +7,9 @@ version in use. Versions are never overwritten.
 from __future__ import annotations
 
 import json
+import os
 import re
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,6 +26,15 @@ class Stored:
     model: Model
     current: bool
     previous: int | None = None
+
+
+@dataclass(frozen=True)
+class Unreadable:
+    """One stored version whose file is damaged, or of a newer ferryid, and why it cannot be read."""
+
+    path: Path
+    current: bool
+    reason: str
 
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,79}")
@@ -47,15 +58,17 @@ def checked_name(name: str) -> str:
 def numbered(model: Model, out: Path) -> Model:
     """Return a model with the version that it will be stored under: the next one of its name.
 
-    A fit that gives, timestamps apart, the same model as a stored version is that version again.
+    A fit that gives, timestamps apart, the same model as a stored version is that version again. Files that cannot be read
+    keep their numbers.
     """
     folder = _folder(out) / model.name
     present = _versions(folder)
     plain = _undated(model)
     for number in present:
-        stored = load_file(folder / f"{number}.json")
-        if _undated(stored) == plain:
-            return stored
+        with suppress(FerryIdError):
+            stored = load_file(folder / f"{number}.json")
+            if _undated(stored) == plain:
+                return stored
     return replace(model, version=max(present, default=0) + 1)
 
 
@@ -99,42 +112,85 @@ def find(reference: str, out: Path) -> Path:
     if not present:
         if path.suffix == ".json" or len(path.parts) > 1:
             raise FerryIdError(f"{reference}: no such model file. Fix: see ferryid models --out {out}")
-        names = [stored.model.name for stored in stored_models(out)]
+        names = [one.name for one in _models(out)]
         raise FerryIdError(
             f"{reference}: no model of that name under {_folder(out)}.{did_you_mean(name, names)} "
             "Fix: list what there is with ferryid models, or give the path of a model file"
         )
-    number = int(version) if _is_number(version) else (_current(folder) or max(present))
-    if number not in present or (version and not _is_number(version)):
-        listed = ", ".join(str(n) for n in present)
-        raise FerryIdError(f"{reference}: no such version of {name}, there are {listed}. Fix: give one of these")
+    listed = ", ".join(str(n) for n in present)
+    if version:
+        number = int(version) if _is_number(version) else -1
+        if number not in present:
+            raise FerryIdError(f"{reference}: no such version of {name}, there are {listed}. Fix: give one of these")
+    else:
+        problem = current_problem(folder)
+        if problem:
+            raise FerryIdError(
+                f"{problem}. Fix: give a version as {name}@NUMBER, there are {listed}, or fit again: a model that is "
+                "accepted becomes the current one"
+            )
+        number = _current(folder) or max(present)
     return folder / f"{number}.json"
+
+
+def current_problem(folder: Path) -> str:
+    """Return what is wrong with the note of the current version of a model, an empty string where nothing is."""
+    path = folder / "current"
+    if not os.path.lexists(path):
+        return ""
+    number = _current(folder)
+    if number is None:
+        return f"{path}: damaged, it holds no number of the current version"
+    if number not in _versions(folder):
+        return f"{path}: names version {number} as the current one, which does not exist"
+    return ""
 
 
 def load_file(path: Path) -> Model:
     """Load one model file."""
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if not text.strip("\0 \r\n\t"):
+            raise ValueError(f"its {len(text)} bytes hold nothing, as after a loss of power")
+        data = json.loads(text)
     # Thousands of brackets, or of digits, end in errors of Python rather than of JSON.
     except (OSError, ValueError, RecursionError) as error:
         raise FerryIdError(
-            f"{path}: not readable as a model file ({error}). Fix: give a JSON file written by ferryid fit"
+            f"{path}: not readable as a model file ({error}). Fix: give another version or a file written by ferryid fit, "
+            "or fit again: the next free number is taken"
         ) from error
     if not isinstance(data, dict):
         raise FerryIdError(f"{path}: not a ferryid model, but a JSON list or value. Fix: give a file of ferryid fit")
     return from_json(data, str(path))
 
 
-def stored_models(out: Path) -> list[Stored]:
+def stored_models(out: Path) -> list[Stored | Unreadable]:
     """Return every stored version, by name and number."""
-    root = _folder(out)
-    found = []
-    for folder in sorted(path for path in root.iterdir() if path.is_dir()) if root.is_dir() else []:
+    found: list[Stored | Unreadable] = []
+    for folder in _models(out):
         current = _current(folder)
         for number in _versions(folder):
             path = folder / f"{number}.json"
-            found.append(Stored(path, load_file(path), number == current))
+            try:
+                model = load_file(path)
+                to_json(model)  # reads the profile in it
+                found.append(Stored(path, model, number == current))
+            except FerryIdError as error:
+                reason = str(error)
+                found.append(
+                    Unreadable(path, number == current, reason if str(path) in reason else f"{path}: {reason}")
+                )
     return found
+
+
+def problems(out: Path) -> list[str]:
+    """Return what is wrong with the notes of current versions."""
+    return [problem for folder in _models(out) if _versions(folder) and (problem := current_problem(folder))]
+
+
+def _models(out: Path) -> list[Path]:
+    root = _folder(out)
+    return sorted(path for path in root.iterdir() if path.is_dir()) if root.is_dir() else []
 
 
 def _folder(out: Path) -> Path:
@@ -147,7 +203,9 @@ def _versions(folder: Path) -> list[int]:
 
 def _current(folder: Path) -> int | None:
     path = folder / "current"
-    text = path.read_text(encoding="utf-8", errors="replace").strip() if path.is_file() else ""
+    text = ""
+    with suppress(OSError):
+        text = path.read_text(encoding="utf-8", errors="replace").strip() if path.is_file() else ""
     return int(text) if _is_number(text) else None
 
 

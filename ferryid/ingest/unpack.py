@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import weakref
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -15,6 +14,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
+from ferryid.files import scratch_folder
 from ferryid.ingest.log import Loss
 
 PIECE_BYTES = {"zstd": 1 << 11, "lz4": 1 << 16}
@@ -139,7 +139,7 @@ def unpacked_batches(
 
 def working_folder(owner: object) -> Path:
     """Make a temporary folder that is removed together with its owner."""
-    folder = Path(tempfile.mkdtemp(prefix="ferryid-"))
+    folder = scratch_folder()
     weakref.finalize(owner, shutil.rmtree, folder, ignore_errors=True)
     return folder
 

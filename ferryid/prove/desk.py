@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError
-from ferryid.files import dump_json, write_text
+from ferryid.files import dump_json, remove_abandoned, write_text
 from ferryid.prove.finished import finished
 from ferryid.prove.seal import SALT_BYTES, Key, canonical, key_of
 from ferryid.prove.sources import sources
@@ -123,5 +123,4 @@ def sweep(folder: Path) -> None:
     """Remove what is left half-done, and what nobody needs any more."""
     shutil.rmtree(folder / "scratch", ignore_errors=True)
     shutil.rmtree(folder / "again", ignore_errors=True)
-    for path in (folder / "logs").glob(".*.part"):
-        shutil.rmtree(path, ignore_errors=True)
+    remove_abandoned(folder / "logs")

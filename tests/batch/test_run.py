@@ -24,7 +24,7 @@ from ferryid.batch.remaining import Remaining, told_time
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import unwritable
 from tests.batch.archive import archive, deadly, recipe, rows_of, run, same
-from tests.batch.work import children_of, ended, environment
+from tests.batch.work import children_of, default_interrupts, ended, environment
 
 FIT = 'steps = ["fit"]\n[fit]\ndelta = 0.4\nsigma = 0.4\ndraws = 20\n'
 
@@ -298,6 +298,7 @@ main()
     return subprocess.Popen(
         [sys.executable, "-c", code, *words, "--out", str(folder / "out"), *options],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, env=environment(),
+        preexec_fn=default_interrupts,
     )  # fmt: skip
 
 
@@ -320,9 +321,8 @@ def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Pat
     before = rows_of(tmp_path)
     assert 2 <= len(before) < 6, "it was over before it was killed"
     assert len(list(results(tmp_path).iterdir())) > len(before), "nothing was half done"
-    abandoned = tmp_path / "out" / "logs" / ".day5-abc.part"
+    abandoned = tmp_path / "out" / "logs" / f".day5.{0:032x}.part"
     abandoned.mkdir()
-    os.utime(abandoned, (0, 0))
 
     second, told = run(tmp_path, logs / "*.mcap", processes=2)
     assert told == [f"{len(before)} of 6 logs done already; {6 - len(before)} left"]

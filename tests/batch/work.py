@@ -77,3 +77,8 @@ def children_of(pid: int) -> list[int]:
 def environment() -> dict[str, str]:
     """Return this environment, for a process that is to find these tests."""
     return {**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT), *filter(None, sys.path)))}
+
+
+def default_interrupts() -> None:
+    """Let a process that is started be interrupted, also where whoever started these tests ignores interrupts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

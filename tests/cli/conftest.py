@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.cli.main import main
+from ferryid.cli import main
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 
@@ -31,7 +31,7 @@ def ferryid(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         monkeypatch.setattr(sys, "argv", ["ferryid", *map(str, arguments)])
         capsys.readouterr()
         try:
-            main()
+            main.run()
             code = 0
         except SystemExit as stop:
             code = stop.code if isinstance(stop.code, int) else 0 if stop.code is None else 1

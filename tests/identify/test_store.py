@@ -11,8 +11,9 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import basis
+from ferryid.identify.catalogue import listing, render_listing
 from ferryid.identify.model import Model, to_json
-from ferryid.identify.store import load, load_file, save, stored_models
+from ferryid.identify.store import Stored, load, load_file, save, stored_models
 from ferryid.vessel import load_profile
 
 
@@ -61,7 +62,8 @@ def test_current_moves_only_on_acceptance(tmp_path: Path) -> None:
     assert load("boat", tmp_path).version == 1
     assert save(made(seed=2), tmp_path).current
     assert load("boat", tmp_path).version == 3
-    assert [(s.model.version, s.model.accepted, s.current) for s in stored_models(tmp_path)] == [
+    stored = [one for one in stored_models(tmp_path) if isinstance(one, Stored)]
+    assert [(s.model.version, s.model.accepted, s.current) for s in stored] == [
         (1, True, False),
         (2, False, False),
         (3, True, True),
@@ -134,3 +136,48 @@ def test_what_breaks_the_json_reader_is_told(tmp_path: Path, text: str) -> None:
     (tmp_path / "model.json").write_text(text, encoding="utf-8")
     with pytest.raises(FerryIdError, match="not readable as a model file"):
         load_file(tmp_path / "model.json")
+
+
+DAMAGE = {
+    "empty": lambda data: b"",
+    "zeros": lambda data: bytes(len(data)),
+    "cut": lambda data: data[: len(data) // 2],
+    "binary": lambda data: bytes(range(256)),
+    "no object": lambda data: b"[]",
+    "other schema": lambda data: data.replace(b"ferryid.model/1", b"ferryid.fit/1"),
+    "newer": lambda data: data.replace(b"ferryid.model/1", b"ferryid.model/9"),
+    "profile": lambda data: data.replace(b"[hull]", b"[[[hull]"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_version_is_a_row_and_keeps_its_number(tmp_path: Path, damage: str) -> None:
+    save(made(), tmp_path)
+    path = save(made(seed=1), tmp_path).path
+    before = path.read_bytes()
+    path.write_bytes(DAMAGE[damage](before))
+    assert path.read_bytes() != before
+    result = listing(tmp_path)
+    first, second = result["models"]
+    assert (first["version"], "unreadable" in first) == (1, False)
+    assert (second["name"], second["version"], second["current"]) == ("boat", 2, True)
+    assert str(path) in second["unreadable"]
+    assert "Fix: " in second["unreadable"]
+    assert "unreadable" in render_listing(result, tmp_path).splitlines()[2]
+    assert load("boat@1", tmp_path).version == 1
+    assert save(made(seed=2), tmp_path).model.version == 3
+    assert save(made(), tmp_path).model.version == 1
+    with pytest.raises(FerryIdError, match="Did you mean"):
+        load("baot", tmp_path)
+
+
+@pytest.mark.parametrize(("text", "told"), [("", "no number"), ("x\n", "no number"), ("7\n", "names version 7")])
+def test_a_damaged_note_of_the_current_version_is_told(tmp_path: Path, text: str, told: str) -> None:
+    save(made(), tmp_path)
+    (tmp_path / "models" / "boat" / "current").write_text(text, encoding="utf-8")
+    with pytest.raises(FerryIdError, match=rf"current: .*{told}.* Fix: give a version as boat@NUMBER, there are 1"):
+        load("boat", tmp_path)
+    assert load("boat@1", tmp_path).version == 1
+    assert told in render_listing(listing(tmp_path), tmp_path).splitlines()[-1]
+    save(made(seed=1), tmp_path)
+    assert load("boat", tmp_path).version == 2

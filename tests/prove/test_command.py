@@ -14,7 +14,7 @@ import pytest
 
 import ferryid.cli
 from ferryid.prove import judges
-from tests.batch.work import children_of, ended, environment
+from tests.batch.work import children_of, default_interrupts, ended, environment
 from tests.cli.conftest import ferryid as ferryid_fixture
 from tests.cli.test_every_command import conforms
 from tests.prove.pretend import PARTS, TALLY
@@ -102,6 +102,7 @@ main()
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=default_interrupts,
         env=environment(),
     ) as working:
         deadline = time.monotonic() + 60.0

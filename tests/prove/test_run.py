@@ -176,7 +176,7 @@ def test_killed_in_the_middle_it_repeats_nothing_and_loses_nothing(tmp_path: Pat
     finished_then = before[path].count(b"\n")
     assert 3 <= finished_then < 24, "it was over before it was killed"
     first = counted()
-    (out / "proof" / "logs" / ".0000.abc.part").mkdir()
+    (out / "proof" / "logs" / f".0000.{0:032x}.part").mkdir()
     with path.open("ab") as file:
         file.write(b'{"name": "0023", "resu')
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import mmap
 import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError
+from ferryid.files import scratch_folder
 from ferryid.ingest.bulk import Decoder
 from ferryid.ingest.formats.mcap import McapLog
 from ferryid.ingest.formats.sqlite3_bag import Sqlite3Log, Storage, refuse_foreign
@@ -126,7 +126,7 @@ class FolderLog:
             )
         if path.suffix not in FORMATS.values():
             return _McapLog(path, None, codec)
-        folder = Path(tempfile.mkdtemp(prefix="ferryid-"))
+        folder = scratch_folder()
         try:
             unpacked, losses = unpack_file(path, folder)
             with unpacked.open("rb") as file:
