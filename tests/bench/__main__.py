@@ -14,7 +14,7 @@ from tests.bench.page import page
 
 REPORT = Path(__file__).resolve().parents[2] / "reports" / "benchmarks.md"
 # In the order of the page; every one exposes run(quick) -> Section.
-MODULES = ("ingest", "identify", "archive", "simulate")
+MODULES = ("ingest", "identify", "archive", "simulate", "long")
 
 
 def main() -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,6 +27,7 @@ from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 from tests.bench.identify import of_motion
 from tests.bench.page import Row, Section, duration, faster_row
+from tests.bench.processes import whole_process
 from tests.bench.rivals import rosbags_to_parquet
 
 ROWS_A_LOG = 144_000
@@ -47,8 +47,8 @@ def run(quick: bool) -> Section:
         size = sum(path.stat().st_size for path in out.glob("logs/*/pieces-*.parquet"))
         fitted, swept = [], []
         for _ in range(3):
-            fitted.append(_process((*FIT, "--out", folder)))
-            swept.append(_process((*SWEEP, "--out", folder)))
+            fitted.append(whole_process((*FIT, "--out", folder)))
+            swept.append(whole_process((*SWEEP, "--out", folder)))
         read = [_one_pass(rows) for _ in range(3)]
     peak = max(memory for _, memory in (*fitted, *swept))
     table = [
@@ -92,9 +92,9 @@ def _batches(logs: int) -> list[Row]:
             "--processes",
             "2",
         )
-        pool, _ = _process((*command, "--out", str(place / "pool")))
+        pool, _ = whole_process((*command, "--out", str(place / "pool")))
         with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-            dask, _ = _process((*command, "--out", str(place / "dask"), "--dask", cluster.scheduler_address))
+            dask, _ = whole_process((*command, "--out", str(place / "dask"), "--dask", cluster.scheduler_address))
         tables = [place / path.stem for path in paths]
         for one in tables:
             one.mkdir()
@@ -107,22 +107,6 @@ def _batches(logs: int) -> list[Row]:
         faster_row(what, [pool], "rosbags to Parquet in a pool of two, no fit", [rosbags], None),
         faster_row(what, [pool], "the same on a Dask cluster of two workers", [dask], None),
     ]
-
-
-def _process(arguments: Sequence[str]) -> tuple[float, int]:
-    """Return time [s] and peak memory [bytes] of one command in a process of its own."""
-    # What the kernel tells of a child counts in the memory of the process that forked it: the child tells by itself.
-    program = (
-        "import atexit, sys; from ferryid.cli.main import main; "
-        "atexit.register(lambda: print(open('/proc/self/status').read().partition('VmHWM:')[2].split()[0], file=sys.stderr)); "
-        "main()"
-    )
-    start = time.perf_counter()
-    run = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False)
-    took = time.perf_counter() - start
-    if run.returncode:
-        raise RuntimeError(f"ferryid {' '.join(arguments)} ended with {run.returncode}: {run.stderr}")
-    return took, int(run.stderr.split()[-1]) * 1024
 
 
 def _season(out: Path, logs: int) -> None:
