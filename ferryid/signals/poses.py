@@ -42,8 +42,9 @@ _DRIFT = 0.2
 _STEPS_HELD = 5.0
 """A fix that repeats too long was lost if the vessel is this many usual steps further afterwards."""
 _PERIODS_HELD, _LEAST_HELD_S = 4.0, 0.5
-_FLIP, _FLIP_S = np.radians(20.0), 120.0
-"""A heading that jumps by 180°, but for this [rad], and back within this [s], was turned round meanwhile."""
+_CLEAR, _CANCEL, _CANCEL_S = 2.0, 0.1, 120.0
+"""A jump this many times the limit, undone by the next but for this share and within this [s], leads away and back."""
+_FLIP = np.radians(20.0)
 
 
 @dataclass(frozen=True)
@@ -233,8 +234,7 @@ class _Limits:
             way, reach = complex(known[0][1] - known[0][0]), _DRIFT * float(known[1][1] - known[1][0])
         miss = move - way
         away = abs(float(wrap(np.array([miss.real]))[0])) if self.angle else abs(miss)
-        flips = self.angle and abs(jump - np.pi) < _FLIP and lasts <= _FLIP_S
-        return away <= _BACK * jump and (flips or reach <= _BACK * jump)
+        return away <= _BACK * jump and reach <= _BACK * jump
 
 
 def _mean_interval(interval: Floats) -> float:
@@ -306,6 +306,7 @@ def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, 
     places = np.flatnonzero(limits.jump(np.abs(move), lasts))
     if places.size == 0 or places.size > max(2, _JUMPS_AT_MOST * fixes.size):
         return []
+    clear = limits.jump(np.abs(move[places]) / _CLEAR, lasts[places])
     starts = [0, *(int(fixes[k + 1]) for k in places)]
     ends = [*(start - 1 for start in starts[1:]), values.size - 1]
     found = []
@@ -314,6 +315,10 @@ def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, 
         size = abs(complex(move[places[k]]))
         later = range(k + 2, min(k + 2 + _AHEAD, len(starts)))
         back = next((j for j in later if _is_back(time_s, values, ends[k], starts[j], size, limits)), None)
+        if back is None and later and clear[k] and time_s[starts[k + 2]] - time_s[ends[k]] <= _CANCEL_S:
+            both = complex(move[places[k]] + move[places[k + 1]])
+            undone = abs(float(wrap(np.array([both.real]))[0])) if limits.angle else abs(both)
+            back = k + 2 if undone <= _CANCEL * size else None
         if back is not None and time_s[ends[back - 1]] - time_s[starts[k + 1]] < 0.5 * time_s[-1]:
             kind = "flip" if limits.angle and abs(size - np.pi) < _FLIP else "away"
             found.append((kind, starts[k + 1], ends[back - 1], size))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -254,6 +255,15 @@ def test_a_log_without_actuators_or_navigation_is_refused() -> None:
         align(recording(navigation(t)), PROFILE)
     with pytest.raises(FerryIdError, match=r"trial: no navigation signal.*Fix: "):
         align(recording(thrusters(t)), PROFILE)
+
+
+def test_one_row_and_a_time_that_stands_still_are_called_that() -> None:
+    one = np.array([3.0])
+    with pytest.raises(FerryIdError, match=r"needs measurements over time, found one row in each of /navigation, /thrusters"):
+        align(recording(navigation(one), thrusters(one)), PROFILE)
+    still = replace(navigation(one), clock=replace(navigation(one).clock, duplicates=99))
+    with pytest.raises(FerryIdError, match=r"time does not advance, found the same time on 100 rows"):
+        align(recording(still, thrusters(one)), PROFILE)
 
 
 def test_alternating_gaps_leave_nothing_and_are_refused() -> None:

@@ -1,0 +1,123 @@
+"""Every command on a log with gaps of 0.3 to 60 s in navigation, in one thruster and in the heading."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Run
+from tests.damage import NAVIGATION, THRUSTER, silent, ten_minutes, without_heading, written
+
+SECONDS = (0.3, 1.0, 5.0, 60.0)
+VESSEL = ("--vessel", "milliampere")
+LOST = 3 * 66
+"""Seconds in the gaps that are not interpolated."""
+
+Command = Callable[..., Run]
+
+
+@pytest.fixture(scope="session")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the log gaps.mcap, the same without gaps, and the output of the commands."""
+    folder = tmp_path_factory.mktemp("gaps")
+    made = silent(ten_minutes(), NAVIGATION, [*zip((30.0, 40.0, 50.0, 100.0), SECONDS, strict=True)])
+    made = silent(made, THRUSTER, [*zip((230.0, 240.0, 250.0, 300.0), SECONDS, strict=True)])
+    made = without_heading(made, [*zip((430.0, 440.0, 450.0, 500.0), SECONDS, strict=True)])
+    written(made, folder / "gaps.mcap")
+    written(ten_minutes(), folder / "whole.mcap")
+    return folder
+
+
+def result(run: Run) -> dict:
+    assert run.code == 0, run.err
+    return json.loads(run.out)
+
+
+def counted(text: str) -> bool:
+    """Tell whether a text gives the rows that were left out and why."""
+    joined = " ".join(text.split())
+    return "rows" in joined and "are left out" in joined and "actuator was not measured" in joined
+
+
+def test_inspect_and_ingest_count_the_gaps(ferryid: Command, place: Path) -> None:
+    clocks = {
+        topic["name"]: topic["clock"]
+        for topic in result(ferryid("inspect", place / "gaps.mcap", *VESSEL, "--json", "-"))["topics"]
+    }
+    assert [len(clocks[topic]["gaps"]) for topic in (NAVIGATION, THRUSTER)] == [4, 4]
+    tables = result(ferryid("ingest", place / "gaps.mcap", *VESSEL, "--out", place / "out", "--json", "-"))["logs"]
+    assert "4 gaps in the recording, the longest 60" in " ".join(tables[0]["data_quality"]["remarks"])
+
+
+def test_fit_evaluate_compare_and_export_leave_the_rows_out_and_count_them(ferryid: Command, place: Path) -> None:
+    log, out = place / "gaps.mcap", ("--out", place / "out")
+    run = ferryid("fit", log, *VESSEL, *out, "--json", place / "fit.json", "--components", "3")
+    assert run.code == 0, run.err
+    assert counted(run.out)
+    fitted = json.loads((place / "fit.json").read_text(encoding="utf-8"))
+    measured, beside = fitted["logs"][0]["left_out"]
+    assert measured["seconds"] == pytest.approx(LOST, abs=2.0)
+    assert measured["stretches"] == 9
+    assert beside["rows"] == 9 * 22
+    assert counted(Path(fitted["report"]).read_text(encoding="utf-8"))
+    used = result(ferryid("models", "milliampere@1", *out, "--json", "-"))["training"][0]["rows"]
+    assert used < 20 * (600 - LOST)
+
+    entry = result(ferryid("evaluate", "milliampere@1", log, *out, "--json", "-"))["logs"][0]
+    assert entry["rows"] <= 20 * (600 - LOST)
+    assert counted(" ".join(entry["warnings"]))
+    assert ferryid("fit", log, *VESSEL, *out, "--components", "1").code == 0
+    run = ferryid("compare", "milliampere@1", "milliampere@2", "--on", log, place / "whole.mcap", *out)
+    assert run.code == 0, run.err
+    assert counted(run.out)
+    exported = result(ferryid("export", log, "--mcap", place / "forces.mcap", *VESSEL, *out, "--json", "-"))
+    assert counted(" ".join(exported["warnings"]))
+
+
+@pytest.mark.parametrize(
+    "what", [("components",), ("window", "--windows", "0.5,1"), ("both", "--windows", "0.5,1"), ("basis",)]
+)
+def test_sweeps(ferryid: Command, place: Path, what: tuple[str, ...]) -> None:
+    run = ferryid("sweep", what[0], place / "gaps.mcap", *VESSEL, *what[1:], "--out", place / "out")
+    assert run.code == 0, run.err
+
+
+def test_diagnoses(ferryid: Command, place: Path) -> None:
+    log, out = place / "gaps.mcap", ("--out", place / "out", "--json", "-")
+    found = result(ferryid("diagnose", log, place / "whole.mcap", "--together", *VESSEL, *out))
+    assert any(counted(note) for note in found["logs"][0]["notes"])
+    assert not any(counted(note) for note in found["logs"][1]["notes"])
+
+
+def test_diagnosis_against_a_simulation(ferryid: Command, place: Path) -> None:
+    run = ferryid("diagnose", place / "gaps.mcap", "--against", place / "whole.mcap", *VESSEL, "--out", place / "out")
+    assert run.code == 0, run.err
+    assert counted(run.out)
+
+
+def test_batch(ferryid: Command, place: Path) -> None:
+    recipe = place / "recipe.toml"
+    recipe.write_text('steps = ["fit"]\n\n[fit]\ncomponents = 3\n', encoding="utf-8")
+    options = (*VESSEL, "--recipe", recipe, "--processes", "1", "--out", place / "batch")
+    (row,) = result(ferryid("batch", place / "gaps.mcap", *options, "--json", "-"))["rows"]
+    assert row["status"] == "done", row
+
+
+def test_a_stray_time_is_counted_on_the_terminal_of_a_fit(ferryid: Command, place: Path) -> None:
+    made = ten_minutes()
+    streams = []
+    for stream in made.streams:
+        if stream.topic == THRUSTER:
+            stamp = stream.stamp_ns.copy()
+            stamp[700], stamp[5000] = 0, stamp[5000] - 10**17
+            stream = replace(stream, stamp_ns=stamp)
+        streams.append(stream)
+    log = written(replace(made, streams=tuple(streams)), place / "stray.mcap")
+    run = ferryid("fit", log, *VESSEL, "--components", "1", "--out", place / "stray")
+    assert run.code == 0, run.err
+    assert "2 of 12000 rows had a senseless stamp and are put at their receive time" in run.out
+    assert "are left out" not in run.out

@@ -1,0 +1,135 @@
+"""Gaps of any length in any signal: the rows in them and beside them are left out, counted, and nothing else changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.signals.align import align
+from ferryid.signals.mirror import mirrored
+from ferryid.signals.prepare import open_track, smoothed
+from ferryid.signals.recording import record
+from ferryid.signals.smooth import measure, smooth_measured
+from ferryid.simulate.trial import Simulation
+from ferryid.vessel import load_profile
+from tests.damage import (
+    NAVIGATION,
+    THRUSTER,
+    changed,
+    moved,
+    repeated,
+    silent,
+    ten_minutes,
+    turned,
+    without_heading,
+    written,
+    zeros,
+)
+
+FERRY = load_profile("milliampere")
+START = 200.0
+FAULT = 75.0
+"""The ferry moves sideways then, at 0.6 m/s and 17 m off its start."""
+MEETS = 22
+"""Rows that a moving average of a second and the central difference lose on both sides of a gap at 20 Hz."""
+
+
+def in_navigation(made: Simulation, gap: tuple[float, float]) -> Simulation:
+    return silent(made, NAVIGATION, [gap])
+
+
+def in_one_thruster(made: Simulation, gap: tuple[float, float]) -> Simulation:
+    return silent(made, THRUSTER, [gap])
+
+
+def in_the_heading(made: Simulation, gap: tuple[float, float]) -> Simulation:
+    return without_heading(made, [gap])
+
+
+@pytest.mark.parametrize("where", [in_navigation, in_one_thruster, in_the_heading])
+@pytest.mark.parametrize("seconds", [0.3, 1.0, 5.0, 60.0])
+def test_rows_in_and_beside_a_gap_are_left_out_and_counted(
+    tmp_path: Path, where: Callable[[Simulation, tuple[float, float]], Simulation], seconds: float
+) -> None:
+    log = written(where(ten_minutes(), (START, seconds)), tmp_path / "gap.mcap")
+    opened = open_track(str(log), FERRY, None)
+    prepared = smoothed(opened, 1.0)
+    lost = np.flatnonzero(~opened.track.valid)
+    if seconds < 0.5:
+        assert lost.size == 0  # as long as samples that come late, and interpolated like those
+        assert prepared.left_out == ()
+        assert any(
+            "the longest 0.3" in remark or "short ones are int" in remark for remark in prepared.quality["remarks"]
+        )
+        return
+    assert abs(lost.size - seconds * 20.0) <= 2
+    assert np.all(np.diff(lost) == 1)
+    measured, beside = opened.measured, prepared.motion
+    assert np.isfinite(measured.nu[measured.usable]).all()
+    assert np.isfinite(beside.nu_dot[beside.valid]).all()
+    assert not beside.valid[lost[0] - MEETS // 2 : lost[-1] + MEETS // 2 + 1].any()
+    assert [one.rows for one in beside.left_out] == [lost.size, MEETS]
+    (said,) = prepared.left_out
+    assert said.startswith(f"{lost.size + MEETS} of 11999 rows (")
+    assert f"left out: {lost.size} (" in said
+    assert prepared.quality["left_out"] == [
+        {"reason": one.reason, "rows": one.rows, "stretches": one.stretches, "seconds": one.seconds}
+        for one in beside.left_out
+    ]
+    assert any("are not used" in remark for remark in prepared.quality["remarks"])
+
+
+def test_missing_rows_do_not_spoil_the_search_for_mirrored_frames() -> None:
+    t = np.arange(0.0, 600.0, 0.05)
+    psi = 0.01 * t
+    nu = np.column_stack([1.0 + 0.3 * np.sin(0.05 * t), 0.2 * np.cos(0.07 * t)])
+    way = np.cumsum((nu[:, 0] + 1j * nu[:, 1]) * np.exp(1j * psi)) / 20.0
+    eta = np.column_stack([way.imag, way.real, psi])
+    whole = mirrored(eta, nu, np.ones(t.size, dtype=bool), 20.0)
+    for column in (eta, nu):
+        column[4000:4020] = np.nan
+    usable = np.isfinite(nu).all(axis=1)
+    assert mirrored(eta, nu, usable, 20.0)[0] == whole[0] == "position"
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (moved(3.0), "The position jumps farther than the vessel can move, and back, once, by up to 3."),
+        (moved(15.0), "The position jumps farther than the vessel can move, and back, once, by up to 15."),
+        (zeros, "The position is exactly zero while the vessel is elsewhere once"),
+        (repeated, "The position repeats its last value while the vessel moves on once"),
+        (turned, "The heading is turned by 180° and back once"),
+    ],
+)
+def test_poses_that_cannot_be_true_are_left_out_and_counted(tmp_path: Path, edit: object, said: str) -> None:
+    log = written(changed(ten_minutes(), [(FAULT, 4.0)], edit), tmp_path / "fault.mcap")  # type: ignore[arg-type]
+    opened = open_track(str(log), FERRY, None)
+    lost = np.flatnonzero(~opened.track.valid) / 20.0
+    assert abs(lost.min() - (FAULT - 0.5)) < 0.25
+    assert abs(lost.max() - (FAULT + 4.5)) < 0.25
+    assert np.isnan(opened.track.columns["psi"][~opened.track.valid]).all()
+    assert any(repair.startswith(said) for repair in opened.track.repairs)
+    assert "because the pose cannot be true" in smoothed(opened, 1.0).left_out[0]
+
+
+def test_nothing_is_left_out_of_a_clean_trial(tmp_path: Path) -> None:
+    opened = open_track(str(written(ten_minutes(), tmp_path / "clean.mcap")), FERRY, None)
+    assert opened.track.valid.all()
+    assert smoothed(opened, 1.0).left_out == ()
+
+
+def test_a_part_of_a_real_log_that_begins_with_a_gap_is_read(
+    shared_data: Callable[[str], Path], tmp_path: Path
+) -> None:
+    lines = shared_data("gunnerus/RVG_ManeuveringTests.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    part = tmp_path / "first.csv"
+    part.write_text("".join(lines[: len(lines) // 4]), encoding="utf-8")
+    profile = load_profile("gunnerus")
+    motion = smooth_measured(measure(align(record(part, profile), profile), profile), 4.0)
+    assert motion.valid.mean() > 0.8
+    assert [one.rows > 0 for one in motion.left_out] == [True] * len(motion.left_out)
+    assert motion.left_out
