@@ -184,20 +184,33 @@ def _decoded(sheet: TextSheet) -> _Body:
     encoding = sheet.encoding.lower().replace("_", "-")
     undecodable = 0
     if encoding not in _UTF8:
-        data = _as_utf8(sheet, data[:], encoding)
-        undecodable = len(re.findall(rb"[^\r\n]*\xef\xbf\xbd[^\r\n]*", data))
+        text = _as_text(sheet, data[:], encoding)
+        data, undecodable = text.encode("utf-8", "replace"), _lines_with("\ufffd", text)
     start = after_lines(data, sheet.first_row)
     if encoding in _UTF8 and not _is_utf8(data, start):
         text = data[start:].decode("utf-8", "surrogateescape")
-        undecodable = len(re.findall("[^\r\n]*[\udc80-\udcff][^\r\n]*", text))
-        data, start = re.sub("[\udc80-\udcff]+", "\ufffd", text).encode(), 0
+        text = re.sub("[\udc80-\udcff]+", "\ufffd", text)
+        undecodable = _lines_with("\ufffd", text)
+        data, start = text.encode(), 0
     cut = len(data) > start and data[-1:] not in (b"\n", b"\r")
     return _Body(data, start, delimiter, cut, undecodable=undecodable)
 
 
-def _as_utf8(sheet: TextSheet, data: bytes, encoding: str) -> bytes:
+def _lines_with(character: str, text: str) -> int:
+    """Number of lines that hold a character."""
+    count, place, end = 0, 0, re.compile("[\r\n]")
+    while (place := text.find(character, place)) >= 0:
+        count += 1
+        following = end.search(text, place)
+        if following is None:
+            break
+        place = following.end()
+    return count
+
+
+def _as_text(sheet: TextSheet, data: bytes, encoding: str) -> str:
     try:
-        return data.decode(encoding, errors="replace").removeprefix("\ufeff").encode("utf-8", "replace")
+        return data.decode(encoding, errors="replace").removeprefix("\ufeff")
     except ValueError as error:
         raise FerryIdError(
             f"{sheet.path}: the text is not {sheet.encoding} ({one_line(str(error))}). "
