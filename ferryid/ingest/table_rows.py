@@ -309,10 +309,8 @@ def _suspect_lines(raw: NDArray[np.uint8], delimiter: bytes) -> NDArray[np.intp]
 def _last_line(lines: Sequence[bytes], number: int, width: int, delimiter: bytes, whole: re.Pattern[bytes]) -> int:
     """Line on which a row ends whose quoted cell goes over several lines; 0 where the quote is damage.
 
-    A line that has as many fields as a row by itself is one, so that a stray quote cannot take rows with it.
+    A line below that has as many fields as a row by itself is one, so that a stray quote cannot take rows with it.
     """
-    if len(lines[number].split(delimiter)) == width:
-        return 0
     for last in range(number + 1, min(number + _MOST_LINES, len(lines))):
         if len(lines[last].split(delimiter)) == width or len(lines[last]) > LONGEST_LINE:
             return 0

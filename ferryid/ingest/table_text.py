@@ -118,7 +118,8 @@ def _decode(path: Path, head: bytes, layout: TableLayout | None) -> tuple[str, s
     wanted = marked or (layout.encoding if layout is not None else "utf-8")
     wide = wanted.lower().replace("_", "-").startswith(("utf-16", "utf-32", "utf16", "utf32"))
     # Zeros at the end are what a power loss leaves of a row that was not written; they cost that row only.
-    if not wide and head.rstrip(b"\0").count(b"\0") * 10 > len(head):
+    lines = head.rstrip(b"\0").splitlines()
+    if not wide and sum(b"\0" in line for line in lines) * 2 >= len(lines):
         raise FerryIdError(
             f"{path}: this is binary data, not a text table. Fix: pass a log in one of the known formats; for UTF-16 "
             'text without a byte-order mark set encoding = "utf-16-le" under [table] in the profile'
