@@ -256,6 +256,8 @@ def _pieces(data: Any, place: int) -> Iterator[bytes]:
 def _without_broken_lines(body: _Body, width: int) -> None:
     """Leave out lines that are too long or whose quotes are not closed, and count them."""
     delimiter = body.delimiter.encode()
+    if len(_suspect_lines(np.frombuffer(body.data, dtype=np.uint8)[body.start :], delimiter)) == 0:
+        return
     data = bytes(body.data[body.start :])
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
@@ -297,13 +299,17 @@ def _suspect_lines(raw: NDArray[np.uint8], delimiter: bytes) -> NDArray[np.intp]
     line = np.searchsorted(ends, quotes)
     first = np.searchsorted(line, line)  # place of the first quote of the same line
     opens = (np.arange(len(quotes)) - first) % 2 == 0
-    limits = (10, delimiter[0])
-    before = np.isin(raw[np.maximum(quotes - 1, 0)], limits) | (quotes == 0)
-    after = np.isin(raw[np.minimum(quotes + 1, len(raw) - 1)], limits) | (quotes == len(raw) - 1)
+    before = _ends_cell(raw[np.maximum(quotes - 1, 0)], delimiter) | (quotes == 0)
+    after = _ends_cell(raw[np.minimum(quotes + 1, len(raw) - 1)], delimiter) | (quotes == len(raw) - 1)
     odd = np.bincount(line, minlength=len(ends)) % 2 == 1
     odd[line[np.where(opens, ~before, ~after)]] = True
     odd[long] = True
     return np.flatnonzero(odd)
+
+
+def _ends_cell(raw: NDArray[np.uint8], delimiter: bytes) -> NDArray[np.bool_]:
+    ends: NDArray[np.bool_] = (raw == delimiter[0]) | (raw == 10) | (raw == 13)
+    return ends
 
 
 def _last_line(lines: Sequence[bytes], number: int, width: int, delimiter: bytes, whole: re.Pattern[bytes]) -> int:

@@ -17,7 +17,15 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest.log import TableLayout, Topic
 from ferryid.ingest.table_rows import TextSheet, quoted
 from ferryid.ingest.table_time import TimePlan, guess_stamp, guess_time, looks_like_datetime
-from ferryid.ingest.tables import no_time, number_doubt, numbers_from_text, plan_time, to_ns, unique_names
+from ferryid.ingest.tables import (
+    no_time,
+    number_doubt,
+    numbers_from_text,
+    plan_time,
+    to_ns,
+    unique_names,
+    with_stated_unit,
+)
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab", ".prn", ".log", ".out")
 _HEAD_BYTES = 1 << 16
@@ -83,6 +91,7 @@ def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> T
         )
         if plan is None:
             raise FerryIdError(no_time(str(path), names))
+        plan = with_stated_unit(plan, layout)
         notes.append(plan.note)
     else:
         if not plan.stamp and guess_stamp(names):

@@ -289,6 +289,13 @@ def test_several_columns_that_may_be_the_time_are_listed() -> None:
     assert '"host_time" may be it too: set time under [table] in the profile' in plan.note
 
 
+def test_a_unit_that_the_profile_states_is_kept_where_the_column_is_guessed(tmp_path: Path) -> None:
+    path = write(tmp_path, "log.csv", "time,u\n0,1\n1,2\n")
+    series, reader = read_all(path, TableLayout(time_unit="us"))
+    assert series.receive_ns.tolist() == [0, 1000]
+    assert "us as the profile states" in reader.topics[0].note
+
+
 def test_an_assumed_unit_is_reported() -> None:
     plan = guess_time({"time": ["0", "100", "200"]})
     assert plan is not None

@@ -172,6 +172,16 @@ CASES = {
         "zero everywhere",
     ),
     "a table without thrust": ("force = [-200, 0, 300]", "force = [0, 0, 0]@", "zero everywhere"),
+    "a coefficient of no propeller": (
+        'thrust = { kind = "polynomial", coefficients = [0.01,',
+        'thrust = { kind = "polynomial", coefficients = [1e308,@',
+        "is not plausible for any vessel",
+    ),
+    "a thrust of no propeller": (
+        'thrust = { kind = "polynomial", coefficients = [0.01, 0.0, 1e-7], valid = [-900, 900] }',
+        'thrust = { kind = "polynomial", coefficients = [0.01, 0.0, 1e9], valid = [-900, 900] }@',
+        "more than any propeller",
+    ),
     "thrust of the wrong sign": (
         "[0.01, 0.0, 1e-7], valid = [-900, 900] }",
         "[-0.01, 0.0, 1e-7], valid = [-900, 900] }@",

@@ -13,7 +13,16 @@ from ferryid.errors import FerryIdError, one_line
 from ferryid.ingest.arrow_columns import column_from_arrow
 from ferryid.ingest.log import Column, Format, Loss, TableLayout, Topic
 from ferryid.ingest.table_time import TimePlan, guess_time
-from ferryid.ingest.tables import Rows, TableReader, no_time, number_doubt, plan_time, to_ns, unique_names
+from ferryid.ingest.tables import (
+    Rows,
+    TableReader,
+    no_time,
+    number_doubt,
+    plan_time,
+    to_ns,
+    unique_names,
+    with_stated_unit,
+)
 
 _LARGE_BYTES = 1 << 30
 _MOST_TIMES_LARGER = 100
@@ -184,7 +193,7 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
     plan = plan_time(str(path), tuple(fields), layout) if layout is not None else None
     guessed = plan is None
     if plan is None:
-        plan = _guess(path, file, fields, places)
+        plan = with_stated_unit(_guess(path, file, fields, places), layout)
         notes.append(plan.note)
     columns, _ = _read(path, {plan.column: places[plan.column]}, {plan.column})
     if not guessed:
