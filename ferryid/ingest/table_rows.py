@@ -184,20 +184,33 @@ def _decoded(sheet: TextSheet) -> _Body:
     encoding = sheet.encoding.lower().replace("_", "-")
     undecodable = 0
     if encoding not in _UTF8:
-        data = _as_utf8(sheet, data[:], encoding)
-        undecodable = len(re.findall(rb"[^\r\n]*\xef\xbf\xbd[^\r\n]*", data))
+        text = _as_text(sheet, data[:], encoding)
+        data, undecodable = text.encode("utf-8", "replace"), _lines_with("\ufffd", text)
     start = after_lines(data, sheet.first_row)
     if encoding in _UTF8 and not _is_utf8(data, start):
         text = data[start:].decode("utf-8", "surrogateescape")
-        undecodable = len(re.findall("[^\r\n]*[\udc80-\udcff][^\r\n]*", text))
-        data, start = re.sub("[\udc80-\udcff]+", "\ufffd", text).encode(), 0
+        text = re.sub("[\udc80-\udcff]+", "\ufffd", text)
+        undecodable = _lines_with("\ufffd", text)
+        data, start = text.encode(), 0
     cut = len(data) > start and data[-1:] not in (b"\n", b"\r")
     return _Body(data, start, delimiter, cut, undecodable=undecodable)
 
 
-def _as_utf8(sheet: TextSheet, data: bytes, encoding: str) -> bytes:
+def _lines_with(character: str, text: str) -> int:
+    """Number of lines that hold a character."""
+    count, place, end = 0, 0, re.compile("[\r\n]")
+    while (place := text.find(character, place)) >= 0:
+        count += 1
+        following = end.search(text, place)
+        if following is None:
+            break
+        place = following.end()
+    return count
+
+
+def _as_text(sheet: TextSheet, data: bytes, encoding: str) -> str:
     try:
-        return data.decode(encoding, errors="replace").removeprefix("\ufeff").encode("utf-8", "replace")
+        return data.decode(encoding, errors="replace").removeprefix("\ufeff")
     except ValueError as error:
         raise FerryIdError(
             f"{sheet.path}: the text is not {sheet.encoding} ({one_line(str(error))}). "
@@ -243,6 +256,8 @@ def _pieces(data: Any, place: int) -> Iterator[bytes]:
 def _without_broken_lines(body: _Body, width: int) -> None:
     """Leave out lines that are too long or whose quotes are not closed, and count them."""
     delimiter = body.delimiter.encode()
+    if len(_suspect_lines(np.frombuffer(body.data, dtype=np.uint8)[body.start :], delimiter)) == 0:
+        return
     data = bytes(body.data[body.start :])
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
@@ -284,22 +299,24 @@ def _suspect_lines(raw: NDArray[np.uint8], delimiter: bytes) -> NDArray[np.intp]
     line = np.searchsorted(ends, quotes)
     first = np.searchsorted(line, line)  # place of the first quote of the same line
     opens = (np.arange(len(quotes)) - first) % 2 == 0
-    limits = (10, delimiter[0])
-    before = np.isin(raw[np.maximum(quotes - 1, 0)], limits) | (quotes == 0)
-    after = np.isin(raw[np.minimum(quotes + 1, len(raw) - 1)], limits) | (quotes == len(raw) - 1)
+    before = _ends_cell(raw[np.maximum(quotes - 1, 0)], delimiter) | (quotes == 0)
+    after = _ends_cell(raw[np.minimum(quotes + 1, len(raw) - 1)], delimiter) | (quotes == len(raw) - 1)
     odd = np.bincount(line, minlength=len(ends)) % 2 == 1
     odd[line[np.where(opens, ~before, ~after)]] = True
     odd[long] = True
     return np.flatnonzero(odd)
 
 
+def _ends_cell(raw: NDArray[np.uint8], delimiter: bytes) -> NDArray[np.bool_]:
+    ends: NDArray[np.bool_] = (raw == delimiter[0]) | (raw == 10) | (raw == 13)
+    return ends
+
+
 def _last_line(lines: Sequence[bytes], number: int, width: int, delimiter: bytes, whole: re.Pattern[bytes]) -> int:
     """Line on which a row ends whose quoted cell goes over several lines; 0 where the quote is damage.
 
-    A line that has as many fields as a row by itself is one, so that a stray quote cannot take rows with it.
+    A line below that has as many fields as a row by itself is one, so that a stray quote cannot take rows with it.
     """
-    if len(lines[number].split(delimiter)) == width:
-        return 0
     for last in range(number + 1, min(number + _MOST_LINES, len(lines))):
         if len(lines[last].split(delimiter)) == width or len(lines[last]) > LONGEST_LINE:
             return 0

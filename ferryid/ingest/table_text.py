@@ -17,7 +17,15 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest.log import TableLayout, Topic
 from ferryid.ingest.table_rows import TextSheet, quoted
 from ferryid.ingest.table_time import TimePlan, guess_stamp, guess_time, looks_like_datetime
-from ferryid.ingest.tables import no_time, number_doubt, numbers_from_text, plan_time, to_ns, unique_names
+from ferryid.ingest.tables import (
+    no_time,
+    number_doubt,
+    numbers_from_text,
+    plan_time,
+    to_ns,
+    unique_names,
+    with_stated_unit,
+)
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab", ".prn", ".log", ".out")
 _HEAD_BYTES = 1 << 16
@@ -83,6 +91,7 @@ def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> T
         )
         if plan is None:
             raise FerryIdError(no_time(str(path), names))
+        plan = with_stated_unit(plan, layout)
         notes.append(plan.note)
     else:
         if not plan.stamp and guess_stamp(names):
@@ -118,7 +127,8 @@ def _decode(path: Path, head: bytes, layout: TableLayout | None) -> tuple[str, s
     wanted = marked or (layout.encoding if layout is not None else "utf-8")
     wide = wanted.lower().replace("_", "-").startswith(("utf-16", "utf-32", "utf16", "utf32"))
     # Zeros at the end are what a power loss leaves of a row that was not written; they cost that row only.
-    if not wide and head.rstrip(b"\0").count(b"\0") * 10 > len(head):
+    lines = head.rstrip(b"\0").splitlines()
+    if not wide and sum(b"\0" in line for line in lines) * 2 >= len(lines):
         raise FerryIdError(
             f"{path}: this is binary data, not a text table. Fix: pass a log in one of the known formats; for UTF-16 "
             'text without a byte-order mark set encoding = "utf-16-le" under [table] in the profile'

@@ -220,6 +220,14 @@ def plan_time(where: str, names: Sequence[str], layout: TableLayout, *, typed: b
     return TimePlan(layout.time, layout.time_unit, layout.stamp)
 
 
+def with_stated_unit(plan: TimePlan, layout: TableLayout | None) -> TimePlan:
+    """Return a guessed plan with the unit that a layout states beside its default, where it names no time column."""
+    if layout is None or layout.time_unit == "s" or plan.unit == "datetime" or layout.time_unit == "datetime":
+        return plan
+    note = f'time guessed: column "{plan.column}" ({layout.time_unit} as the profile states)'
+    return replace(plan, unit=layout.time_unit, note=note)
+
+
 def no_time(where: str, names: Sequence[str]) -> str:
     """Return the message for a table in which no column looks like a time."""
     likely = [name for name in names if has_time_word(name)]

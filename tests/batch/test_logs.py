@@ -96,6 +96,14 @@ def test_a_log_in_text_form_is_no_list(season: Path) -> None:
             r"the date of row 2 cannot be read, found '2024-13-01'\. Fix: write 2024-05-17",
         ),
         ("log,note\na.mcap,x,y\n", r"row 2 has 3 cells, the header 2\. Fix: "),
+        (
+            "file,vessel\na.mcap,x\n",
+            r'a manifest needs the column "log" .*, found the columns file, vessel\. Fix: rename the column "file"',
+        ),
+        ("date,vessel\n2024-05-17,x\n", r"a manifest needs .*, found the columns date, vessel\. Fix: add the column"),
+        ("path\na.mcap\n", r'a manifest needs .* found the columns path\. Fix: rename the column "path" to log'),
+        ('log,note\na.mcap,"' + "x" * 140_000 + '"\n', r"the manifest cannot be read, field larger"),
+        ("log\n" + "x" * 5000 + "\n", r"names what cannot be a file .* Fix: correct the path"),
     ],
 )
 def test_manifests_that_cannot_be_used(season: Path, text: str, says: str) -> None:

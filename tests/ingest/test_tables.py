@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Reader, Series, TableLayout
-from ferryid.ingest.table_time import datetimes_to_ns, guess_time, numbers_to_ns
+from ferryid.ingest.table_time import datetimes_to_ns, guess_time, numbers_to_ns, unit_doubt
 
 
 def write(folder: Path, name: str, content: str | bytes) -> Path:
@@ -266,12 +266,58 @@ def test_epoch_seconds_keep_what_a_float_can_hold() -> None:
         ({"timestamp": ["1744362945123456789", "1744362945223456789"]}, "timestamp", "ns"),
         ({"%time": ["1744362945.1", "1744362945.2"]}, "%time", "s"),
         ({"column 1": ["0.0", "0.05", "0.1"], "column 2": ["3", "2", "3"]}, "column 1", "s"),
+        ({"a": ["1", "2"], "original_timestamp": ["1744362945.1", "1744362945.2"]}, "original_timestamp", "s"),
+        ({"speed": ["1", "2"], "sensorTime": ["0", "100"]}, "sensorTime", "ms"),
+        ({"time_zone": ["1", "2"], "stamp_nsecs": ["1", "2"], "stamp_secs": ["7", "8"]}, "stamp_secs", "s"),
+        ({"time": ["0", "50", "100"]}, "time", "ms"),
+        ({"time": ["0", "50000", "100000"]}, "time", "us"),
+        ({"time": ["0", "50000000", "100000000"]}, "time", "ns"),
+        ({"time [s]": ["0", "50", "100"]}, "time [s]", "s"),
+        ({"time": ["1744362945123", "1744362945223"]}, "time", "ms"),
     ],
 )
 def test_time_column_is_guessed(sample: dict[str, list[str]], column: str, unit: str) -> None:
     plan = guess_time(sample)
     assert plan is not None
     assert (plan.column, plan.unit) == (column, unit)
+
+
+def test_several_columns_that_may_be_the_time_are_listed() -> None:
+    plan = guess_time({"u": ["1", "2"], "gps_week_time": ["1", "2"], "host_time": ["5", "6"]})
+    assert plan is not None
+    assert plan.column == "gps_week_time"
+    assert '"host_time" may be it too: set time under [table] in the profile' in plan.note
+
+
+def test_a_unit_that_the_profile_states_is_kept_where_the_column_is_guessed(tmp_path: Path) -> None:
+    path = write(tmp_path, "log.csv", "time,u\n0,1\n1,2\n")
+    series, reader = read_all(path, TableLayout(time_unit="us"))
+    assert series.receive_ns.tolist() == [0, 1000]
+    assert "us as the profile states" in reader.topics[0].note
+
+
+def test_an_assumed_unit_is_reported() -> None:
+    plan = guess_time({"time": ["0", "100", "200"]})
+    assert plan is not None
+    assert "ms, since steps of 100 are too long for seconds" in plan.note
+
+
+@pytest.mark.parametrize(
+    ("numbers", "unit", "told"),
+    [
+        ([0.0, 100.0, 200.0], "s", 'look like milliseconds, so set time_unit = "ms"'),
+        ([1744362945123.0, 1744362945223.0], "s", 'look like milliseconds, so set time_unit = "ms"'),
+        ([1744362945.1, 1744362945.2], "ns", 'look like seconds, so set time_unit = "s"'),
+        ([0.0, 0.01, 0.02], "ms", 'look like seconds, so set time_unit = "s"'),
+        ([0.0, 0.1, 0.2], "s", ""),
+        ([1744362945.0, 1744362946.0], "s", ""),
+        ([0.0, 20.0, 40.0], "ms", ""),
+    ],
+)
+def test_a_stated_unit_that_cannot_be_right_is_doubted(numbers: list[float], unit: str, told: str) -> None:
+    doubt = unit_doubt(np.array(numbers), unit)
+    assert told in doubt
+    assert bool(told) == bool(doubt)
 
 
 def test_a_row_counter_or_a_named_rising_column_is_no_time() -> None:

@@ -242,6 +242,17 @@ def test_a_damaged_cache_is_made_anew(tmp_path: Path, log: Path, boat: Profile) 
     ferryid_parquet.read_table(path)
 
 
+def test_any_flipped_byte_of_a_cached_table_is_found(tmp_path: Path, log: Path, boat: Profile) -> None:
+    record(log, boat, tmp_path)
+    (path,) = (tmp_path / "logs").rglob("*.parquet")
+    data = path.read_bytes()
+    checksum = ferryid_parquet.table_checksum(path)
+    for place in range(0, len(data), max(1, len(data) // 40)):
+        path.write_bytes(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])
+        with pytest.raises(FerryIdError, match=r"cannot be read .*delete its folder"):
+            ferryid_parquet.read_table(path, checksum)
+
+
 @pytest.mark.parametrize("failure", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
 def test_nothing_half_written_is_left(
     tmp_path: Path, log: Path, boat: Profile, monkeypatch: pytest.MonkeyPatch, failure: BaseException

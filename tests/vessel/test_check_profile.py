@@ -96,6 +96,9 @@ CASES = {
         "mass_kg = 1" + 400 * "0" + "@",
         "must be a number, found one of more",
     ),
+    "mass of no vessel": ("mass_kg = 1000.0", "mass_kg = 1e308@", "1e+308 is not plausible for any vessel"),
+    "mass of nothing": ("mass_kg = 1000.0", "mass_kg = 1e-300@", "must be at least 1e-12"),
+    "damping of no vessel": ('"X_u" = -20.0', '"X_u" = -1e308@', "must be at most 1e+15 in size"),
     "mass as text": ("mass_kg = 1000.0", 'mass_kg = "1000"@', "must be a number, found a string"),
     "mass not finite": ("mass_kg = 1000.0", "mass_kg = inf@", "must be above 0, found inf"),
     "no inertia": (
@@ -169,6 +172,16 @@ CASES = {
         "zero everywhere",
     ),
     "a table without thrust": ("force = [-200, 0, 300]", "force = [0, 0, 0]@", "zero everywhere"),
+    "a coefficient of no propeller": (
+        'thrust = { kind = "polynomial", coefficients = [0.01,',
+        'thrust = { kind = "polynomial", coefficients = [1e308,@',
+        "is not plausible for any vessel",
+    ),
+    "a thrust of no propeller": (
+        'thrust = { kind = "polynomial", coefficients = [0.01, 0.0, 1e-7], valid = [-900, 900] }',
+        'thrust = { kind = "polynomial", coefficients = [0.01, 0.0, 1e9], valid = [-900, 900] }@',
+        "more than any propeller",
+    ),
     "thrust of the wrong sign": (
         "[0.01, 0.0, 1e-7], valid = [-900, 900] }",
         "[-0.01, 0.0, 1e-7], valid = [-900, 900] }@",

@@ -13,7 +13,16 @@ from ferryid.errors import FerryIdError, one_line
 from ferryid.ingest.arrow_columns import column_from_arrow
 from ferryid.ingest.log import Column, Format, Loss, TableLayout, Topic
 from ferryid.ingest.table_time import TimePlan, guess_time
-from ferryid.ingest.tables import Rows, TableReader, no_time, number_doubt, plan_time, to_ns, unique_names
+from ferryid.ingest.tables import (
+    Rows,
+    TableReader,
+    no_time,
+    number_doubt,
+    plan_time,
+    to_ns,
+    unique_names,
+    with_stated_unit,
+)
 
 _LARGE_BYTES = 1 << 30
 _MOST_TIMES_LARGER = 100
@@ -62,7 +71,7 @@ def _read(
     file = _open_file(path)
     raw = list(dict.fromkeys(name for name, _ in places.values()))
     rows, size = file.metadata.num_rows, path.stat().st_size
-    needed = max(8 * rows * len(places), _claimed_bytes(path, file, raw))
+    needed = max(8 * rows * len(places), _claimed_bytes(path, file))
     if rows < 0 or needed > max(_LARGE_BYTES, _MOST_TIMES_LARGER * size):
         raise FerryIdError(
             f"{path}: the Parquet file claims {rows} rows that need {needed / 1e6:.0f} MB, found {size} bytes, which "
@@ -80,14 +89,11 @@ def _read(
     return _read_groups(path, file, raw, places, times, first)
 
 
-def _claimed_bytes(path: Path, file: Any, names: Sequence[str]) -> int:
-    """Size in memory of the pages of columns, as the footer claims it."""
+def _claimed_bytes(path: Path, file: Any) -> int:
+    """Size in memory of all pages, as the footer claims it."""
     try:
-        footer = file.metadata
-        paths = [footer.schema.column(index).path for index in range(footer.num_columns)]
-        wanted = [i for i, one in enumerate(paths) if any(one == name or one.startswith(f"{name}.") for name in names)]
-        groups = [footer.row_group(group) for group in range(footer.num_row_groups)]
-        return sum(group.column(index).total_uncompressed_size for group in groups for index in wanted)
+        # Not column by column: pyarrow ends the process where the statistics of a column are damaged.
+        return sum(int(file.metadata.row_group(group).total_byte_size) for group in range(file.num_row_groups))
     except _failures() as error:
         raise _damaged(path, error) from error
 
@@ -187,7 +193,7 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
     plan = plan_time(str(path), tuple(fields), layout) if layout is not None else None
     guessed = plan is None
     if plan is None:
-        plan = _guess(path, file, fields, places)
+        plan = with_stated_unit(_guess(path, file, fields, places), layout)
         notes.append(plan.note)
     columns, _ = _read(path, {plan.column: places[plan.column]}, {plan.column})
     if not guessed:
@@ -230,23 +236,26 @@ def _guess(path: Path, file: Any, fields: Mapping[str, str], places: Mapping[str
     for name, kind in fields.items():
         if kind == "datetime":
             return TimePlan(name, "datetime", note=f'time guessed: column "{name}" (timestamps)')
-    plan = None
-    try:
-        batch = next((one for one in file.iter_batches(batch_size=200) if one.num_rows), None)
-        if batch is not None:
-            columns = _columns(_table_of(batch), places, set(fields))
-            plan = guess_time({name: [str(value) for value in columns[name].tolist()] for name in fields})
-    except _failures() as error:
-        raise _damaged(path, error) from error
+    columns = _first_rows(path, file, places, set(fields))
+    plan = guess_time({name: [str(value) for value in columns[name].tolist()] for name in fields})
     if plan is None:
         raise FerryIdError(no_time(str(path), tuple(fields)))
     return plan
 
 
-def _table_of(batch: Any) -> Any:
+def _first_rows(path: Path, file: Any, places: Mapping[str, tuple[str, int]], times: set[str]) -> dict[str, Column]:
+    """Up to 200 rows of the first row group that has any and can be read."""
     import pyarrow as pa
 
-    return pa.Table.from_batches([batch])
+    first: Exception = ValueError("no row can be read")
+    for group in range(file.num_row_groups):
+        try:
+            for batch in file.iter_batches(batch_size=200, row_groups=[group]):
+                if batch.num_rows:
+                    return _columns(pa.Table.from_batches([batch]), places, times)
+        except _failures() as error:
+            first = error
+    raise _damaged(path, first) from first
 
 
 FORMAT = Format(name="Parquet table", matches=_matches, open=_open, order=20)

@@ -10,7 +10,9 @@ from ferryid.ingest.tables import TableReader
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return path.is_file() and path.suffix.lower() in SUFFIXES and looks_like_text(head)
+    suffix = path.suffix.lower()
+    # A damaged byte does not make a CSV file something else.
+    return path.is_file() and (suffix in (".csv", ".tsv") or (suffix in SUFFIXES and looks_like_text(head)))
 
 
 def _open(path: Path, layout: TableLayout | None) -> TableReader:

@@ -1,0 +1,158 @@
+"""Damaged text tables: every line below the header is a row or counted as lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest import open_log
+from ferryid.ingest.log import Reader, Series, TableLayout
+from ferryid.ingest.table_rows import LONGEST_LINE
+
+HEADER = b"time,a,mode\n"
+ROWS = [b"%d.0,%d.5,auto" % (n, n) for n in range(10)]
+
+
+def read(folder: Path, content: bytes, layout: TableLayout | None = None) -> tuple[Series, Reader]:
+    path = folder / "log.csv"
+    path.write_bytes(content)
+    reader = open_log(path, layout)
+    return reader.read({"table": tuple(reader.topics[0].fields)})["table"], reader
+
+
+def lost(reader: Reader) -> int:
+    return sum(loss.messages or 0 for loss in reader.losses)
+
+
+def with_row(row: bytes, place: int = 4) -> bytes:
+    return HEADER + b"\n".join([*ROWS[:place], row, *ROWS[place:]]) + b"\n"
+
+
+@pytest.mark.parametrize(
+    ("row", "what"),
+    [
+        (b"4.5,\xff\xfe,auto,7,8", "without 3 fields"),
+        (b"4.5,1\xff", "without 3 fields"),
+        (b'4.5,"1.5,auto', "a quote that is not closed"),
+        (b'"4.5,1.5,auto', "a quote that is not closed"),
+        (b'4.5,1,"au""to', "a quote that is not closed"),
+        (b"4.5;1.5;auto", "without 3 fields"),
+        (b"\0" * 5000, "without 3 fields"),
+        (b"4.5," + b"9" * (LONGEST_LINE + 1) + b",auto", "more than a million characters"),
+    ],
+)
+def test_a_damaged_row_costs_itself_and_is_counted(tmp_path: Path, row: bytes, what: str) -> None:
+    series, reader = read(tmp_path, with_row(row))
+    assert series.columns["a"].tolist() == [n + 0.5 for n in range(10)]
+    assert lost(reader) == 1
+    assert any(what in loss.what for loss in reader.losses)
+
+
+def test_a_row_of_bad_utf8_and_wrong_width_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    _, reader = read(tmp_path, with_row(b"4.5,\xff,auto,7"))
+    assert lost(reader) == 1
+    assert capfd.readouterr() == ("", "")
+
+
+def test_bytes_that_are_not_text_cost_their_cell_only(tmp_path: Path) -> None:
+    content = with_row(b"4.5,1.\xff5,auto").replace(b"9.5,auto", b"9.5,au\xc3to").replace(b"0.5,auto", "0.5,à".encode())
+    content = content.replace(b"1.5,auto", "1.5,à".encode()).replace(b"2.5,auto", "2.5,à".encode())
+    series, reader = read(tmp_path, content)
+    np.testing.assert_array_equal(series.columns["a"][3:6], [3.5, np.nan, 4.5])
+    assert series.columns["mode"][-1] == "au\ufffdto"
+    assert any("2 rows hold bytes that are not utf-8 text" in loss.what for loss in reader.losses)
+    assert any('1 cells of column "a" are not numbers' in loss.what for loss in reader.losses)
+
+
+def test_one_damaged_byte_in_the_head_does_not_make_utf8_text_cp1252(tmp_path: Path) -> None:
+    content = "time,course [°]\n".encode() + "0,1\n1,2°\n2,3\n".encode() + b"3,\xff4\n4,5\n"
+    series, _ = read(tmp_path, content)
+    np.testing.assert_array_equal(series.columns["course [°]"], [1, np.nan, 3, np.nan, 5])
+
+
+def test_quoted_cells_may_go_over_lines(tmp_path: Path) -> None:
+    series, reader = read(tmp_path, with_row(b'4.5,1.5,"several\nlines"'))
+    assert series.columns["mode"][4] == "several\nlines"
+    assert len(series.receive_ns) == 11
+    assert lost(reader) == 0
+
+
+def test_two_stray_quotes_do_not_take_the_rows_between_them(tmp_path: Path) -> None:
+    rows = list(ROWS)
+    rows[2], rows[7] = b'2.0,"2.5,auto', b'7.0,7.5",auto'
+    series, reader = read(tmp_path, HEADER + b"\n".join(rows) + b"\n")
+    assert len(series.receive_ns) + lost(reader) == 10
+    assert len(series.receive_ns) >= 8
+
+
+def test_lines_that_end_in_cr_are_rows(tmp_path: Path) -> None:
+    series, reader = read(tmp_path, (HEADER + b"\n".join(ROWS) + b"\n").replace(b"\n", b"\r"))
+    assert (len(series.receive_ns), lost(reader)) == (10, 0)
+
+
+def test_a_form_feed_is_no_end_of_a_line(tmp_path: Path) -> None:
+    series, reader = read(tmp_path, b"run\x0c12\n" + HEADER + b"\n".join(ROWS))
+    assert (len(series.receive_ns), lost(reader)) == (10, 0)
+
+
+def test_zeros_after_a_power_loss_cost_the_last_row(tmp_path: Path) -> None:
+    series, reader = read(tmp_path, HEADER + b"\n".join(ROWS) + b"\n10.0,1" + b"\0" * 4096)
+    assert (len(series.receive_ns), lost(reader)) == (10, 1)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be", "utf-32"])
+def test_wide_text_reads_as_any_other(tmp_path: Path, encoding: str) -> None:
+    text = (HEADER + b"\n".join(ROWS)).decode()
+    mark = "\ufeff" if encoding == "utf-16-be" else ""
+    series, reader = read(tmp_path, (mark + text).encode(encoding))
+    assert series.columns["a"].tolist() == [n + 0.5 for n in range(10)]
+    assert reader.topics[0].end_ns == 9 * 10**9
+
+
+def test_utf16_without_a_mark_is_read_where_the_profile_names_it(tmp_path: Path) -> None:
+    content = (HEADER + b"\n".join(ROWS)).decode().encode("utf-16-le")
+    series, _ = read(tmp_path, content, TableLayout(time="time", encoding="utf-16-le"))
+    assert len(series.receive_ns) == 10
+
+
+def test_a_header_longer_than_the_first_look(tmp_path: Path) -> None:
+    names = ",".join(["time", *(f"a long name of column {n}" for n in range(6000))])
+    rows = "\n".join(",".join([str(t), *["1"] * 6000]) for t in range(3))
+    path = tmp_path / "log.csv"
+    path.write_text(names + "\n" + rows + "\n")
+    assert open_log(path).read({"table": ("a long name of column 5999",)})["table"].receive_ns.tolist() == [
+        0,
+        10**9,
+        2 * 10**9,
+    ]
+
+
+def test_whole_nanoseconds_stay_exact_beside_missing_cells(tmp_path: Path) -> None:
+    times = [1744362945123456789 + n * 100_000_001 for n in range(10)]
+    for missing in (b"", b"ERR"):
+        rows = [b"%d,%d.5,auto" % (t, n) for n, t in enumerate(times)]
+        rows[5] = missing + b",5.5,auto"
+        series, reader = read(tmp_path, HEADER + b"\n".join(rows))
+        assert series.receive_ns.tolist() == times[:5] + times[6:]
+        assert lost(reader) == 1
+
+
+def test_times_that_nanoseconds_cannot_hold_are_lost_rows(tmp_path: Path) -> None:
+    series, reader = read(tmp_path, with_row(b"9223372036854775807,1.5,auto").replace(b".0,", b","))
+    assert (len(series.receive_ns), lost(reader)) == (10, 1)
+    dates = b"".join(b"%s-04-11 11:15:4%d,1,auto\n" % (year, n) for n, year in enumerate([b"2025", b"9999", b"2025"]))
+    series, reader = read(tmp_path, HEADER + dates)
+    assert (len(series.receive_ns), lost(reader)) == (2, 1)
+
+
+def test_numbers_that_only_python_reads_are_unreadable(tmp_path: Path) -> None:
+    series, _ = read(tmp_path, with_row(b"4.5,1_0,auto") + "11,١٢,auto\n".encode())
+    assert np.isnan(series.columns["a"][[4, 11]]).all()
+
+
+def test_a_table_without_time_lists_the_columns_that_may_be_meant(tmp_path: Path) -> None:
+    with pytest.raises(FerryIdError, match=r'found "boot_time" of 2 columns, whose values do not rise.*time under'):
+        read(tmp_path, b"boot_time,u\n9,1\n5,2\n3,1\n1,2\n")

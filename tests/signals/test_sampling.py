@@ -1,0 +1,98 @@
+"""Logs whose time stands still, is of another unit, or advances too slowly are refused with the remedy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.report.structure import spectrum
+from ferryid.signals.inspect import inspect
+from ferryid.signals.prepare import prepare
+from ferryid.vessel.load import parse_profile
+from ferryid.vessel.profile import Profile
+
+TOML = """
+schema = "ferryid.vessel/1"
+name = "boat"
+source = "test"
+[hull]
+length_m = 5.0
+mass_kg = 1000.0
+k_zz_m = 1.2
+[table]
+time = "t"
+[[actuator]]
+name = "main"
+kind = "force"
+position_m = [-1.5, 0.0]
+[signals.velocity]
+topic = "table"
+fields = ["u", "v"]
+unit = "m/s"
+frame = "FRD"
+[signals.yaw_rate]
+topic = "table"
+field = "r"
+unit = "rad/s"
+frame = "FRD"
+[signals."main.force"]
+topic = "table"
+field = "F"
+unit = "N"
+"""
+
+
+@pytest.fixture
+def boat() -> Profile:
+    return parse_profile(TOML, "boat.toml")
+
+
+def table(folder: Path, times: list[str]) -> str:
+    n = np.arange(len(times))
+    rows = zip(times, np.sin(n / 9), np.cos(n / 7), np.sin(n / 5) / 9, 90 * np.cos(n / 11), strict=True)
+    lines = [",".join((t, *(f"{value:.6f}" for value in values))) for t, *values in rows]
+    path = folder / "x.csv"
+    path.write_text("t,u,v,r,F\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [
+        ([str(100 * n) for n in range(300)], r'every 100 s.*look like milliseconds, so set time_unit = "ms" under'),
+        ([str(100_000 * n) for n in range(300)], r'look like microseconds, so set time_unit = "us" under \[table\]'),
+        ([str(1744362945123 + 100 * n) for n in range(300)], r'look like milliseconds, so set time_unit = "ms"'),
+        ([str(10 * n) for n in range(300)], r"at least 0\.7 Hz\. Fix: record the navigation at a higher rate"),
+        (["5.0"] * 300, r"x\.csv: time does not advance, found 300 rows of table with the same time\. Fix: name"),
+        (["5.0"], r"x\.csv: table holds one row only"),
+        ([""] * 9, r"no row has a readable time in column .t. \(s\), found an empty cell"),
+    ],
+)
+def test_a_wrong_time_column_is_explained_by_fit_and_inspect(
+    tmp_path: Path, boat: Profile, times: list[str], told: str
+) -> None:
+    path = table(tmp_path, times)
+    with pytest.raises(FerryIdError, match=told):
+        prepare(path, boat, tmp_path / "out", window_s=1.0)
+    vessel = inspect(path, boat)["vessel"]
+    assert not vessel["usable"]
+    assert vessel["problem"]
+
+
+def test_a_log_of_one_sample_per_second_is_taken(tmp_path: Path, boat: Profile) -> None:
+    prepared = prepare(table(tmp_path, [str(n) for n in range(300)]), boat, tmp_path / "out", window_s=1.0)
+    assert "Smoothing: none, a window of 1 s holds one row at 1 Hz." in prepared.motion.repairs
+    assert inspect(table(tmp_path, [str(n) for n in range(300)]), boat)["vessel"]["usable"]
+
+
+def test_the_spectrum_of_a_slow_log_is_no_crash() -> None:
+    n = 200
+    motion = SimpleNamespace(
+        rate_hz=0.01, valid=np.ones(n, dtype=bool), tau=np.random.default_rng(1).normal(size=(n, 3))
+    )
+    frequency, density = spectrum(SimpleNamespace(motion=motion, tau_model=np.zeros((n, 3))), "tau_model", 0)  # type: ignore[arg-type]
+    assert frequency.size == density.size > 0
