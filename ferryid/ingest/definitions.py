@@ -135,6 +135,14 @@ def typestore_of(types: Types) -> Any:
     return store
 
 
+def md5sum(store: Any, msgtype: str) -> str:
+    """Return the checksum that ROS1 gives a registered type, or an empty string where its definition is incomplete."""
+    try:
+        return str(store.generate_msgdef(msgtype)[1])
+    except PARSER_ERRORS:
+        return ""
+
+
 def checked(types: Types, *, empty_bytes: int) -> Types:
     """Return the types as they may be registered: checked, and without constants that Python cannot write down.
 
