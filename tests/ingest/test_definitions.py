@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.writer import Writer
+from rosbags.rosbag1 import Writer as Writer1
 
 from ferryid.errors import FerryIdError
-from ferryid.ingest import definitions
+from ferryid.ingest import definitions, open_log
 from ferryid.ingest.definitions import DefinitionError, parse_definition, typestore_of
 from ferryid.ingest.formats.mcap import McapLog
 from ferryid.ingest.layout import leaf_fields
@@ -286,3 +287,24 @@ def test_protobuf_messages_that_cannot_be_are_counted() -> None:
     log = log_of(("nav.State", "protobuf", definition), messages)
     assert log.read({"/a": ["name"]})["/a"].columns["name"].tolist() == ["a"]
     assert [loss.messages for loss in log.losses] == [4]
+
+
+def test_an_incomplete_definition_of_a_ros1_bag_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    with Writer1(path) as writer:
+        for topic, text in (("/missing", "Nobody x\n"), ("/shared", MSG_BOMBS["shared twice"])):
+            connection = writer.add_connection(topic, f"ferry/msg/{topic[1:]}", msgdef=text, md5sum="0" * 32)
+            writer.write(connection, T0, bytes(8))
+    log = open_log(path)
+    assert ["cannot be read" in topic.note for topic in log.topics] == [True, True]
+    for topic, found in (("/missing", "incomplete definition"), ("/shared", "holds more than 20000 messages")):
+        with pytest.raises(FerryIdError, match=rf"{found}.* Fix: "):
+            log.read({topic: []})
+
+
+def test_protobuf_messages_over_the_bound_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ferryid.ingest.protobuf.MAX_MESSAGE_BYTES", 1000)
+    definition = descriptors({"name": "string"})
+    log = log_of(("nav.State", "protobuf", definition), [b"\x0a\x01a" * 100, b"\x0a\x01a" * 400])
+    assert log.read({"/a": ["name"]})["/a"].columns["name"].tolist() == ["a"]
+    assert [loss.messages for loss in log.losses] == [1]

@@ -265,7 +265,7 @@ class Rosbag1Reader:
         if topic.type not in store.fielddefs:
             fault = self._faults.get((connection.msgtype, connection.md5sum), "describes other types")
             raise FerryIdError(
-                f"{file}: topic {name} cannot be decoded, the definition of {topic.type} {fault}. "
+                f"{file}: topic {name} cannot be decoded, found no readable definition of {topic.type}: it {fault}. "
                 "Fix: copy the bag from the recorder again, or record with a valid message file"
             )
         if connection.md5sum not in ("*", md5sum(store, topic.type)):
