@@ -45,8 +45,8 @@ _TYPES = {
 
 MAX_DEFINITION_BYTES = 16 << 20
 """Descriptors of one schema; they need about ten times as much memory."""
-MAX_MESSAGE_BYTES = 64 << 20
-"""One message; decoded it needs up to thirteen times as much memory."""
+MAX_MESSAGE_BYTES = 32 << 20
+"""One message; decoded it needs up to thirty times as much memory."""
 MAX_NESTED = 100
 """Messages nested in one another, as deep as protobuf itself decodes them."""
 _INTEGERS = frozenset({FieldDescriptor.TYPE_INT64, FieldDescriptor.TYPE_INT32})

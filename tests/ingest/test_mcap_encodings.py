@@ -288,3 +288,96 @@ def test_bad_json() -> None:
     assert (loss.topic, loss.messages) == ("/a", 2)
     with pytest.raises(FerryIdError, match=r'no JSON message has a value at \'w.v\'.*Fix: .*Did you mean "v"'):
         log.read({"/a": ["w.v"]})
+
+
+def json_log(messages: list[bytes], schema: bytes = b"") -> McapLog:
+    return log_of("json", ("State", "jsonschema", schema) if schema else None, messages)[1]
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        b"[" * 100_000,
+        b'{"x":' * 50_000 + b"1" + b"}" * 50_000,
+        b'{"x": ' + b"9" * 5000 + b"}",
+        b'{"x": 1, "stamp": {"sec": 99999999999999, "nanosec": 0}}',
+        b'{"x": 1, "stamp": {"sec": -9223372036854775808, "nanosec": -9223372036854775808}}',
+        b'{"x": "\xff"}',
+        b"",
+    ],
+)
+def test_json_messages_that_cannot_be_are_counted(bad: bytes) -> None:
+    log = json_log([b'{"x": 1}', bad, b'{"x": 2, "x": 3}'])
+    assert log.read({"/a": ["x"]})["/a"].columns["x"].tolist() == [1, 3]
+    assert [loss.messages for loss in log.losses] == [1]
+
+
+def test_json_messages_over_the_bound_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ferryid.ingest.json_messages.MAX_MESSAGE_BYTES", 1000)
+    log = json_log([b'{"x": 1}', b'{"x": 2, "y": [' + b"[]," * 400 + b"0]}"])
+    assert log.read({"/a": ["x"]})["/a"].columns["x"].tolist() == [1]
+    assert [loss.messages for loss in log.losses] == [1]
+
+
+def test_json_integers_beyond_floats_are_infinite() -> None:
+    digits = b"1" + b"0" * 400
+    log = json_log([b'{"x": ' + number + b"}" for number in (digits, b"-" + digits, b"null", b"1e400", b"2")])
+    assert repr(log.read({"/a": ["x"]})["/a"].columns["x"].tolist()) == "[inf, -inf, nan, inf, 2.0]"
+
+
+def test_json_texts_can_be_written_down() -> None:
+    log = json_log([b'{"x": "\\ud800", "\\udfff": 1, "\xc3\xa6": 2}'])
+    assert [*log.topics[0].fields] == ["x", "?", "æ"]
+    assert log.read({"/a": ["x"]})["/a"].columns["x"].tolist() == ["?"]
+
+
+@pytest.mark.parametrize(
+    "schema",
+    [
+        b'{"type": {"a": 1}}',
+        b'{"type": [["number"], {}]}',
+        b'{"properties": {"x": {"type": [{}]}, "y": {"items": 1, "type": "array"}}}',
+        b'{"properties":{"x":' * 5000 + b"1" + b"}}" * 5000,
+        b"\xff",
+        b"[" * 100_000,
+        b'{"properties": {' + b",".join(b'"x%d": {"type": "number"}' % k for k in range(50_001)) + b"}}",
+    ],
+)
+def test_json_schemas_that_declare_nothing_usable_leave_the_messages(schema: bytes) -> None:
+    log = json_log([b'{"x": 1.5}'], schema)
+    assert dict(log.topics[0].fields) == {"x": "float64"}
+    assert log.read({"/a": ["x"]})["/a"].columns["x"].tolist() == [1.5]
+
+
+def test_long_names_in_json_are_listed_within_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ferryid.ingest.definitions.MAX_FIELD_TEXT", 100_000)
+    message = json.dumps({"a" * 10_000: {f"x{k}": k for k in range(50)}, "x": 1}).encode()
+    log = json_log([message])
+    assert dict(log.topics[0].fields) == {}
+    assert log.read({"/a": ["x"]})["/a"].columns["x"].tolist() == [1]
+
+
+def test_protobuf_times_beyond_the_range_are_counted() -> None:
+    messages = []
+    for seconds in (1, 9_223_372_037, -9_223_372_037):
+        state = STATE(a_double=1.5)
+        state.stamp.seconds = seconds
+        messages.append(state.SerializeToString())
+    _, log = protobuf_log(messages)
+    assert log.read({"/a": ["a_double"]})["/a"].columns["a_double"].tolist() == [1.5]
+    assert [loss.messages for loss in log.losses] == [2]
+
+
+def test_a_timestamp_that_the_log_defines_otherwise_is_no_time() -> None:
+    file = FileDescriptorProto(name="a.proto", package="google.protobuf", syntax="proto3")
+    stamp = file.message_type.add(name="Timestamp")
+    stamp.field.add(name="seconds", number=1, type="TYPE_STRING", label="LABEL_OPTIONAL")
+    state = file.message_type.add(name="State")
+    state.field.add(
+        name="stamp", number=1, type="TYPE_MESSAGE", type_name=".google.protobuf.Timestamp", label="LABEL_OPTIONAL"
+    )
+    definition = FileDescriptorSet(file=[file]).SerializeToString()
+    _, log = log_of("protobuf", ("google.protobuf.State", "protobuf", definition), [b"\x0a\x03\x0a\x01a"])
+    series = log.read({"/a": ["stamp.seconds"]})["/a"]
+    assert series.stamp_ns is None
+    assert series.columns["stamp.seconds"].tolist() == ["a"]

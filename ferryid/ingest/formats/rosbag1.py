@@ -20,7 +20,7 @@ from rosbags.typesys.msg import normalize_msgtype
 
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
-from ferryid.ingest.definitions import DefinitionError, parse_definition
+from ferryid.ingest.definitions import DefinitionError, md5sum, parse_definition
 from ferryid.ingest.layout import EMPTY_MEMBER, stamp_path
 from ferryid.ingest.log import Format, Loss, Series, TableLayout, Topic
 from ferryid.ingest.rosbag1_chunks import (
@@ -126,6 +126,7 @@ class Rosbag1Reader:
         # Shared, because rosbags compiles code for every type that a store holds.
         self._store = get_typestore(Stores.EMPTY)
         self._definitions: dict[tuple[str, str], Mapping[str, Any]] = {}
+        self._faults: dict[tuple[str, str], str] = {}
         self.topics: tuple[Topic, ...] = tuple(self._topic(name) for name in sorted(self._by_topic))
         self.losses: tuple[Loss, ...] = tuple(self._opening)
 
@@ -224,8 +225,9 @@ class Rosbag1Reader:
             parsed: Mapping[str, Any]
             try:
                 parsed = parse_definition(connection.definition, normalize_msgtype(connection.msgtype), "ros1msg")
-            except DefinitionError:
+            except DefinitionError as error:
                 parsed = {}
+                self._faults[key] = str(error)
             self._definitions[key] = parsed
         return self._definitions[key]
 
@@ -281,18 +283,18 @@ class Rosbag1Reader:
             )
         store = self._registered(connection, topic)
         if topic.type not in store.fielddefs:
+            fault = self._faults.get((connection.msgtype, connection.md5sum), "describes other types")
             raise FerryIdError(
-                f"{file}: topic {name} cannot be decoded, found no readable definition of {topic.type}. "
+                f"{file}: topic {name} cannot be decoded, found no readable definition of {topic.type}: it {fault}. "
+                "Fix: copy the bag from the recorder again, or record with a valid message file"
+            )
+        checksum = md5sum(store, topic.type)
+        if not checksum:
+            raise FerryIdError(
+                f"{file}: topic {name} cannot be decoded, found no definition of a type that {topic.type} is made of. "
                 "Fix: copy the bag from the recorder again"
             )
-        try:
-            md5sum = store.generate_msgdef(topic.type)[1]
-        except TypesysError as error:
-            raise FerryIdError(
-                f"{file}: topic {name} cannot be decoded, found no definition of a type that {topic.type} is made of "
-                f"({str(error).splitlines()[0]}). Fix: copy the bag from the recorder again"
-            ) from error
-        if connection.md5sum not in ("*", md5sum):
+        if connection.md5sum not in ("*", checksum):
             what = f"the definition of {topic.type} does not match its checksum: values of {name} may be misread"
             lost.append(Loss(str(file), what, name, 0))
         return decoder_for("ros1", store, topic.type, name, paths, topic.count, where=str(file))
