@@ -22,6 +22,7 @@ from ferryid.ingest.rosbag1_records import (
     RecordError,
     Records,
     connection_of,
+    nanoseconds,
 )
 
 MAX_CHUNK = 512 << 20
@@ -266,8 +267,11 @@ def replaced(data: Any, chunk: Chunk, allowance: Allowance, *, intact: bool) -> 
 def _contradicted(data: Any, chunk: Chunk, walked: dict[int, Entries]) -> dict[int, NDArray[np.bool_]]:
     """Return which messages of each connection have another time in the index, and that may be the right one.
 
-    The time of either may be damaged. Where the times of most messages differ the index records are another chunk's.
+    The time of either may be damaged. Where the times of most messages differ, and those of the chunk information are the
+    messages' own, the index records are another chunk's.
     """
+    times = np.concatenate([np.empty(0, np.int64), *map(nanoseconds, walked.values())])
+    stated = bool(len(times)) and (times.min(), times.max()) == (chunk.start_ns, chunk.end_ns)
     doubtful: dict[int, NDArray[np.bool_]] = {}
     for number, entries in walked.items():
         listed = {tuple(row) for row in chunk.entries(data, number).tolist()}
@@ -283,4 +287,4 @@ def _contradicted(data: Any, chunk: Chunk, walked: dict[int, Entries]) -> dict[i
         if any(rows):
             doubtful[number] = np.array(rows, np.bool_)
     count = sum(int(np.count_nonzero(rows)) for rows in doubtful.values())
-    return doubtful if 2 * count < sum(len(one) for one in walked.values()) or count == 1 else {}
+    return {} if stated and 2 * count > len(times) else doubtful

@@ -61,7 +61,7 @@ class Walked:
     repeats
         Byte of a chunk that was left out to the byte of the same chunk before it.
     index
-        First byte behind the chunks and their index records, None where nothing is left behind them.
+        First byte of the chunk information behind the chunks and their index records, None where there is none.
     """
 
     connections: dict[int, Connection] = field(default_factory=dict)
@@ -116,7 +116,6 @@ def walk(records: Records) -> Walked:
                 connection = connection_of(data, record)
                 if found.connections.setdefault(connection.number, connection) != connection:
                     doubtful.add(connection.number)
-                found.index = found.index or position
             elif record.op == CHUNK_INFO:
                 infos.append(info_of(data, record))
                 found.index = found.index or position
@@ -142,12 +141,25 @@ def walk(records: Records) -> Walked:
             found.doubts.setdefault(chunk.position, NOT_LISTED)
         left = _assign_all(data, found, infos)
     by_place = {chunk.position: chunk for chunk in found.chunks}
+    moved: list[ChunkInfo] = []
     for info in left:
         chunk_there = by_place.get(info.chunk)
         if chunk_there is None:
-            found.missing.append(info)
+            moved.append(info)
         elif chunk_there.counts is None:
             info.note_on(chunk_there)
+    # What is left is of chunks that are lost, but for those whose times or place are wrong.
+    by_counts: dict[Any, list[Chunk]] = {}
+    for chunk in found.chunks if moved else ():
+        content = _content(data, chunk) if chunk.counts is None else None
+        if content:
+            by_counts.setdefault(content[2], []).append(chunk)
+    for info in moved:
+        same = by_counts.get(frozenset(info.counts.items()))
+        if same:
+            info.note_on(same.pop(0))
+        else:
+            found.missing.append(info)
     return found
 
 
@@ -279,8 +291,6 @@ def _drop_repeats(data: Any, found: Walked) -> None:
             first = seen.setdefault(digest, chunk)
             if first is not chunk and chunk.end > chunk.start:
                 found.repeats[chunk.position] = first.position
-                if first.counts is None:
-                    first.counts = chunk.counts
     found.chunks = [chunk for chunk in found.chunks if chunk.position not in found.repeats]
 
 
@@ -325,12 +335,17 @@ def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss
         what = f"the chunk at byte {info.chunk} is damaged: its {messages} messages are lost"
         add(what, messages, info.start_ns, info.end_ns)
     reported = {info.chunk for info in found.missing}
-    complete = found.index is not None and all(chunk.counts is not None for chunk in found.chunks)
+    index = found.index if found.index is not None else size
+    if announced < size and _kind(Records(data), announced) in (CONNECTION, CHUNK_INFO):
+        index = announced
+    # Without a gap in it the index lists every chunk that there was.
+    listed = index < size and all(chunk.counts is not None for chunk in found.chunks)
+    listed = listed and all(end <= index for _, end in found.gaps)
     for first, end in found.gaps:
         # Damage to the index itself, the end of a cut file and chunks with a count are in the list already.
-        if first in reported or (found.index is not None and first >= found.index) or (end >= size and cut):
+        if first in reported or first >= index or (end >= size and cut):
             continue
-        if complete:
+        if listed:
             add(f"bytes {first} to {end} are damaged: every chunk that the index lists was found without them", 0)
         else:
             add(f"bytes {first} to {end} are damaged: what they held is lost", None)

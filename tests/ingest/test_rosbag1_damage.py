@@ -1,0 +1,264 @@
+"""ROS1 bags whose records contradict each other: every message is returned or reported lost, and none twice."""
+
+from __future__ import annotations
+
+import bz2
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import lz4.frame
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.ingest import open_log, rosbag1_chunks
+from ferryid.ingest.rosbag1_chunks import Allowance, decompressed
+from ferryid.ingest.rosbag1_messages import Messages
+from ferryid.ingest.rosbag1_records import (
+    CHUNK,
+    CHUNK_INFO,
+    CONNECTION,
+    INDEX,
+    Chunk,
+    RecordError,
+    Records,
+    connection_of,
+)
+from tests.ingest.test_rosbag1 import COMPRESSIONS, COUNT, START, WANTED, assert_rows_are_right, write_bag
+
+ALL = COUNT * 3 // 2
+
+
+class Raw(NamedTuple):
+    """One record, to be changed and written again."""
+
+    fields: dict[bytes, bytes]
+    data: bytes
+
+    @property
+    def op(self) -> int:
+        return self.fields[b"op"][0]
+
+    def packed(self) -> bytes:
+        pairs = (name + b"=" + value for name, value in self.fields.items())
+        header = b"".join(struct.pack("<I", len(pair)) + pair for pair in pairs)
+        return struct.pack("<I", len(header)) + header + struct.pack("<I", len(self.data)) + self.data
+
+
+def parsed(bag: bytes) -> list[Raw]:
+    """List the records of a whole bag."""
+    records, position, found = Records(bag), 13, []
+    while position < len(bag):
+        record = records.at(position)
+        found.append(Raw(dict(record.fields), bag[record.start : record.end]))
+        position = record.end
+    return found
+
+
+def places(records: list[Raw], op: int) -> list[int]:
+    return [place for place, record in enumerate(records) if record.op == op]
+
+
+def read_changed(
+    folder: Path, compression: str, change: Callable[[list[Raw]], Any], *, verify: bool = False
+) -> tuple[int, Any]:
+    """Write a bag, change its list of records, read it: number of rows and the reader."""
+    path = write_bag(folder / "a.bag", compression)
+    records = parsed(path.read_bytes())
+    change(records)
+    path.write_bytes(b"#ROSBAG V2.0\n" + b"".join(record.packed() for record in records))
+    reader = open_log(path)
+    series = reader.read(WANTED, verify=verify)
+    assert_rows_are_right(series)
+    times = np.concatenate([one.receive_ns for one in series.values()])
+    assert len(np.unique(times)) == len(times)
+    return len(times), reader
+
+
+def change_field(op: int, which: int, name: bytes, value: bytes) -> Callable[[list[Raw]], None]:
+    def change(records: list[Raw]) -> None:
+        records[places(records, op)[which]].fields[name] = value
+
+    return change
+
+
+def change_entry(row: int, other: int, columns: slice) -> Callable[[list[Raw]], None]:
+    """Overwrite part of one entry of the sixth index record by that of another."""
+
+    def change(records: list[Raw]) -> None:
+        place = places(records, INDEX)[5]
+        entries = np.frombuffer(records[place].data, "<u4").reshape(-1, 3).copy()
+        entries[row, columns] = entries[other, columns]
+        records[place] = records[place]._replace(data=entries.tobytes())
+
+    return change
+
+
+def repeat(op: int, which: int) -> Callable[[list[Raw]], None]:
+    def change(records: list[Raw]) -> None:
+        place = places(records, op)[which]
+        records.insert(place + 1, records[place])
+
+    return change
+
+
+def drop(op: int, which: int) -> Callable[[list[Raw]], None]:
+    def change(records: list[Raw]) -> None:
+        del records[places(records, op)[which]]
+
+    return change
+
+
+def move(op: int, which: int, to: int) -> Callable[[list[Raw]], None]:
+    def change(records: list[Raw]) -> None:
+        place = places(records, op)
+        records.insert(place[to], records.pop(place[which]))
+
+    return change
+
+
+WHOLE = {
+    "count of an index record": change_field(INDEX, 4, b"count", b"\1\0\0\0"),
+    "connection of an index record": change_field(INDEX, 4, b"conn", b"\1\0\0\0"),
+    "unknown connection of an index record": change_field(INDEX, 4, b"conn", b"\7\0\0\0"),
+    "index record twice": repeat(INDEX, 4),
+    "index record missing": drop(INDEX, 4),
+    "index record elsewhere": move(INDEX, 4, 9),
+    "index entry twice": change_entry(3, 4, slice(None)),
+    "place of an index entry twice": change_entry(3, 4, slice(2, 3)),
+    "count of the chunk information": change_field(CHUNK_INFO, 3, b"count", b"\1\0\0\0"),
+    "place in the chunk information": change_field(CHUNK_INFO, 3, b"chunk_pos", b"\1\2\3\4\5\6\7\x88"),
+    "chunk information twice": repeat(CHUNK_INFO, 3),
+    "chunk information missing": drop(CHUNK_INFO, 3),
+    "number of chunks": change_field(3, 0, b"chunk_count", b"\2\0\0\0"),
+    "number of connections": change_field(3, 0, b"conn_count", b"\1\0\0\0"),
+    "place of the index": change_field(3, 0, b"index_pos", b"\xff" * 8),
+    "number of a connection": change_field(CONNECTION, -1, b"conn", b"\0\0\0\0"),
+    "chunk twice": repeat(CHUNK, 3),
+    "chunk elsewhere": move(CHUNK, 3, 6),
+    "size of a chunk too small": change_field(CHUNK, 3, b"size", b"\1\0\0\0"),
+    "size of a chunk too large": change_field(CHUNK, 3, b"size", b"\xff" * 4),
+}
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize("damage", WHOLE)
+def test_a_damaged_index_costs_no_message_and_is_reported(tmp_path: Path, compression: str, damage: str) -> None:
+    rows, reader = read_changed(tmp_path, compression, WHOLE[damage], verify=True)
+    assert rows == ALL
+    assert reader.losses
+    assert [loss.messages for loss in reader.losses] == [0] * len(reader.losses)
+
+
+@pytest.mark.parametrize("damage", ["count of an index record", "connection of an index record", "index record twice"])
+def test_a_damaged_index_costs_no_message_without_verify_either(tmp_path: Path, damage: str) -> None:
+    assert read_changed(tmp_path, "lz4", WHOLE[damage])[0] == ALL
+
+
+def test_a_chunk_that_is_gone_is_counted_by_its_chunk_information(tmp_path: Path) -> None:
+    rows, reader = read_changed(tmp_path, "lz4", drop(CHUNK, 3))
+    assert rows < ALL
+    assert rows + sum(loss.messages for loss in reader.losses) == ALL
+
+
+@pytest.mark.parametrize("length", [0, 50, 9000, 0xFFFFFFFF])
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_a_chunk_of_wrong_length_costs_no_message(tmp_path: Path, compression: str, length: int) -> None:
+    path = write_bag(tmp_path / "a.bag", compression)
+    bag = bytearray(path.read_bytes())
+    records = parsed(bytes(bag))
+    place = 13 + sum(len(record.packed()) for record in records[: places(records, CHUNK)[3]])
+    at = place + 4 + struct.unpack_from("<I", bag, place)[0]
+    bag[at : at + 4] = struct.pack("<I", length)
+    path.write_bytes(bag)
+    reader = open_log(path)
+    series = reader.read(WANTED)
+    assert_rows_are_right(series)
+    assert sum(len(one.receive_ns) for one in series.values()) == ALL
+    assert reader.losses
+
+
+def test_verify_counts_lost_messages_of_topics_that_nobody_wants(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "a.bag", "none")
+    bag = bytearray(path.read_bytes())
+    place = bag.index(struct.pack("<d", 300.0)) - 30
+    bag[place : place + 8] = b"\xff" * 8
+    path.write_bytes(bag)
+    reader = open_log(path)
+    reader.read({"/force": []})
+    assert reader.losses == ()
+    reader.read({"/force": []}, verify=True)
+    assert [loss.messages for loss in reader.losses] == [1]
+
+
+@pytest.mark.parametrize("time", [b"\xff" * 8, bytes(8), b"\xff" * 4 + bytes(4)])
+def test_nonsense_times_of_the_index_cost_no_message_but_their_own(tmp_path: Path, time: bytes) -> None:
+    def change(records: list[Raw]) -> None:
+        place = places(records, INDEX)[5]
+        records[place] = records[place]._replace(data=time + records[place].data[8:])
+
+    rows, reader = read_changed(tmp_path, "lz4", change)
+    assert rows + sum(loss.messages for loss in reader.losses) == ALL
+    assert reader.losses
+
+
+def test_a_connection_without_a_part_of_its_definition_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "a.bag", "none", count=3)
+    path.write_bytes(path.read_bytes().replace(b"MSG: std_msgs/Header", b"MSG: std_msgs/HeadeR"))
+    reader = open_log(path)
+    with pytest.raises(FerryIdError, match="Fix: "):
+        reader.read({"/force": []})
+
+
+def stored_chunk(compression: str, content: bytes, size: int) -> tuple[bytes, Chunk]:
+    data = {"lz4": lz4.frame.compress, "bz2": bz2.compress}[compression](content)
+    return data, Chunk(0, 0, len(data), compression, size)
+
+
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize("compression", ["lz4", "bz2"])
+def test_a_chunk_expands_to_its_allowance_at_most(
+    monkeypatch: pytest.MonkeyPatch, compression: str, exact: bool
+) -> None:
+    monkeypatch.setattr(rosbag1_chunks, "FREE_CHUNK", 1000)
+    monkeypatch.setattr(rosbag1_chunks, "MAX_CHUNK", 100_000)
+    for size in (0, 1000, 10**7, 2**32 - 1):
+        data, chunk = stored_chunk(compression, bytes(10**7), size)
+        content = decompressed(data, chunk, Allowance(10**9, 100_000), exact=exact)
+        assert len(content.buffer) <= min(100_000, 1000 + 255 * len(data))
+        assert not content.whole
+        assert "more than" in content.fault
+
+
+def test_all_chunks_together_expand_to_the_allowance_of_the_file() -> None:
+    allowance = Allowance(25_000)
+    data, chunk = stored_chunk("bz2", bytes(10_000), 10_000)
+    sizes = [len(decompressed(data, chunk, allowance, exact=True).buffer) for _ in range(4)]
+    assert sizes == [10_000, 10_000, 5000, 0]
+
+
+@pytest.mark.parametrize("compression", ["lz4", "bz2"])
+@pytest.mark.parametrize("size", [0, 10, 4_000_000_000])
+def test_a_wrong_stated_size_costs_nothing_of_the_content(compression: str, size: int) -> None:
+    data, chunk = stored_chunk(compression, bytes(range(256)) * 40, size)
+    content = decompressed(data, chunk, Allowance.of_file(len(data)), exact=True)
+    assert bytes(content.buffer) == bytes(range(256)) * 40
+    assert content.whole
+    assert "size" in content.fault
+
+
+def test_a_message_that_reaches_past_the_end_of_a_short_chunk_is_not_found() -> None:
+    messages = Messages()
+    fields = {b"op": b"\2", b"conn": bytes(4), b"time": struct.pack("<II", START // 10**9, 0)}
+    whole = Raw(fields, b"x" * 8).packed()
+    entry = np.array([[START // 10**9, 0, 0]], np.uint32)
+    assert messages.locate(whole, entry, np.zeros(1, np.int64))[2] is None
+    assert messages.locate(whole[:20], entry, np.zeros(1, np.int64))[2] is not None
+
+
+def test_a_connection_record_of_absurd_length_is_no_connection() -> None:
+    data = Raw({b"op": b"\7", b"conn": bytes(4), b"topic": b"/a"}, bytes(5 << 20)).packed()
+    with pytest.raises(RecordError, match="bytes"):
+        connection_of(data, Records(data).at(0))
