@@ -84,7 +84,7 @@ def test_a_message_index_that_is_there_twice_or_not_at_all(summary: bool) -> Non
     for changed in (content.replace(index, 2 * index), content.replace(index, b"")):
         got, losses = accounted(changed)
         assert got == ALL
-        assert losses or move == -13
+        assert losses
 
 
 @pytest.mark.parametrize("summary", [True, False])
@@ -103,7 +103,7 @@ def test_a_message_turned_into_another_record_is_reported(opcode: int) -> None:
     if opcode != 5:
         got, losses = accounted(HEAD + b"".join(parts) + DATA_END + footer(0))
         assert got == [value for value in ALL if value != 20]
-        assert losses or move == -13
+        assert losses
 
 
 def test_the_end_of_the_data_is_where_no_message_follows() -> None:
