@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.ingest.log import Loss
-from ferryid.ingest.mcap_chunks import Loaded, Unpacker, check_covered, content, load_carefully, representable
+from ferryid.ingest.mcap_chunks import Loaded, check_covered, content, load_carefully, representable
 from ferryid.ingest.mcap_index import (
     MESSAGE,
     MESSAGE_HEADER,
@@ -27,6 +27,7 @@ from ferryid.ingest.mcap_index import (
     message_table,
     record_header,
 )
+from ferryid.ingest.mcap_unpack import Unpacker
 
 LOADERS = 2
 """Threads that decompress while the decoders run: zstd, lz4 and the checksum release the interpreter."""
@@ -314,12 +315,8 @@ def _located(
         Messages per channel id, and the bytes that they take up in each chunk, shape (chunks,).
     """
     channels = sorted({channel for plan in batch for channel in plan.entries})
-    parts = [
-        (channel, number, plan.entries[channel])
-        for channel in channels
-        for number, plan in enumerate(batch)
-        if channel in plan.entries
-    ]
+    found = ((channel, number) for number, plan in enumerate(batch) for channel in plan.entries)
+    parts = [(channel, number, batch[number].entries[channel]) for channel, number in sorted(found)]
     taken = np.zeros(len(batch))
     if not parts:
         return {}, taken

@@ -1,20 +1,16 @@
 """The content of one MCAP chunk: decompressed as far as needed, checked, walked, and what is damaged reported.
 
-Memory: a chunk is decompressed only up to the size that it states, and not at all where that is more than `MAX_CHUNK`.
 A walk takes at most one message per byte that the chunk takes up in the file (`LEAST_WALK` at least): no recorder
-reaches that, as every message has its own time.
+reaches that, as every message has its own time. So what is held of a file's messages is at most 26 bytes, and those of
+the wanted fields, per byte of the file.
 """
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
-import lz4.frame
 import numpy as np
-import zstandard
 from numpy.typing import NDArray
 
 from ferryid.ingest.checksum import crc32
@@ -35,90 +31,10 @@ from ferryid.ingest.mcap_index import (
     stored_crc,
     walk,
 )
+from ferryid.ingest.mcap_unpack import Unpacker
 
-MAX_CHUNK = 256 << 20
-"""A compressed chunk that states more bytes than this is not read. Recorders write chunks of 1 to 8 MiB, and none larger
-than this unless a single message is; an uncompressed chunk needs no memory and has no limit."""
 LEAST_WALK = 4096
 """Records of a chunk that are walked whatever its size in the file."""
-_thread = threading.local()
-
-
-class Unpacker:
-    """Decompresses a chunk from its beginning, as far as it is asked, into `room` if that is given."""
-
-    def __init__(self, file: memoryview, chunk: Chunk, room: Bytes | None = None) -> None:
-        if chunk.compression not in ("zstd", "lz4"):
-            raise DamagedRecord(f"a chunk has the unknown compression {chunk.compression!r}")
-        if chunk.uncompressed_size > MAX_CHUNK:
-            raise DamagedRecord(
-                f"a chunk states {chunk.uncompressed_size} bytes when decompressed, more than the {MAX_CHUNK} that are read"
-            )
-        self._source = file[chunk.data_offset : chunk.data_offset + chunk.compressed_size]
-        self._size = chunk.uncompressed_size
-        self._room = room
-        self._have = 0
-        self._taken = 0
-        self._zstd: Any = None
-        self._lz4: Any = None
-        if chunk.compression == "zstd":
-            # A stream reader that is given room for the whole frame decompresses straight into it.
-            if not hasattr(_thread, "zstd"):
-                _thread.zstd = zstandard.ZstdDecompressor()
-            self._zstd = _thread.zstd.stream_reader(self._source, read_across_frames=True)
-        else:
-            self._lz4 = lz4.frame.create_decompression_context()
-
-    def upto(self, size: int) -> Bytes:
-        """Return the first `size` bytes, fewer only where the compressed data end before.
-
-        Raises
-        ------
-        DamagedRecord
-            For data that cannot be decompressed.
-        """
-        size = min(size, self._size)
-        try:
-            if self._room is None and self._lz4 is not None and self._have == 0 and size == self._size:
-                # The whole chunk in the memory that lz4 allocates: no copy.
-                piece, self._taken, _ = lz4.frame.decompress_chunk(self._lz4, self._source, max_length=size)
-                self._room = np.frombuffer(piece, np.uint8)
-                self._have = len(piece)
-            if self._room is None:
-                self._room = np.empty(self._size, np.uint8)
-            while self._have < size:
-                got = self._more(self._room, size)
-                if not got:
-                    break
-                self._have += got
-        except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError) as error:
-            raise DamagedRecord("a chunk cannot be decompressed") from error
-        return self._room[: min(size, self._have)]
-
-    def has_more(self) -> bool:
-        """Tell whether anything is left behind the size that the chunk states, after all of that was read."""
-        rest = np.empty(1, np.uint8)
-        try:
-            if self._zstd is not None:
-                return int(self._zstd.readinto(rest.data)) > 0
-            if self._taken >= len(self._source):
-                return False
-            piece, _, _ = lz4.frame.decompress_chunk(self._lz4, self._source[self._taken :], max_length=1)
-            return len(piece) > 0
-        except (zstandard.ZstdError, RuntimeError, ValueError, EOFError):
-            return True
-
-    def _more(self, room: Bytes, size: int) -> int:
-        if self._zstd is not None:
-            return int(self._zstd.readinto(room[self._have : size].data))
-        if self._taken >= len(self._source):
-            return 0
-        piece, taken, _ = lz4.frame.decompress_chunk(
-            self._lz4, self._source[self._taken :], max_length=size - self._have
-        )
-        self._taken += taken
-        room[self._have : self._have + len(piece)] = np.frombuffer(piece, np.uint8)
-        return len(piece)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import struct
 from array import array
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from io import BytesIO
 from typing import Any, TypeVar
 
@@ -77,17 +78,20 @@ class Messages:
 
     def by_channel(self, wanted: Collection[int]) -> dict[int, Messages]:
         """Return the messages of the wanted channels that have any, each in the order of this table."""
-        rows = np.flatnonzero(np.isin(self.channels, list(wanted)))
-        if not len(rows):
+        if not len(self):
             return {}
-        rows = rows[np.argsort(self.channels[rows], kind="stable")]
-        ids, firsts = np.unique(self.channels[rows], return_index=True)
+        order = np.argsort(self.channels, kind="stable")
+        ids, firsts = np.unique(self.channels[order], return_index=True)
+        stops = [*firsts[1:].tolist(), len(self)]
         return {
-            channel: self.take(part) for channel, part in zip(ids.tolist(), np.split(rows, firsts[1:]), strict=True)
+            channel: self.take(order[first:stop])
+            for channel, first, stop in zip(ids.tolist(), firsts.tolist(), stops, strict=True)
+            if channel in wanted
         }
 
-    def count(self) -> dict[int, int]:
-        """Return the number of messages per channel id."""
+    @cached_property
+    def counts(self) -> dict[int, int]:
+        """Number of messages per channel id."""
         ids, counts = np.unique(self.channels, return_counts=True)
         return dict(zip(ids.tolist(), counts.tolist(), strict=True))
 
@@ -111,6 +115,8 @@ class Chunk:
         The messages, found by walking the chunk; None as long as it was not walked.
     truncated
         True for the chunk in which the file ends.
+    refused
+        True for a chunk that would take the file past the bound on what is decompressed of it.
     """
 
     offset: int
@@ -123,11 +129,12 @@ class Chunk:
     indexed: Mapping[int, tuple[int, int]] | None
     table: Messages | None = None
     truncated: bool = False
+    refused: bool = False
 
     def counts(self) -> dict[int, int]:
         """Return the number of messages per channel id, as far as it is known without reading the chunk."""
         if self.table is not None:
-            return self.table.count()
+            return self.table.counts
         return {key: count for key, (_, count) in (self.indexed or {}).items()}
 
     def every(self, file: memoryview) -> NDArray[np.int64]:
@@ -223,7 +230,7 @@ class Index:
             for key, count in chunk.counts().items():
                 total[key] = total.get(key, 0) + count
         if self.loose is not None:
-            for key, count in self.loose.count().items():
+            for key, count in self.loose.counts.items():
                 total[key] = total.get(key, 0) + count
         return total
 
@@ -236,9 +243,8 @@ def definition(opcode: int, content: Bytes | memoryview) -> Schema | Channel:
     DamagedRecord
         Where the content does not make one.
     """
-    if opcode == SCHEMA:
-        return parsed(Schema.read, content)
-    return parsed(Channel.read, content)
+    found: Schema | Channel = parsed(Schema.read, content) if opcode == SCHEMA else parsed(Channel.read, content)
+    return found
 
 
 def parsed(read: Callable[[ReadDataStream], Definition], content: Bytes | memoryview) -> Definition:

@@ -9,7 +9,13 @@ import numpy as np
 from mcap.records import Channel, Schema
 
 from ferryid.ingest.log import Loss
-from ferryid.ingest.mcap_chunks import MAX_CHUNK, check_covered, content, copies_lost, walk_chunk, without_copies
+from ferryid.ingest.mcap_chunks import (
+    check_covered,
+    content,
+    copies_lost,
+    walk_chunk,
+    without_copies,
+)
 from ferryid.ingest.mcap_index import (
     LATEST_NS,
     MESSAGE_HEADER,
@@ -21,7 +27,10 @@ from ferryid.ingest.mcap_index import (
 )
 from ferryid.ingest.mcap_scan import scan
 from ferryid.ingest.mcap_summary import read_summary, summary_start
+from ferryid.ingest.mcap_unpack import MAX_CHUNK, MAX_EXPANDED, MAX_RATIO
 
+MAX_CONFLICTS = 16
+"""Contradicting definitions that are reported one by one."""
 FIRST_CHUNK = 8 << 20
 """A first chunk up to this size [bytes] is read when a file is opened."""
 
@@ -64,8 +73,11 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
         found = sum(index.counts().values())
         what = f"{reason}; the index was rebuilt by walking the whole file, which found {found} messages"
         index.losses.insert(0, Loss(name, what, messages=0))
-    for conflict in dict.fromkeys(index.conflicts):
-        index.losses.append(Loss(name, conflict))
+    conflicts = list(dict.fromkeys(index.conflicts))
+    index.losses += [Loss(name, conflict) for conflict in conflicts[:MAX_CONFLICTS]]
+    if len(conflicts) > MAX_CONFLICTS:
+        what = f"{len(conflicts) - MAX_CONFLICTS} more definitions contradict earlier ones of the same id"
+        index.losses.append(Loss(name, what))
     late = sum(chunk.end_ns == LATEST_NS for chunk in index.chunks)
     if late:
         what = f"{late} chunks state times of 2**63 ns or later, which cannot be represented"
@@ -143,8 +155,19 @@ def _merge(index: Index, summary: Index) -> None:
         index.add(definition)
 
 
+def _refuse_expansion(index: Index, size: int) -> None:
+    """Mark the chunks that would take the file past the bound on what is decompressed of it."""
+    left = MAX_EXPANDED + MAX_RATIO * size
+    for number, chunk in enumerate(index.chunks):
+        if chunk.compression:
+            left -= min(chunk.uncompressed_size, MAX_CHUNK)
+            if left < 0:
+                index.chunks[number] = replace(chunk, refused=True)
+
+
 def _walk_chunks(index: Index, file: memoryview, whole_file: Bytes, name: str) -> None:
     """Walk the chunks that have no message index or define what is known from nowhere else, all if counts disagree."""
+    _refuse_expansion(index, len(file))
     index.complete = _confirmed(index)
     for number, chunk in enumerate(index.chunks):
         unknown = any(channel not in index.channels for channel in chunk.indexed or ())
@@ -174,7 +197,7 @@ def _walk_into(index: Index, number: int, file: memoryview, whole_file: Bytes, n
             index.define(opcode, text)
         except DamagedRecord as error:
             index.losses.append(Loss(name, str(error), None, None, chunk.start_ns, chunk.end_ns))
-    if walked.counts() == chunk.counts():
+    if chunk.indexed is not None and walked.counts() == chunk.counts():
         return
     index.chunks[number] = walked
     if loss is None and chunk.indexed is not None:
@@ -194,11 +217,14 @@ def _check_loose(index: Index, whole_file: Bytes, name: str) -> None:
     if len(kept) < len(index.loose):
         index.losses.append(copies_lost(name, len(index.loose) - len(kept)))
     defined = np.isin(kept.channels, list(index.channels))
+    surplus = index.statistics is not None and sum(index.counts().values()) > index.statistics.message_count
     times = kept.log_ns[defined]
+    if index.chunks:
+        times = np.array([(chunk.start_ns, chunk.end_ns) for chunk in index.chunks])
     if len(times):
-        odd = ~defined & ((kept.log_ns < times.min()) | (kept.log_ns > times.max()))
+        odd = ((kept.log_ns < times.min()) | (kept.log_ns > times.max())) & (surplus | ~defined)
         if odd.any():
-            what = f"{int(odd.sum())} records that look like messages of unknown channels at other times were left out"
+            what = f"{int(odd.sum())} records that look like messages of other channels or times were left out"
             index.losses.append(Loss(name, what))
             kept = kept.take(~odd)
     index.loose = kept

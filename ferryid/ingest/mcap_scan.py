@@ -11,7 +11,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from mcap.records import Metadata
 
 from ferryid.ingest.log import Loss
 from ferryid.ingest.mcap_index import (
@@ -34,7 +33,6 @@ from ferryid.ingest.mcap_index import (
     chunk_at,
     lenient_chunk,
     message_table,
-    parsed,
     record_header,
     sound_chunk,
     walk,
@@ -167,9 +165,7 @@ def _take(
             if not _sound_attachment(content):
                 odd.append(record)
         elif kind == METADATA:
-            try:
-                parsed(Metadata.read, content)
-            except DamagedRecord:
+            if 8 + int.from_bytes(content[:4], "little") > length:
                 odd.append(record)
         elif kind not in (CHUNK, MESSAGE_INDEX) and (kind, start) != (HEADER, len(MAGIC)):
             odd.append(record)
@@ -203,7 +199,7 @@ def _next_record(file: memoryview, start: int, stop: int, channels: Container[in
         if len(file) - position < MESSAGE_HEADER:
             return None
         if file[position] == CHUNK:
-            if sound_chunk(file, position):
+            if record_header(file, position)[1] >= 40 and sound_chunk(file, position):
                 return position
         elif _leads_on(file, position, channels):
             return position

@@ -65,12 +65,14 @@ class McapLog:
 
     def _undefined(self) -> tuple[Loss, ...]:
         """Report which messages belong to channels whose definition is nowhere in the file."""
+        stated = None if self._index.statistics is None else self._index.statistics.channel_message_counts
         return tuple(
             Loss(
                 self._name,
                 f"the definition of channel {channel} is missing, its topic is unknown",
                 None,
-                count,
+                # What the statistics do not know may be no messages at all.
+                count if not stated or channel in stated else None,
             )
             for channel, count in sorted(self._index.counts().items())
             if channel not in self._index.channels
@@ -162,11 +164,15 @@ class McapLog:
                 found[key] += len(messages)
         if verify:
             losses += self._data_checksum()
-        losses += self._shortfall(found, losses)
+        differing = self._shortfall(found, losses)
+        surplus = {loss.topic for loss in differing if loss.messages == 0}
+        losses += differing
         pieces: dict[str, list[Series]] = {}
         for group in groups:
             pieces.setdefault(group.topic, []).append(group.decoder.finish())
-            losses += group.decoder.losses(self._name)
+            for loss in group.decoder.losses(self._name):
+                # Where there are more messages than the statistics count, those that cannot be decoded may be none.
+                losses.append(replace(loss, messages=None) if group.topic in surplus else loss)
         self.losses = self._opening + tuple(_joined(losses))
         return {topic: _one_series(series) for topic, series in pieces.items()}
 
