@@ -31,7 +31,7 @@ from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
 
-SCHEMA = "ferryid.pieces/1"
+SCHEMA = "ferryid.pieces/2"
 _MATTERS = ("basis", "smoother", "residual", "rate_hz", "delta", "sigma", "zeta")
 """Settings that change the pieces; all others are chosen when they are added up."""
 
@@ -149,7 +149,8 @@ def write(path: Path, key: Mapping[str, Any], log: Kept) -> None:
         "files": log.files,
         "basis": log.basis,
         "rate_hz": log.rate_hz,
-        "ranges": {name: list(span) for name, span in log.ranges.items()},
+        # In a list, which keeps their order: two fits of the same pieces give the same model file.
+        "ranges": [[name, *span] for name, span in log.ranges.items()],
         "sectors": list(log.sectors),
         "columns": [one.test.K, one.test.m],
         "n": [pieces.n.tolist() for pieces in stored],
@@ -187,7 +188,7 @@ def _read(path: Path, key: Mapping[str, Any]) -> Kept:
         files=tuple(told["files"]),
         basis=told["basis"],
         rate_hz=told["rate_hz"],
-        ranges={name: (low, high) for name, (low, high) in told["ranges"].items()},
+        ranges={name: (low, high) for name, low, high in told["ranges"]},
         sectors=told["sectors"],
         studied=Studied(
             told["name"],
