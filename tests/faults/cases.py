@@ -11,7 +11,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +56,7 @@ class Bench:
         self._folder = folder.resolve()
         self._out = self._folder / "out"
         prepare(self._folder)
+        _draw_once()
         self._started: dict[str, Path] = {}
         self._expected: dict[str, dict[str, Any]] = {}
         self.operations: dict[str, list[Operation]] = {}
@@ -149,6 +150,24 @@ class Bench:
                 said.write_text(f"not done after {LONGEST_S:.0f} s")
             time.sleep(0.002)
         return os.waitstatus_to_exitcode(ended[1]), said.read_text()
+
+
+def _draw_once() -> None:
+    """Keep the pages and figures of fits: to draw them again takes longer than all the rest of a case."""
+    from ferryid.files import dump_json
+    from ferryid.identify.model import to_json
+    from ferryid.report import fit_report
+
+    kept: dict[str, Any] = {}
+    drawn = fit_report.render
+
+    def render(result: Any) -> Any:
+        key = dump_json(to_json(replace(result.model, created="")))
+        if key not in kept:
+            kept[key] = drawn(result)
+        return kept[key]
+
+    fit_report.render = render
 
 
 def _child(
