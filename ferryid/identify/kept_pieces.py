@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ferryid import __version__
 from ferryid.errors import FerryIdError
-from ferryid.files import replacing
+from ferryid.files import remove_abandoned, replacing
 from ferryid.identify.choose import Studied, studied
 from ferryid.identify.crossed import TEST_WINDOW_S
 from ferryid.identify.excitation import heading_sectors, payload_kg, ranges
@@ -91,6 +91,7 @@ def kept(folder: Path, profile: Profile, settings: FitSettings, windows_s: Seque
     }
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
     path = folder / f"pieces-{digest[:16]}.parquet"
+    remove_abandoned(folder)
     if path.exists():
         try:
             return _read(path, key)
