@@ -13,7 +13,7 @@ from tests.batch.work import environment
 from tests.faults import disk
 from tests.faults.system import Operation
 
-SAMPLE = 10
+SAMPLE = 8
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks, and reads /proc")
