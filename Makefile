@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test demo picture bench real thesis proof wavy fixtures wheel-check lint clean
+.PHONY: test demo picture bench real thesis proof wavy faults fixtures wheel-check lint clean
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .
@@ -46,6 +46,11 @@ proof: $(VENV)/installed
 # Learns a hull in waves that nobody measured, and uses it in calm water: writes reports/waves.md.
 wavy: $(VENV)/installed
 	$(BIN)/python -m tests.wavy
+
+# A full disk, an I/O error, a kill and a loss of power at every operation of the commands that write: prints a table.
+# SAMPLE=N takes that many of the cases.
+faults: $(VENV)/installed
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.faults $(if $(SAMPLE),--sample $(SAMPLE))
 
 fixtures: $(VENV)/installed
 	$(BIN)/python -m fixtures

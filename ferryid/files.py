@@ -91,9 +91,7 @@ def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
     lock: int | None = None
     try:
         make_folder(path.parent)
-        if path.parent not in _swept:
-            _swept.add(path.parent)
-            remove_abandoned(path.parent)
+        remove_abandoned(path.parent)
         _unfinished[key] = draft
         lock = _locked(draft.lock)
         yield draft.new
@@ -104,6 +102,8 @@ def replacing(path: Path, *, new: bool = False) -> Iterator[Path]:
             _replace_folder(draft, path)
         else:
             os.replace(draft.new, path)
+        # First, so that the sync makes this last as well.
+        draft.remove()
         sync(path.parent)
     except OSError as error:
         raise unwritable(path, error) from error
@@ -139,7 +139,13 @@ def _lock(number: int, *, wait: bool) -> bool | None:
 
 
 def remove_abandoned(folder: Path) -> None:
-    """Remove what processes that were killed left under temporary names in a folder, and nothing of one that lives."""
+    """Remove what processes that were killed left under temporary names in a folder, and nothing of one that lives.
+
+    A process looks once; `replacing` does so, and whoever finds a result finished and has nothing to write.
+    """
+    if folder in _swept:
+        return
+    _swept.add(folder)
     try:
         found = [_TEMPORARY.fullmatch(name) for name in os.listdir(folder)]
     except OSError:
@@ -258,6 +264,8 @@ def _replace_folder(draft: _Draft, path: Path) -> None:
         # Another process finished the same result meanwhile: one is as good as the other.
         if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
             raise
+    # Before the old one is removed.
+    sync(path.parent)
 
 
 def _remove(path: Path) -> None:

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import errno
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ferryid import files
 from ferryid.errors import FerryIdError
-from ferryid.files import dump_json, replacing, write_text
+from ferryid.files import dump_json, make_folder, remove_abandoned, remove_unfinished, replacing, write_text
+from tests.batch.work import environment
 
 
 def test_an_interrupt_leaves_the_old_file_and_no_rest(tmp_path: Path) -> None:
@@ -53,3 +60,134 @@ def test_json_has_no_nan_and_plain_numbers() -> None:
         {"a": np.array([1.0, np.nan, np.inf]), "b": np.float64(2.5), "c": np.int64(3), "d": np.bool_(True)}
     )
     assert text == '{\n "a": [\n  1.0,\n  null,\n  null\n ],\n "b": 2.5,\n "c": 3,\n "d": true\n}\n'
+
+
+WRITER = """
+import sys, time
+from pathlib import Path
+from ferryid.files import replacing
+with replacing(Path(sys.argv[1])) as temporary:
+    temporary.mkdir()
+    (temporary / "page").write_text("half")
+    print("writing", flush=True)
+    sys.stdin.read()
+"""
+
+
+def writing(path: Path) -> subprocess.Popen[str]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        env=environment(),
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stdout.readline() == "writing\n"
+    return process
+
+
+def test_what_a_killed_process_left_is_removed_and_what_a_living_one_writes_is_not(tmp_path: Path) -> None:
+    with writing(tmp_path / "dead") as dead, writing(tmp_path / "alive") as alive:
+        dead.send_signal(signal.SIGKILL)
+        dead.wait()
+        assert len(list(tmp_path.glob(".dead.*"))) == 2
+        write_text(tmp_path / "other", "x")
+        assert not list(tmp_path.glob(".dead.*"))
+        alive.communicate("")
+    assert (tmp_path / "alive" / "page").read_text(encoding="utf-8") == "half"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["alive", "other"]
+
+
+def test_foreign_files_are_not_taken_for_leftovers(tmp_path: Path) -> None:
+    names = [".film.part", f"{0:032x}.part", ".a.lock", f".a.{0:031x}.part", "b.old"]
+    for name in names:
+        (tmp_path / name).write_text("", encoding="utf-8")
+    remove_abandoned(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+
+
+def test_a_folder_that_was_moved_aside_comes_back(tmp_path: Path) -> None:
+    for name in ("report", "other"):
+        (tmp_path / f".{name}.{0:032x}.old").mkdir()
+        (tmp_path / f".{name}.{0:032x}.old" / "page").write_text("old", encoding="utf-8")
+    (tmp_path / "other").mkdir()
+    remove_abandoned(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["other", "report"]
+    assert (tmp_path / "report" / "page").read_text(encoding="utf-8") == "old"
+
+
+def test_a_process_that_ends_at_once_removes_what_it_writes(tmp_path: Path) -> None:
+    def ends() -> None:
+        with replacing(tmp_path / "report") as temporary:
+            temporary.mkdir()
+            remove_unfinished()
+            assert list(tmp_path.iterdir()) == []
+
+    with pytest.raises(FerryIdError):
+        ends()
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Record what is synced and renamed."""
+    found: list[str] = []
+
+    def noted(name: str, path: Callable[..., str]) -> None:
+        real = getattr(os, name)
+
+        def call(*arguments: object) -> object:
+            result = real(*arguments)
+            found.append(f"{name} {Path(path(*arguments)).name}")
+            return result
+
+        monkeypatch.setattr(os, name, call)
+
+    noted("fsync", lambda number: os.readlink(f"/proc/self/fd/{number}"))
+    for name in ("replace", "rename", "link"):
+        noted(name, lambda source, target: target)
+    return found
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize("new", [False, True])
+def test_a_file_is_synced_before_it_is_renamed_and_its_folder_after(
+    tmp_path: Path, calls: list[str], new: bool
+) -> None:
+    with replacing(tmp_path / "new" / "a", new=new) as temporary:
+        temporary.write_text("x", encoding="utf-8")
+    name = temporary.name
+    assert calls == [f"fsync {tmp_path.name}", f"fsync {name}", f"{'link' if new else 'replace'} a", "fsync new"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_all_of_a_folder_is_synced_before_it_is_renamed(tmp_path: Path, calls: list[str]) -> None:
+    with replacing(tmp_path / "report") as temporary:
+        (temporary / "figures").mkdir(parents=True)
+        (temporary / "figures" / "a").touch()
+        (temporary / "b").touch()
+    name = temporary.name
+    assert calls == ["fsync a", "fsync figures", "fsync b", f"fsync {name}", "replace report", f"fsync {tmp_path.name}"]
+
+
+def test_a_file_system_without_links_and_syncs_is_written_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOTSUP, "not supported")
+
+    monkeypatch.setattr(os, "link", refuse)
+    monkeypatch.setattr(os, "fsync", refuse)
+    monkeypatch.setattr(files, "_lock", lambda number, wait: None)
+    for _ in range(2):
+        with replacing(tmp_path / "a", new=True) as temporary:
+            temporary.write_text("x", encoding="utf-8")
+        (tmp_path / "a").unlink()
+    make_folder(tmp_path / "b" / "c")
+    assert [path.name for path in tmp_path.iterdir()] == ["b"]
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_what_is_there_is_never_taken_by_a_new_result(tmp_path: Path, folder: bool) -> None:
+    write_text(tmp_path / "a", "old")
+    with pytest.raises(FerryIdError, match="exists already"), replacing(tmp_path / "a", new=True) as temporary:
+        temporary.mkdir() if folder else temporary.touch()
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    assert (tmp_path / "a").read_text(encoding="utf-8") == "old"

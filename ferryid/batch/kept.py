@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ferryid.files import dump_json, sync, unwritable, write_text
+from ferryid.files import dump_json, remove_abandoned, sync, unwritable, write_text
 
 ROW = "row.json"
 CHECK = "check"
@@ -78,6 +78,8 @@ class Kept:
 
     def __init__(self, results: Path) -> None:
         found = [(path, read_row(path)) for path in sorted(results.glob("*")) if path.is_dir()]
+        for path, _ in found:
+            remove_abandoned(path)
         self._rows = {folder: row for folder, row in found if row is not None}
         self._folders: dict[str, list[Path]] = {}
         for folder, row in self._rows.items():

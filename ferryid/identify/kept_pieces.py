@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ferryid import __version__
 from ferryid.errors import FerryIdError
-from ferryid.files import replacing
+from ferryid.files import remove_abandoned, replacing
 from ferryid.identify.choose import Studied, studied
 from ferryid.identify.crossed import TEST_WINDOW_S
 from ferryid.identify.excitation import heading_sectors, payload_kg, ranges
@@ -31,7 +31,7 @@ from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
 
-SCHEMA = "ferryid.pieces/1"
+SCHEMA = "ferryid.pieces/2"
 _MATTERS = ("basis", "smoother", "residual", "rate_hz", "delta", "sigma", "zeta")
 """Settings that change the pieces; all others are chosen when they are added up."""
 
@@ -91,6 +91,7 @@ def kept(folder: Path, profile: Profile, settings: FitSettings, windows_s: Seque
     }
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
     path = folder / f"pieces-{digest[:16]}.parquet"
+    remove_abandoned(folder)
     if path.exists():
         try:
             return _read(path, key)
@@ -149,7 +150,8 @@ def write(path: Path, key: Mapping[str, Any], log: Kept) -> None:
         "files": log.files,
         "basis": log.basis,
         "rate_hz": log.rate_hz,
-        "ranges": {name: list(span) for name, span in log.ranges.items()},
+        # In a list, which keeps their order: two fits of the same pieces give the same model file.
+        "ranges": [[name, *span] for name, span in log.ranges.items()],
         "sectors": list(log.sectors),
         "columns": [one.test.K, one.test.m],
         "n": [pieces.n.tolist() for pieces in stored],
@@ -187,7 +189,7 @@ def _read(path: Path, key: Mapping[str, Any]) -> Kept:
         files=tuple(told["files"]),
         basis=told["basis"],
         rate_hz=told["rate_hz"],
-        ranges={name: (low, high) for name, (low, high) in told["ranges"].items()},
+        ranges={name: (low, high) for name, low, high in told["ranges"]},
         sectors=told["sectors"],
         studied=Studied(
             told["name"],

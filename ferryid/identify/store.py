@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.files import dump_json, write_text
+from ferryid.files import dump_json, remove_abandoned, write_text
 from ferryid.identify.model import Model, from_json, to_json
 
 
@@ -62,6 +62,7 @@ def numbered(model: Model, out: Path) -> Model:
     keep their numbers.
     """
     folder = _folder(out) / model.name
+    remove_abandoned(folder)
     present = _versions(folder)
     plain = _undated(model)
     for number in present:

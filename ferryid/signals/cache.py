@@ -12,7 +12,7 @@ from typing import Any
 
 from ferryid import __version__
 from ferryid.errors import FerryIdError
-from ferryid.files import replacing, write_text
+from ferryid.files import remove_abandoned, replacing, write_text
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
 from ferryid.signals.parquet import TIME_COLUMNS, read_table, table_checksum, unit_of, write_table
@@ -44,6 +44,7 @@ def has_any(out: Path, name: str, profile: Profile) -> bool:
 
 def by_files(out: Path, name: str, paths: Sequence[Path], profile: Profile, *, verify: bool) -> Recording | None:
     """Return the kept recording of files that did not change since, without reading any of them; None if there is none."""
+    remove_abandoned(out / "logs")
     try:
         now = signatures(paths)
     except OSError:
