@@ -10,17 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ferryid.errors import FerryIdError
-from ferryid.ingest.bulk import Decoder
 from ferryid.ingest.formats.mcap import McapLog
 from ferryid.ingest.formats.sqlite3_bag import Sqlite3Log, Storage, refuse_foreign
 from ferryid.ingest.formats.sqlite3_bag import matches as is_sqlite
 from ferryid.ingest.join import join
-from ferryid.ingest.log import Format, Loss, Nanoseconds, Reader, Series, TableLayout, Topic
+from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
+from ferryid.ingest.message_compression import UnpackingDecoder
 from ferryid.ingest.rosbag2_metadata import KEY, NAME, File, Metadata, read_metadata
-from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file
+from ferryid.ingest.unpack import FORMATS, unpack_file
 
 ENDINGS = tuple(end + packed for end in (".db3", ".mcap") for packed in ("", *FORMATS.values()))
 
@@ -199,35 +197,8 @@ class _McapLog(McapLog):
     def _groups(self, wanted: Mapping[str, Sequence[str]]) -> Any:
         groups, losses = super()._groups(wanted)
         if self._codec:
-            groups = [replace(group, decoder=_Unpacking(group.decoder, self._codec)) for group in groups]
+            groups = [replace(group, decoder=UnpackingDecoder(group.decoder, self._codec)) for group in groups]
         return groups, losses
-
-
-class _Unpacking:
-    """Decoder of messages that are compressed one by one."""
-
-    def __init__(self, decoder: Decoder, codec: str) -> None:
-        self._decoder = decoder
-        self._unpack = message_unpacker(codec)
-        self._lost = 0
-        self.finish = decoder.finish
-
-    def add(self, buffer: Any, starts: Any, sizes: Any, receive_ns: Nanoseconds) -> None:
-        view = memoryview(buffer)
-        blobs = [
-            self._unpack(bytes(view[start : start + size]))
-            for start, size in zip(starts.tolist(), sizes.tolist(), strict=True)
-        ]
-        sound = [blob for blob in blobs if blob is not None]
-        kept = np.array([blob is not None for blob in blobs], bool)
-        lengths = np.array([len(blob) for blob in sound], np.int64)
-        self._decoder.add(b"".join(sound), np.cumsum(lengths) - lengths, lengths, receive_ns[kept])
-        self._lost += len(blobs) - len(sound)
-
-    def losses(self, file: str) -> tuple[Loss, ...]:
-        """Say what could not be unpacked or decoded."""
-        lost = (Loss(file, "messages that cannot be unpacked", messages=self._lost),) if self._lost else ()
-        return (*lost, *self._decoder.losses(file))
 
 
 def _loss(path: Path, about: File, what: str) -> Loss:
