@@ -63,7 +63,9 @@ class Database:
     @property
     def cut(self) -> str:
         """What is to be reported of a file that is shorter than its header states, or an empty string."""
-        return f"the file ends after {self.bytes} bytes of {self.stated_bytes}" if self.bytes < self.stated_bytes else ""
+        return (
+            f"the file ends after {self.bytes} bytes of {self.stated_bytes}" if self.bytes < self.stated_bytes else ""
+        )
 
     def connect(self) -> sqlite3.Connection:
         """Return a connection for one thread at a time, whose statements are interrupted when they do not end."""

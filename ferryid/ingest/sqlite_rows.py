@@ -15,7 +15,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.errors import FerryIdError
 from ferryid.ingest.sqlite_database import FAULTS, Database
 
 Integers = NDArray[np.int64]
@@ -189,11 +188,11 @@ def read_numbers(connection: sqlite3.Connection, low: int, high: int) -> tuple[R
     if count == 0:
         return Rows(*(np.zeros(0, np.int64) for _ in fields(Rows))), []
     # Texts and blobs sort behind all numbers, a real number has a point, and a NULL is missing in the text.
-    if isinstance(last_topic, int) and isinstance(last_time, int) and all(texts):
-        if not any(text.translate(None, b"0123456789-,") for text in texts):
-            columns = [np.fromstring(text, np.int64, sep=",") for text in texts]
-            if all(column.size == count for column in columns):
-                return Rows(*columns), []
+    numbers = isinstance(last_topic, int) and isinstance(last_time, int) and all(texts)
+    if numbers and not any(text.translate(None, b"0123456789-,") for text in texts):
+        columns = [np.fromstring(text, np.int64, sep=",") for text in texts]
+        if all(column.size == count for column in columns):
+            return Rows(*columns), []
     found = connection.execute(ROWS, (low, high)).fetchall()
     good = [row for row in found if all(isinstance(value, int) for value in row)]
     invalid = [row[0] for row in found if not all(isinstance(value, int) for value in row)]
@@ -402,11 +401,8 @@ def read_data(database: Database, rows: Rows, topic_ids: Sequence[int]) -> Itera
         where = f" AND topic_id IN ({','.join(map(str, topic_ids))})"
     with closing(database.connect()) as connection:
         encoding = connection.execute("PRAGMA encoding").fetchone()[0]
-    if encoding == b"UTF-8":
-        joined = f"SELECT group_concat(data, '') {TABLE}{where}"
-    else:
-        # SQLite would convert the concatenated bytes as if they were text.
-        joined = ""
+    # Of another encoding, SQLite would convert the concatenated bytes as if they were text.
+    joined = f"SELECT group_concat(data, '') {TABLE}{where}" if encoding == b"UTF-8" else ""
     parts = [rows.take(slice(*edge)) for edge in _edges(rows.size)]
     left = 2 * database.bytes
 
