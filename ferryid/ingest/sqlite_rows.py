@@ -247,7 +247,9 @@ def _compared(
             # A rowid that the index does not list is a damaged one, and so is a row of other types.
             rows = rows.take(np.isin(rows.rowid, listed))
             stretches = _stretches(rows.rowid, np.setdiff1d(listed, rows.rowid))
-            return Scan(rows, 0, stretches, True, True, reason or "a page of the table is damaged")
+            # Damage may have taken rows out of the index too.
+            complete = database.index_entries() <= listed.size
+            return Scan(rows, 0, stretches, complete, True, reason or "a page of the table is damaged")
         if extra := held.size - listed.size:
             reason = f"the index {index} lacks {extra} of {held.size} rows"
         return Scan(rows, invalid.size, (), not extra, True, reason)
@@ -255,14 +257,12 @@ def _compared(
     if index:
         reason = reason or f"the index {index} cannot be read"
     elif not salvage.bad:
-        faults = database.table_check("messages")
-        reason = "; ".join(faults[:1])
-    damaged = bool(index or salvage.bad or faults)
-    held = rows.rowid if damaged else np.sort(np.append(rows.rowid, invalid))
-    stretches = _gaps(held, database.bytes // ROW_BYTES + 1)
-    if stretches and not reason:
-        reason = "rowids are missing in a table without an index"
-    return Scan(rows, 0 if damaged else invalid.size, stretches, not damaged, False, reason)
+        # Without an index, nothing but the pages that nothing refers to shows what is lost.
+        faults = database.integrity()
+        if not faults:
+            return Scan(rows, invalid.size, (), True, True, "")
+        reason = faults[0]
+    return Scan(rows, 0, _gaps(rows.rowid, database.bytes // ROW_BYTES + 1), False, False, reason)
 
 
 def _numbers_or_none(connection: sqlite3.Connection, span: tuple[int, int]) -> tuple[Rows, list[int]] | None:
