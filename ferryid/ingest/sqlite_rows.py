@@ -1,14 +1,14 @@
-"""Rows of rosbag2's messages table: which there are, which are lost, and their data in large pieces.
+"""Rows of rosbag2's messages table: which there are, and which are lost.
 
 A row that becomes Python objects costs more than its decoding. SQLite itself concatenates the columns of some
-thousand rows, so that one statement returns their numbers as one text and their data as one buffer. Where a statement
+thousand rows, so that one statement returns their numbers as one text. Where a statement
 meets a damaged page, its range of rowids is divided until only the rows of that page are left out.
 """
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, fields
 
@@ -22,11 +22,8 @@ Mask = NDArray[np.bool_]
 
 LAST_ROWID = 2**63 - 1
 CHUNK_ROWS = 4096
-CHUNK_BYTES = 2 << 20
 # No row with four columns takes less of a page than this.
 ROW_BYTES = 8
-# Topics that a statement names; of more, all rows are read.
-NAMED_TOPICS = 500
 # Statements that may fail on a damaged file before the rest of it is given up.
 MAX_FAILURES = 100_000
 MAX_RETRIES = 2_000
@@ -34,7 +31,7 @@ SPARSE_CHUNKS = 1_000
 
 TABLE = "FROM messages NOT INDEXED WHERE rowid BETWEEN ? AND ?"
 NUMBERS = (
-    "SELECT count(*), max(topic_id), max(timestamp), group_concat(rowid), group_concat(topic_id), "
+    "SELECT count(*), group_concat(rowid), group_concat(topic_id), "
     f"group_concat(timestamp), group_concat(length(data)) {TABLE}"
 )
 ROWS = f"SELECT rowid, topic_id, timestamp, length(data) {TABLE}"
@@ -184,12 +181,11 @@ def read_numbers(connection: sqlite3.Connection, low: int, high: int) -> tuple[R
     sqlite3.Error
         A page is damaged.
     """
-    count, last_topic, last_time, *texts = connection.execute(NUMBERS, (low, high)).fetchone()
+    count, *texts = connection.execute(NUMBERS, (low, high)).fetchone()
     if count == 0:
         return Rows(*(np.zeros(0, np.int64) for _ in fields(Rows))), []
-    # Texts and blobs sort behind all numbers, a real number has a point, and a NULL is missing in the text.
-    numbers = isinstance(last_topic, int) and isinstance(last_time, int) and all(texts)
-    if numbers and not any(text.translate(None, b"0123456789-,") for text in texts):
+    # A real number has a point, and a NULL is missing in the text.
+    if all(texts) and not any(text.translate(None, b"0123456789-,") for text in texts):
         columns = [np.fromstring(text, np.int64, sep=",") for text in texts]
         if all(column.size == count for column in columns):
             return Rows(*columns), []
@@ -367,93 +363,3 @@ def _gaps(held: Integers, capacity: int) -> tuple[Stretch, ...]:
         Stretch(int(low[i]), int(held[i]), gap if (gap := int(held[i]) - int(low[i]) - 1) <= capacity else None)
         for i in places.tolist()
     )
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Messages read together: `data` end to end, of the rows whose `kept` is true, and their sizes [bytes]."""
-
-    rows: Rows
-    kept: Mask
-    data: bytes
-    size: Integers
-
-
-def read_data(database: Database, rows: Rows, topic_ids: Sequence[int]) -> Iterator[Piece]:
-    """Read the data of all rows of some topics.
-
-    Parameters
-    ----------
-    rows
-        Rows of any topics, in order of rowid.
-    topic_ids
-        Wanted topics; of more than a statement can name, the rows of all topics are read.
-
-    Yields
-    ------
-    Piece
-        In order of rowid, until twice as many bytes as the file has were read: only a damaged or hostile file holds
-        rows that share pages. The rows behind are kept nowhere.
-    """
-    where = ""
-    if len(topic_ids) <= NAMED_TOPICS:
-        rows = rows.take(np.isin(rows.topic_id, topic_ids))
-        where = f" AND topic_id IN ({','.join(map(str, topic_ids))})"
-    with closing(database.connect()) as connection:
-        encoding = connection.execute("PRAGMA encoding").fetchone()[0]
-    # Of another encoding, SQLite would convert the concatenated bytes as if they were text.
-    joined = f"SELECT group_concat(data, '') {TABLE}{where}" if encoding == b"UTF-8" else ""
-    parts = [rows.take(slice(*edge)) for edge in _edges(rows.size)]
-    left = 2 * database.bytes
-
-    def work(connection: sqlite3.Connection, part: Rows) -> Piece:
-        return _piece(database, connection, joined, part)
-
-    done = 0
-    for piece in database.in_order(work, parts):
-        yield piece
-        done += 1
-        left -= len(piece.data)
-        if left < 0:
-            break
-    for part in parts[done:]:
-        yield Piece(part, np.zeros(len(part), bool), b"", np.zeros(0, np.int64))
-
-
-def _edges(size: Integers) -> Iterator[tuple[int, int]]:
-    """Cut rows into parts of limited number and size."""
-    ends = np.cumsum(size)
-    first = 0
-    while first < size.size:
-        before = int(ends[first] - size[first])
-        last = int(np.searchsorted(ends, before + CHUNK_BYTES, "right"))
-        last = min(max(last, first + 1), first + CHUNK_ROWS)
-        yield first, last
-        first = last
-
-
-def _piece(database: Database, connection: sqlite3.Connection, joined: str, rows: Rows) -> Piece:
-    """Read the data of a few rows, in halves where they do not come out as they should."""
-    everything = np.ones(len(rows), bool)
-    if joined:
-        try:
-            data = connection.execute(joined, (int(rows.rowid[0]), int(rows.rowid[-1]))).fetchone()[0] or b""
-        except FAULTS as error:
-            database.checked(error)
-            data = None
-        if data is not None and len(data) == int(rows.size.sum()):
-            return Piece(rows, everything, data, rows.size)
-    if len(rows) > 1:
-        half = len(rows) // 2
-        halves = [_piece(database, connection, joined, rows.take(part)) for part in (slice(half), slice(half, None))]
-        kept, sizes = (np.concatenate([getattr(h, name) for h in halves]) for name in ("kept", "size"))
-        return Piece(rows, kept, b"".join(h.data for h in halves), sizes)
-    try:
-        found = connection.execute("SELECT data FROM messages NOT INDEXED WHERE rowid=?", (int(rows.rowid[0]),))
-        row = found.fetchone()
-    except FAULTS as error:
-        database.checked(error)
-        row = None
-    if row is None or not isinstance(row[0], bytes):
-        return Piece(rows, ~everything, b"", np.zeros(0, np.int64))
-    return Piece(rows, everything, row[0], np.array([len(row[0])], np.int64))

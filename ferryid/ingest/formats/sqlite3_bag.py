@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,17 +17,13 @@ from ferryid.ingest.bulk import Decoder, decoder_for
 from ferryid.ingest.log import Format, Loss, Series, TableLayout, Topic
 from ferryid.ingest.message_compression import UnpackingDecoder
 from ferryid.ingest.ros2_types import Definition, RecordedText, define, normalized
+from ferryid.ingest.rosbag2_tables import Recorded, RecordedTopic, line, read_tables
+from ferryid.ingest.sqlite_data import read_data
 from ferryid.ingest.sqlite_database import FAULTS, MAGIC, Database
-from ferryid.ingest.sqlite_rows import Scan, Stretch, read_data, scan_rows
+from ferryid.ingest.sqlite_rows import Scan, Stretch, scan_rows
 from ferryid.ingest.unpack import FORMATS, unpack_file, working_folder
 
 DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
-COLUMNS = {
-    "topics": {"id", "name", "type"},
-    "messages": {"id", "topic_id", "timestamp", "data"},
-    "message_definitions": {"topic_type", "encoding", "encoded_message_definition"},
-    "schema": {"ros_distro"},
-}
 # More lost stretches than these are reported as one.
 MAX_STRETCHES = 50
 WAL_HEADER_BYTES, WAL_FRAME_BYTES = 32, 24
@@ -57,26 +53,6 @@ class Storage:
     end_ns: int | None = None
 
 
-@dataclass(frozen=True)
-class RecordedTopic:
-    """One row of the table of topics; what is not text there is None."""
-
-    number: int
-    name: str
-    type: str | None
-    encoding: str | None
-    digest: str
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """The tables beside the messages: topics, definitions by type, and the ROS distribution."""
-
-    topics: tuple[RecordedTopic, ...]
-    definitions: Mapping[str, RecordedText]
-    distro: str
-
-
 class Sqlite3Log:
     """Reader of one SQLite file; nothing is ever written beside it.
 
@@ -98,7 +74,7 @@ class Sqlite3Log:
         self._storage = storage or Storage()
         file, losses = self._settled(path)
         self._database = Database(file, path)
-        recorded = self._recorded()
+        recorded = read_tables(self._database)
         names = list(dict.fromkeys(topic.name for topic in recorded.topics))
         self._place = {name: i for i, name in enumerate(names)}
         # Topic of every number, in order of the numbers; a topic may have several.
@@ -109,7 +85,7 @@ class Sqlite3Log:
             scan = scan_rows(self._database)
         except FAULTS as error:
             raise FerryIdError(
-                f"{path}: the table of messages cannot be read ({_line(error)}). Fix: copy the file again"
+                f"{path}: the table of messages cannot be read ({line(error)}). Fix: copy the file again"
             ) from error
         self._rows, unlisted = scan.rows, 0
         # Index of the topic of every message; one without messages and topics has none.
@@ -146,57 +122,13 @@ class Sqlite3Log:
                 connection.execute("SELECT count(*) FROM sqlite_master").fetchall()
                 _, _, applied = connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         except FAULTS as error:
-            what = f"{names} cannot be applied ({_line(error)}): the last messages are lost"
+            what = f"{names} cannot be applied ({line(error)}): the last messages are lost"
             return path, (Loss(str(path), what),)
         left = sum(_wal_frames(log) for log in logs if log.name.endswith("-wal")) - max(applied, 0)
         if left > 0:
             what = f"{left} pages in {names} are of unfinished or damaged transactions: their messages are lost"
             losses = (Loss(str(path), what),)
         return copy, losses
-
-    def _recorded(self) -> Recorded:
-        path = self.paths[0]
-        try:
-            with closing(self._database.connect()) as connection:
-                connection.text_factory = lambda raw: raw.decode(errors="replace")
-                tables = dict(connection.execute("SELECT name, sql FROM sqlite_master WHERE type='table'").fetchall())
-                columns = {
-                    # A view is of no use here: what it selects may never end. Computed columns are not listed.
-                    name: {row[1] for row in connection.execute(f"PRAGMA table_info('{name}')")}
-                    for name in COLUMNS
-                    if str(tables.get(name)).upper().startswith("CREATE TABLE")
-                }
-                sound = {name for name in columns if COLUMNS[name] <= columns[name]}
-                if not {"topics", "messages"} <= sound:
-                    if self._database.cut:
-                        raise sqlite3.DatabaseError(self._database.cut)
-                    found = ", ".join(sorted(map(str, tables))[:10]) or "none"
-                    raise FerryIdError(
-                        f"{path}: an SQLite database but not one of rosbag2, whose tables topics and messages with "
-                        f"their columns are needed, found the tables: {found}. "
-                        "Fix: give the .db3 file that rosbag2 recorded"
-                    )
-                encoding = "serialization_format" if "serialization_format" in columns["topics"] else "'cdr'"
-                digest = "type_description_hash" if "type_description_hash" in columns["topics"] else "''"
-                topics = connection.execute(f"SELECT id, name, type, {encoding}, {digest} FROM topics ORDER BY id")
-                listed = tuple(_listed(topics))
-                definitions = {}
-                if "message_definitions" in sound:
-                    for name, kind, text in connection.execute(
-                        "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-                    ):
-                        if isinstance(name, str):
-                            both = isinstance(kind, str) and isinstance(text, str)
-                            definitions[normalized(name)] = RecordedText(kind, text) if both else RecordedText("", "")
-                distro = ""
-                if "schema" in sound:
-                    distro = next((str(row[0]) for row in connection.execute("SELECT ros_distro FROM schema")), "")
-        except FAULTS as error:
-            raise FerryIdError(
-                f"{path}: the list of topics cannot be read, the SQLite file is damaged or cut off ({_line(error)}). "
-                "Fix: copy it from the recorder again, or recover it with sqlite3's .recover"
-            ) from self._database.checked(error)
-        return Recorded(listed, definitions, distro)
 
     def _topics_of(self, numbers: Any) -> Any:
         """Return the index of the topic of every message, -1 for one that the file does not list."""
@@ -337,7 +269,7 @@ class Sqlite3Log:
             dropped = self._feed(decoders)
         except FAULTS as error:
             raise FerryIdError(
-                f"{path}: the messages cannot be read any more ({_line(error)}). Fix: copy the file again"
+                f"{path}: the messages cannot be read any more ({line(error)}). Fix: copy the file again"
             ) from self._database.checked(error)
         losses += [
             Loss(path, f"messages of {name} whose data cannot be read from their pages", name, count)
@@ -371,21 +303,6 @@ class Sqlite3Log:
         return dropped
 
 
-def _listed(rows: Iterable[tuple[Any, ...]]) -> Iterator[RecordedTopic]:
-    """Check the rows of the table of topics; one without a name or number is left out, its messages are then lost."""
-    seen = set()
-    for number, name, msgtype, encoding, digest in rows:
-        if isinstance(number, int) and isinstance(name, str) and number not in seen:
-            seen.add(number)
-            yield RecordedTopic(
-                number,
-                name,
-                msgtype if isinstance(msgtype, str) else None,
-                encoding if isinstance(encoding, str) else None,
-                digest if isinstance(digest, str) else "",
-            )
-
-
 def _wal_frames(log: Path) -> int:
     """Count the frames of a write-ahead log that were written since it was last begun anew."""
     with log.open("rb") as file:
@@ -396,10 +313,6 @@ def _wal_frames(log: Path) -> int:
             count += 1
             file.seek(WAL_HEADER_BYTES + count * size)
     return count
-
-
-def _line(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
 
 
 def matches(path: Path, head: bytes) -> bool:
