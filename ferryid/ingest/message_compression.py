@@ -13,6 +13,9 @@ from ferryid.ingest.unpack import message_unpacker
 
 # Unpacked messages are passed on in batches of about this size.
 BATCH_BYTES = 16 << 20
+# All messages of a topic together may unpack to this many times their size; constant pictures reach a thousand.
+MAX_RATIO = 4000
+FREE_BYTES = 256 << 20
 
 
 class UnpackingDecoder:
@@ -30,6 +33,7 @@ class UnpackingDecoder:
         self._decoder = decoder
         self._unpack = message_unpacker(codec)
         self._lost = 0
+        self._left = FREE_BYTES
 
     def add(self, buffer: Any, starts: NDArray[np.int64], sizes: NDArray[np.int64], receive_ns: Nanoseconds) -> None:
         """Take the compressed messages that lie in `buffer` at `starts` with `sizes` [bytes]."""
@@ -38,10 +42,12 @@ class UnpackingDecoder:
         rows: list[int] = []
         held = 0
         for row, (start, size) in enumerate(zip(starts.tolist(), sizes.tolist(), strict=True)):
-            message = self._unpack(bytes(view[start : start + size]))
+            self._left += MAX_RATIO * size
+            message = self._unpack(bytes(view[start : start + size])) if self._left > 0 else None
             if message is None:
                 self._lost += 1
                 continue
+            self._left -= len(message)
             messages.append(message)
             rows.append(row)
             held += len(message)

@@ -11,9 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
+from rosbags.rosbag2 import CompressionMode
 
 from ferryid.errors import FerryIdError
-from ferryid.ingest import open_log
+from ferryid.ingest import message_compression, open_log
+from ferryid.ingest.join import join
 from ferryid.ingest.log import Loss, Reader
 from tests.ingest.test_rosbag2 import (
     START,
@@ -400,3 +403,33 @@ def test_messages_that_only_the_metadata_knows_are_counted_beside_corrupt_ones(t
     log = open_log(folder)
     assert len(xs(log)) == 45
     assert lost_messages(log) == 5
+
+
+def test_messages_that_unpack_to_far_more_than_their_file_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(message_compression, "FREE_BYTES", 100_000)
+    monkeypatch.setattr(message_compression, "MAX_RATIO", 10)
+    folder = recording(tmp_path / "trial", mode=CompressionMode.MESSAGE, count=1)
+    (folder / "trial.db3").unlink()
+    packed = zstandard.ZstdCompressor().compress(image(0, 60_000))
+    database(folder / "trial.db3", [(2, START + i, packed) for i in range(20)])
+    edit(folder, topics_with_message_count=[])
+    log = open_log(folder)
+    heights = log.read({"/image": ["height"]})["/image"].columns["height"]
+    assert 0 < heights.size < 5
+    assert heights.size + lost_messages(log) == 20
+
+
+def test_a_recording_of_many_topics_is_joined_in_linear_time(tmp_path: Path) -> None:
+    path = database(tmp_path / "log.db3", [])
+    with closing(sqlite3.connect(path)) as connection:
+        rows = ((i, f"/t{i}", "std_msgs/msg/Float64", "cdr", "", "") for i in range(3, 5003))
+        connection.executemany("INSERT INTO topics VALUES (?, ?, ?, ?, ?, ?)", rows)
+        connection.commit()
+    part = open_log(path)
+    joined = join([part])
+    names = [topic.name for topic in part.topics if topic.name.startswith("/t")]
+    begun = time.process_time()
+    assert len(joined.read({name: [] for name in names})) == 5000
+    assert time.process_time() - begun < 5
