@@ -42,15 +42,17 @@ class JoinedReader:
             For a topic or field that no part has, or a topic whose type differs between the parts.
         """
         where = " + ".join(str(path) for path in self.paths)
-        known = {topic.name: topic for topic in self.topics}
+        known: dict[str, set[str]] = {}
+        for part in self._parts:
+            for topic in part.topics:
+                known.setdefault(topic.name, set()).add(topic.type)
         for name in wanted:
             if name not in known:
                 raise FerryIdError(
                     f"{where}: no topic {name}, found {len(known)} others in the parts. "
                     f"Fix: name one of them.{did_you_mean(name, known)}"
                 )
-            types = {topic.type for part in self._parts for topic in part.topics if topic.name == name}
-            if len(types) > 1:
+            if len(types := known[name]) > 1:
                 raise FerryIdError(
                     f"{where}: topic {name} cannot be read as one, found the types {', '.join(sorted(types))} "
                     "in different parts. Fix: read the parts as separate logs"

@@ -122,7 +122,7 @@ def against_rosbags(folder: Path, minutes: float) -> list[Row]:
     rows = []
     for kind, compression in PLAIN:
         log = logs.log(folder, kind, compression, minutes)
-        goal = None if minutes < 120 else 30.0 if kind == "db3" else 35.0
+        goal = None if minutes < 120 else 15.0 if kind == "db3" else 35.0
         what = f"{minutes:g} min {NAMES[kind]} {compression}: log → Parquet"
         columns(log)
         bare, whole, theirs = in_turn(

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import mmap
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError
 from ferryid.files import scratch_folder
-from ferryid.ingest.bulk import Decoder
 from ferryid.ingest.formats.mcap import McapLog
 from ferryid.ingest.formats.sqlite3_bag import Sqlite3Log, Storage, refuse_foreign
 from ferryid.ingest.formats.sqlite3_bag import matches as is_sqlite
 from ferryid.ingest.join import join
-from ferryid.ingest.log import Format, Loss, Nanoseconds, Reader, Series, TableLayout, Topic
+from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
+from ferryid.ingest.message_compression import UnpackingDecoder
 from ferryid.ingest.rosbag2_metadata import KEY, NAME, File, Metadata, read_metadata
-from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file, unpacked_batches
+from ferryid.ingest.unpack import FORMATS, unpack_file
 
 ENDINGS = tuple(end + packed for end in (".db3", ".mcap") for packed in ("", *FORMATS.values()))
 
@@ -68,7 +68,8 @@ class FolderLog:
         self._joined = join(parts)
         self.paths: tuple[Path, ...] = (*self._joined.paths, folder / NAME)
         self._opening = tuple(losses)
-        self._set_losses()
+        self._only_stated = tuple(self._uncounted())
+        self.losses: tuple[Loss, ...] = (*self._opening, *self._joined.losses, *self._only_stated)
         self.topics: tuple[Topic, ...] = self._described()
         refuse_foreign(folder, self.topics)
 
@@ -96,8 +97,16 @@ class FolderLog:
                 )
                 for path in there.values()
             ]
-        else:
+        elif there:
+            # Renamed since, or of another recording: what metadata.yaml counts is compared in the end.
             found = [(path, File(path.name, None, None, None)) for path in there.values()]
+            names = ", ".join(sorted(path.name for path in there.values())[:3])
+            losses = [
+                replace(
+                    loss, what=f"{loss.what}; {names} there was read instead", messages=0, start_ns=None, end_ns=None
+                )
+                for loss in losses
+            ]
         if not found:
             names = ", ".join(about.name for about in self._stated.files) or "none"
             raise FerryIdError(
@@ -154,23 +163,28 @@ class FolderLog:
             *(replace(about, count=0, note="only in metadata.yaml") for about in stated.values()),
         )
 
-    def _set_losses(self) -> None:
-        """Put together what was lost, with the messages that only metadata.yaml knows of."""
+    def _uncounted(self) -> Iterator[Loss]:
+        """Report the messages that only metadata.yaml knows of."""
         losses = [*self._opening, *self._joined.losses]
-        told = sum(loss.messages or 0 for loss in losses)
+        if any(loss.messages is None for loss in losses):
+            return
         held = {topic.name: topic.count for topic in self._joined.topics}
         short = {
             topic.name: topic.count - held.get(topic.name, 0)
             for topic in self._stated.topics
             if topic.count > held.get(topic.name, 0)
         }
-        # What a damaged or missing file took with it has been told already, though not topic by topic.
-        if sum(short.values()) > told and not any(loss.messages is None for loss in losses):
-            losses += [
-                Loss(str(self._folder / NAME), "counts more messages than the files hold", name, count)
-                for name, count in short.items()
-            ]
-        self.losses: tuple[Loss, ...] = tuple(losses)
+        # What a damaged or missing file took with it is reported already, though not topic by topic, and a topic may
+        # have another name here and there.
+        stated = sum(topic.count for topic in self._stated.topics)
+        reported = sum(loss.messages or 0 for loss in losses)
+        rest = min(sum(short.values()), stated - sum(held.values())) - reported
+        where, what = str(self._folder / NAME), "counts more messages than the files hold"
+        if rest == sum(short.values()):
+            for topic, count in short.items():
+                yield Loss(where, what, topic, count)
+        elif rest > 0:
+            yield Loss(where, what, messages=rest)
 
     def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
         """Decode the wanted fields of the wanted topics in every file.
@@ -181,7 +195,7 @@ class FolderLog:
             For a topic or field that the log does not have, or a topic that cannot be decoded.
         """
         series = self._joined.read(wanted, verify=verify)
-        self._set_losses()
+        self.losses = (*self._opening, *self._joined.losses, *self._only_stated)
         return series
 
 
@@ -197,33 +211,8 @@ class _McapLog(McapLog):
     def _groups(self, wanted: Mapping[str, Sequence[str]]) -> Any:
         groups, losses = super()._groups(wanted)
         if self._codec:
-            groups = [replace(group, decoder=_Unpacking(group.decoder, self._codec)) for group in groups]
+            groups = [replace(group, decoder=UnpackingDecoder(group.decoder, self._codec)) for group in groups]
         return groups, losses
-
-
-class _Unpacking:
-    """Decoder of messages that are compressed one by one."""
-
-    def __init__(self, decoder: Decoder, codec: str) -> None:
-        self._decoder = decoder
-        self._unpack = message_unpacker(codec)
-        self._lost = 0
-        self.finish = decoder.finish
-
-    def add(self, buffer: Any, starts: Any, sizes: Any, receive_ns: Nanoseconds) -> None:
-        view = memoryview(buffer)
-        messages = (
-            bytes(view[start : start + size]) for start, size in zip(starts.tolist(), sizes.tolist(), strict=True)
-        )
-        self._lost += len(starts)
-        for batch, places, lengths, numbers in unpacked_batches(self._unpack, messages):
-            self._decoder.add(batch, places, lengths, receive_ns[numbers])
-            self._lost -= len(numbers)
-
-    def losses(self, file: str) -> tuple[Loss, ...]:
-        """Say what could not be unpacked or decoded."""
-        lost = (Loss(file, "messages that cannot be unpacked", messages=self._lost),) if self._lost else ()
-        return (*lost, *self._decoder.losses(file))
 
 
 def _loss(path: Path, about: File, what: str) -> Loss:

@@ -8,26 +8,25 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.bulk import Decoder, decoder_for
 from ferryid.ingest.log import Format, Loss, Series, TableLayout, Topic
+from ferryid.ingest.message_compression import UnpackingDecoder
 from ferryid.ingest.ros2_types import Definition, RecordedText, define, normalized
-from ferryid.ingest.sqlite_pages import (
-    LAST_ROWID,
-    MAGIC,
-    Damage,
-    Pages,
-    Rows,
-    find_rows,
-    read_runs,
-)
-from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file, unpacked_batches, working_folder
+from ferryid.ingest.rosbag2_tables import Recorded, RecordedTopic, line, read_tables
+from ferryid.ingest.sqlite_data import read_data
+from ferryid.ingest.sqlite_database import FAULTS, MAGIC, Database
+from ferryid.ingest.sqlite_rows import Scan, Stretch, scan_rows
+from ferryid.ingest.unpack import FORMATS, unpack_file, working_folder
 
 DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
-MESSAGE_COLUMNS = ["id", "topic_id", "timestamp", "data"]
+# More lost stretches than these are reported as one.
+MAX_STRETCHES = 50
+WAL_HEADER_BYTES, WAL_FRAME_BYTES = 32, 24
 
 
 @dataclass(frozen=True)
@@ -54,16 +53,6 @@ class Storage:
     end_ns: int | None = None
 
 
-@dataclass(frozen=True)
-class Recorded:
-    """The tables beside the messages: topics as (id, name, type, serialisation, type hash) and definitions."""
-
-    root: int
-    topics: tuple[tuple[int, str, str, str, str], ...]
-    definitions: Mapping[str, RecordedText]
-    distro: str
-
-
 class Sqlite3Log:
     """Reader of one SQLite file; nothing is ever written beside it.
 
@@ -83,19 +72,30 @@ class Sqlite3Log:
     def __init__(self, path: Path, storage: Storage | None = None) -> None:
         self.paths: tuple[Path, ...] = (path,)
         self._storage = storage or Storage()
-        self._file, losses = self._settled(path)
-        self._ids: dict[str, list[int]] = {}
-        with Pages(self._file) as pages:
-            cut = f"the file ends after {pages.bytes} bytes of {pages.stated}" if pages.bytes < pages.stated else ""
-            recorded = self._recorded(cut)
-            for number, name, *_ in recorded.topics:
-                self._ids.setdefault(name, []).append(number)
-            known = {number for number, *_ in recorded.topics}
-            self._rows, damages = find_rows(pages, recorded.root, known)
-        losses += tuple(self._told(damages, cut))
-        foreign = ~np.isin(self._rows.topic_id, sorted(known))
-        if foreign.any():
-            losses += (Loss(str(path), "messages of topics that the file does not list", messages=int(foreign.sum())),)
+        file, losses = self._settled(path)
+        self._database = Database(file, path)
+        recorded = read_tables(self._database)
+        names = list(dict.fromkeys(topic.name for topic in recorded.topics))
+        self._place = {name: i for i, name in enumerate(names)}
+        # Topic of every number, in order of the numbers; a topic may have several.
+        self._numbers = np.array(sorted(topic.number for topic in recorded.topics), np.int64)
+        of = {topic.number: self._place[topic.name] for topic in recorded.topics}
+        self._topic_of = np.array([of[number] for number in self._numbers.tolist()], np.int64)
+        try:
+            scan = scan_rows(self._database)
+        except FAULTS as error:
+            raise FerryIdError(
+                f"{path}: the table of messages cannot be read ({line(error)}). Fix: copy the file again"
+            ) from error
+        self._rows, unlisted = scan.rows, 0
+        # Index of the topic of every message; one without messages and topics has none.
+        self._topic = self._topics_of(self._rows.topic_id)
+        if (foreign := self._topic < 0).any():
+            unlisted = int(foreign.sum())
+            self._rows, self._topic = self._rows.take(~foreign), self._topic[~foreign]
+        losses += tuple(self._lost(scan))
+        if unlisted:
+            losses += (Loss(str(path), "messages of topics that the file does not list", messages=unlisted),)
         self._definitions: dict[str, Definition] = {}
         self.topics: tuple[Topic, ...] = tuple(self._topics(recorded))
         self.losses: tuple[Loss, ...] = losses
@@ -108,7 +108,7 @@ class Sqlite3Log:
         if path.suffix in FORMATS.values():
             file, losses = unpack_file(path, working_folder(self))
         logs = [path.with_name(path.name + end) for end in ("-wal", "-journal")]
-        logs = [log for log in logs if log.exists() and log.stat().st_size > 0]
+        logs = [log for log in logs if log.is_file() and log.stat().st_size > 0]
         if not logs or file != path:
             return file, losses
         # The recorder was interrupted: its last transactions stand beside the file, and SQLite puts them in.
@@ -116,122 +116,118 @@ class Sqlite3Log:
         copy = Path(shutil.copy(path, folder))
         for log in logs:
             shutil.copy(log, folder)
+        names = " and ".join(log.name for log in logs)
         try:
             with closing(sqlite3.connect(copy)) as connection:
-                connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
                 connection.execute("SELECT count(*) FROM sqlite_master").fetchall()
-        except sqlite3.DatabaseError as error:
-            names = " and ".join(log.name for log in logs)
-            return path, (Loss(str(path), f"{names} cannot be applied ({error}): the last messages are lost"),)
+                _, _, applied = connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+        except FAULTS as error:
+            what = f"{names} cannot be applied ({line(error)}): the last messages are lost"
+            return path, (Loss(str(path), what),)
+        left = sum(_wal_frames(log) for log in logs if log.name.endswith("-wal")) - max(applied, 0)
+        if left > 0:
+            what = f"{left} pages in {names} are of unfinished or damaged transactions: their messages are lost"
+            losses = (Loss(str(path), what),)
         return copy, losses
 
-    def _connect(self) -> sqlite3.Connection:
-        # Immutable: no lock and no -shm file, so a read-only folder will do. A writable schema, which nothing writes,
-        # makes SQLite open a truncated file.
-        connection = sqlite3.connect(f"{self._file.resolve().as_uri()}?immutable=1", uri=True)
-        connection.text_factory = lambda raw: raw.decode(errors="replace")
-        connection.execute("PRAGMA writable_schema=ON")
-        return connection
+    def _topics_of(self, numbers: Any) -> Any:
+        """Return the index of the topic of every message, -1 for one that the file does not list."""
+        if not self._numbers.size:
+            return np.full(numbers.size, -1)
+        at = np.minimum(np.searchsorted(self._numbers, numbers), self._numbers.size - 1)
+        return np.where(self._numbers[at] == numbers, self._topic_of[at], -1)
 
-    def _recorded(self, cut: str) -> Recorded:
-        path = self.paths[0]
-        try:
-            with closing(self._connect()) as connection:
-                tables = dict(
-                    connection.execute("SELECT name, rootpage FROM sqlite_master WHERE type='table'").fetchall()
-                )
-                columns = {
-                    name: [row[1] for row in connection.execute(f"PRAGMA table_info('{name}')")]
-                    for name in ("topics", "messages", "message_definitions", "schema")
-                    if name in tables
-                }
-                if columns.get("messages") != MESSAGE_COLUMNS or not {"id", "name", "type"} <= {
-                    *columns.get("topics", ())
-                }:
-                    if cut:
-                        raise sqlite3.DatabaseError(cut)
-                    found = ", ".join(sorted(tables)) or "none"
-                    raise FerryIdError(
-                        f"{path}: an SQLite database but not one of rosbag2, found the tables: {found}. "
-                        "Fix: give the .db3 file that rosbag2 recorded"
-                    )
-                serialization = "serialization_format" if "serialization_format" in columns["topics"] else "'cdr'"
-                digest = "type_description_hash" if "type_description_hash" in columns["topics"] else "''"
-                topics = connection.execute(
-                    f"SELECT id, name, type, {serialization}, {digest} FROM topics ORDER BY id"
-                ).fetchall()
-                definitions = {}
-                if "message_definitions" in tables:
-                    for name, encoding, text in connection.execute(
-                        "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-                    ):
-                        definitions[normalized(name)] = RecordedText(encoding, text)
-                distro = ""
-                if "ros_distro" in columns.get("schema", ()):
-                    distro = next((row[0] for row in connection.execute("SELECT ros_distro FROM schema")), "")
-        except sqlite3.DatabaseError as error:
-            raise FerryIdError(
-                f"{path}: the list of topics cannot be read, the SQLite file is damaged or cut off ({error}). "
-                "Fix: copy it from the recorder again, or recover it with sqlite3's .recover"
-            ) from error
-        return Recorded(tables["messages"], tuple(topics), definitions, distro)
-
-    def _told(self, damages: Sequence[Damage], cut: str) -> Iterator[Loss]:
-        """Say what stretches of lost rows cost; neighbouring ones are one loss."""
-        merged: list[Damage] = []
-        for damage in damages:
-            if merged and damage.low <= merged[-1].high:
-                last = merged.pop()
-                where = last.where if last.where.endswith("others") else f"{last.where} and others"
-                counts = (last.rows, damage.rows)
-                count = None if counts[0] is None or counts[1] is None else counts[0] + counts[1]
-                damage = Damage(last.low, max(damage.high, last.high), where, count)
-            merged.append(damage)
-        rows, told = self._rows, 0
-        for damage in merged:
-            first, last = np.searchsorted(rows.rowid, [damage.low, damage.high], "right")
-            lost = damage.rows
-            if lost is None and damage.high != LAST_ROWID:
-                lost = damage.high - damage.low - int(last - first)
-            elif lost is None and self._storage.messages is not None:
-                lost = max(0, self._storage.messages - len(rows) - told)
-            if lost == 0:
-                continue
-            told += lost or 0
+    def _lost(self, scan: Scan) -> Iterator[Loss]:
+        """Report the rows that were not found."""
+        path, rows, stated = str(self.paths[0]), scan.rows, self._storage.messages
+        cause = "; ".join(filter(None, (self._database.cut, scan.reason)))
+        if scan.invalid:
+            yield Loss(path, "rows whose topic, time or data are of another type", messages=scan.invalid)
+        stretches = scan.stretches
+        if not scan.indexed and stated is not None and len(rows) + scan.invalid == stated:
+            # All that was recorded is there: the rowids that are missing never were messages.
+            stretches = ()
+        known = sum(stretch.count or 0 for stretch in stretches)
+        unknown = not scan.complete or any(stretch.count is None for stretch in stretches)
+        rest = None if stated is None else stated - len(rows) - scan.invalid - known
+        if len(stretches) > MAX_STRETCHES:
+            count = None if any(stretch.count is None for stretch in stretches) else known
+            cause = f"{cause}, in {len(stretches)} places"
+            stretches = (Stretch(stretches[0].low, stretches[-1].high, count),)
+        for stretch in stretches:
+            first = int(np.searchsorted(rows.rowid, stretch.low, "right"))
+            last = int(np.searchsorted(rows.rowid, stretch.high, "left"))
+            count = stretch.count if stretch.count is not None or rest is None or rest <= 0 else rest
             yield Loss(
-                str(self.paths[0]),
-                "; ".join(filter(None, (cut, damage.where))),
-                messages=lost,
+                path,
+                cause,
+                messages=count,
                 start_ns=int(rows.time_ns[first - 1]) if first else None,
                 end_ns=int(rows.time_ns[last]) if last < len(rows) else self._storage.end_ns,
             )
+        if scan.complete or not unknown:
+            return
+        if rest is not None and rest > 0:
+            start = int(rows.time_ns[-1]) if len(rows) else None
+            yield Loss(path, cause, messages=rest, start_ns=start, end_ns=self._storage.end_ns)
+        else:
+            # A stated number that fits what was read proves that nothing else is lost.
+            what = cause if rest == 0 else f"{cause}; messages at the end may be lost too"
+            yield Loss(path, what, messages=0 if rest == 0 else None)
 
     def _topics(self, recorded: Recorded) -> Iterator[Topic]:
         distro = self._storage.distro or recorded.distro
-        for name, numbers in self._ids.items():
-            entries = [entry for entry in recorded.topics if entry[0] in numbers]
-            types = sorted({normalized(entry[2]) for entry in entries})
-            _, _, _, own_encoding, digest = entries[0]
-            encoding = self._storage.encodings.get(name, own_encoding)
-            times = self._rows.time_ns[np.isin(self._rows.topic_id, numbers)]
-            if encoding != "cdr":
-                found = Definition(None, {}, f'cannot be decoded: serialised as "{encoding}", only cdr is supported')
-            elif len(types) > 1:
-                found = Definition(None, {}, f"cannot be decoded: recorded with the types {' and '.join(types)}")
-            else:
-                digest = digest or self._storage.digests.get(name, "")
-                found = define(types[0], recorded.definitions.get(types[0]), digest, distro)
+        entries: dict[str, list[RecordedTopic]] = {}
+        for topic in recorded.topics:
+            entries.setdefault(topic.name, []).append(topic)
+        counts = np.bincount(self._topic, minlength=len(entries))
+        starts, ends = np.full(len(entries), np.iinfo(np.int64).max), np.full(len(entries), np.iinfo(np.int64).min)
+        order = np.argsort(self._compact(self._topic), kind="stable")
+        held = np.flatnonzero(counts)
+        if held.size:
+            times = self._rows.time_ns[order]
+            edges = (np.cumsum(counts) - counts)[held]
+            starts[held] = np.minimum.reduceat(times, edges)
+            ends[held] = np.maximum.reduceat(times, edges)
+        for i, (name, several) in enumerate(entries.items()):
+            found, msgtype, encoding = self._definition(name, several, recorded.definitions, distro)
             self._definitions[name] = found
             yield Topic(
                 name=name,
-                type=types[0],
+                type=msgtype,
                 encoding=encoding,
-                count=times.size,
-                start_ns=int(times.min()) if times.size else None,
-                end_ns=int(times.max()) if times.size else None,
+                count=int(counts[i]),
+                start_ns=int(starts[i]) if counts[i] else None,
+                end_ns=int(ends[i]) if counts[i] else None,
                 fields=found.fields,
                 note=found.note,
             )
+
+    def _definition(
+        self, name: str, entries: Sequence[RecordedTopic], definitions: Mapping[str, RecordedText], distro: str
+    ) -> tuple[Definition, str, str]:
+        """Return the definition of a topic's type, the type and the serialisation."""
+        types = sorted({normalized(entry.type) for entry in entries if entry.type is not None})
+        own, digest = entries[0].encoding, entries[0].digest
+        encoding = self._storage.encodings.get(name, own or "")
+        note = ""
+        if any(entry.type is None for entry in entries):
+            note = "its type is no text"
+        elif own is None and not encoding:
+            note = "its serialisation is no text"
+        elif encoding != "cdr":
+            note = f'serialised as "{encoding}", only cdr is supported'
+        elif len(types) > 1:
+            note = f"recorded with the types {' and '.join(types)}"
+        msgtype = types[0] if types else ""
+        if note:
+            return Definition(None, {}, f"cannot be decoded: {note}"), msgtype, encoding
+        digest = digest or self._storage.digests.get(name, "")
+        return define(msgtype, definitions.get(msgtype), digest, distro), msgtype, encoding
+
+    def _compact(self, topics: Any) -> Any:
+        """Return indices of topics in a type that is quick to sort."""
+        return topics.astype(np.uint16) if len(self._place) < 1 << 16 else topics
 
     def _decoders(self, wanted: Mapping[str, Sequence[str]]) -> dict[str, Decoder]:
         path = self.paths[0]
@@ -250,7 +246,8 @@ class Sqlite3Log:
                     f"{path}: {name} of type {topic.type} {definition.note}. "
                     "Fix: record with a newer rosbag2, which stores definitions, as cdr, or map another topic"
                 )
-            decoders[name] = decoder_for("cdr", definition.typestore, topic.type, name, fields, topic.count, str(path))
+            decoder = decoder_for("cdr", definition.typestore, topic.type, name, fields, topic.count, str(path))
+            decoders[name] = UnpackingDecoder(decoder, self._storage.codec) if self._storage.codec else decoder
         return decoders
 
     def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
@@ -262,12 +259,20 @@ class Sqlite3Log:
             For a topic or field that the log does not have, or a topic that cannot be decoded.
         """
         decoders = self._decoders(wanted)
-        # SQLite keeps no checksums; what can be verified is that pages, cells and indices fit together.
-        losses = list(self._opening_losses) + (self._integrity() if verify else [])
-        dropped = self._feed(decoders)
         path = str(self.paths[0])
+        # SQLite keeps no checksums; what can be verified is that pages, cells and indices fit together.
+        faults = self._database.integrity() if verify else []
+        losses = [*self._opening_losses]
+        if faults:
+            losses.append(Loss(path, f"SQLite's integrity check: {'; '.join(faults)}"))
+        try:
+            dropped = self._feed(decoders)
+        except FAULTS as error:
+            raise FerryIdError(
+                f"{path}: the messages cannot be read any more ({line(error)}). Fix: copy the file again"
+            ) from self._database.checked(error)
         losses += [
-            Loss(path, f"messages of {name} that cannot be unpacked or whose pages are lost", name, count)
+            Loss(path, f"messages of {name} whose data cannot be read from their pages", name, count)
             for name, count in dropped.items()
             if count
         ]
@@ -278,44 +283,36 @@ class Sqlite3Log:
         return series
 
     def _feed(self, decoders: Mapping[str, Decoder]) -> dict[str, int]:
-        """Give every wanted message to its decoder; return how many of each topic could not be."""
-        ids = {number: name for name in decoders for number in self._ids[name]}
-        rows = self._rows
-        if len(ids) < len(self.topics):
-            rows = rows.take(np.isin(rows.topic_id, sorted(ids)))
+        """Give every wanted message to its decoder; return how many of each topic could not be read."""
         dropped = dict.fromkeys(decoders, 0)
-        with Pages(self._file) as pages:
-            # A message never begins its page, though an empty one may stand behind its last byte.
-            numbers = (rows.start - 1) // pages.size + 1
-            for first, last, buffer, base in read_runs(pages, numbers):
-                part = rows.take(slice(first, last))
-                one_by_one = self._storage.codec or (part.local < part.size).any()
-                for number, name in ids.items():
-                    mine = np.flatnonzero(part.topic_id == number)
-                    if one_by_one:
-                        dropped[name] += self._add_one_by_one(pages, part.take(mine), decoders[name])
-                    else:
-                        starts = part.start[mine] - base
-                        decoders[name].add(buffer, starts, part.size[mine], part.time_ns[mine])
+        names = {self._place[name]: name for name in decoders}
+        wanted = self._numbers[np.isin(self._topic_of, list(names))]
+        if not wanted.size:
+            return dropped
+        for piece in read_data(self._database, self._rows, wanted.tolist()):
+            topic = self._topics_of(piece.rows.topic_id)
+            for place, lost in zip(*np.unique(topic[~piece.kept], return_counts=True), strict=True):
+                if place in names:
+                    dropped[names[place]] += int(lost)
+            topic, times = topic[piece.kept], piece.rows.time_ns[piece.kept]
+            starts = np.cumsum(piece.size) - piece.size
+            order = np.argsort(self._compact(topic), kind="stable")
+            for mine in np.split(order, np.flatnonzero(np.diff(topic[order])) + 1):
+                if mine.size and (name := names.get(int(topic[mine[0]]))) is not None:
+                    decoders[name].add(piece.data, starts[mine], piece.size[mine], times[mine])
         return dropped
 
-    def _add_one_by_one(self, pages: Pages, rows: Rows, decoder: Decoder) -> int:
-        """Give messages to a decoder that are compressed or lie on several pages; return how many are lost."""
-        unpack = message_unpacker(self._storage.codec) if self._storage.codec else bytes
-        lost = len(rows)
-        for batch, starts, sizes, numbers in unpacked_batches(unpack, (pages.blob(rows, i) for i in range(len(rows)))):
-            decoder.add(batch, starts, sizes, rows.time_ns[numbers])
-            lost -= len(numbers)
-        return lost
 
-    def _integrity(self) -> list[Loss]:
-        try:
-            with closing(self._connect()) as connection:
-                faults = [row[0] for row in connection.execute("PRAGMA integrity_check(10)")]
-        except sqlite3.DatabaseError as error:
-            faults = [str(error)]
-        told = [" ".join(fault.split()) for fault in faults if fault != "ok"]
-        return [Loss(str(self.paths[0]), f"SQLite's integrity check: {'; '.join(told)}")] if told else []
+def _wal_frames(log: Path) -> int:
+    """Count the frames of a write-ahead log that were written since it was last begun anew."""
+    with log.open("rb") as file:
+        head = file.read(WAL_HEADER_BYTES)
+        size = WAL_FRAME_BYTES + int.from_bytes(head[8:12], "big")
+        count = 0
+        while len(head) == WAL_HEADER_BYTES and file.read(WAL_FRAME_BYTES)[8:16] == head[16:24]:
+            count += 1
+            file.seek(WAL_HEADER_BYTES + count * size)
+    return count
 
 
 def matches(path: Path, head: bytes) -> bool:
