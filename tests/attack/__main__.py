@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import itertools
 import os
 import sys
@@ -39,12 +40,14 @@ def main() -> int:
     for seed in seeds:
         print(f"attack: seed {seed}, {options.cases} cases", flush=True)
         start, results = time.monotonic(), list[Result]()
-        for result in attack(seed, iter(range(1, options.cases + 1)), workers=options.workers, only=options.format):
-            results.append(result)
-            if len(results) % 250 == 0:
-                rate = len(results) / (time.monotonic() - start)
-                bad = sum(bool(each.outcome.violations) for each in results)
-                print(f"{len(results)} cases, {rate:.0f} per second, {bad} with a violation", flush=True)
+        # Interrupted, a run shows what it found so far.
+        with contextlib.suppress(KeyboardInterrupt):
+            for result in attack(seed, iter(range(1, options.cases + 1)), workers=options.workers, only=options.format):
+                results.append(result)
+                if len(results) % 250 == 0:
+                    rate = len(results) / (time.monotonic() - start)
+                    bad = sum(bool(each.outcome.violations) for each in results)
+                    print(f"{len(results)} cases, {rate:.0f} per second, {bad} with a violation", flush=True)
         seconds, bad = time.monotonic() - start, sum(bool(each.outcome.violations) for each in results)
         runs.append((seed, len(results), seconds, table(results), bad))
         failed += bad

@@ -108,7 +108,9 @@ def columns(random: Random, base: Base) -> Mutated | None:
             0, "time", pa.array([None if i % 7 == 0 else 1_600_000_000 * 10**9 + i for i in range(count)], pa.timestamp("ns"))
         ),
         "values as lists": lambda: table.set_column(1, "data", pa.array([[1.0]] * count)),
-        "values as a map": lambda: table.set_column(1, "data", pa.array([[("a", 1)]] * count, pa.map_(pa.string(), pa.int64()))),
+        "values as a map": lambda: table.set_column(
+            1, "data", pa.array([[("a", 1)]] * count, pa.map_(pa.string(), pa.int64()))
+        ),
         "values as decimals": lambda: table.set_column(1, "data", table.column(1).cast(pa.decimal128(20, 2))),
         "values as binary": lambda: table.set_column(1, "data", pa.array([b"\xff"] * count)),
         "values as text": lambda: table.set_column(1, "data", pa.array(["x"] * count)),

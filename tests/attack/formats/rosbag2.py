@@ -81,7 +81,7 @@ def _aliases(random: Random, text: str) -> tuple[str, str]:
     names += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, depth)]
     target = random.choice(("relative_file_paths", "topics_with_message_count", "files", "custom_data"))
     what = f"aliases that grow to 9 to the power of {depth}, as {target}"
-    lines = [line for line in text.split("\n")]
+    lines = text.split("\n")
     place = next((i for i, line in enumerate(lines) if line.strip().startswith(target + ":")), len(lines) - 1)
     indent = " " * (len(lines[place]) - len(lines[place].lstrip()) or 2)
     if random.random() < 0.5:
