@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import itertools
 import os
+import signal
 import sys
 import time
 from pathlib import Path
@@ -36,6 +37,7 @@ def main() -> int:
     seeds = options.seed or [int(time.time())]
     if options.only is not None:
         return _one(seeds[0], options.only, options.format, options.keep)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     runs, failed = [], 0
     for seed in seeds:
         print(f"attack: seed {seed}, {options.cases} cases", flush=True)

@@ -121,7 +121,7 @@ class Case:
 
 
 RAW_SHARE = 0.35
-HEAVY = ("bomb", "metadata: aliases", "metadata: long")
+HEAVY = ("bomb", "metadata: aliases", "metadata: long", "metadata: depth", "metadata: topics")
 HEAVY_SHARE = 0.1
 """Of what takes long to read even where it is read well, a tenth of the cases drawn is run."""
 COMMAND_EVERY = 200

@@ -19,16 +19,28 @@ def _made(base: Base, name: str, content: bytes, what: str, *, cut: bool = False
     if content == base.files[name]:
         return None
     # A cell of a text may be changed to another valid one, and a line to none or two.
-    total = text_total(base, name, content) if name.endswith((".csv", ".txt")) else None
-    return Mutated(f"{name}: {what}", replaced(base, name, content), cut=cut, total=total)
+    if name.endswith((".csv", ".txt")):
+        return edited_text(base, name, content, what)
+    return Mutated(f"{name}: {what}", replaced(base, name, content), cut=cut)
+
+
+def edited_text(base: Base, name: str, content: bytes, what: str, total: int | None = None) -> Mutated | None:
+    """Return a text table edited by whole lines: as many rows are expected as it has lines now, or `total`."""
+    old = base.files[name]
+    if content == old:
+        return None
+    total = text_total(base, name, content) if total is None else total
+    # What is no line of names any more may be a row.
+    extra = int(content.splitlines()[:1] != old.splitlines()[:1])
+    return Mutated(f"{name}: {what}", replaced(base, name, content), total=total, extra=extra)
 
 
 def text_total(base: Base, name: str, content: bytes) -> int:
-    """Count the rows of all text files as lines that are not blank, but for the one with the names."""
+    """Count the rows of all text files as lines that hold anything, but for the one with the names."""
     rows = 0
     for file, old in base.files.items():
         lines = (content if file == name else old).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
-        rows += max(sum(bool(line.strip()) for line in lines) - 1, 0)
+        rows += max(sum(bool(line.strip(b" \t,;")) for line in lines) - 1, 0)
     return rows
 
 

@@ -6,9 +6,9 @@ import csv
 import io
 from random import Random
 
-from tests.attack.case import Base, Mutated, Mutation, Rows, replaced
+from tests.attack.case import Base, Mutated, Mutation, Rows
 from tests.attack.logs import messages, rows
-from tests.attack.raw import text_total
+from tests.attack.raw import edited_text, text_total
 
 WANTED = {"table": ("data",)}
 ODD_CELLS = (
@@ -49,13 +49,6 @@ def _file(random: Random, base: Base) -> str:
     return random.choice(sorted(base.files))
 
 
-def _made(base: Base, name: str, content: bytes, what: str, total: int | None = None) -> Mutated | None:
-    if content == base.files[name]:
-        return None
-    total = text_total(base, name, content) if total is None else total
-    return Mutated(f"{name}: {what}", replaced(base, name, content), total=total)
-
-
 def _lines(base: Base, name: str) -> tuple[list[bytes], bytes]:
     content = base.files[name]
     end = b"\r\n" if b"\r\n" in content else b"\n"
@@ -84,7 +77,7 @@ def cells(random: Random, base: Base) -> Mutated | None:
     rows_before = sum(len(each.times) for each in base.truth.values())
     # A line end inside quotes makes no row.
     total = rows_before if "\n" in value and before == 0 else None
-    return _made(base, name, content, f"{len(places)} cells of column {column} set to {shown}", total)
+    return edited_text(base, name, content, f"{len(places)} cells of column {column} set to {shown}", total)
 
 
 def lines_moved(random: Random, base: Base) -> Mutated | None:
@@ -109,7 +102,7 @@ def lines_moved(random: Random, base: Base) -> Mutated | None:
         lines[place] = lines[place].rpartition(separator)[0]
     else:
         lines[place] = bytes(byte for byte in random.randbytes(40) if byte not in b"\r\n")
-    return _made(base, name, end.join(lines) + end, f"line {place} {action}")
+    return edited_text(base, name, end.join(lines) + end, f"line {place} {action}")
 
 
 def header(random: Random, base: Base) -> Mutated | None:
@@ -136,8 +129,9 @@ def header(random: Random, base: Base) -> Mutated | None:
     else:
         lines[0] = separator.join([names[0]] * len(names))
     content = end.join(lines) + end
-    total = text_total(base, name, content) + (action == "none")
-    return _made(base, name, content, f"line of names: {action}", total)
+    total = text_total(base, name, content)
+    # Without names the first of these lines is a row, which may be taken for the names.
+    return edited_text(base, name, content, f"line of names: {action}", total)
 
 
 def encoding(random: Random, base: Base) -> Mutated | None:
@@ -145,7 +139,9 @@ def encoding(random: Random, base: Base) -> Mutated | None:
     name = _file(random, base)
     text = base.files[name].decode()
     codec = random.choice(("utf-16", "utf-16-le", "utf-16-be", "utf-8-sig", "utf-32", "cp037", "utf-7"))
-    return _made(base, name, text.encode(codec), f"in {codec}", sum(len(each.times) for each in base.truth.values()))
+    return edited_text(
+        base, name, text.encode(codec), f"in {codec}", sum(len(each.times) for each in base.truth.values())
+    )
 
 
 def bad_text(random: Random, base: Base) -> Mutated | None:
@@ -159,7 +155,7 @@ def bad_text(random: Random, base: Base) -> Mutated | None:
         at = random.randrange(len(lines[place]) + 1)
         # Also too many cells: what reports a bad line must not fail for what is in it.
         lines[place] = lines[place][:at] + odd + lines[place][at:] + random.choice((b"", _separator(lines) + b"7"))
-    return _made(base, name, end.join(lines) + end, f"{odd!r} in {len(places)} lines")
+    return edited_text(base, name, end.join(lines) + end, f"{odd!r} in {len(places)} lines")
 
 
 def separators(random: Random, base: Base) -> Mutated | None:
@@ -170,7 +166,7 @@ def separators(random: Random, base: Base) -> Mutated | None:
     other = random.choice((b",", b";", b"\t", b" ", b"|", b":"))
     share = random.choice((0.02, 0.5, 1.0))
     lines = [line.replace(separator, other) if random.random() < share else line for line in lines]
-    return _made(base, name, end.join(lines) + end, f"{separator!r} is {other!r} in {share:.0%} of the lines")
+    return edited_text(base, name, end.join(lines) + end, f"{separator!r} is {other!r} in {share:.0%} of the lines")
 
 
 def line_ends(random: Random, base: Base) -> Mutated | None:
@@ -179,7 +175,7 @@ def line_ends(random: Random, base: Base) -> Mutated | None:
     lines, _ = _lines(base, name)
     ends = random.choice(([b"\r"], [b"\r\n", b"\n"], [b"\n", b"\r"], [b"\n\n"], [b"\n\r"], [b"\n", b"\x0b"]))
     content = b"".join(line + random.choice(ends) for line in lines)
-    return _made(base, name, content, f"lines end with {ends!r}")
+    return edited_text(base, name, content, f"lines end with {ends!r}")
 
 
 MUTATIONS: dict[str, Mutation] = {
