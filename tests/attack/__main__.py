@@ -95,6 +95,8 @@ def _one(seed: int, number: int, only: str, keep: Path) -> int:
         tempfile.tempdir = None
     write(case.mutated, keep)
     print(f"{outcome.result} in {outcome.seconds:.2f} s of processor time with {outcome.memory / 1e6:.0f} MB")
+    for line in outcome.reported:
+        print(f"reported: {line}")
     for violation in outcome.violations:
         print(f"VIOLATION {violation}")
     print(f"its log is kept: {keep / case.base.path}")

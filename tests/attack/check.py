@@ -41,6 +41,8 @@ class Outcome:
     seconds: float = 0.0
     memory: int = 0
     overstated: bool = False
+    reported: tuple[str, ...] = ()
+    """Refusal or losses, with verification."""
 
 
 @dataclass
@@ -51,6 +53,12 @@ class _Found:
     losses: tuple[Loss, ...] = ()
     undecodable: Mapping[str, int] = field(default_factory=dict)
     refusal: str = ""
+
+    @property
+    def reported(self) -> tuple[str, ...]:
+        """What a user is shown, the first lines of it."""
+        losses = [f"{loss.topic or 'any topic'}: {loss.messages} messages, {loss.what}"[:300] for loss in self.losses]
+        return tuple([self.refusal[:300]] if self.refusal else losses[:10])
 
 
 def examine(case: Case, folder: Path, temporary: Path, opener: Open = open_log) -> Outcome:
@@ -75,7 +83,7 @@ def examine(case: Case, folder: Path, temporary: Path, opener: Open = open_log) 
     violations: list[str] = []
     resident = _begin_measuring()
     start = _processor_s()
-    result, overstated = "refused", False
+    result, overstated, reported = "refused", False, ()
     # The command checks nothing of the messages; its own case comes besides.
     for verify in (False, True):
         began = _processor_s()
@@ -86,7 +94,7 @@ def examine(case: Case, folder: Path, temporary: Path, opener: Open = open_log) 
             verdict, problems, over = judge(case, found, verify)
             faults += problems
             overstated = overstated or over
-            result = result if verify else verdict
+            result, reported = result if verify else verdict, found.reported
         violations += [f"{'with' if verify else 'without'} verification: {fault}" for fault in faults]
     if case.command:
         violations += [f"as a command: {fault}" for fault in _commands(path, temporary.with_name("out"))]
@@ -100,7 +108,7 @@ def examine(case: Case, folder: Path, temporary: Path, opener: Open = open_log) 
         gc.collect()
     if left := sorted(each.name for each in temporary.iterdir()):
         violations.append(f"temporary files were left: {len(left)}")
-    return Outcome(result, tuple(dict.fromkeys(violations)), seconds, memory, overstated)
+    return Outcome(result, tuple(dict.fromkeys(violations)), seconds, memory, overstated, reported)
 
 
 def write(mutated: Mutated, folder: Path) -> None:
@@ -186,7 +194,7 @@ def judge(case: Case, found: _Found, verify: bool) -> tuple[str, list[str], bool
     """
     base, mutated = case.base, case.mutated
     if found.refusal:
-        short = "memory" in found.refusal and not mutated.bomb
+        short = "not enough memory" in found.refusal and not mutated.bomb
         faults = [f"refused for memory although it is small: {found.refusal[:200]!r}"] if short else []
         return "refused", faults, False
     faults = []
