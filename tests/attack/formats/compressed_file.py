@@ -28,11 +28,15 @@ def bases() -> list[Base]:
     ]
 
 
-def packed(content: bytes, ending: str, level: int = 3) -> bytes:
-    """Compress with a content checksum."""
+def packed(content: bytes, ending: str) -> bytes:
+    """Compress in blocks of 2 kB, so that damage to one leaves others, with a content checksum."""
+    pieces = [content[at : at + 2000] for at in range(0, len(content), 2000)]
     if ending == ".lz4":
-        return bytes(lz4.frame.compress(content, content_checksum=True))
-    return zstandard.ZstdCompressor(level=level, write_checksum=True).compress(content)
+        frame = lz4.frame.LZ4FrameCompressor(content_checksum=True, auto_flush=True)
+        return bytes(frame.begin(len(content)) + b"".join(map(frame.compress, pieces)) + frame.flush())
+    packer = zstandard.ZstdCompressor(write_checksum=True).compressobj(size=len(content))
+    blocks = [packer.compress(piece) + packer.flush(zstandard.COMPRESSOBJ_FLUSH_BLOCK) for piece in pieces]
+    return b"".join(blocks) + packer.flush()
 
 
 def _base(inner: Base, ending: str, guard: str) -> Base:
@@ -76,7 +80,7 @@ def frames(random: Random, base: Base) -> Mutated | None:
     what = f"{count} frames"
     action = random.choice(("none", "empty", "skippable", "noise", "dropped", "duplicated", "swapped"))
     place = random.randrange(count)
-    missing = extra = 0
+    extra, cut = 0, False
     if action == "empty":
         made.insert(place, packed(b"", ending))
     elif action == "skippable":
@@ -87,12 +91,13 @@ def frames(random: Random, base: Base) -> Mutated | None:
         # A file of several frames less one is whole to a decompressor; what is inside must miss the rest.
         made[place : place + 1] = [] if action == "dropped" else [made[place]] * 2
         extra = base.count if action == "duplicated" else 0
+        cut = action == "dropped" and place == count - 1
         if not made:
             return None
     elif action == "swapped":
         other = random.randrange(count)
         made[place], made[other] = made[other], made[place]
-    return _made(base, b"".join(made), f"{what}, {action}", missing=missing, extra=extra, content=True)
+    return _made(base, b"".join(made), f"{what}, {action}", extra=extra, cut=cut, content=True)
 
 
 def header(random: Random, base: Base) -> Mutated | None:
