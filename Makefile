@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test demo picture bench real thesis proof wavy faults fixtures wheel-check lint clean
+.PHONY: test demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .
@@ -23,6 +23,13 @@ picture: demo
 
 bench: $(VENV)/installed $(VENV)/bench-installed
 	$(BIN)/python -m tests.bench
+
+# Damaged and hostile logs of every format: writes reports/attack.md. CASES=N takes more of them, SEED=N repeats a run; several
+# seeds (SEED="1 2") are several runs on one page.
+CASES ?= 2000
+attack: SEED = $(shell date +%s)
+attack: $(VENV)/installed
+	$(BIN)/python -m tests.attack --cases $(CASES) $(foreach seed,$(SEED),--seed $(seed))
 
 # Fits and diagnoses of the real recordings, where they lie in ../shared/data; writes reports/real.md and reports/real.
 real: $(VENV)/installed

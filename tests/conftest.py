@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,3 +22,12 @@ def shared_data() -> Callable[[str], Path]:
         return path
 
     return locate
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Show how a test that drew at random is repeated, whether it passed or failed."""
+    for outcome in ("passed", "failed"):
+        for report in terminalreporter.stats.get(outcome, []):
+            for name, value in report.user_properties:
+                if name == "repeat":
+                    terminalreporter.write_line(f"{report.nodeid} drew at random; to repeat it: {value}")
