@@ -93,6 +93,13 @@ def test_lines_that_end_in_cr_are_rows(tmp_path: Path) -> None:
     assert (len(series.receive_ns), lost(reader)) == (10, 0)
 
 
+def test_quotes_on_lines_that_end_in_cr_are_no_pair(tmp_path: Path) -> None:
+    rows = list(ROWS)
+    rows[2], rows[7] = b'2.0,2.5,"', b'7.0,",auto'
+    series, reader = read(tmp_path, (HEADER + b"\n".join(rows) + b"\n").replace(b"\n", b"\r"))
+    assert (len(series.receive_ns), lost(reader)) == (8, 2)
+
+
 def test_a_form_feed_is_no_end_of_a_line(tmp_path: Path) -> None:
     series, reader = read(tmp_path, b"run\x0c12\n" + HEADER + b"\n".join(ROWS))
     assert (len(series.receive_ns), lost(reader)) == (10, 0)
