@@ -163,3 +163,9 @@ def test_numbers_that_only_python_reads_are_unreadable(tmp_path: Path) -> None:
 def test_a_table_without_time_lists_the_columns_that_may_be_meant(tmp_path: Path) -> None:
     with pytest.raises(FerryIdError, match=r'found "boot_time" of 2 columns, whose values do not rise.*time under'):
         read(tmp_path, b"boot_time,u\n9,1\n5,2\n3,1\n1,2\n")
+
+
+@pytest.mark.parametrize("encoding", ["idna", "undefined", "base64", "punycode", "utf-99"])
+def test_an_encoding_that_is_not_for_files_is_refused(tmp_path: Path, encoding: str) -> None:
+    with pytest.raises(FerryIdError, match=rf'names the encoding "{encoding}", which cannot be used|readable time'):
+        read(tmp_path, with_row(ROWS[0]), TableLayout(time="time", encoding=encoding))
