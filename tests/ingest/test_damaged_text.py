@@ -51,9 +51,12 @@ def test_a_damaged_row_costs_itself_and_is_counted(tmp_path: Path, row: bytes, w
     assert any(what in loss.what for loss in reader.losses)
 
 
-def test_a_row_of_bad_utf8_and_wrong_width_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    _, reader = read(tmp_path, with_row(b"4.5,\xff,auto,7"))
-    assert lost(reader) == 1
+def test_a_row_of_bad_utf8_and_wrong_width_far_down_is_counted_in_silence(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rows = [b"%d.0,%d.5,auto" % (n, n) for n in range(6000)]  # more than the first look at the file
+    series, reader = read(tmp_path, HEADER + b"\n".join([*rows[:5500], b"0.5,\xff,auto,7", *rows[5500:]]) + b"\n")
+    assert (len(series.receive_ns), lost(reader)) == (6000, 1)
     assert capfd.readouterr() == ("", "")
 
 
