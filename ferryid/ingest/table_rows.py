@@ -291,7 +291,11 @@ def _whole_row(delimiter: bytes) -> re.Pattern[bytes]:
 
 def _suspect_lines(raw: NDArray[np.uint8], delimiter: bytes) -> NDArray[np.intp]:
     """Lines that are too long, or whose quotes do not stand in pairs at the ends of cells."""
-    ends = np.append(np.flatnonzero(raw == 10), len(raw))
+    end = raw == 10
+    returns = np.flatnonzero(raw == 13)
+    if len(returns):
+        end[returns[raw[np.minimum(returns + 1, len(raw) - 1)] != 10]] = True  # a CR by itself ends a line too
+    ends = np.append(np.flatnonzero(end), len(raw))
     long = np.flatnonzero(np.diff(ends, prepend=-1) > LONGEST_LINE)
     quotes = np.flatnonzero(raw == 34)
     if len(quotes) == 0:

@@ -134,6 +134,7 @@ def _decode(path: Path, head: bytes, layout: TableLayout | None) -> tuple[str, s
             'text without a byte-order mark set encoding = "utf-16-le" under [table] in the profile'
         )
     try:
+        head[:64].decode(wanted, errors="replace")  # some codecs are for names and not for files
         decoder = codecs.getincrementaldecoder(wanted)(errors="strict")
         return decoder.decode(head).removeprefix("\ufeff"), wanted, ["byte-order mark skipped"] if marked else []
     except UnicodeDecodeError:

@@ -174,7 +174,7 @@ def _parse_table(reader: TableReader | None) -> TableLayout | None:
         reader.fault(f'"separator" cannot be {separator!r}. Fix: use ",", ";", "\\t", "|" or "whitespace"', "separator")
     encoding = reader.text("encoding", "utf-8")
     try:
-        known = "0,a\n".encode(encoding).decode(encoding) == "0,a\n"
+        known = "0,a\n".encode(encoding).decode(encoding, "replace") == "0,a\n"
     except (LookupError, ValueError):
         known = False
     if not known:

@@ -51,9 +51,12 @@ def test_a_damaged_row_costs_itself_and_is_counted(tmp_path: Path, row: bytes, w
     assert any(what in loss.what for loss in reader.losses)
 
 
-def test_a_row_of_bad_utf8_and_wrong_width_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    _, reader = read(tmp_path, with_row(b"4.5,\xff,auto,7"))
-    assert lost(reader) == 1
+def test_a_row_of_bad_utf8_and_wrong_width_far_down_is_counted_in_silence(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rows = [b"%d.0,%d.5,auto" % (n, n) for n in range(6000)]  # more than the first look at the file
+    series, reader = read(tmp_path, HEADER + b"\n".join([*rows[:5500], b"0.5,\xff,auto,7", *rows[5500:]]) + b"\n")
+    assert (len(series.receive_ns), lost(reader)) == (6000, 1)
     assert capfd.readouterr() == ("", "")
 
 
@@ -91,6 +94,13 @@ def test_two_stray_quotes_do_not_take_the_rows_between_them(tmp_path: Path) -> N
 def test_lines_that_end_in_cr_are_rows(tmp_path: Path) -> None:
     series, reader = read(tmp_path, (HEADER + b"\n".join(ROWS) + b"\n").replace(b"\n", b"\r"))
     assert (len(series.receive_ns), lost(reader)) == (10, 0)
+
+
+def test_quotes_on_lines_that_end_in_cr_are_no_pair(tmp_path: Path) -> None:
+    rows = list(ROWS)
+    rows[2], rows[7] = b'2.0,2.5,"', b'7.0,",auto'
+    series, reader = read(tmp_path, (HEADER + b"\n".join(rows) + b"\n").replace(b"\n", b"\r"))
+    assert (len(series.receive_ns), lost(reader)) == (8, 2)
 
 
 def test_a_form_feed_is_no_end_of_a_line(tmp_path: Path) -> None:
@@ -156,3 +166,9 @@ def test_numbers_that_only_python_reads_are_unreadable(tmp_path: Path) -> None:
 def test_a_table_without_time_lists_the_columns_that_may_be_meant(tmp_path: Path) -> None:
     with pytest.raises(FerryIdError, match=r'found "boot_time" of 2 columns, whose values do not rise.*time under'):
         read(tmp_path, b"boot_time,u\n9,1\n5,2\n3,1\n1,2\n")
+
+
+@pytest.mark.parametrize("encoding", ["idna", "undefined", "base64", "punycode", "utf-99"])
+def test_an_encoding_that_is_not_for_files_is_refused(tmp_path: Path, encoding: str) -> None:
+    with pytest.raises(FerryIdError, match=rf'names the encoding "{encoding}", which cannot be used|readable time'):
+        read(tmp_path, with_row(ROWS[0]), TableLayout(time="time", encoding=encoding))
