@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.ingest.sqlite_database import FAULTS, Database
 from ferryid.ingest.sqlite_rows import CHUNK_ROWS, TABLE, Integers, Mask, Rows
 
-CHUNK_BYTES = 2 << 20
+CHUNK_BYTES = 1 << 19
 # Topics that a statement names; of more, all rows are read.
 NAMED_TOPICS = 500
 

@@ -31,7 +31,7 @@ SPARSE_CHUNKS = 1_000
 
 TABLE = "FROM messages NOT INDEXED WHERE rowid BETWEEN ? AND ?"
 NUMBERS = (
-    "SELECT count(*), group_concat(rowid), group_concat(topic_id), "
+    "SELECT count(*), max(topic_id), max(timestamp), group_concat(rowid), group_concat(topic_id), "
     f"group_concat(timestamp), group_concat(length(data)) {TABLE}"
 )
 ROWS = f"SELECT rowid, topic_id, timestamp, length(data) {TABLE}"
@@ -181,11 +181,12 @@ def read_numbers(connection: sqlite3.Connection, low: int, high: int) -> tuple[R
     sqlite3.Error
         A page is damaged.
     """
-    count, *texts = connection.execute(NUMBERS, (low, high)).fetchone()
+    count, last_topic, last_time, *texts = connection.execute(NUMBERS, (low, high)).fetchone()
     if count == 0:
         return Rows(*(np.zeros(0, np.int64) for _ in fields(Rows))), []
-    # A real number has a point, and a NULL is missing in the text.
-    if all(texts) and not any(text.translate(None, b"0123456789-,") for text in texts):
+    # Texts and blobs sort behind all numbers, a real number has a point, and a NULL is missing in the text.
+    numbers = isinstance(last_topic, int) and isinstance(last_time, int) and all(texts)
+    if numbers and not any(text.translate(None, b"0123456789-,") for text in texts):
         columns = [np.fromstring(text, np.int64, sep=",") for text in texts]
         if all(column.size == count for column in columns):
             return Rows(*columns), []

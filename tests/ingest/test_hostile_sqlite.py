@@ -16,7 +16,6 @@ from rosbags.rosbag2 import CompressionMode
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest import message_compression, open_log
-from ferryid.ingest.join import join
 from ferryid.ingest.log import Loss, Reader
 from tests.ingest.test_rosbag2 import (
     START,
@@ -176,7 +175,7 @@ def test_broken_overflow_pages_cost_their_own_message(tmp_path: Path) -> None:
 # Values of other types
 
 
-VALUES = ["NULL", "x'00ff'", "-9223372036854775808", "9e999", "'text'", "zeroblob(10000)"]
+VALUES = ["NULL", "x'00ff'", "-9223372036854775808", "9e999", "'text'", "'1-2'", "zeroblob(10000)"]
 
 
 @pytest.mark.parametrize("value", VALUES)
@@ -304,7 +303,7 @@ def test_pages_that_refer_to_each_other_in_circles_come_to_an_end(tmp_path: Path
 
 def test_many_topics_take_linear_time(tmp_path: Path) -> None:
     path = database(tmp_path / "log.db3", [])
-    count = 10_000
+    count = 20_000
     with closing(sqlite3.connect(path)) as connection:
         connection.executemany(
             "INSERT INTO topics VALUES (?, ?, 'std_msgs/msg/Float64', 'cdr', '', '')",
@@ -419,17 +418,3 @@ def test_messages_that_unpack_to_far_more_than_their_file_are_counted(
     heights = log.read({"/image": ["height"]})["/image"].columns["height"]
     assert 0 < heights.size < 5
     assert heights.size + lost_messages(log) == 20
-
-
-def test_a_recording_of_many_topics_is_joined_in_linear_time(tmp_path: Path) -> None:
-    path = database(tmp_path / "log.db3", [])
-    with closing(sqlite3.connect(path)) as connection:
-        rows = ((i, f"/t{i}", "std_msgs/msg/Float64", "cdr", "", "") for i in range(3, 5003))
-        connection.executemany("INSERT INTO topics VALUES (?, ?, ?, ?, ?, ?)", rows)
-        connection.commit()
-    part = open_log(path)
-    joined = join([part])
-    names = [topic.name for topic in part.topics if topic.name.startswith("/t")]
-    begun = time.process_time()
-    assert len(joined.read({name: [] for name in names})) == 5000
-    assert time.process_time() - begun < 5
