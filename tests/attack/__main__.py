@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tests.attack.case import draw, formats
 from tests.attack.check import examine, reported_undamaged, write
-from tests.attack.page import grouped, page, table
+from tests.attack.page import grouped, listed, page, table
 from tests.attack.run import Result, attack, warm_up
 
 REPORT = Path(__file__).resolve().parents[2] / "reports" / "attack.md"
@@ -51,9 +51,11 @@ def main() -> int:
                     bad = sum(bool(each.outcome.violations) for each in results)
                     print(f"{len(results)} cases, {rate:.0f} per second, {bad} with a violation", flush=True)
         seconds, bad = time.monotonic() - start, sum(bool(each.outcome.violations) for each in results)
-        runs.append((seed, len(results), seconds, table(results), bad))
+        text = table(results)
+        shown = "\n\n".join(filter(None, (text, listed(seed, results, options.format))))
+        runs.append((seed, len(results), seconds, shown, bad))
         failed += bad
-        print(runs[-1][3])
+        print(text)
         _show(seed, results, options.format)
         print(f"seed {seed}: {len(results)} cases in {seconds:.0f} s, {bad} with a violation", flush=True)
     if str(options.out) != "-":

@@ -67,6 +67,15 @@ def grouped(results: Iterable[Result]) -> list[tuple[str, str, str, list[Result]
     return sorted(((*key, each) for key, each in groups.items()), key=lambda group: -len(group[3]))
 
 
+def listed(seed: int, results: Iterable[Result], only: str) -> str:
+    """Return violations as a list, one case of each group with the command that repeats it; empty without any."""
+    flag = f" --format {only}" if only else ""
+    return "\n".join(
+        f"- {len(group)} × {form}, {kind}: {text} (`python -m tests.attack --seed {seed} --only {group[0].number}{flag}`)"
+        for form, kind, text, group in grouped(results)
+    )
+
+
 def page(runs: Sequence[tuple[int, int, float, str, int]], bases: Sequence[str], not_covered: str) -> str:
     """Return the page in Markdown.
 
