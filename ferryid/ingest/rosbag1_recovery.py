@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import re
+import sys
+from bisect import bisect_right
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -73,6 +76,11 @@ class Walked:
     repeats: dict[int, int] = field(default_factory=dict)
     index: int | None = None
 
+    def in_gap(self, position: int) -> bool:
+        """Tell whether a byte is in a stretch that is no record."""
+        before = bisect_right(self.gaps, (position, sys.maxsize))
+        return before > 0 and position < self.gaps[before - 1][1]
+
     def gap(self, first: int, end: int) -> None:
         """Note bytes that are no records."""
         self.gaps.append((first, end))
@@ -126,15 +134,14 @@ def walk(records: Records) -> Walked:
             if following == len(data):
                 following = finder.next(position + 1, (CHUNK_INFO, CONNECTION))
             found.gap(position, following)
-        if len(found.connections) > MAX_CONNECTIONS or len(found.chunks) > MAX_CHUNKS:
-            raise RecordError(f"it holds more than {MAX_CONNECTIONS} connections or {MAX_CHUNKS} chunks")
+        _check_numbers(found)
         position = following
     for number in doubtful:
         del found.connections[number]
     infos = list({(info.chunk, info.start_ns, info.end_ns, *info.counts.items()): info for info in infos}.values())
     _drop_repeats(data, found)
     left = _assign_all(data, found, infos)
-    if any(not any(first <= info.chunk < end for first, end in found.gaps) for info in left):
+    if not all(found.in_gap(info.chunk) for info in left):
         # No damage accounts for what these records list: chunks may have index records of others behind them.
         for chunk in found.chunks:
             chunk.counts = chunk.start_ns = chunk.end_ns = None
@@ -149,15 +156,15 @@ def walk(records: Records) -> Walked:
         elif chunk_there.counts is None:
             info.note_on(chunk_there)
     # What is left is of chunks that are lost, but for those whose times or place are wrong.
-    by_counts: dict[Any, list[Chunk]] = {}
+    by_counts: dict[Any, deque[Chunk]] = {}
     for chunk in found.chunks if moved else ():
         content = _content(data, chunk) if chunk.counts is None else None
         if content:
-            by_counts.setdefault(content[2], []).append(chunk)
+            by_counts.setdefault(content[2], deque()).append(chunk)
     for info in moved:
         same = by_counts.get(frozenset(info.counts.items()))
         if same:
-            info.note_on(same.pop(0))
+            info.note_on(same.popleft())
         else:
             found.missing.append(info)
     return found
@@ -182,6 +189,11 @@ def _assign_all(data: Any, found: Walked, infos: list[ChunkInfo]) -> list[ChunkI
     _walk_chunks(data, found)
     left = _assign(data, found.chunks, left, moved=False)
     return _assign(data, found.chunks, left, moved=True)
+
+
+def _check_numbers(found: Walked) -> None:
+    if len(found.connections) > MAX_CONNECTIONS or len(found.chunks) > MAX_CHUNKS:
+        raise RecordError(f"it holds more than {MAX_CONNECTIONS} connections or {MAX_CHUNKS} chunks")
 
 
 def _end_of_chunk(finder: _Finder, chunk: Chunk) -> int:
@@ -255,16 +267,17 @@ def _assign(data: Any, chunks: list[Chunk], infos: list[ChunkInfo], *, moved: bo
     The record must be of a chunk at that place, or with `moved` of any: where bytes went missing or came in, all chunks
     behind them have moved.
     """
-    free: dict[Any, dict[int, Chunk]] = {}
+    free: dict[Any, deque[Chunk]] = {}
     for chunk in chunks if infos else ():
         if chunk.counts is None:
-            free.setdefault(_content(data, chunk), {})[chunk.position] = chunk
+            content = _content(data, chunk)
+            free.setdefault((content, None if moved else chunk.position), deque()).append(chunk)
     left: list[ChunkInfo] = []
     for info in infos:
-        same = free.get((info.start_ns, info.end_ns, frozenset(info.counts.items())), {})
-        place = next(iter(same), -1) if moved else info.chunk
-        if place in same:
-            info.note_on(same.pop(place))
+        stated = info.start_ns, info.end_ns, frozenset(info.counts.items())
+        same = free.get((stated, None if moved else info.chunk))
+        if same:
+            info.note_on(same.popleft())
         else:
             left.append(info)
     return left
@@ -304,7 +317,9 @@ def _walk_chunks(data: Any, found: Walked) -> None:
             continue
         content = decompressed(data, chunk, allowance, exact=True)
         walked = walk_chunk(content.buffer)
-        found.connections = {**walked.connections, **found.connections}
+        for number, connection in walked.connections.items():
+            found.connections.setdefault(number, connection)
+        _check_numbers(found)
         if not trusted:
             chunk.walked = walked.entries
             if not (content.whole and walked.whole):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
-from ferryid.ingest import open_log, rosbag1_chunks
+from ferryid.ingest import open_log, rosbag1_chunks, rosbag1_recovery
 from ferryid.ingest.rosbag1_chunks import Allowance, decompressed
 from ferryid.ingest.rosbag1_messages import Messages
 from ferryid.ingest.rosbag1_records import (
@@ -57,16 +57,21 @@ def parsed(bag: bytes) -> list[Raw]:
     return found
 
 
+@pytest.fixture(scope="module", params=COMPRESSIONS)
+def whole(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """An undamaged bag of each compression."""
+    return write_bag(tmp_path_factory.mktemp("whole") / "a.bag", request.param).read_bytes()
+
+
 def places(records: list[Raw], op: int) -> list[int]:
     return [place for place, record in enumerate(records) if record.op == op]
 
 
 def read_changed(
-    folder: Path, compression: str, change: Callable[[list[Raw]], Any], *, verify: bool = False
+    path: Path, whole: bytes, change: Callable[[list[Raw]], Any], *, verify: bool = False
 ) -> tuple[int, Any]:
-    """Write a bag, change its list of records, read it: number of rows and the reader."""
-    path = write_bag(folder / "a.bag", compression)
-    records = parsed(path.read_bytes())
+    """Change the list of records of a bag and read it: number of rows and the reader."""
+    records = parsed(whole)
     change(records)
     path.write_bytes(b"#ROSBAG V2.0\n" + b"".join(record.packed() for record in records))
     reader = open_log(path)
@@ -143,32 +148,28 @@ WHOLE = {
 }
 
 
-@pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("damage", WHOLE)
-def test_a_damaged_index_costs_no_message_and_is_reported(tmp_path: Path, compression: str, damage: str) -> None:
-    rows, reader = read_changed(tmp_path, compression, WHOLE[damage], verify=True)
+def test_a_damaged_index_costs_no_message_and_is_reported(tmp_path: Path, whole: bytes, damage: str) -> None:
+    rows, reader = read_changed(tmp_path / "a.bag", whole, WHOLE[damage], verify=True)
     assert rows == ALL
     assert reader.losses
     assert [loss.messages for loss in reader.losses] == [0] * len(reader.losses)
 
 
 @pytest.mark.parametrize("damage", ["count of an index record", "connection of an index record", "index record twice"])
-def test_a_damaged_index_costs_no_message_without_verify_either(tmp_path: Path, damage: str) -> None:
-    assert read_changed(tmp_path, "lz4", WHOLE[damage])[0] == ALL
+def test_a_damaged_index_costs_no_message_without_verify_either(tmp_path: Path, whole: bytes, damage: str) -> None:
+    assert read_changed(tmp_path / "a.bag", whole, WHOLE[damage])[0] == ALL
 
 
-def test_a_chunk_that_is_gone_is_counted_by_its_chunk_information(tmp_path: Path) -> None:
-    rows, reader = read_changed(tmp_path, "lz4", drop(CHUNK, 3))
+def test_a_chunk_that_is_gone_is_counted_by_its_chunk_information(tmp_path: Path, whole: bytes) -> None:
+    rows, reader = read_changed(tmp_path / "a.bag", whole, drop(CHUNK, 3))
     assert rows < ALL
     assert rows + sum(loss.messages for loss in reader.losses) == ALL
 
 
 @pytest.mark.parametrize("length", [0, 50, 9000, 0xFFFFFFFF])
-@pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_a_chunk_of_wrong_length_costs_no_message(tmp_path: Path, compression: str, length: int) -> None:
-    path = write_bag(tmp_path / "a.bag", compression)
-    bag = bytearray(path.read_bytes())
-    records = parsed(bytes(bag))
+def test_a_chunk_of_wrong_length_costs_no_message(tmp_path: Path, whole: bytes, length: int) -> None:
+    path, bag, records = tmp_path / "a.bag", bytearray(whole), parsed(whole)
     place = 13 + sum(len(record.packed()) for record in records[: places(records, CHUNK)[3]])
     at = place + 4 + struct.unpack_from("<I", bag, place)[0]
     bag[at : at + 4] = struct.pack("<I", length)
@@ -194,12 +195,12 @@ def test_verify_counts_lost_messages_of_topics_that_nobody_wants(tmp_path: Path)
 
 
 @pytest.mark.parametrize("time", [b"\xff" * 8, bytes(8), b"\xff" * 4 + bytes(4)])
-def test_nonsense_times_of_the_index_cost_no_message_but_their_own(tmp_path: Path, time: bytes) -> None:
+def test_nonsense_times_of_the_index_cost_no_message_but_their_own(tmp_path: Path, whole: bytes, time: bytes) -> None:
     def change(records: list[Raw]) -> None:
         place = places(records, INDEX)[5]
         records[place] = records[place]._replace(data=time + records[place].data[8:])
 
-    rows, reader = read_changed(tmp_path, "lz4", change)
+    rows, reader = read_changed(tmp_path / "a.bag", whole, change)
     assert rows + sum(loss.messages for loss in reader.losses) == ALL
     assert reader.losses
 
@@ -224,8 +225,8 @@ def test_a_chunk_expands_to_its_allowance_at_most(
 ) -> None:
     monkeypatch.setattr(rosbag1_chunks, "FREE_CHUNK", 1000)
     monkeypatch.setattr(rosbag1_chunks, "MAX_CHUNK", 100_000)
-    for size in (0, 1000, 10**7, 2**32 - 1):
-        data, chunk = stored_chunk(compression, bytes(10**7), size)
+    for size in (0, 10**6, 2**32 - 1):
+        data, chunk = stored_chunk(compression, bytes(10**6), size)
         content = decompressed(data, chunk, Allowance(10**9, 100_000), exact=exact)
         assert len(content.buffer) <= min(100_000, 1000 + 255 * len(data))
         assert not content.whole
@@ -262,3 +263,11 @@ def test_a_connection_record_of_absurd_length_is_no_connection() -> None:
     data = Raw({b"op": b"\7", b"conn": bytes(4), b"topic": b"/a"}, bytes(5 << 20)).packed()
     with pytest.raises(RecordError, match="bytes"):
         connection_of(data, Records(data).at(0))
+
+
+def test_more_connections_than_any_recorder_writes_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_bag(tmp_path / "a.bag", "none", count=3)
+    path.write_bytes(path.read_bytes()[:-1])
+    monkeypatch.setattr(rosbag1_recovery, "MAX_CONNECTIONS", 1)
+    with pytest.raises(FerryIdError, match="more than 1 connections"):
+        open_log(path)
