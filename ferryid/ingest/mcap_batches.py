@@ -165,7 +165,8 @@ def _gathered(
                 batch, size, count = [], 0, 0
             yield item
             continue
-        if not (thorough or _holds(item, wanted)):
+        # A chunk with a table was walked, and with that checked, when the file was opened.
+        if not _holds(item, wanted) and (item.table is not None or not thorough):
             continue
         try:
             plan = _plan(file, item, wanted, thorough)
@@ -209,9 +210,7 @@ def _items(index: Index) -> Iterator[Chunk | Messages]:
 
 
 def _holds(chunk: Chunk, wanted: Collection[int]) -> bool:
-    if chunk.table is not None:
-        return bool(np.isin(chunk.table.channels, list(wanted)).any())
-    return chunk.indexed is not None and any(channel in wanted for channel in chunk.indexed)
+    return any(channel in wanted for channel in chunk.counts())
 
 
 def _plan(file: memoryview, chunk: Chunk, wanted: Collection[int], thorough: bool) -> _Plan:

@@ -161,6 +161,12 @@ def walk_table(data: Bytes, chunk: Chunk) -> tuple[Messages, list[tuple[int, int
     return table, others, end
 
 
+def header_fields(buffer: Bytes, messages: Messages) -> NDArray[np.void]:
+    """Return the record headers of messages as `MESSAGE_FIELDS`, shape (n,)."""
+    headers = np.ndarray((len(buffer) - MESSAGE_HEADER + 1,), f"V{MESSAGE_HEADER}", buffer, strides=(1,))
+    return headers[messages.starts - MESSAGE_HEADER].view(MESSAGE_FIELDS)
+
+
 def without_copies(buffer: Bytes, messages: Messages, surplus: bool = False) -> Messages:
     """Return the messages without those that are the same, byte for byte, as an earlier one of the same number.
 
@@ -169,8 +175,7 @@ def without_copies(buffer: Bytes, messages: Messages, surplus: bool = False) -> 
     """
     if len(messages) < 2 or (messages.log_ns[1:] > messages.log_ns[:-1]).all():
         return messages
-    headers = np.ndarray((len(buffer) - MESSAGE_HEADER + 1,), f"V{MESSAGE_HEADER}", buffer, strides=(1,))
-    fields = headers[messages.starts - MESSAGE_HEADER].view(MESSAGE_FIELDS)
+    fields = header_fields(buffer, messages)
     order = np.lexsort((fields["length"], fields["sequence"], messages.log_ns, messages.channels))
     fields = fields[order]
     numbered = np.isin(fields["channel"], fields["channel"][fields["sequence"] != 0])
@@ -282,14 +287,15 @@ def _lost(
     for channel, count in sorted(chunk.counts().items()):
         if channel not in wanted:
             continue
-        missing = count - (len(kept[channel]) if kept and channel in kept else 0)
         start_ns, end_ns = chunk.start_ns, chunk.end_ns
         if chunk.indexed is not None:
             try:
-                times = index_entries(file, channel, *chunk.indexed[channel])[:, 0]
-                start_ns, end_ns = max(int(times.min()), 0), max(int(times.max()), 0)
+                entries = index_entries(file, channel, *chunk.indexed[channel])
+                start_ns, end_ns = max(int(entries[:, 0].min()), 0), max(int(entries[:, 0].max()), 0)
+                count = len(np.unique(entries[:, 1]))
             except (DamagedRecord, ValueError):
                 pass
+        missing = count - (len(kept[channel]) if kept and channel in kept else 0)
         if missing > 0:
             losses.append(Loss(name, what, topics.get(channel), missing, start_ns, end_ns))
     return losses

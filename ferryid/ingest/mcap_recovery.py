@@ -13,6 +13,7 @@ from ferryid.ingest.mcap_chunks import (
     check_covered,
     content,
     copies_lost,
+    header_fields,
     walk_chunk,
     without_copies,
 )
@@ -219,13 +220,17 @@ def _check_loose(index: Index, whole_file: Bytes, name: str) -> None:
     defined = np.isin(kept.channels, list(index.channels))
     surplus = index.statistics is not None and sum(index.counts().values()) > index.statistics.message_count
     times = kept.log_ns[defined]
-    if index.chunks:
+    odd = np.zeros(len(kept), np.bool_)
+    if index.chunks and len(kept):
+        # A MessageIndex record behind a chunk whose kind was damaged: its length field stands in place of the number.
+        fields = header_fields(whole_file, kept)
+        odd = (fields["sequence"] % 16 == 0) & (fields["length"] == fields["sequence"].astype(np.uint64) + 6)
         times = np.array([(chunk.start_ns, chunk.end_ns) for chunk in index.chunks])
     if len(times):
-        odd = ((kept.log_ns < times.min()) | (kept.log_ns > times.max())) & (surplus | ~defined)
-        if odd.any():
-            what = f"{int(odd.sum())} records that look like messages of other channels or times were left out"
-            index.losses.append(Loss(name, what))
-            kept = kept.take(~odd)
+        odd |= ((kept.log_ns < times.min()) | (kept.log_ns > times.max())) & (surplus | ~defined)
+    if odd.any():
+        what = f"{int(odd.sum())} records that look like messages of other channels or times were left out"
+        index.losses.append(Loss(name, what))
+        kept = kept.take(~odd)
     index.loose = kept
     index.complete = _confirmed(index)

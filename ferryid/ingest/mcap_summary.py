@@ -141,7 +141,7 @@ def _contradiction(file: memoryview, stop: int, extents: list[tuple[int, int]]) 
         # Messages outside chunks are found by walking the file.
         return None
     for (_, end), (start, _) in pairwise([(0, len(MAGIC)), *extents, (stop, stop)]):
-        if end > start:
+        if end > start or start > stop:
             return "the summary lists chunks that overlap or lie outside the data"
         if end < start:
             _, others, reached = walk(file, end, start)

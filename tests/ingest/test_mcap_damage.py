@@ -245,3 +245,38 @@ def test_a_definition_longer_than_its_record_is_no_definition() -> None:
     got, losses = accounted(HEAD + bad + b"".join(message(number) for number in range(COUNT)))
     assert got == ALL
     assert any("1 damaged, unknown or misplaced records" in loss.what for loss in losses)
+
+
+def test_a_summary_that_lists_a_chunk_behind_the_file_is_not_believed() -> None:
+    content = with_summary(chunk_records())
+    # A ChunkIndex record: start and end time, offset of the chunk, its length, message index offsets.
+    start = content.rindex(struct.pack("<QQ", T0 + 45, T0 + 145))
+    (offset,) = struct.unpack_from("<Q", content, start + 16)
+    damaged = bytearray(content)
+    for place in (start + 16, start + 38):
+        moved = struct.unpack_from("<Q", content, place)[0] + 10 * len(content)
+        damaged[place : place + 8] = struct.pack("<Q", moved)
+    damaged[-12:-8] = bytes(4)
+    assert offset < len(content)
+    got, losses = accounted(bytes(damaged))
+    assert got == ALL
+    assert losses
+
+
+@pytest.mark.parametrize("summary", [True, False])
+def test_a_message_index_turned_into_a_message_is_no_message(summary: bool) -> None:
+    chunks = chunk_records()
+    content = with_summary(chunks) if summary else without_summary(chunks)
+    index = message_index(chunks[1][1])
+    got, losses = accounted(content.replace(index, b"\x05" + index[1:]))
+    assert got == ALL
+    assert losses
+
+
+def test_a_message_named_twice_in_a_chunk_that_cannot_be_read_is_lost_once() -> None:
+    chunks = chunk_records("zstd")
+    entries = [chunks[1][1][0], *chunks[1][1]]
+    chunks[1] = chunks[1][0][:-9] + bytes(9), entries
+    got, losses = accounted(without_summary(chunks))
+    assert len(got) == COUNT - PER_CHUNK
+    assert PER_CHUNK in [loss.messages for loss in losses]
