@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
+from ferryid.files import dump_json
 from ferryid.identify import archive as module
 from ferryid.identify import kept_pieces
 from ferryid.identify.archive import fit_archive
 from ferryid.identify.archived_logs import folders
 from ferryid.identify.fit import fit
+from ferryid.identify.model import to_json
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweep import sweep
 from ferryid.report.fit_report import fit_archive_and_report
@@ -81,6 +83,12 @@ def test_a_damaged_file_is_made_anew(season: Path) -> None:
     for path in season.glob("logs/*/pieces-*.parquet"):
         path.write_bytes(path.read_bytes()[:-100])
     np.testing.assert_array_equal(fit_archive(PROFILE, SETTINGS, season).model.theta, whole.model.theta)
+
+
+def test_the_same_fit_again_is_the_same_model_file(season: Path, tmp_path: Path) -> None:
+    shutil.copytree(season / "logs", tmp_path / "logs", ignore=shutil.ignore_patterns("pieces-*"))
+    texts = [dump_json(to_json(replace(fit_archive(PROFILE, SETTINGS, tmp_path).model, created=""))) for _ in range(2)]
+    assert texts[0] == texts[1]
 
 
 def test_sums_that_are_another_logs_are_made_anew(season: Path, tmp_path: Path) -> None:
