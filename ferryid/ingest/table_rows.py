@@ -6,7 +6,7 @@ import csv
 import mmap
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +40,15 @@ class TextSheet:
     decimal: str
     first_row: int
     encoding: str
+    unread: str = ""
+    """What is lost before the first row, as a sentence."""
 
     def load(self, names: Sequence[str]) -> Rows:
         """Parse the named columns of every row that has the right number of fields."""
-        return _load(self, tuple(names))
+        rows = _load(self, tuple(names))
+        if not self.unread:
+            return rows
+        return replace(rows, losses=(Loss(str(self.path), self.unread, self.topic.name), *rows.losses))
 
 
 @dataclass

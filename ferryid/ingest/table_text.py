@@ -54,6 +54,8 @@ class _Shape:
     names: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
+    unread: str = ""
+    """What is lost before the first row, as a sentence."""
 
 
 def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> TextSheet:
@@ -111,7 +113,9 @@ def open_text(path: Path, layout: TableLayout | None, topic: str = "table") -> T
         fields=fields,
         note="; ".join(note for note in notes if note),
     )
-    return TextSheet(path, described, plan, names, shape.separator, shape.decimal, shape.first_row, encoding)
+    return TextSheet(
+        path, described, plan, names, shape.separator, shape.decimal, shape.first_row, encoding, shape.unread
+    )
 
 
 def looks_like_text(head: bytes) -> bool:
@@ -188,6 +192,12 @@ def _is_number(text: str, decimal: str) -> bool:
     return True
 
 
+def _is_measured(text: str, decimal: str) -> bool:
+    """True for a number or a time, but not for the 1 that stands for a unit."""
+    bare = text.strip()
+    return bare not in ("", "1") and (_is_number(bare, decimal) or looks_like_datetime(bare))
+
+
 def _is_row(fields: Sequence[str], decimal: str) -> bool:
     """At least half of the fields are values, and one is a number or a time."""
     if len(fields) < 2:
@@ -235,6 +245,12 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
             "Fix: pass a log, or describe the table under [table] in the profile (separator, skip_rows, columns)"
         )
     _, _, width, separator, decimal, first = best
+    # Between the line of names and the first intact row may stand damaged ones, which still hold a number; units do not.
+    top = first
+    while top > 0 and any(_is_measured(cell, decimal) for cell in _split(lines[top - 1], separator)):
+        top -= 1
+    if top > 0 and len(_split(lines[top - 1], separator)) == width:
+        first = top
     header = first
     while header > 0 and len(_split(lines[header - 1], separator)) == width:
         header -= 1
@@ -248,6 +264,12 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     else:
         names = tuple(f"column {place}" for place in range(1, width + 1))
         notes.append("no header row: columns are named by their place")
+    unread = ""
+    if header == first and any(
+        len(cells) > 1 and any(_is_measured(cell, decimal) for cell in cells)
+        for cells in (_split(line, separator) for line in lines[:first])
+    ):
+        unread = f"{first} line(s) before the first row cannot be read: names of columns and rows may be lost with them"
     if header > 0:
         notes.append(f"{header} line(s) before the table skipped")
     filled_rows = tuple(_rows(lines[first:], separator, width))
@@ -256,7 +278,7 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
         notes.append(f"columns separated by {shown}")
     if decimal == ",":
         notes.append("decimal comma")
-    return _Shape(separator, decimal, first, names, filled_rows, tuple(notes))
+    return _Shape(separator, decimal, first, names, filled_rows, tuple(notes), unread)
 
 
 def _names_for(line: str, separator: str, width: int) -> tuple[str, ...] | None:

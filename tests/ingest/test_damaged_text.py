@@ -172,3 +172,30 @@ def test_a_table_without_time_lists_the_columns_that_may_be_meant(tmp_path: Path
 def test_an_encoding_that_is_not_for_files_is_refused(tmp_path: Path, encoding: str) -> None:
     with pytest.raises(FerryIdError, match=rf'names the encoding "{encoding}", which cannot be used|readable time'):
         read(tmp_path, with_row(ROWS[0]), TableLayout(time="time", encoding=encoding))
+
+
+@pytest.mark.parametrize("damaged", ["16\\xff\\xff,2,ok", "0.0,2", "0.0,2,ok,4,5"])
+def test_a_damaged_first_row_is_lost_by_itself_and_leaves_the_names(tmp_path: Path, damaged: str) -> None:
+    rows = "".join(f"{n},{n * 2},ok\n" for n in range(1, 40))
+    path = tmp_path / "t.csv"
+    path.write_bytes(f"time,a,note\n{damaged}\n{rows}".encode("latin-1").replace(b"\\xff", b"\xff"))
+    reader = open_log(path)
+    series = reader.read({"table": ("a",)})["table"]
+    assert len(series.receive_ns) == 39
+    assert sum(loss.messages or 0 for loss in reader.losses) == 1
+
+
+def test_lines_before_the_first_row_that_hold_numbers_but_no_names_are_a_loss(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("time,a;0,1;1,2\n2,3;3,4\n" + "".join(f"{n},{n * 2}\n" for n in range(4, 40)), encoding="utf-8")
+    reader = open_log(path)
+    reader.read({"table": ()})
+    assert any("lines" in loss.what or "line(s) before" in loss.what for loss in reader.losses)
+
+
+def test_a_line_of_units_below_the_names_is_no_row(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("time,a,b\ns,m,1\n" + "".join(f"{n},{n * 2},0\n" for n in range(40)), encoding="utf-8")
+    reader = open_log(path)
+    assert len(reader.read({"table": ("a",)})["table"].receive_ns) == 40
+    assert reader.losses == ()
