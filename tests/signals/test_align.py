@@ -259,7 +259,9 @@ def test_a_log_without_actuators_or_navigation_is_refused() -> None:
 
 def test_one_row_and_a_time_that_stands_still_are_called_that() -> None:
     one = np.array([3.0])
-    with pytest.raises(FerryIdError, match=r"needs measurements over time, found one row in each of /navigation, /thrusters"):
+    with pytest.raises(
+        FerryIdError, match=r"needs measurements over time, found one row in each of /navigation, /thrusters"
+    ):
         align(recording(navigation(one), thrusters(one)), PROFILE)
     still = replace(navigation(one), clock=replace(navigation(one).clock, duplicates=99))
     with pytest.raises(FerryIdError, match=r"time does not advance, found the same time on 100 rows"):
