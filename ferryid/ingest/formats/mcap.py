@@ -18,8 +18,9 @@ from ferryid.ingest.checksum import crc32
 from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
 from ferryid.ingest.mcap_batches import batches
 from ferryid.ingest.mcap_chunks import Loaded
-from ferryid.ingest.mcap_index import DATA_END, MAGIC, RECORD_HEADER, Messages, record_header, spans
+from ferryid.ingest.mcap_index import DATA_END, MAGIC, RECORD_HEADER, Messages, record_header
 from ferryid.ingest.mcap_recovery import read_index
+from ferryid.ingest.mcap_spans import spans
 
 
 @dataclass(frozen=True)
