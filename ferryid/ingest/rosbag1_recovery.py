@@ -63,6 +63,8 @@ class Walked:
         Byte of a chunk that was walked to what is wrong with the chunk itself.
     repeats
         Byte of a chunk that was left out to the byte of the same chunk before it.
+    infos
+        Number of chunk information records.
     index
         First byte of the chunk information behind the chunks and their index records, None where there is none.
     """
@@ -74,6 +76,7 @@ class Walked:
     doubts: dict[int, str] = field(default_factory=dict)
     faults: dict[int, str] = field(default_factory=dict)
     repeats: dict[int, int] = field(default_factory=dict)
+    infos: int = 0
     index: int | None = None
 
     def in_gap(self, position: int) -> bool:
@@ -116,6 +119,9 @@ def walk(records: Records) -> Walked:
                     found.doubts[position] = "its stated length is damaged, or they are"
             elif record.op == BAG_HEADER and position == len(MAGIC):
                 following = finder.next(record.start, (CHUNK, CHUNK_INFO, CONNECTION))
+                first = record.end if record.end < following else record.start
+                if bytes(data[first:following]).strip():
+                    found.gap(first, following)
             elif record.op == INDEX and found.chunks:
                 duplicate = note_index(data, found.chunks[-1], record)
                 if duplicate:
@@ -140,6 +146,7 @@ def walk(records: Records) -> Walked:
         del found.connections[number]
     infos = list({(info.chunk, info.start_ns, info.end_ns, *info.counts.items()): info for info in infos}.values())
     _drop_repeats(data, found)
+    found.infos = len(infos)
     left = _assign_all(data, found, infos)
     if not all(found.in_gap(info.chunk) for info in left):
         # No damage accounts for what these records list: chunks may have index records of others behind them.
@@ -320,9 +327,13 @@ def _walk_chunks(data: Any, found: Walked) -> None:
         for number, connection in walked.connections.items():
             found.connections.setdefault(number, connection)
         _check_numbers(found)
+        whole = content.whole and walked.whole
+        if trusted and whole and not walked.entries.keys() >= chunk.indexed.keys():
+            found.doubts[chunk.position] = "they are of an unknown connection"
+            trusted = False
         if not trusted:
             chunk.walked = walked.entries
-            if not (content.whole and walked.whole):
+            if not whole:
                 found.faults[chunk.position] = content.fault or "its records are damaged"
 
 
@@ -338,9 +349,10 @@ def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss
     add(f"the index cannot be used ({error}): a walk over all records found {count} messages without it", 0)
     _add_chunks(data, found, add)
     try:
-        announced = Records(data).at(len(MAGIC)).number(b"index_pos")
+        header = Records(data).at(len(MAGIC))
+        announced, chunks = header.number(b"index_pos"), header.number(b"chunk_count")
     except RecordError:
-        announced = 0
+        announced = chunks = 0
     # An index that is there shows that only its announced place is damaged, not that the file was cut.
     cut = found.index is None and announced > size
     if cut:
@@ -353,8 +365,8 @@ def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss
     index = found.index if found.index is not None else size
     if announced < size and _kind(Records(data), announced) in (CONNECTION, CHUNK_INFO):
         index = announced
-    # Without a gap in it the index lists every chunk that there was.
-    listed = index < size and all(chunk.counts is not None for chunk in found.chunks)
+    # Without a gap in it the index lists every chunk that there was, as many as the bag header counts.
+    listed = chunks == found.infos and index < size and all(chunk.counts is not None for chunk in found.chunks)
     listed = listed and all(end <= index for _, end in found.gaps)
     for first, end in found.gaps:
         # Damage to the index itself, the end of a cut file and chunks with a count are in the list already.

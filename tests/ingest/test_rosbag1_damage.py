@@ -271,3 +271,15 @@ def test_more_connections_than_any_recorder_writes_are_refused(tmp_path: Path, m
     monkeypatch.setattr(rosbag1_recovery, "MAX_CONNECTIONS", 1)
     with pytest.raises(FerryIdError, match="more than 1 connections"):
         open_log(path)
+
+
+def test_a_first_chunk_whose_record_is_damaged_is_reported_without_chunk_information_too(
+    tmp_path: Path, whole: bytes
+) -> None:
+    def change(records: list[Raw]) -> None:
+        records[places(records, CHUNK)[0]].fields[b"op"] = b"\x55"
+        del records[places(records, CHUNK_INFO)[0]]
+
+    rows, reader = read_changed(tmp_path / "a.bag", whole, change)
+    assert rows < ALL
+    assert None in [loss.messages for loss in reader.losses]

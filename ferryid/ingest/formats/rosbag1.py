@@ -114,7 +114,8 @@ class Rosbag1Reader:
         except RecordError as error:
             connections, chunks = self._recovered(error)
         self._chunks = chunks
-        self._note_strangers({connection.number for connection in connections})
+        self._numbers = [connection.number for connection in connections]
+        self._note_strangers(set(self._numbers))
         self._chunks_of: dict[int, list[Chunk]] = {}
         for chunk in chunks:
             for number in chunk.connections:
@@ -407,7 +408,9 @@ class Rosbag1Reader:
             here = slice(first, first + len(entries))
             first += len(entries)
             if intact is not None:
-                tally.add(receive_ns[here][~intact[here]], wanted=name is not None)
+                # Messages of connections without a record were reported as lost at opening.
+                known = np.isin(owners[here], self._numbers)
+                tally.add(receive_ns[here][~intact[here] & known], wanted=name is not None)
             if name is None:
                 continue
             if intact is None:
