@@ -332,6 +332,11 @@ def _gaps(index: Index, gaps: Sequence[tuple[int, int]], size: int, name: str) -
         last = max((time for time in before if time >= 0), default=None)
         if stop == size:
             what = "the file ends without its end record, and whatever followed is missing"
+            if start < size:
+                what = (
+                    f"the file ends without its end record: its last {size - start} bytes, from byte {start} on, are damaged "
+                    "or cut off, and what they held is missing"
+                )
             yield Loss(name, what, None, None, last, None)
         else:
             what = f"{stop - start} damaged bytes from byte {start} were passed over"

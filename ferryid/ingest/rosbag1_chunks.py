@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from bz2 import BZ2Decompressor
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, NamedTuple
@@ -147,6 +148,9 @@ def _expanded(stored: memoryview, compression: str, size: int, limit: int) -> tu
         return content, "", decoder.eof
     except DAMAGE as error:
         fault = f"it does not decompress ({error})"
+        if "contentChecksum" in str(error):
+            # All of it decompresses, and any part of it may be wrong.
+            return b"", "its content does not match its checksum", False
     # Up to the first damaged byte: in steps to near it, then from the start again and up to it byte by byte.
     good = _steps(stored, 0, SALVAGE_STEP, compression, limit)[1]
     return _steps(stored, good, 1, compression, limit)[0], fault, False
@@ -262,6 +266,22 @@ def replaced(data: Any, chunk: Chunk, allowance: Allowance, *, intact: bool) -> 
         for number, rows in _contradicted(data, chunk, entries).items():
             entries[number], doubtful[number] = entries[number][~rows], entries[number][rows]
     return Replaced(replace(chunk, walked=entries), content.buffer, doubtful)
+
+
+def missing(chunk: Chunk, walked: Chunk, known: Collection[int]) -> dict[int, int]:
+    """Return how many messages of each connection the index records of a chunk count beyond those that are in it.
+
+    Messages of a known connection that the index records do not count make up for them, as then the index is damaged.
+    """
+    surplus = sum(max(0, walked.count(number) - chunk.indexed.get(number, 0)) for number in known)
+    short: dict[int, int] = {}
+    for number, count in chunk.indexed.items():
+        beyond = max(0, count - walked.count(number))
+        made_up = min(beyond, surplus)
+        surplus -= made_up
+        if beyond > made_up:
+            short[number] = beyond - made_up
+    return short
 
 
 def _contradicted(data: Any, chunk: Chunk, walked: dict[int, Entries]) -> dict[int, NDArray[np.bool_]]:

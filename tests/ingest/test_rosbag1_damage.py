@@ -283,3 +283,56 @@ def test_a_first_chunk_whose_record_is_damaged_is_reported_without_chunk_informa
     rows, reader = read_changed(tmp_path / "a.bag", whole, change)
     assert rows < ALL
     assert None in [loss.messages for loss in reader.losses]
+
+
+def rewritten_chunk(change: Callable[[bytes], bytes]) -> Callable[[list[Raw]], None]:
+    """Change the stored bytes of the second chunk, whatever its compression."""
+
+    def edit(records: list[Raw]) -> None:
+        place = places(records, CHUNK)[1]
+        records[place] = records[place]._replace(data=change(records[place].data))
+
+    return edit
+
+
+@pytest.mark.parametrize("verify", [False, True])
+def test_a_message_cut_out_of_a_chunk_that_index_and_chunk_information_count_is_lost(
+    tmp_path: Path, verify: bool
+) -> None:
+    def cut(records: list[Raw]) -> None:
+        place = places(records, CHUNK)[1]
+        inside = Records(content := lz4.frame.decompress(records[place].data))
+        messages, position = [], 0
+        while position < len(content):
+            record = inside.at(position)
+            messages.append(content[position : record.end])
+            position = record.end
+        data = b"".join([*messages[:-2], messages[-1]])
+        records[place].fields[b"size"] = struct.pack("<I", len(data))
+        records[place] = records[place]._replace(data=lz4.frame.compress(data, content_checksum=True))
+
+    whole = write_bag(tmp_path / "whole.bag", "lz4").read_bytes()
+    count, reader = read_changed(tmp_path / "b.bag", whole, cut, verify=verify)
+    assert count + sum(loss.messages or 0 for loss in reader.losses) == ALL
+
+
+def test_verify_believes_nothing_of_a_chunk_whose_content_checksum_is_wrong(tmp_path: Path) -> None:
+    def flip(stored: bytes) -> bytes:
+        # A literal of the content; where one stands hangs on the compressor, so that it is searched.
+        for place in range(len(stored) - 8, 0, -1):
+            damaged = stored[:place] + bytes([stored[place] ^ 1]) + stored[place + 1 :]
+            try:
+                lz4.frame.decompress(damaged)
+            except RuntimeError as error:
+                if "contentChecksum" in str(error):
+                    return damaged
+        pytest.fail("no byte of the chunk can be damaged alone")
+
+    def recompress(stored: bytes) -> bytes:
+        return flip(lz4.frame.compress(lz4.frame.decompress(stored), content_checksum=True))
+
+    whole = write_bag(tmp_path / "whole.bag", "lz4").read_bytes()
+    count, reader = read_changed(tmp_path / "b.bag", whole, rewritten_chunk(recompress), verify=True)
+    assert count < ALL
+    assert count + sum(loss.messages or 0 for loss in reader.losses) == ALL
+    assert any("does not match its checksum" in loss.what for loss in reader.losses)

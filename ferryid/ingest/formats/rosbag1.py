@@ -30,6 +30,7 @@ from ferryid.ingest.rosbag1_chunks import (
     covers,
     decompressed,
     distinct,
+    missing,
     replaced,
 )
 from ferryid.ingest.rosbag1_messages import Messages
@@ -397,6 +398,13 @@ class Rosbag1Reader:
                 for number, entries in better.doubtful.items():
                     if check or number in topic_of:
                         tally.add(nanoseconds(entries), wanted=number in topic_of)
+                for number, count in missing(chunk, better.chunk, self._numbers).items():
+                    short = count - len(better.doubtful.get(number, ()))
+                    if short > 0 and (check or number in topic_of):
+                        # Only where the chunk information counts the same are the index records believed.
+                        tally.hidden |= chunk.counts != chunk.indexed
+                        tally.count += short if number in topic_of and not tally.hidden else 0
+                        tally.others += short if number not in topic_of and not tally.hidden else 0
                 return tally
             intact = np.ones(len(starts), np.bool_) if intact is None else intact
             first_rows = np.unique(starts, return_index=True)[1]
