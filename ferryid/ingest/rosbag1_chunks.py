@@ -176,11 +176,16 @@ def _steps(stored: memoryview, first: int, step: int, compression: str, limit: i
 
 
 class WalkedChunk(NamedTuple):
-    """Records of one decompressed chunk; `whole` when the last of them ends where the chunk does."""
+    """Records of one decompressed chunk; `whole` when the last of them ends where the chunk does.
+
+    `following` leads from the place of each connection record to that of the message behind it, which index records may
+    mean by that place.
+    """
 
     connections: dict[int, Connection]
     entries: dict[int, Entries]
     whole: bool
+    following: dict[int, int]
 
 
 def walk_chunk(buffer: Any) -> WalkedChunk:
@@ -189,12 +194,15 @@ def walk_chunk(buffer: Any) -> WalkedChunk:
     entries: dict[int, array[int]] = {}
     size = memoryview(buffer).nbytes
     position, records = 0, Records(buffer)
+    before: list[int] = []
+    following: dict[int, int] = {}
     while position < size:
         try:
             record = records.at(position)
             if record.end > size:
                 break
             if record.op == CONNECTION:
+                before.append(position)
                 connection = connection_of(buffer, record)
                 connections[connection.number] = connection
             elif record.op == MESSAGE:
@@ -202,13 +210,15 @@ def walk_chunk(buffer: Any) -> WalkedChunk:
                 if number not in entries:
                     entries[number] = array("I")
                 entries[number].extend((time & 0xFFFFFFFF, time >> 32, position))
+                following.update(dict.fromkeys(before, position))
+                before.clear()
             else:
                 break
         except RecordError:
             break
         position = record.end
     found = {number: np.frombuffer(one, np.uint32).reshape(-1, 3) for number, one in entries.items()}
-    return WalkedChunk(connections, found, position == size)
+    return WalkedChunk(connections, found, position == size, following)
 
 
 def distinct(starts: NDArray[np.int64], bounds: set[int]) -> bool:
@@ -263,7 +273,7 @@ def replaced(data: Any, chunk: Chunk, allowance: Allowance, *, intact: bool) -> 
         counts = {number: len(one) for number, one in entries.items()}
         if counts != chunk.indexed and not (intact and chunk.counts is None):
             return None
-        for number, rows in _contradicted(data, chunk, entries).items():
+        for number, rows in _contradicted(data, chunk, walked).items():
             entries[number], doubtful[number] = entries[number][~rows], entries[number][rows]
     return Replaced(replace(chunk, walked=entries), content.buffer, doubtful)
 
@@ -284,17 +294,20 @@ def missing(chunk: Chunk, walked: Chunk, known: Collection[int]) -> dict[int, in
     return short
 
 
-def _contradicted(data: Any, chunk: Chunk, walked: dict[int, Entries]) -> dict[int, NDArray[np.bool_]]:
+def _contradicted(data: Any, chunk: Chunk, walked: WalkedChunk) -> dict[int, NDArray[np.bool_]]:
     """Return which messages of each connection have another time in the index, and that may be the right one.
 
     The time of either may be damaged. Where the times of most messages differ, and those of the chunk information are the
     messages' own, the index records are another chunk's.
     """
-    times = np.concatenate([np.empty(0, np.int64), *map(nanoseconds, walked.values())])
+    times = np.concatenate([np.empty(0, np.int64), *map(nanoseconds, walked.entries.values())])
     stated = bool(len(times)) and (times.min(), times.max()) == (chunk.start_ns, chunk.end_ns)
     doubtful: dict[int, NDArray[np.bool_]] = {}
-    for number, entries in walked.items():
-        listed = {tuple(row) for row in chunk.entries(data, number).tolist()}
+    for number, entries in walked.entries.items():
+        listed = {
+            (seconds, ns, walked.following.get(place, place))
+            for seconds, ns, place in chunk.entries(data, number).tolist()
+        }
         if chunk.start_ns is not None and chunk.end_ns is not None:
             within = range(chunk.start_ns, chunk.end_ns + 1)
         else:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.ingest.log import Loss
-from ferryid.ingest.rosbag1_chunks import Allowance, decompressed, walk_chunk
+from ferryid.ingest.rosbag1_chunks import Allowance, decompressed, missing, walk_chunk
 from ferryid.ingest.rosbag1_records import (
     BAG_HEADER,
     CHUNK,
@@ -190,9 +190,6 @@ def _assign_all(data: Any, found: Walked, infos: list[ChunkInfo]) -> list[ChunkI
                 found.doubts[chunk.position] = NOT_LISTED
     else:
         left = []
-    if found.chunks and found.chunks[-1].counts is None:
-        # The file may end between the index records of its last chunk.
-        found.chunks[-1].index.clear()
     _walk_chunks(data, found)
     left = _assign(data, found.chunks, left, moved=False)
     return _assign(data, found.chunks, left, moved=True)
@@ -318,7 +315,9 @@ def _walk_chunks(data: Any, found: Walked) -> None:
     """Look into the chunks whose index records are lost or in doubt, or of unknown connections."""
     allowance = Allowance.of_file(len(data))
     for chunk in found.chunks:
-        trusted = chunk.index and chunk.position not in found.doubts
+        # The file may end between the index records of its last chunk.
+        last = chunk is found.chunks[-1] and chunk.counts is None
+        trusted = chunk.index and chunk.position not in found.doubts and not last
         known = all(number in found.connections for number in chunk.index)
         if chunk.walked is not None or (trusted and known):
             continue
@@ -335,6 +334,8 @@ def _walk_chunks(data: Any, found: Walked) -> None:
             chunk.walked = walked.entries
             if not whole:
                 found.faults[chunk.position] = content.fault or "its records are damaged"
+            elif last and chunk.position not in found.doubts and missing(chunk, chunk, found.connections):
+                found.faults[chunk.position] = "its index records count more messages than it holds"
 
 
 def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss]:

@@ -46,6 +46,11 @@ def main() -> int:
         with contextlib.suppress(KeyboardInterrupt):
             for result in attack(seed, iter(range(1, options.cases + 1)), workers=options.workers, only=options.format):
                 results.append(result)
+                if result.outcome.violations:
+                    print(
+                        f"violation: --seed {seed} --only {result.number}: {result.format}, {result.what[:150]}",
+                        flush=True,
+                    )
                 if len(results) % 250 == 0:
                     rate = len(results) / (time.monotonic() - start)
                     bad = sum(bool(each.outcome.violations) for each in results)

@@ -336,3 +336,30 @@ def test_verify_believes_nothing_of_a_chunk_whose_content_checksum_is_wrong(tmp_
     assert count < ALL
     assert count + sum(loss.messages or 0 for loss in reader.losses) == ALL
     assert any("does not match its checksum" in loss.what for loss in reader.losses)
+
+
+def test_a_damaged_time_is_no_repair_where_the_index_means_the_connection_record_before_the_message(
+    tmp_path: Path,
+) -> None:
+    def change(records: list[Raw]) -> None:
+        chunk = places(records, CHUNK)[0]
+        content = bytearray(records[chunk].data)
+        inside = Records(bytes(content))
+        message = inside.at(0)
+        while message.op == CONNECTION:
+            message = inside.at(message.end)
+        index = next(
+            place for place in places(records, INDEX) if records[place].fields[b"conn"] == message.fields[b"conn"]
+        )
+        entries = np.frombuffer(records[index].data, "<u4").reshape(-1, 3).copy()
+        assert entries[0, 2] == message.position > 0
+        entries[0, 2] = 0
+        records[index] = records[index]._replace(data=entries.tobytes())
+        time = content.index(b"time=", message.position) + 5
+        content[time + 4] ^= 4
+        records[chunk] = records[chunk]._replace(data=bytes(content))
+
+    whole = write_bag(tmp_path / "whole.bag", "none").read_bytes()
+    count, reader = read_changed(tmp_path / "b.bag", whole, change)
+    assert count == ALL - 1
+    assert [loss.messages for loss in reader.losses if loss.messages] == [1]
