@@ -158,9 +158,9 @@ def walk(records: Records) -> Walked:
     moved: list[ChunkInfo] = []
     for info in left:
         chunk_there = by_place.get(info.chunk)
-        if chunk_there is None:
+        if chunk_there is None or chunk_there.counts is not None:
             moved.append(info)
-        elif chunk_there.counts is None:
+        else:
             info.note_on(chunk_there)
     # What is left is of chunks that are lost, but for those whose times or place are wrong.
     by_counts: dict[Any, deque[Chunk]] = {}

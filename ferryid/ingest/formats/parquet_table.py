@@ -116,6 +116,8 @@ def _read_groups(
     if not parts or not groups:
         raise _damaged(path, first) from first
     joined = {name: np.concatenate([part[name] for part in parts]) for name in places}
+    # The count of a group may be what is damaged; that of the file is another.
+    lost = max(lost, file.metadata.num_rows - sum(len(next(iter(part.values()), ())) for part in parts))
     what = (
         f"{lost} rows in {groups} of {file.num_row_groups} row groups are damaged and were left out ({_reason(first)})"
     )
