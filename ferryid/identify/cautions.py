@@ -48,9 +48,6 @@ def cautions(
                 f"{one.recording.name}: up to {moved} rows of a topic were out of order or repeated a time, as when a clock is "
                 "set back during the recording: stretches may lie over one another."
             )
-        if one.recording.losses:
-            more = f" (and {len(one.recording.losses) - 1} more losses)" if len(one.recording.losses) > 1 else ""
-            warnings.append(f"{one.recording.name}: not all could be read: {one.recording.losses[-1].what}{more}")
     return tuple(warnings)
 
 

@@ -143,7 +143,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     valid, measured, wrong = valid[kept], measured[kept], wrong[kept]
     t0_ns += round(int(rows[0]) * 1e9 / rate)
     left_out = (
-        *LeftOut.of("velocity, heading or an actuator was not measured", ~measured & ~wrong, rate),
+        *LeftOut.of(_unmeasured(profile, columns, ~measured & ~wrong), ~measured & ~wrong, rate),
         *LeftOut.of("the pose cannot be true", wrong, rate),
     )
     repairs.extend(
@@ -412,6 +412,18 @@ def _measured(log: str, profile: Profile, columns: Mapping[str, Floats], wrong: 
         # Without it neither wind nor current can be turned to the vessel, and no pose can be predicted.
         valid &= np.isfinite(psi) | wrong
     return valid
+
+
+def _unmeasured(profile: Profile, columns: Mapping[str, Floats], rows: Flags) -> str:
+    """Return why rows are left out: the signals of which they lack a value, and how many."""
+    counts = {
+        name: int(np.count_nonzero(rows & ~np.isfinite(columns[name])))
+        for name in dict.fromkeys([*_needed(profile, columns), "psi"])
+        if name in columns
+    }
+    most = sorted((name for name in counts if counts[name]), key=lambda name: -counts[name])
+    shown = ", ".join(f"{name} {counts[name]}" for name in most[:4]) + (", ..." if len(most) > 4 else "")
+    return f"velocity, heading or an actuator was not measured ({shown})"
 
 
 def _needed(profile: Profile, columns: Mapping[str, Floats]) -> list[str]:

@@ -77,8 +77,9 @@ def remarks(recording: Recording, repairs: Sequence[str] = ()) -> list[str]:
 
 
 def left_out_sentences(recording: Recording, track: Track | Motion) -> tuple[str, ...]:
-    """Return which rows of a log are not used, because of their times, of gaps or of faults, as sentences with numbers."""
-    said = grouped_notes({topic: _of_clock(stream) for topic, stream in recording.streams.items()})
+    """Return what of a log could not be read, and which rows are not used because of times, gaps or faults, as sentences."""
+    said = [*_unread(recording.losses)]
+    said += grouped_notes({topic: _of_clock(stream) for topic, stream in recording.streams.items()})
     if track.left_out:
         reasons = "; ".join(
             f"{one.rows} ({one.seconds:.1f} s in {one.stretches} stretch{'es' * (one.stretches > 1)}) because {one.reason}"
@@ -87,6 +88,20 @@ def left_out_sentences(recording: Recording, track: Track | Motion) -> tuple[str
         rows, seconds = sum(one.rows for one in track.left_out), sum(one.seconds for one in track.left_out)
         said.append(f"{rows} of {track.t.size} rows ({seconds:.1f} s) are left out: {reasons}.")
     return tuple(said)
+
+
+def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
+    """Return in one sentence what could not be read in all, and the largest or least certain part of it."""
+    if not losses:
+        return ()
+    count, unknown = sum(loss.messages or 0 for loss in losses), any(loss.messages is None for loss in losses)
+    if count:
+        what = f"{count} message{'s' * (count > 1)} could not be read" + (", and perhaps more" if unknown else "")
+    else:
+        what = "messages may be lost" if unknown else "the log is damaged, and no message of it is known to be lost"
+    main = max(losses, key=lambda loss: (loss.messages or 0, loss.messages is None))
+    others = len(losses) - 1
+    return (f"{what}: {loss_sentence(main)[:-1]}" + (f"; and {others} more, see ferryid inspect." if others else "."),)
 
 
 def _of_clock(stream: Stream) -> list[str]:

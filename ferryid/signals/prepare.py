@@ -12,11 +12,15 @@ import numpy as np
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.data_quality import left_out_sentences
+from ferryid.signals.quality import POSE
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, smooth_measured
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel.profile import Profile
+
+SHORT_OVERLAP_NS = 2_000_000_000
+"""Recorders start and stop topics within this time of each other [ns]; more is reported."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,32 @@ class Prepared:
 
 
 def doubts_of(recording: Recording, track: Track) -> tuple[str, ...]:
-    """Return contradictions between a log's signals, and actuators known by their orders alone, as sentences."""
-    return (*(doubt.says for doubt in track.doubts), *recording.orders_for_feedback)
+    """Return what to mind of a log as sentences: signals that contradict each other, end early or are not there."""
+    empty = [name for name in POSE if name in track.columns and not np.isfinite(track.columns[name]).any()]
+    return (
+        *(doubt.says for doubt in track.doubts),
+        *recording.orders_for_feedback,
+        *_overlap(recording, track),
+        *(f"{name} is mapped and has no value in this log." for name in empty),
+    )
+
+
+def _overlap(recording: Recording, track: Track) -> list[str]:
+    """Return how much is not used because navigation and actuators were not recorded together, if it is of any length."""
+    streams = {topic: stream.time_ns for topic, stream in recording.streams.items() if len(stream.time_ns)}
+    first, last = track.t0_ns, track.t0_ns + round(float(track.t[-1]) * 1e9)
+    sides = []
+    if first - recording.start_ns > SHORT_OVERLAP_NS:
+        topic = min(streams, key=lambda name: abs(int(streams[name][0]) - first))
+        sides.append(f"the first {(first - recording.start_ns) * 1e-9:.1f} s, as {topic} begins then")
+    if recording.end_ns - last > SHORT_OVERLAP_NS:
+        topic = min(streams, key=lambda name: abs(int(streams[name][-1]) - last))
+        sides.append(f"the last {(recording.end_ns - last) * 1e-9:.1f} s, as {topic} ends before")
+    if not sides:
+        return []
+    return [
+        f"{track.t[-1]:.1f} s are used, the time that navigation and actuators share, without {' and '.join(sides)}."
+    ]
 
 
 def open_track(path: str, profile: Profile, out: Path, *, rate_hz: float | None = None, verify: bool = False) -> Opened:
@@ -129,18 +157,3 @@ def refuse_twice(opened: Sequence[Opened]) -> None:
     files = [file for one in opened for file in {str(Path(file).resolve()) for file in one.recording.files}]
     if shared := sorted({file for file in files if files.count(file) > 1}):
         raise FerryIdError(f"{shared[0]}: is part of two logs, so that it would judge itself. Fix: give it once")
-    for number, one in enumerate(opened):
-        for other in opened[:number]:
-            if _same_signals(one.measured, other.measured):
-                raise FerryIdError(
-                    f"{one.recording.files[0]}: holds the same messages as {other.recording.files[0]}, as a copy in another "
-                    "format does, so that it would judge itself. Fix: give one of them"
-                )
-
-
-def _same_signals(one: Measured, other: Measured) -> bool:
-    """True if velocities and forces of two logs are the same numbers."""
-    return all(
-        np.array_equal(values, twin, equal_nan=True)
-        for values, twin in ((one.t, other.t), (one.nu, other.nu), (one.tau, other.tau))
-    )

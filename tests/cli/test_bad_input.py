@@ -62,11 +62,6 @@ def test_a_recording_and_its_copy_in_another_format_in_one_folder(
     refused(ferryid(command, tmp_path, *vessel), "short.mcap", "the same", "short.bag")
 
 
-def test_a_recording_and_its_copy_in_another_format_as_two_logs(ferryid, fixtures: Path, tmp_path: Path) -> None:
-    logs = (fixtures / "short.bag", fixtures / "short.mcap")
-    refused(ferryid("fit", *logs, "--vessel", "milliampere", "--out", tmp_path), "the same messages", "judge itself")
-
-
 def test_a_thruster_known_by_its_orders_alone_is_said_on_the_terminal(ferryid, fixtures: Path, tmp_path: Path) -> None:
     profile = profile_with(tmp_path, 'topic = "/thruster1/state"', 'topic = "/thruster1/stat"')
     run = ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")

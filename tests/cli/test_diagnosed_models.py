@@ -82,9 +82,12 @@ def test_from_a_diagnosis_to_a_simulation(ferryid, tmp_path: Path) -> None:
     data = json.loads(path.read_text(encoding="utf-8"))
     data["vessel_effects"][0]["effect"] = "sea_monster"
     path.write_text(json.dumps(data), encoding="utf-8")
-    for command in (("evaluate", "ferry", log), ("models",), ("simulate", scenario, "--model", path)):
+    for command in (("evaluate", "ferry", log), ("simulate", scenario, "--model", path)):
         where = ("--out", tmp_path / "c.bag") if command[0] == "simulate" else ("--out", out)
         unknown = ferryid(*command, *where)
         assert unknown.code == 2
         assert '"sea_monster", which this version of ferryid does not know' in unknown.err
         assert unknown.err.count("\n") == 1
+    listed = ferryid("models", "--out", out)
+    assert listed.code == 0
+    assert '"sea_monster", which this version of ferryid does not know' in " ".join(listed.out.split())

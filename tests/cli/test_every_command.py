@@ -61,7 +61,7 @@ def test_inspect(ferryid, fixtures: Path, log: str, vessel: tuple[str, ...]) -> 
 
 
 def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_path: Path) -> None:
-    log, other, out = fixtures / "short.mcap", fixtures / "truncated.bag", tmp_path / "out"
+    log, other, out = fixtures / "short.mcap", fixtures / "short.bag", tmp_path / "out"
 
     run = ferryid("ingest", log, "--vessel", "milliampere", "--out", out, "--json", "-")
     tables = conforms(run.out)["logs"][0]
@@ -120,10 +120,9 @@ def test_ingest_fit_evaluate_compare_and_models(ferryid, fixtures: Path, tmp_pat
     conforms(ferryid("models", "milliampere@1", "--out", out, "--json", "-").out)
 
 
-@pytest.mark.parametrize(("what", "windows"), [("components", 1), ("window", 5), ("both", 2)])
+@pytest.mark.parametrize(("what", "windows"), [("components", 1), ("window", 8), ("both", 2)])
 def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, windows: int) -> None:
-    # The shorter of the two logs has no room for the three longest of the usual windows.
-    logs = [fixtures / "short.mcap", fixtures / "truncated.bag"]
+    logs = [fixtures / "short.mcap", fixtures / "short.bag"]
     options = ("--windows", "0.5,1") if what == "both" else ()
     run = ferryid("sweep", what, *logs, "--vessel", "milliampere", *SCALE, *options, "--out", tmp_path, "--json", "-")
     assert run.code == 0, run.err
@@ -145,7 +144,7 @@ def test_sweep_settings(ferryid, fixtures: Path, tmp_path: Path, what: str, wind
 
 
 def test_sweep_structures(ferryid, fixtures: Path, tmp_path: Path) -> None:
-    logs = [fixtures / "short.mcap", fixtures / "truncated.bag"]
+    logs = [fixtures / "short.mcap", fixtures / "short.bag"]
     run = ferryid("sweep", "basis", *logs, "--vessel", "milliampere", *SCALE, "--out", tmp_path, "--json", "-")
     assert run.code == 0, run.err
     found = conforms(run.out)
@@ -176,7 +175,7 @@ def test_fit_takes_the_window_that_it_is_told_to_choose(ferryid, fixtures: Path,
 
 
 def test_diagnose_one_log_and_two(ferryid, fixtures: Path, tmp_path: Path) -> None:
-    log, other = fixtures / "short.mcap", fixtures / "truncated.bag"
+    log, other = fixtures / "short.mcap", fixtures / "short.bag"
     run = ferryid("diagnose", log, "--vessel", "milliampere", "--out", tmp_path, "--json", "-")
     assert run.code == 0, run.err
     one = conforms(run.out)

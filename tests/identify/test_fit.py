@@ -101,11 +101,11 @@ def test_held_axes_lose_their_acceleration_terms_only() -> None:
 
 
 def test_several_logs_and_whole_logs_for_validation(tmp_path: Path) -> None:
-    logs = [str(FIXTURES / "short.mcap"), str(FIXTURES / "truncated.bag")]
+    logs = [str(FIXTURES / "short.mcap"), str(FIXTURES / "short.bag")]
     result = fit(logs, PROFILE, replace(SETTINGS, split="logs"), tmp_path)
     assert [log.training.any() for log in result.logs] == [True, False]
     assert [log.validation.any() for log in result.logs] == [False, True]
-    assert [log.motion.log for log in result.logs] == ["short", "truncated"]
+    assert [log.motion.log for log in result.logs] == ["short (1)", "short (2)"]
 
 
 @pytest.mark.parametrize("residual", ["commanded", "parallel"])

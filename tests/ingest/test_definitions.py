@@ -16,6 +16,7 @@ import pytest
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.writer import Writer
 from rosbags.rosbag1 import Writer as Writer1
+from rosbags.typesys import Stores, get_typestore
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest import definitions, open_log
@@ -184,6 +185,11 @@ def test_constants_and_expressions_are_as_rosbags_evaluates_them() -> None:
 def test_names_that_are_not_of_ros_reach_no_generated_code(
     name: str, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # Modules that are imported meanwhile would be empty.
+    typestore_of(parse_definition("float64 x\n", "warm/msg/Up", "ros1msg"))
+    define("warm/msg/Up", RecordedText("ros2msg", "float64 x\n"), "", "")
+    for store in Stores:
+        get_typestore(store)
     ran: list[Any] = []
     monkeypatch.setattr(builtins, "exec", lambda *code: ran.append(code))
     for encoding in ("ros1msg", "ros2msg"):

@@ -293,8 +293,8 @@ class Rosbag1Reader:
         checksum = md5sum(store, topic.type)
         if not checksum:
             raise FerryIdError(
-                f"{file}: topic {name} cannot be decoded, found no definition of a type that {topic.type} is made of. "
-                "Fix: copy the bag from the recorder again"
+                f"{file}: topic {name} cannot be decoded, found an incomplete definition, without a type that "
+                f"{topic.type} is made of. Fix: copy the bag from the recorder again"
             )
         if connection.md5sum not in ("*", checksum):
             what = f"the definition of {topic.type} does not match its checksum: values of {name} may be misread"
