@@ -90,8 +90,9 @@ def test_a_common_hull_points_to_the_hidden_wind_and_a_mirrored_one_does_not(sha
     true = np.array([wind.mean(axis=0) for wind in hidden if wind is not None])
     mirrored = placebos(joint.members)[MIRRORED]
     spread, lift = np.split(joint.hull.spread, [-len(INDUCED)])
-    assert np.median(off(joint.hull, true)) < 25.0
-    assert np.median(off(fit_together(mirrored, spread, lift), true)) > 40.0
+    found = np.median(off(joint.hull, true))
+    assert found < 25.0
+    assert np.median(off(fit_together(mirrored, spread, lift), true)) > 4.0 * found
 
 
 def off(hull: SharedHull, true: np.ndarray) -> np.ndarray:

@@ -102,7 +102,9 @@ def lines_moved(random: Random, base: Base) -> Mutated | None:
         lines[place] = lines[place].rpartition(separator)[0]
     else:
         lines[place] = bytes(byte for byte in random.randbytes(40) if byte not in b"\r\n")
-    return edited_text(base, name, end.join(lines) + end, f"line {place} {action}")
+    # The line of names may stand twice below each other, as that of units does: it is no row.
+    total = sum(len(each.times) for each in base.truth.values()) if (place, action) == (0, "duplicated") else None
+    return edited_text(base, name, end.join(lines) + end, f"line {place} {action}", total)
 
 
 def header(random: Random, base: Base) -> Mutated | None:
