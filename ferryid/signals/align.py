@@ -49,6 +49,8 @@ _VELOCITY = ("u", "vel_N", "x", "psi")
 MOST_EMPTY_ROWS, MOST_SPARSE = 2_000_000, 50
 """A grid beyond both limits, the second in rows per sample, comes of wrong times, not of gaps."""
 _EXACT_S = 1e-6
+_ENDS_S = 2.0
+"""Rows at either end of the common time that lack a signal count as left out from this length [s] on."""
 _HEADING_SHARE = 0.8
 """A heading that was measured on this share of the rows is needed; one that was measured on fewer is left out by others."""
 
@@ -139,15 +141,21 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
         )
     rows = np.flatnonzero(valid)
     kept = slice(int(rows[0]), int(rows[-1]) + 1)
-    columns = {name: np.ascontiguousarray(values[kept]) for name, values in columns.items()}
-    valid, measured, wrong = valid[kept], measured[kept], wrong[kept]
-    t0_ns += round(int(rows[0]) * 1e9 / rate)
+    lost = ~measured & ~wrong
+    for side in (slice(0, kept.start), slice(kept.stop, None)):
+        # Topics never begin and end with the same row; more than that is a loss.
+        if np.count_nonzero(lost[side]) < _ENDS_S * rate:
+            lost[side] = False
     left_out = (
-        *LeftOut.of(_unmeasured(profile, columns, ~measured & ~wrong), ~measured & ~wrong, rate),
+        *LeftOut.of(_unmeasured(profile, columns, lost), lost, rate),
         *LeftOut.of("the pose cannot be true", wrong, rate),
     )
+    total = sum(one.rows for one in left_out) + int(np.count_nonzero(valid))
+    columns = {name: np.ascontiguousarray(values[kept]) for name, values in columns.items()}
+    valid = valid[kept]
+    t0_ns += round(int(rows[0]) * 1e9 / rate)
     repairs.extend(
-        f"{one.rows} of {valid.size} rows ({one.seconds:.1f} s in {one.stretches} stretches) are not used: {one.reason}."
+        f"{one.rows} of {total} rows ({one.seconds:.1f} s in {one.stretches} stretches) are not used: {one.reason}."
         for one in left_out
     )
     track = Track(recording.name, t[: valid.size], t0_ns, rate, columns, valid, tuple(repairs), left_out=left_out)

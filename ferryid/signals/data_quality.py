@@ -86,7 +86,9 @@ def left_out_sentences(recording: Recording, track: Track | Motion) -> tuple[str
             for one in track.left_out
         )
         rows, seconds = sum(one.rows for one in track.left_out), sum(one.seconds for one in track.left_out)
-        said.append(f"{rows} of {track.t.size} rows ({seconds:.1f} s) are left out: {reasons}.")
+        # Rows cut from the ends count as well.
+        total = max(track.t.size, rows + int(np.count_nonzero(track.valid)))
+        said.append(f"{rows} of {total} rows ({seconds:.1f} s) are left out: {reasons}.")
     return tuple(said)
 
 

@@ -66,15 +66,18 @@ def doubts_of(recording: Recording, track: Track) -> tuple[str, ...]:
 
 def _overlap(recording: Recording, track: Track) -> list[str]:
     """Return how much is not used because navigation and actuators were not recorded together, if it is of any length."""
-    streams = {topic: stream.time_ns for topic, stream in recording.streams.items() if len(stream.time_ns)}
     first, last = track.t0_ns, track.t0_ns + round(float(track.t[-1]) * 1e9)
+    begins = {topic: abs(int(s.time_ns[0]) - first) for topic, s in recording.streams.items() if len(s.time_ns)}
+    ends = {topic: abs(int(s.time_ns[-1]) - last) for topic, s in recording.streams.items() if len(s.time_ns)}
     sides = []
-    if first - recording.start_ns > SHORT_OVERLAP_NS:
-        topic = min(streams, key=lambda name: abs(int(streams[name][0]) - first))
-        sides.append(f"the first {(first - recording.start_ns) * 1e-9:.1f} s, as {topic} begins then")
-    if recording.end_ns - last > SHORT_OVERLAP_NS:
-        topic = min(streams, key=lambda name: abs(int(streams[name][-1]) - last))
-        sides.append(f"the last {(recording.end_ns - last) * 1e-9:.1f} s, as {topic} ends before")
+    for cut_ns, near, where, verb in (
+        (first - recording.start_ns, begins, "first", "begins then"),
+        (recording.end_ns - last, ends, "last", "ends before"),
+    ):
+        topic = min(near, key=lambda name: near[name])
+        # Rows that lack a value at either end are counted with all others that do.
+        if cut_ns > SHORT_OVERLAP_NS > near[topic]:
+            sides.append(f"the {where} {cut_ns * 1e-9:.1f} s, as {topic} {verb}")
     if not sides:
         return []
     return [

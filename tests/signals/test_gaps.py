@@ -133,3 +133,24 @@ def test_a_part_of_a_real_log_that_begins_with_a_gap_is_read(
     assert motion.valid.mean() > 0.8
     assert [one.rows > 0 for one in motion.left_out] == [True] * len(motion.left_out)
     assert motion.left_out
+
+
+def test_a_signal_that_ends_early_is_said_with_the_time_that_is_used(tmp_path: Path) -> None:
+    log = written(silent(ten_minutes(), THRUSTER, [(400.0, 1000.0)]), tmp_path / "early.mcap")
+    (said,) = (one for one in open_track(str(log), FERRY, None).doubts if "share" in one)
+    assert said.startswith(("400.0 s are used", "399.9 s are used"))
+    assert f"without the last 200.0 s, as {THRUSTER} ends before" in said
+
+
+def test_rows_without_a_heading_at_the_end_of_a_log_are_counted(tmp_path: Path) -> None:
+    log = written(without_heading(ten_minutes(), [(560.0, 1000.0)]), tmp_path / "end.mcap")
+    prepared = smoothed(open_track(str(log), FERRY, None), 1.0)
+    said = " ".join(prepared.left_out)
+    assert "799 of" in said
+    assert "(psi 799)" in said
+
+
+def test_what_could_not_be_read_is_said_with_the_sum_first() -> None:
+    log = Path(__file__).resolve().parents[2] / "fixtures" / "truncated.mcap"
+    prepared = smoothed(open_track(str(log), FERRY, None), 1.0)
+    assert any("may be lost" in said or "could not be read" in said for said in prepared.left_out)
