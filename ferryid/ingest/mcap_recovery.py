@@ -64,6 +64,7 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
             summary = _moved_summary(file, index.data_end, name)
         if summary is not None:
             _merge(index, summary)
+            _check_statistics(index, len(file), name)
         _walk_chunks(index, file, whole_file, name)
         if not index.complete:
             _check_loose(index, whole_file, name)
@@ -114,12 +115,17 @@ def _moved_summary(file: memoryview, data_end: int, name: str) -> Index | None:
 
 
 def _check_statistics(index: Index, size: int, name: str) -> None:
-    """Drop statistics that cannot be true: a message takes at least 31 bytes of the file or of a chunk."""
+    """Drop statistics that cannot be true: a message takes at least 31 bytes of the file or of a chunk.
+
+    A chunk that is not known may hold as much as a chunk can; each takes at least 49 bytes of the file.
+    """
     if index.statistics is None:
         return
     stated = index.statistics.message_count
     counts = index.statistics.channel_message_counts
-    possible = (size + sum(min(chunk.uncompressed_size, MAX_CHUNK) for chunk in index.chunks)) // MESSAGE_HEADER
+    unknown = min(max(index.statistics.chunk_count - len(index.chunks), 0), size // 49)
+    expanded = sum(min(chunk.uncompressed_size, MAX_CHUNK) for chunk in index.chunks) + unknown * MAX_CHUNK
+    possible = (size + expanded) // MESSAGE_HEADER
     if stated > possible or (counts and sum(counts.values()) != stated):
         what = (
             f"the file's own statistics cannot be true ({stated} messages, {sum(counts.values())} when added up by "

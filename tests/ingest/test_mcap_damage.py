@@ -280,3 +280,13 @@ def test_a_message_named_twice_in_a_chunk_that_cannot_be_read_is_lost_once() -> 
     got, losses = accounted(without_summary(chunks))
     assert len(got) == COUNT - PER_CHUNK
     assert PER_CHUNK in [loss.messages for loss in losses]
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_statistics_of_well_compressed_chunks_without_an_index_are_believed(compression: str) -> None:
+    still = b"\0\1\0\0" + bytes(8)
+    inside = b"".join(message(number, time_ns=T0 + number // 20, data=still) for number in range(2000))
+    data = HEAD + chunk(inside, compression) + DATA_END
+    summary = DEFINITIONS + channel() + statistics(2000, chunks=1)
+    got, losses = read(data + summary + footer(len(data), summary, crc=True))
+    assert (len(got), losses) == (2000, ())
