@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -150,3 +151,23 @@ def test_milliseconds_stated_as_seconds_are_noted(tmp_path: Path) -> None:
     parquet.write_table(table, tmp_path / "log.parquet")
     (topic,) = open_log(tmp_path / "log.parquet", TableLayout(time="time")).topics
     assert 'look like milliseconds, so set time_unit = "ms"' in topic.note
+
+
+@pytest.mark.parametrize("as_dictionary", [True, False])
+def test_a_long_text_that_all_rows_have_is_held_once(tmp_path: Path, as_dictionary: bool) -> None:
+    text = "a" * (4 << 20)
+    rows = pa.array(np.zeros(N, np.int32), mask=np.arange(N) == 7)
+    table = pa.table({**columns(), "note": pa.DictionaryArray.from_arrays(rows, pa.array([text]))})
+    parquet.write_table(table, tmp_path / "log.parquet", store_schema=as_dictionary)
+    allowed = 100 << 20
+    pa_before = pa.default_memory_pool().bytes_allocated()
+    tracemalloc.start()
+    try:
+        series, _ = read(tmp_path / "log.parquet")
+        assert tracemalloc.get_traced_memory()[1] < allowed
+    finally:
+        tracemalloc.stop()
+    assert pa.default_memory_pool().bytes_allocated() - pa_before < allowed
+    notes = series.columns["note"]
+    assert [len(notes[row]) for row in (0, 7, 8)] == [len(text), 0, len(text)]
+    assert notes[0] is notes[N - 1]
