@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError
@@ -93,7 +94,7 @@ def read_tables(database: Database) -> Recorded:
     return Recorded(listed, definitions, distro)
 
 
-def _check_rowid(connection: sqlite3.Connection, path: str) -> None:
+def _check_rowid(connection: sqlite3.Connection, path: Path) -> None:
     """Refuse a table of messages without SQLite's own row numbers, or whose column hides them, generated ones too.
 
     Raises

@@ -171,3 +171,15 @@ def test_a_long_text_that_all_rows_have_is_held_once(tmp_path: Path, as_dictiona
     notes = series.columns["note"]
     assert [len(notes[row]) for row in (0, 7, 8)] == [len(text), 0, len(text)]
     assert notes[0] is notes[N - 1]
+
+
+def test_texts_in_structs_of_several_row_groups_are_read(tmp_path: Path) -> None:
+    texts = pa.array(["a", "b", None] * (N // 3))
+    struct = pa.StructArray.from_arrays([texts, pa.array(np.arange(N))], ["note", "value"])
+    parquet.write_table(
+        pa.table({**columns(), "s": struct, "note": texts}), tmp_path / "log.parquet", row_group_size=90
+    )
+    series, reader = read(tmp_path / "log.parquet")
+    assert not reader.losses
+    for name in ("s.note", "note"):
+        assert series.columns[name].tolist() == ["a", "b", ""] * (N // 3)

@@ -62,13 +62,11 @@ def _open_file(path: Path) -> Any:
         file = parquet.ParquetFile(path, page_checksum_verification=True)
         columns = [file.schema.column(number) for number in range(len(file.schema))]
         texts = [
-            column.path
-            for column in columns
-            if column.logical_type.type == "STRING" and not column.max_repetition_level
+            column.path for column in columns if column.logical_type.type == "STRING" and column.path == column.name
         ]
         if not texts:
             return file
-        # As dictionaries, a text that many rows have is in memory once.
+        # As dictionaries, a text that many rows have is in memory once; pyarrow cannot do so in structs of several groups.
         return parquet.ParquetFile(path, page_checksum_verification=True, read_dictionary=texts)
     except _failures() as error:
         raise _damaged(path, error) from error
