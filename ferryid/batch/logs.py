@@ -99,6 +99,10 @@ def entries_of(asked: Sequence[str], vessel: str | None, tell: Callable[[str], N
 
 
 def _entries(one: str, vessel: str | None, tell: Callable[[str], None]) -> Iterator[Entry]:
+    if not one.strip():
+        raise FerryIdError(
+            "LOG: the path or pattern is empty, logs were to be read. Fix: name a file, a folder or a pattern"
+        )
     path = Path(one)
     if path.is_file() and path.suffix.lower() in LISTS and path.stat().st_size <= LARGEST_BYTES:
         text = _text(path)

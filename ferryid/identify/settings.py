@@ -21,6 +21,8 @@ WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
 """Smoothing windows that are usually tried [s]."""
 SHORTEST_WINDOW_S = 0.01
 """A shorter window [s] holds a single sample at any usual rate and smooths nothing, which 0 asks for openly."""
+LEAST_FACTOR = 1e-3
+"""A smaller factor on the base model than this is no factor but its absence, and the inverse of one overflows."""
 
 
 @dataclass(frozen=True)
@@ -103,8 +105,9 @@ class FitSettings:
             raise FerryIdError(f"--seed: {self.seed} is no seed. Fix: give a whole number from 0 on")
         for key in ("delta", "sigma", "zeta"):
             value = getattr(self, key)
-            if not 0.0 <= value <= 100.0 or (key != "sigma" and value == 0.0):
-                raise FerryIdError(f"--{key}: {value} is no usable factor. Fix: give a number near 1")
+            if not LEAST_FACTOR <= value <= 100.0 and not (key == "sigma" and value == 0.0):
+                least = f"{'0, or ' if key == 'sigma' else ''}{LEAST_FACTOR:g} to 100"
+                raise FerryIdError(f"--{key}: {value} is no usable factor. Fix: give {least}, near 1 as a rule")
 
     @property
     def scale(self) -> dict[str, float]:

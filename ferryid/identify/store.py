@@ -62,6 +62,11 @@ def numbered(model: Model, out: Path) -> Model:
     keep their numbers.
     """
     folder = _folder(out) / model.name
+    if model.accepted and (folder / "current").is_dir():
+        raise FerryIdError(
+            f"{folder / 'current'}: the number of the current version is stored in this file, found a folder. "
+            "Fix: move or delete that folder and fit again, or fit with another --name"
+        )
     remove_abandoned(folder)
     present = _versions(folder)
     plain = _undated(model)

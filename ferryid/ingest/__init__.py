@@ -72,8 +72,10 @@ def existing_parts(text: str) -> list[Path]:
     """Split a joined path at those ``+`` that leave paths which all exist (a folder's name may hold one too)."""
     pieces = text.split("+")
     for count in range(1, len(pieces) + 1):
-        head = Path("+".join(pieces[:count]))
-        if not head.exists():
+        joined = "+".join(pieces[:count])
+        head = Path(joined)
+        # An empty path would be the working folder.
+        if not joined.strip() or not head.exists():
             continue
         if count == len(pieces):
             return [head]
@@ -85,7 +87,11 @@ def existing_parts(text: str) -> list[Path]:
 
 def _open_parts(text: str, parts: list[Path], layout: TableLayout | None) -> Reader:
     if not parts:
-        missing = [piece for piece in text.split("+") if not Path(piece).exists()]
+        missing = [
+            piece if piece.strip() else "a name beside a +"
+            for piece in text.split("+")
+            if not piece.strip() or not Path(piece).exists()
+        ]
         raise FerryIdError(
             f"{text}: no such file, and as parts joined by + it lacks {', '.join(missing)}. "
             "Fix: check the path of every part"

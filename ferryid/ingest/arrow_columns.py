@@ -21,6 +21,8 @@ def column_from_arrow(chunked: Any, *, is_time: bool = False) -> Column:
     import pyarrow as pa
 
     if pa.types.is_dictionary(chunked.type):
+        if pa.types.is_string(chunked.type.value_type) or pa.types.is_large_string(chunked.type.value_type):
+            return _texts_of_dictionaries(chunked)
         chunked = chunked.cast(chunked.type.value_type)
     kind = chunked.type
     if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
@@ -48,6 +50,17 @@ def column_from_arrow(chunked: Any, *, is_time: bool = False) -> Column:
     texts = np.empty(len(chunked), dtype=object)
     texts[:] = ["" if value is None else str(value) for value in chunked.to_pylist()]
     return texts
+
+
+def _texts_of_dictionaries(chunked: Any) -> Column:
+    """Texts with "" where missing; each text of a dictionary is held once, however many rows have it."""
+    parts = []
+    for chunk in chunked.chunks:
+        # One text more than the dictionary has, for the missing cells.
+        values = np.array([*(value or "" for value in chunk.dictionary.to_pylist()), ""], dtype=object)
+        rows = chunk.indices.cast("int64").fill_null(len(values) - 1) if chunk.indices.null_count else chunk.indices
+        parts.append(values[rows.to_numpy(zero_copy_only=False)])
+    return np.concatenate(parts) if parts else np.empty(0, dtype=object)
 
 
 def _timestamps(chunked: Any) -> Column:

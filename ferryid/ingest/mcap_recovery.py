@@ -26,7 +26,7 @@ from ferryid.ingest.mcap_index import (
     Index,
     stored_crc,
 )
-from ferryid.ingest.mcap_scan import scan
+from ferryid.ingest.mcap_scan import scan, unread_behind
 from ferryid.ingest.mcap_summary import read_summary, summary_start
 from ferryid.ingest.mcap_unpack import MAX_CHUNK, MAX_EXPANDED, MAX_RATIO
 
@@ -58,18 +58,23 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
     if index is not None and reason is None and not _needs_walk(index):
         _walk_chunks(index, file, whole_file, name)
         _check_definitions(index, file, whole_file)
+    behind = None
     if index is None or not index.complete:
         summary, index = index, scan(file, name)
+        behind = unread_behind(file, index.data_end, name)
         if summary is None:
             summary = _moved_summary(file, index.data_end, name)
         if summary is not None:
             _merge(index, summary)
+            _check_statistics(index, len(file), name)
         _walk_chunks(index, file, whole_file, name)
         if not index.complete:
             _check_loose(index, whole_file, name)
     if index.complete:
         # All messages that were ever written are there.
         index.losses = [loss if loss.messages else replace(loss, messages=0) for loss in index.losses]
+    if behind is not None:
+        index.losses.append(behind)
     if reason is not None:
         found = sum(index.counts().values())
         what = f"{reason}; the index was rebuilt by walking the whole file, which found {found} messages"
@@ -114,12 +119,17 @@ def _moved_summary(file: memoryview, data_end: int, name: str) -> Index | None:
 
 
 def _check_statistics(index: Index, size: int, name: str) -> None:
-    """Drop statistics that cannot be true: a message takes at least 31 bytes of the file or of a chunk."""
+    """Drop statistics that cannot be true: a message takes at least 31 bytes of the file or of a chunk.
+
+    A chunk that is not known may hold as much as a chunk can; each takes at least 49 bytes of the file.
+    """
     if index.statistics is None:
         return
     stated = index.statistics.message_count
     counts = index.statistics.channel_message_counts
-    possible = (size + sum(min(chunk.uncompressed_size, MAX_CHUNK) for chunk in index.chunks)) // MESSAGE_HEADER
+    unknown = min(max(index.statistics.chunk_count - len(index.chunks), 0), size // 49)
+    expanded = sum(min(chunk.uncompressed_size, MAX_CHUNK) for chunk in index.chunks) + unknown * MAX_CHUNK
+    possible = (size + expanded) // MESSAGE_HEADER
     if stated > possible or (counts and sum(counts.values()) != stated):
         what = (
             f"the file's own statistics cannot be true ({stated} messages, {sum(counts.values())} when added up by "
@@ -215,7 +225,8 @@ def _check_loose(index: Index, whole_file: Bytes, name: str) -> None:
     if index.loose is None:
         return
     kept = without_copies(whole_file, index.loose)
-    if len(kept) < len(index.loose):
+    copied = len(kept) < len(index.loose)
+    if copied:
         index.losses.append(copies_lost(name, len(index.loose) - len(kept)))
     defined = np.isin(kept.channels, list(index.channels))
     surplus = index.statistics is not None and sum(index.counts().values()) > index.statistics.message_count
@@ -233,4 +244,5 @@ def _check_loose(index: Index, whole_file: Bytes, name: str) -> None:
         index.losses.append(Loss(name, what))
         kept = kept.take(~odd)
     index.loose = kept
-    index.complete = _confirmed(index)
+    # Where a stretch of bytes was copied, a message made of two halves may stand for the one that it cut through.
+    index.complete = _confirmed(index) and not copied

@@ -40,6 +40,7 @@ from ferryid.ingest.mcap_index import (
 
 # A message or chunk record of less than 1 TiB may begin here; the look-ahead lets candidates overlap.
 _CANDIDATE = re.compile(rb"[\x05\x06](?=.{5}\x00{3})", re.DOTALL)
+_MAGIC = re.compile(re.escape(MAGIC))
 _CHAIN = 3
 """Records behind a candidate that must look like records too."""
 _SUSPECTS = 4
@@ -99,13 +100,13 @@ def _segment(file: memoryview, position: int, index: Index, found: _Found, odd: 
     """Walk up to the next damaged place; returns where to go on behind it, None at the end of the data."""
     messages, others, end = walk(file, position, len(file))
     closing = _closing(messages, others)
+    _define(index, file, [record for record in others if closing is None or record[1] < closing])
     if closing is not None and _next_record(file, end, len(file), index.channels) is None:
         # What follows the data repeats it, and is damaged where the file had to be walked.
         index.data_end = closing
         others = [record for record in others if record[1] < closing]
         _take(file, index, found, odd, messages, others)
         return None
-    _define(index, file, others)
     if sound_chunk(file, end) and _next_chunk(file, end + RECORD_HEADER) is None:
         # The file ends inside this chunk.
         others.append((CHUNK, end, len(file) - end - RECORD_HEADER))
@@ -137,6 +138,20 @@ def _segment(file: memoryview, position: int, index: Index, found: _Found, odd: 
     _take(file, index, found, odd, messages, others)
     found.gaps.append((end, len(file) if after is None else after))
     return after
+
+
+def unread_behind(file: memoryview, data_end: int, name: str) -> Loss | None:
+    """Report what stands behind the data and is not of their summary: another log, or messages of unknown channels."""
+    closed = _MAGIC.search(file, data_end)
+    if closed is not None and closed.end() < len(file):
+        what = f"{len(file) - closed.end()} bytes behind the end of the log, from byte {closed.end()} on, are not read"
+        return Loss(name, what)
+    if data_end < len(file):
+        start = _next_record(file, walk(file, data_end, len(file))[2], len(file), range(1 << 16))
+        if start is not None:
+            what = f"{len(file) - start} bytes behind the end of the data hold records that are not read"
+            return Loss(name, what)
+    return None
 
 
 def _closing(messages: Sequence[int], others: Sequence[Record]) -> int | None:

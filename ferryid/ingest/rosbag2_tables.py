@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError
@@ -69,6 +70,7 @@ def read_tables(database: Database) -> Recorded:
                     f"their columns are needed, found the tables: {found}. "
                     "Fix: give the .db3 file that rosbag2 recorded"
                 )
+            _check_rowid(connection, path)
             encoding = "serialization_format" if "serialization_format" in columns["topics"] else "'cdr'"
             digest = "type_description_hash" if "type_description_hash" in columns["topics"] else "''"
             topics = connection.execute(f"SELECT id, name, type, {encoding}, {digest} FROM topics ORDER BY id")
@@ -90,6 +92,31 @@ def read_tables(database: Database) -> Recorded:
             "Fix: copy it from the recorder again, or recover it with sqlite3's .recover"
         ) from database.checked(error)
     return Recorded(listed, definitions, distro)
+
+
+def _check_rowid(connection: sqlite3.Connection, path: Path) -> None:
+    """Refuse a table of messages without SQLite's own row numbers, or whose column hides them, generated ones too.
+
+    Raises
+    ------
+    FerryIdError
+        With the way to copy the table.
+    """
+    fault = ""
+    if any(str(row[1]).lower() == "rowid" for row in connection.execute("PRAGMA table_xinfo('messages')")):
+        fault = "a column named rowid hides them"
+    else:
+        try:
+            connection.execute("SELECT rowid FROM messages LIMIT 0").close()
+        except sqlite3.OperationalError as error:
+            if "no such column" not in str(error):
+                raise
+            fault = "it was created WITHOUT ROWID"
+    if fault:
+        raise FerryIdError(
+            f"{path}: SQLite's row numbers of the table messages are needed to read it, {fault}. "
+            "Fix: copy the columns id, topic_id, timestamp and data into a table as rosbag2 creates it"
+        )
 
 
 def _listed(rows: Iterable[tuple[Any, ...]]) -> Iterator[RecordedTopic]:

@@ -116,3 +116,9 @@ def test_manifests_that_cannot_be_used(season: Path, text: str, says: str) -> No
 def test_what_matches_nothing(season: Path, asked: str) -> None:
     with pytest.raises(FerryIdError, match=r"nothing is there that this matches\. Fix: "):
         named("season/a.mcap", asked)
+
+
+@pytest.mark.parametrize("asked", ["", "  ", "+", "season/a.mcap+", "+season/a.mcap"])
+def test_an_empty_path_is_not_the_working_folder(season: Path, asked: str) -> None:
+    with pytest.raises(FerryIdError, match=r"(is empty|matches)[^\n]*\. Fix: "):
+        named("season/a.mcap", asked)

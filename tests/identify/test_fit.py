@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,6 +32,14 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Opened:
 def fitted(monkeypatch: pytest.MonkeyPatch, opened: Opened, settings: FitSettings = SETTINGS) -> FitResult:
     monkeypatch.setattr(module, "open_track", lambda *_, **__: opened)
     return fit(["short.mcap"], PROFILE, settings, Path("nowhere"))
+
+
+@pytest.mark.parametrize("factor", ["delta", "sigma", "zeta"])
+@pytest.mark.parametrize("value", [1e-320, 9e-4, -1.0, 101.0, math.nan])
+def test_a_factor_that_is_hardly_there_is_refused(factor: str, value: float) -> None:
+    with pytest.raises(FerryIdError, match=rf"^--{factor}: .* is no usable factor\. Fix: give .*0\.001 to 100"):
+        FitSettings(**{factor: value})
+    assert FitSettings(sigma=0.0, delta=1e-3).scale == {"delta": 1e-3, "sigma": 0.0, "zeta": 1.0}
 
 
 def test_recovers_the_true_inertia_from_a_base_at_forty_percent(

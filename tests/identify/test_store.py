@@ -171,6 +171,17 @@ def test_a_damaged_version_is_a_row_and_keeps_its_number(tmp_path: Path, damage:
         load("baot", tmp_path)
 
 
+def test_a_folder_in_place_of_the_current_version_is_reported_with_a_remedy(tmp_path: Path) -> None:
+    save(made(), tmp_path)
+    current = tmp_path / "models" / "boat" / "current"
+    current.unlink()
+    current.mkdir()
+    assert "holds no number" in render_listing(listing(tmp_path), tmp_path).splitlines()[-1]
+    with pytest.raises(FerryIdError, match=r"current: the number .*, found a folder\. Fix: move or delete that folder"):
+        save(made(seed=1), tmp_path)
+    assert load("boat@1", tmp_path).version == 1
+
+
 @pytest.mark.parametrize(("text", "told"), [("", "no number"), ("x\n", "no number"), ("7\n", "names version 7")])
 def test_a_damaged_note_of_the_current_version_is_told(tmp_path: Path, text: str, told: str) -> None:
     save(made(), tmp_path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -150,3 +151,35 @@ def test_milliseconds_stated_as_seconds_are_noted(tmp_path: Path) -> None:
     parquet.write_table(table, tmp_path / "log.parquet")
     (topic,) = open_log(tmp_path / "log.parquet", TableLayout(time="time")).topics
     assert 'look like milliseconds, so set time_unit = "ms"' in topic.note
+
+
+@pytest.mark.parametrize("as_dictionary", [True, False])
+def test_a_long_text_that_all_rows_have_is_held_once(tmp_path: Path, as_dictionary: bool) -> None:
+    text = "a" * (4 << 20)
+    rows = pa.array(np.zeros(N, np.int32), mask=np.arange(N) == 7)
+    table = pa.table({**columns(), "note": pa.DictionaryArray.from_arrays(rows, pa.array([text]))})
+    parquet.write_table(table, tmp_path / "log.parquet", store_schema=as_dictionary)
+    allowed = 100 << 20
+    pa_before = pa.default_memory_pool().bytes_allocated()
+    tracemalloc.start()
+    try:
+        series, _ = read(tmp_path / "log.parquet")
+        assert tracemalloc.get_traced_memory()[1] < allowed
+    finally:
+        tracemalloc.stop()
+    assert pa.default_memory_pool().bytes_allocated() - pa_before < allowed
+    notes = series.columns["note"]
+    assert [len(notes[row]) for row in (0, 7, 8)] == [len(text), 0, len(text)]
+    assert notes[0] is notes[N - 1]
+
+
+def test_texts_in_structs_of_several_row_groups_are_read(tmp_path: Path) -> None:
+    texts = pa.array(["a", "b", None] * (N // 3))
+    struct = pa.StructArray.from_arrays([texts, pa.array(np.arange(N))], ["note", "value"])
+    parquet.write_table(
+        pa.table({**columns(), "s": struct, "note": texts}), tmp_path / "log.parquet", row_group_size=90
+    )
+    series, reader = read(tmp_path / "log.parquet")
+    assert not reader.losses
+    for name in ("s.note", "note"):
+        assert series.columns[name].tolist() == ["a", "b", ""] * (N // 3)

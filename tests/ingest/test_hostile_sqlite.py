@@ -217,6 +217,24 @@ def test_a_missing_column_is_one_line(tmp_path: Path, table: str) -> None:
         open_log(path)
 
 
+@pytest.mark.parametrize("column", ["rowid TEXT DEFAULT 'x'", "RowId INTEGER DEFAULT 5", "rowid INTEGER AS (7)"])
+def test_a_column_that_hides_the_row_numbers_is_refused(tmp_path: Path, column: str) -> None:
+    path = changed(database(tmp_path / "a.db3", points(0, 30)), f"ALTER TABLE messages ADD COLUMN {column}")
+    with pytest.raises(FerryIdError, match=r"a\.db3: .*a column named rowid hides them\. Fix: copy the columns"):
+        outcome(path)
+
+
+def test_messages_without_row_numbers_are_refused(tmp_path: Path) -> None:
+    path = changed(
+        database(tmp_path / "a.db3", points(0, 30)),
+        "ALTER TABLE messages RENAME TO old",
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB) WITHOUT ROWID",
+        "INSERT INTO messages SELECT id, topic_id, timestamp, data FROM old",
+    )
+    with pytest.raises(FerryIdError, match=r"a\.db3: .*created WITHOUT ROWID\. Fix: copy the columns"):
+        outcome(path)
+
+
 def test_a_database_of_wide_characters_gives_the_same_messages(tmp_path: Path) -> None:
     path = tmp_path / "log.db3"
     with closing(sqlite3.connect(path)) as connection:

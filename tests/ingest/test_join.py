@@ -115,6 +115,8 @@ def test_what_is_no_log_is_refused_in_one_line(tmp_path: Path) -> None:
     assert "readme.md" in refusal(tmp_path / "other")
     bag(tmp_path / "a.bag", range(2))
     assert f"lacks {tmp_path / 'b.bag'}" in refusal(f"{tmp_path / 'a.bag'}+{tmp_path / 'b.bag'}")
+    assert "lacks a name beside a +" in refusal("+")
+    assert "lacks a name beside a +" in refusal(f"{tmp_path / 'a.bag'}+")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")

@@ -15,6 +15,7 @@ from tests.ingest.mcap_records import (
     DATA_END,
     DEFINITIONS,
     HEAD,
+    MAGIC,
     PER_CHUNK,
     T0,
     accounted,
@@ -33,6 +34,7 @@ from tests.ingest.mcap_records import (
 )
 
 ALL = [float(number) for number in range(COUNT)]
+STATISTICS = struct.Struct("<QHIIIIQQI")
 COMPRESSIONS = ["", "zstd", "lz4"]
 
 
@@ -280,3 +282,53 @@ def test_a_message_named_twice_in_a_chunk_that_cannot_be_read_is_lost_once() -> 
     got, losses = accounted(without_summary(chunks))
     assert len(got) == COUNT - PER_CHUNK
     assert PER_CHUNK in [loss.messages for loss in losses]
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_statistics_of_well_compressed_chunks_without_an_index_are_believed(compression: str) -> None:
+    still = b"\0\1\0\0" + bytes(8)
+    inside = b"".join(message(number, time_ns=T0 + number // 20, data=still) for number in range(2000))
+    data = HEAD + chunk(inside, compression) + DATA_END
+    summary = DEFINITIONS + channel() + statistics(2000, chunks=1)
+    got, losses = read(data + summary + footer(len(data), summary, crc=True))
+    assert (len(got), losses) == (2000, ())
+
+
+def unchunked(numbers: range, key: int = 1) -> bytes:
+    """Return a finished file of messages outside chunks."""
+    head = MAGIC + record(1, text("ros2") + text("test")) + DEFINITIONS + channel(key)
+    data = head + b"".join(message(number, key) for number in numbers) + DATA_END
+    summary = DEFINITIONS + channel(key) + record(11, STATISTICS.pack(len(numbers), 1, 1, 0, 0, 0, T0, T0 + COUNT, 0))
+    return data + summary + footer(len(data), summary, crc=True)
+
+
+@pytest.mark.parametrize(("cut", "short"), [(0, 0), (30, 0), (0, 30), (90, 0), (0, 90)])
+def test_a_log_behind_another_is_read(cut: int, short: int) -> None:
+    first, second = unchunked(range(40)), unchunked(range(40, COUNT))
+    got, losses = accounted(first[: len(first) - cut] + second[: len(second) - short])
+    assert got == ALL
+    assert any(loss.messages is None for loss in losses)
+
+
+@pytest.mark.parametrize("cut", [0, 30, 90])
+@pytest.mark.parametrize("behind", [unchunked(range(40, COUNT), key=7), bytes(5000)])
+def test_what_stands_behind_a_log_and_is_not_read_is_reported(cut: int, behind: bytes) -> None:
+    first = unchunked(range(40))
+    first = first[: len(first) - cut] if behind[0] else first
+    for verify in (False, True):
+        got, losses = read(first + behind, verify=verify)
+        assert got[:40] == ALL[:40]
+        assert any(loss.messages is None for loss in losses)
+
+
+def test_a_copied_stretch_that_ends_the_data_hides_no_message() -> None:
+    content = unchunked(range(COUNT))
+    end = content.index(DATA_END)
+    stretch = content[end - 300 : end + 60]
+    for place in range(len(HEAD), end, 97):
+        got, losses = read(content[:place] + stretch + content[place:])
+        assert set(ALL) <= set(got) or any(loss.messages is None for loss in losses)
+
+
+def test_an_intact_log_outside_chunks_has_no_loss() -> None:
+    assert read(unchunked(range(COUNT))) == (ALL, ())

@@ -59,7 +59,15 @@ def _open_file(path: Path) -> Any:
     import pyarrow.parquet as parquet
 
     try:
-        return parquet.ParquetFile(path, page_checksum_verification=True)
+        file = parquet.ParquetFile(path, page_checksum_verification=True)
+        columns = [file.schema.column(number) for number in range(len(file.schema))]
+        texts = [
+            column.path for column in columns if column.logical_type.type == "STRING" and column.path == column.name
+        ]
+        if not texts:
+            return file
+        # As dictionaries, a text that many rows have is in memory once; pyarrow cannot do so in structs of several groups.
+        return parquet.ParquetFile(path, page_checksum_verification=True, read_dictionary=texts)
     except _failures() as error:
         raise _damaged(path, error) from error
 
