@@ -26,12 +26,12 @@ _BEYOND_NS = 3600 * STEP_NS
 """Rows at either end are strays only if further away than this, and than the rest is long; nearer, they follow a gap."""
 
 
-def stray_times(times: Nanoseconds) -> Flags:
-    """Return which rows have a time that contradicts the order of the rows before and after them.
+def stray_times(times: Nanoseconds) -> tuple[Flags, Flags]:
+    """Return which rows have a time that contradicts the order of the others, and which were written late.
 
     The longest chain of rows whose times rise, in the order of the file, is right; rows between those of the chain are
     strays. Rows before its first and after its last are strays if they are few, else a clock was set there. Rows that
-    were written late and fit into a gap elsewhere are none. The sequence is cut at outlying steps only, and the chain
+    fit into a gap elsewhere are no strays but were written late. The sequence is cut at outlying steps only, and the chain
     links whole pieces: rows less than a second out of order stay with those around them.
 
     Parameters
@@ -41,34 +41,35 @@ def stray_times(times: Nanoseconds) -> Flags:
 
     Returns
     -------
-    ndarray of bool
-        Shape (n,).
+    tuple of ndarray of bool
+        Strays and late rows, each of shape (n,).
     """
     count = len(times)
-    stray = np.zeros(count, dtype=bool)
+    stray, late = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     if count < _FEWEST:
-        return stray
+        return stray, late
     # Differences of far times leave 64 bits; as floating point they are exact enough to be compared with a second.
     steps = np.diff(times.astype(np.float64))
     if steps.min() >= -STEP_NS and steps.max() <= _BEYOND_NS:
-        return stray
+        return stray, late
     usual = float(np.median(np.abs(steps)))
     outlying = (steps < -STEP_NS) | (steps > max(STEP_NS, _PERIODS * usual))
     if np.count_nonzero(outlying) > 0.5 * count:
-        return stray
+        return stray, late
     stretches = [(0, count)]
     while stretches:
         start, stop = stretches.pop()
-        first, last = _mark(times[start:stop], outlying[start : stop - 1], stray[start:stop], usual)
+        part = slice(start, stop)
+        first, last = _mark(times[part], outlying[start : stop - 1], stray[part], late[part], usual)
         # A clock that was set: what lies before and after has an order of its own. At most so many stretches hold this.
         if (last - first) * _STRETCHES > count:
             ends = ((start, start + first), (start + last, stop))
-            stretches += [(a, b) for a, b in ends if b - a >= _FEWEST and not stray[a:b].all()]
-    return stray
+            stretches += [(a, b) for a, b in ends if b - a >= _FEWEST and not (stray | late)[a:b].any()]
+    return stray, late
 
 
-def _mark(times: Nanoseconds, outlying: Flags, stray: Flags, usual: float) -> tuple[int, int]:
-    """Mark the strays of one stretch in place; return where the chain of right rows starts and stops."""
+def _mark(times: Nanoseconds, outlying: Flags, stray: Flags, late: Flags, usual: float) -> tuple[int, int]:
+    """Mark the strays and late rows of one stretch in place; return where the chain of right rows starts and stops."""
     count = len(times)
     starts = np.concatenate([[0], np.flatnonzero(outlying) + 1])
     stops = np.append(starts[1:], count)
@@ -97,7 +98,8 @@ def _mark(times: Nanoseconds, outlying: Flags, stray: Flags, usual: float) -> tu
     if count - last > short:
         found[last:] = False
     # Rows of another stretch, neither right nor stray, say nothing about the gaps of this one.
-    stray |= _without_late(times, found, times[first:last][~found[first:last]], usual)
+    late |= _late(times, found, times[first:last][~found[first:last]], usual)
+    stray |= found & ~late
     return first, last
 
 
@@ -158,16 +160,17 @@ def _put(tree: list[int], node: int, value: int) -> None:
         tree[node] = largest
 
 
-def _without_late(times: Nanoseconds, stray: Flags, right: Nanoseconds, usual: float) -> Flags:
-    """Return the strays without those that fit into a gap of the right rows: they were written late."""
+def _late(times: Nanoseconds, outside: Flags, right: Nanoseconds, usual: float) -> Flags:
+    """Return which of the rows outside the chain fit into a gap of the right rows: they were written late."""
+    late = np.zeros(len(times), dtype=bool)
     rest = np.sort(right)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], stray, [False]]).astype(np.int8)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], outside, [False]]).astype(np.int8)))
     for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         first, last = int(times[start:stop].min()), int(times[start:stop].max())
         place = int(np.searchsorted(rest, first))
         fits = 0 < place < len(rest) and int(rest[place]) > last
-        # Chunks may change places; a single row ahead of its time is in the place that another stray left.
-        late = stop - start > 1 or start == 0 or first < int(times[start - 1])
-        if fits and late and int(rest[place]) - int(rest[place - 1]) >= (last - first) + 1.5 * usual:
-            stray[start:stop] = False
-    return stray
+        # Blocks may change places; a single row ahead of its time is in the place that another stray left.
+        later = stop - start > 1 or start == 0 or first < int(times[start - 1])
+        if fits and later and int(rest[place]) - int(rest[place - 1]) >= (last - first) + 1.5 * usual:
+            late[start:stop] = True
+    return late
