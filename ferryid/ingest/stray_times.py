@@ -30,9 +30,9 @@ def stray_times(times: Nanoseconds) -> tuple[Flags, Flags]:
     """Return which rows have a time that contradicts the order of the others, and which were written late.
 
     The longest chain of rows whose times rise, in the order of the file, is right; rows between those of the chain are
-    strays. Rows before its first and after its last are strays if they are few, else a clock was set there. Rows that
-    fit into a gap elsewhere are no strays but were written late. The sequence is cut at outlying steps only, and the chain
-    links whole pieces: rows less than a second out of order stay with those around them.
+    strays. Rows before its first and after its last are strays if they are few or all have one far time, else a clock
+    was set there. Rows that fit into a gap elsewhere are no strays but were written late. The sequence is cut at
+    outlying steps only, and the chain links whole pieces: rows less than a second out of order stay with those around.
 
     Parameters
     ----------
@@ -74,12 +74,15 @@ def _mark(times: Nanoseconds, outlying: Flags, stray: Flags, late: Flags, usual:
     starts = np.concatenate([[0], np.flatnonzero(outlying) + 1])
     stops = np.append(starts[1:], count)
     lowest, highest = np.minimum.reduceat(times, starts), np.maximum.reduceat(times, starts)
+    sizes = stops - starts
+    # A time that stands still is no clock, and many rows with it are worth no more than one.
+    still = (lowest == highest) & (sizes >= _FEWEST)
     short = max(_SHORT, int(_SHORT_SHARE * count))
     usable = np.ones(len(starts), dtype=bool)
     chain = _longest_chain(starts, stops, lowest, highest, usable)
     # Times before or after all others rise too; those far from the bulk of the chain are left out, and it is searched anew.
-    rows = np.cumsum((stops - starts)[chain])
-    core = chain[(rows > short) & (rows - (stops - starts)[chain] < rows[-1] - short)]
+    rows = np.cumsum(sizes[chain])
+    core = chain[(rows > short) & (rows - sizes[chain] < rows[-1] - short) & ~still[chain]]
     if len(core):
         low, high = int(lowest[core].min()), int(highest[core].max())
         far = max(_BEYOND_NS, high - low)
@@ -90,13 +93,14 @@ def _mark(times: Nanoseconds, outlying: Flags, stray: Flags, late: Flags, usual:
     first, last = int(starts[chain[0]]), int(stops[chain[-1]])
     outside = np.ones(len(starts), dtype=bool)
     outside[chain] = False
-    found = np.repeat(outside, stops - starts)
+    found = np.repeat(outside, sizes)
     if np.count_nonzero(found[first:last]) > _MOST * (last - first):
         return 0, count
+    unset = np.repeat(still & ~usable, sizes)
     if first > short:
-        found[:first] = False
+        found[:first] = unset[:first]
     if count - last > short:
-        found[last:] = False
+        found[last:] = unset[last:]
     # Rows of another stretch, neither right nor stray, say nothing about the gaps of this one.
     late |= _late(times, found, times[first:last][~found[first:last]], usual)
     stray |= found & ~late

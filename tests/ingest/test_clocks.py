@@ -273,6 +273,16 @@ def test_a_run_of_strays_costs_its_own_rows(count: int, run: int, wild: int) -> 
     assert (report.strays, report.dropped, report.resets) == (run, run, 0)
 
 
+@pytest.mark.parametrize("place", [slice(0, 480), slice(-480, None)])
+@pytest.mark.parametrize("wild", [0, START * 2])
+def test_a_run_of_one_far_time_at_either_end_costs_its_own_rows(place: slice, wild: int) -> None:
+    receive = sender(24_000)
+    receive[place] = wild
+    _, rows, report = repair(receive, None)
+    np.testing.assert_array_equal(rows, np.delete(np.arange(24_000), place))
+    assert (report.strays, report.resets, report.gaps) == (480, 0, ())
+
+
 def test_strays_in_two_runs_of_a_clock_leave_the_longer_run() -> None:
     (first, _), (second, right) = (strayed(count, count // 100, "2 s later", count) for count in (9000, 12_000))
     _, rows, report = repair(np.concatenate([first, second]), None)
