@@ -238,7 +238,7 @@ def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ..
     usual = _median(latency[~unset] if zeros else latency)
     replaced = 0
     # A stamp in the future by itself is no late message (which would be old): the sender wrote nonsense.
-    strange = unset | _alone_in_future(latency) | stray_times(stamp)
+    strange = unset | _alone_in_future(latency) | stray_times(stamp)[0]
     if strange.any():
         replaced = int(np.count_nonzero(strange))
         if replaced * 100 > max(count, 200):
@@ -311,17 +311,18 @@ def _ordered(
     steps = np.diff(times)
     lowest = int(steps.min(initial=1))
     strays = 0
-    if drop_far_side and (stray := stray_times(times)).any():
+    stray, late = stray_times(times) if drop_far_side else (np.zeros(count, dtype=bool),) * 2
+    if stray.any():
         strays = int(np.count_nonzero(stray))
         told.append(
             f"{strays} of {count} rows left out, first row {int(np.argmax(stray)) + 1}: the time contradicts that of the "
             "rows before and after"
         )
-        rows, times = rows[~stray], times[~stray]
+        rows, times, late = rows[~stray], times[~stray], late[~stray]
         steps = np.diff(times)
         lowest = int(steps.min(initial=1))
     if lowest < -_STEP_NS and drop_far_side:
-        start, stop, backward = _longest_stretch(times)
+        start, stop, backward = _longest_stretch(times, late)
         if stop - start < len(times):
             resets += backward
             far = len(times) - (stop - start)
@@ -462,15 +463,22 @@ def _theil_sen(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
     return float(np.median((y[second] - y[first])[apart] / run[apart])) if apart.any() else float("nan")
 
 
-def _longest_stretch(times: Nanoseconds) -> tuple[int, int, int]:
-    """Start and stop of the longest stretch without a lasting jump back, and how many such jumps there are."""
+def _longest_stretch(times: Nanoseconds, late: NDArray[np.bool_]) -> tuple[int, int, int]:
+    """Start and stop of the longest stretch without a lasting jump back, and how many such jumps there are.
+
+    Rows written late are no jump back; they belong to the stretch around them.
+    """
+    whole = len(times)
+    places = np.append(np.flatnonzero(~late), whole)
+    places[0] = 0
+    times = times[~late]
     backward = np.flatnonzero(np.diff(times) < -_STEP_NS)
     highest = np.maximum.accumulate(times)
     # A jump back lasts unless later rows soon rise past what came before; a single late row does so at once.
     lasting = [int(p) + 1 for p in backward if int(np.max(times[p + 1 : p + 4])) < int(highest[p])]
     if not lasting:
-        return 0, len(times), 0
+        return 0, whole, 0
     edges = [0, *lasting, len(times)]
     lengths = np.diff(edges)
     best = int(np.argmax(lengths))
-    return edges[best], edges[best + 1], len(lasting)
+    return int(places[edges[best]]), int(places[edges[best + 1]]), len(lasting)

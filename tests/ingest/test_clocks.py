@@ -239,6 +239,64 @@ def test_a_stray_beside_a_clock_that_was_set_changes_nothing_about_it() -> None:
     assert (report.strays, report.dropped, report.resets) == (1, 401, 1)
 
 
+def strayed(count: int, strays: int, wild: str, seed: int) -> tuple[Times, Times]:
+    """Receive times at 20 Hz with strays at random rows, and the rows that are right."""
+    rng = np.random.default_rng(seed)
+    receive, places = sender(count), rng.choice(count, strays, replace=False)
+    later = {"2 s later": 2 * SECOND, "10 s earlier": -10 * SECOND}
+    if wild in later:
+        receive[places] += later[wild]
+    else:
+        receive[places] = 0 if wild == "zero" else rng.integers(0, 2**62, strays)
+    return receive, np.setdiff1d(np.arange(count), places)
+
+
+@pytest.mark.parametrize("wild", ["2 s later", "10 s earlier", "zero", "random"])
+@pytest.mark.parametrize("strays", [10, 40, 100, 200, 960])
+def test_strays_at_random_rows_cost_their_own_rows(wild: str, strays: int) -> None:
+    receive, right = strayed(24_000, strays, wild, seed=strays)
+    times, rows, report = repair(receive, None)
+    assert np.isin(right, rows).sum() >= 0.999 * len(right)
+    # Of strays near by, one that fits the gap which another left cannot be told from a row written late.
+    assert len(np.setdiff1d(rows, right)) <= (0.002 * 24_000 if wild == "10 s earlier" else 0)
+    assert bool((np.diff(times) > 0).all())
+    assert (report.strays, report.resets) == (24_000 - report.count, 0)
+
+
+@pytest.mark.parametrize("wild", [0, START + 9999 * SECOND, START * 2])
+@pytest.mark.parametrize(("count", "run"), [(24_000, 241), (24_000, 480), (1000, 60)])
+def test_a_run_of_strays_costs_its_own_rows(count: int, run: int, wild: int) -> None:
+    receive = sender(count)
+    receive[count // 2 : count // 2 + run] = wild
+    _, rows, report = repair(receive, None)
+    np.testing.assert_array_equal(rows, np.delete(np.arange(count), np.s_[count // 2 : count // 2 + run]))
+    assert (report.strays, report.dropped, report.resets) == (run, run, 0)
+
+
+@pytest.mark.parametrize("place", [slice(0, 480), slice(-480, None)])
+@pytest.mark.parametrize("wild", [0, START * 2])
+def test_a_run_of_one_far_time_at_either_end_costs_its_own_rows(place: slice, wild: int) -> None:
+    receive = sender(24_000)
+    receive[place] = wild
+    _, rows, report = repair(receive, None)
+    np.testing.assert_array_equal(rows, np.delete(np.arange(24_000), place))
+    assert (report.strays, report.resets, report.gaps) == (480, 0, ())
+
+
+def test_strays_in_two_runs_of_a_clock_leave_the_longer_run() -> None:
+    (first, _), (second, right) = (strayed(count, count // 100, "2 s later", count) for count in (9000, 12_000))
+    _, rows, report = repair(np.concatenate([first, second]), None)
+    np.testing.assert_array_equal(rows, 9000 + right)
+    assert (report.strays, report.resets, report.dropped) == (210, 1, 9120)
+
+
+def test_blocks_of_rows_that_changed_places_are_sorted() -> None:
+    order = np.r_[0:400, 500:540, 400:500, 540:2000]
+    times, _, report = repair(sender(2000)[order], None)
+    np.testing.assert_array_equal(times, sender(2000))
+    assert (report.strays, report.dropped) == (0, 0)
+
+
 @pytest.mark.parametrize("wild", ["far future", "far past", "negative"])
 @pytest.mark.parametrize("places", [[400], [400, 401, 402], [0], [999]])
 def test_stray_stamps_are_replaced_and_counted(wild: str, places: list[int]) -> None:
