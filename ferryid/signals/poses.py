@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,12 +34,20 @@ _SPEEDS = 3.0
 _QUANTILE = 0.98
 _JUMPS_AT_MOST = 0.02
 """With a larger share of jumps the signal is noise, and none of them is known to be wrong."""
-_AHEAD = 40
+_AHEAD = 24
 """So many jumps are looked past for the place where the pose comes back."""
+_WAYS = 2.0
+"""A jump is farther than this many times the way that the measured velocity accounts for."""
+_ORIGIN_S = 10.0
+"""A stretch after a jump is kept as one with another origin if it is longer [s], or than a quarter of the log."""
+_KEPT_AT_LEAST = 0.4
+"""Where less than this share fits together, no part is known to be the right one, and only the jumps are left out."""
 _BACK = 0.4
 """A pose is back if it misses its place by less than this share of the jump, and the vessel has not moved farther itself."""
 _DRIFT = 0.2
 """Where the velocity is measured, this share of the way is uncertain."""
+_HELD_WAY = 0.25
+"""And if the measured velocity, where there is one, accounts for this share of that."""
 _STEPS_HELD = 5.0
 """A fix that repeats too long was lost if the vessel is this many usual steps further afterwards."""
 _PERIODS_HELD, _LEAST_HELD_S = 4.0, 0.5
@@ -57,7 +66,9 @@ class PoseFault:
         ``"position"`` or ``"heading"``.
     kind
         ``"jump"``: a step after which the pose stays, so that the step alone is left out; ``"away"``: between a jump and the
-        one back; ``"flip"``: the same of a heading, by 180°; ``"zero"``: exactly zero; ``"held"``: repeats its last value.
+        one back; ``"flip"``: the same of a heading, by 180°; ``"off"``, ``"turned"``: the same as these two, but from the
+        start or to the end of the log; ``"zero"``: exactly zero; ``"held"``: repeats its last value; ``"frequent"``: jumps
+        so often that no sample is known to be wrong, one fault for each jump, of which none is left out.
     samples
         Wrong samples; none in a jump.
     start_ns, end_ns
@@ -72,6 +83,11 @@ class PoseFault:
     start_ns: int
     end_ns: int
     size: float
+
+    @property
+    def left_out(self) -> bool:
+        """False where jumps are too frequent to know which samples are wrong."""
+        return self.kind != "frequent"
 
     @property
     def seconds(self) -> float:
@@ -107,6 +123,13 @@ def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
                 continue
             times = "once" if len(those) == 1 else f"{len(those)} times"
             size = max(fault.size for fault in those)
+            if kind == "frequent":
+                far = f"{size:.2f} m" if signal == "position" else f"{np.degrees(size):.0f}°"
+                said.append(
+                    f"The {signal} jumps {len(those)} times farther than the vessel can move, by up to {far}: too often to "
+                    "know which samples are wrong, so that none is left out. Check the sensor and its fields in the profile."
+                )
+                continue
             text = f"The {signal} {what} {times}, by up to " + (
                 f"{size:.2f} m" if signal == "position" else f"{np.degrees(size):.0f}°"
             )
@@ -119,9 +142,12 @@ def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
 _SAYS = {
     "jump": "jumps farther than the vessel can move, without a jump back,",
     "away": "jumps farther than the vessel can move, and back,",
+    "off": "is farther from the rest of the log than the vessel can move, at its start or end,",
     "flip": "is turned by 180° and back",
+    "turned": "is turned by 180° against the longer part of the log, which is taken for right (check the sensor),",
     "zero": "is exactly zero while the vessel is elsewhere",
     "held": "repeats its last value while the vessel moves on",
+    "frequent": "",
 }
 
 _Path = Callable[[Floats], tuple[Complex, Floats]]
@@ -151,7 +177,9 @@ def _faults(signal: str, time_ns: Nanoseconds, values: Complex, path: _Path | No
                 found.append(_fault(signal, kind, time_ns, first, last, size))
     good = np.flatnonzero(~bad)
     for kind, first, last, size in _jumps(time_s[good], values[good], limits):
-        if last < first:
+        if kind == "frequent":
+            found.append(PoseFault(signal, kind, 0, int(time_ns[good[first]]), int(time_ns[good[last]]), size))
+        elif last < first:
             found.append(PoseFault(signal, kind, 0, int(time_ns[good[last]]), int(time_ns[good[first]]), size))
         else:
             found.append(_fault(signal, kind, time_ns, int(good[first]), int(good[last]), size))
@@ -207,6 +235,17 @@ class _Limits:
     def elsewhere(self, move: float) -> bool:
         """True where a pose is not where noise and a usual interval may bring it."""
         return move > max(_STEPS_HELD * self.step, self.speed * self.period_s)
+
+    def known(self, at_s: Floats) -> bool:
+        """True where the velocity is measured throughout."""
+        return self.path is not None and bool(np.isfinite(self.path(at_s + self.start_ns * 1e-9)[0]).all())
+
+    def ways(self, at_s: Floats) -> Complex:
+        """Return the ways by the velocity from each time to the next; 0 where it was not measured."""
+        if self.path is None:
+            return np.zeros(max(0, at_s.size - 1), dtype=np.complex128)
+        way = np.diff(self.path(at_s + self.start_ns * 1e-9)[0])
+        return np.where(np.isfinite(way), way, 0.0)
 
     def travelled(self, first_s: float, last_s: float) -> float:
         """Return how far the velocity has brought the vessel in the meantime; 0 where that is not known."""
@@ -287,51 +326,119 @@ def _held(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[int, i
         else:
             step = abs(complex(_difference(values[last : last + 2], angle=limits.angle)[0]))
             lost = time_s[last + 1] - time_s[last] <= longest and limits.elsewhere(step)
+            if lost and limits.path is not None:
+                way = limits.ways(time_s[[first - 1, last + 1]])
+                lost = not limits.known(time_s[[first - 1, last + 1]]) or abs(complex(way[0])) >= _HELD_WAY * step
         if lost:
             found.append((first, last))
     return found
 
 
 def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, int, int, float]]:
-    """Return kind, first and last index, and size, of what lies between a jump and the one back.
+    """Return kind, first and last index, and size, of the stretches between jumps that do not belong to the rest.
 
-    Where there is no way back, the last index is that before the jump, and the first that after it.
+    For a jump to another origin, the last index is that before it, and the first that after it. Jumps that are too frequent
+    come as one, whose indices are those of the first and the last.
     """
     fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
     if fixes.size < _FEWEST:
         return []
     move = _difference(values[fixes], angle=limits.angle)
+    way = limits.ways(time_s[fixes])
     # What a slow receiver repeats was measured at its first sample, but not what repeats far beyond the usual.
     lasts = np.minimum(np.diff(time_s[fixes]), time_s[fixes[1:]] - time_s[fixes[1:] - 1] + 2.0 * limits.period_s)
-    places = np.flatnonzero(limits.jump(np.abs(move), lasts))
-    if places.size == 0 or places.size > max(2, _JUMPS_AT_MOST * fixes.size):
+    # What the measured velocity explains is no jump, however fast.
+    places = np.flatnonzero(limits.jump(np.abs(move), lasts) & (np.abs(move) > limits.floor + _WAYS * np.abs(way)))
+    if places.size == 0:
         return []
-    clear = limits.jump(np.abs(move[places]) / _CLEAR, lasts[places])
-    starts = [0, *(int(fixes[k + 1]) for k in places)]
-    ends = [*(start - 1 for start in starts[1:]), values.size - 1]
+    if places.size > max(2, _JUMPS_AT_MOST * fixes.size):
+        first, last = int(fixes[places[0] + 1]), int(fixes[places[-1] + 1])
+        return [("frequent", first, last, float(np.abs(move[places]).max()))] * int(places.size)
+    starts = np.concatenate([[0], fixes[places + 1]])
+    ends = np.concatenate([starts[1:] - 1, [values.size - 1]])
+    off = move[places] - way[places]
+    clear = limits.jump(np.abs(off) / _CLEAR, lasts[places])
+    stretches = _Stretches(time_s, values, limits, starts, ends, off, clear)
+    links = stretches.kept(0, len(starts))
+    if sum(int(ends[k] - starts[k]) + 1 for k in links) < _KEPT_AT_LEAST * values.size:
+        links = list(range(len(starts)))  # no part is known to be the right one
+    sizes = np.abs(wrap(off.real)) if limits.angle else np.abs(off)
     found = []
-    k = 0
-    while k < len(starts) - 1:
-        size = abs(complex(move[places[k]]))
-        later = range(k + 2, min(k + 2 + _AHEAD, len(starts)))
-        back = next((j for j in later if _is_back(time_s, values, ends[k], starts[j], size, limits)), None)
-        if back is None and later and clear[k] and time_s[starts[k + 2]] - time_s[ends[k]] <= _CANCEL_S:
-            both = complex(move[places[k]] + move[places[k + 1]])
-            undone = abs(float(wrap(np.array([both.real]))[0])) if limits.angle else abs(both)
-            back = k + 2 if undone <= _CANCEL * size else None
-        if back is not None and time_s[ends[back - 1]] - time_s[starts[k + 1]] < 0.5 * time_s[-1]:
-            kind = "flip" if limits.angle and abs(size - np.pi) < _FLIP else "away"
-            found.append((kind, starts[k + 1], ends[back - 1], size))
-            k = back
-        else:
-            found.append(("jump", starts[k + 1], ends[k], size))
-            k += 1
+    for before, after in pairwise([-1, *links, len(starts)]):
+        size = float(sizes[before if before >= 0 else after - 1]) if after < len(starts) or before < after - 1 else 0.0
+        flip = limits.angle and abs(size - np.pi) < _FLIP
+        if after - before > 1:
+            inside = before >= 0 and after < len(starts)
+            kind = ("flip" if inside else "turned") if flip else ("away" if inside else "off")
+            found.append((kind, int(starts[before + 1]), int(ends[after - 1]), size))
+        elif before >= 0 and after < len(starts):
+            found.append(("jump", int(starts[after]), int(ends[before]), size))
     return found
 
 
-def _is_back(time_s: Floats, values: Complex, last: int, first: int, jump: float, limits: _Limits) -> bool:
-    move = complex(_between(values, np.array([last]), np.array([first]), angle=limits.angle)[0])
-    return limits.back(jump, move, float(time_s[last]), float(time_s[first]))
+@dataclass(frozen=True)
+class _Stretches:
+    """The stretches between jumps.
+
+    Attributes
+    ----------
+    starts, ends
+        First and last index of every stretch.
+    off, clear
+        By how much every jump between them leads away from where the vessel can be, and whether that is beyond doubt.
+    """
+
+    time_s: Floats
+    values: Complex
+    limits: _Limits
+    starts: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    off: Complex
+    clear: NDArray[np.bool_]
+
+    def kept(self, first: int, stop: int) -> list[int]:
+        """Return the stretches whose samples are the most, of those that fit each other or are long on their own.
+
+        A stretch that does not fit the one before costs `_ORIGIN_S`, that of a heading turned by 180° cannot follow at all.
+        A return to where the vessel must be is worth as much as what is left out before it, up to what agrees on both sides.
+        """
+        size = (self.ends - self.starts + 1).astype(np.float64)
+        cost = min(_ORIGIN_S * self.values.size / max(float(self.time_s[-1]), 1e-9), 0.25 * self.values.size)
+        total = np.concatenate([[0.0], np.cumsum(size)])
+        origin = np.concatenate([[0.0 + 0j], np.cumsum(self.off)])
+        best, kept = size.copy(), size.copy()
+        previous = np.full(len(size), -1)
+        for j in range(first + 1, stop):
+            for i in range(max(first, j - _AHEAD), j):
+                apart = origin[j] - origin[i]
+                turn = abs(float(wrap(np.array([apart.real]))[0])) if self.limits.angle else abs(apart)
+                flips = self.limits.angle and abs(abs(float(wrap(np.array([self.off[i].real]))[0])) - np.pi) < _FLIP
+                between = float(total[j] - total[i + 1])
+                value = best[i] + size[j]
+                if j > i + 1 and self._fits(i, j, turn, flips=flips):
+                    value += 0.0 if flips else min(between, kept[i] + size[j])
+                elif self.limits.angle and abs(turn - np.pi) < _FLIP:
+                    continue
+                else:
+                    value -= cost
+                if value > best[j]:
+                    best[j], kept[j], previous[j] = value, kept[i] + size[j], i
+        chain = [first + int(np.argmax(best[first:stop]))]
+        while previous[chain[-1]] >= 0:
+            chain.append(int(previous[chain[-1]]))
+        return chain[::-1]
+
+    def _fits(self, i: int, j: int, apart: float, *, flips: bool) -> bool:
+        """True where stretch j goes on where stretch i ended, from the jumps between or from the way between."""
+        jump = abs(float(wrap(np.array([self.off[i].real]))[0])) if self.limits.angle else abs(complex(self.off[i]))
+        last, first = int(self.ends[i]), int(self.starts[j])
+        lasts = float(self.time_s[first] - self.time_s[last])
+        if flips:
+            return bool(apart < _FLIP)
+        if self.clear[i] and apart <= _CANCEL * jump and lasts <= _CANCEL_S:
+            return True
+        move = complex(_between(self.values, np.array([last]), np.array([first]), angle=self.limits.angle)[0])
+        return self.limits.back(jump, move, float(self.time_s[last]), float(self.time_s[first]))
 
 
 def _integral(samples: Samples, name: str) -> _Path | None:
