@@ -359,7 +359,7 @@ def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, 
     off = move[places] - way[places]
     clear = limits.jump(np.abs(off) / _CLEAR, lasts[places])
     stretches = _Stretches(time_s, values, limits, starts, ends, off, clear)
-    links = stretches.kept(0, len(starts))
+    links = stretches.kept()
     if sum(int(ends[k] - starts[k]) + 1 for k in links) < _KEPT_AT_LEAST * values.size:
         links = list(range(len(starts)))  # no part is known to be the right one
     sizes = np.abs(wrap(off.real)) if limits.angle else np.abs(off)
@@ -396,7 +396,7 @@ class _Stretches:
     off: Complex
     clear: NDArray[np.bool_]
 
-    def kept(self, first: int, stop: int) -> list[int]:
+    def kept(self) -> list[int]:
         """Return the stretches whose samples are the most, of those that fit each other or are long on their own.
 
         A stretch that does not fit the one before costs `_ORIGIN_S`, that of a heading turned by 180° cannot follow at all.
@@ -408,29 +408,34 @@ class _Stretches:
         origin = np.concatenate([[0.0 + 0j], np.cumsum(self.off)])
         best, kept = size.copy(), size.copy()
         previous = np.full(len(size), -1)
-        for j in range(first + 1, stop):
-            for i in range(max(first, j - _AHEAD), j):
-                apart = origin[j] - origin[i]
-                turn = abs(float(wrap(np.array([apart.real]))[0])) if self.limits.angle else abs(apart)
-                flips = self.limits.angle and abs(abs(float(wrap(np.array([self.off[i].real]))[0])) - np.pi) < _FLIP
-                between = float(total[j] - total[i + 1])
+        for j in range(1, len(size)):
+            for i in range(j - 1, max(0, j - _AHEAD) - 1, -1):
+                credit = min(float(total[j] - total[i + 1]), kept[i] + size[j])
+                if best[i] + size[j] + credit <= best[j]:
+                    continue
+                apart = self._turn(origin[j] - origin[i])
+                flips = self.limits.angle and abs(self._turn(self.off[i]) - np.pi) < _FLIP
                 value = best[i] + size[j]
-                if j > i + 1 and self._fits(i, j, turn, flips=flips):
-                    value += 0.0 if flips else min(between, kept[i] + size[j])
-                elif self.limits.angle and abs(turn - np.pi) < _FLIP:
+                if j > i + 1 and self._fits(i, j, apart, flips=flips):
+                    value += 0.0 if flips else credit
+                elif self.limits.angle and abs(apart - np.pi) < _FLIP:
                     continue
                 else:
                     value -= cost
                 if value > best[j]:
                     best[j], kept[j], previous[j] = value, kept[i] + size[j], i
-        chain = [first + int(np.argmax(best[first:stop]))]
+        chain = [int(np.argmax(best))]
         while previous[chain[-1]] >= 0:
             chain.append(int(previous[chain[-1]]))
         return chain[::-1]
 
+    def _turn(self, change: complex) -> float:
+        """Return the size of a change, of headings at most half a turn."""
+        return float(abs((change.real + np.pi) % (2.0 * np.pi) - np.pi)) if self.limits.angle else float(abs(change))
+
     def _fits(self, i: int, j: int, apart: float, *, flips: bool) -> bool:
         """True where stretch j goes on where stretch i ended, from the jumps between or from the way between."""
-        jump = abs(float(wrap(np.array([self.off[i].real]))[0])) if self.limits.angle else abs(complex(self.off[i]))
+        jump = self._turn(self.off[i])
         last, first = int(self.ends[i]), int(self.starts[j])
         lasts = float(self.time_s[first] - self.time_s[last])
         if flips:
@@ -471,8 +476,10 @@ def _summed(time_ns: Nanoseconds, rate: Complex) -> _Path | None:
     way = np.concatenate([[0.0], np.cumsum(middle * interval)])
     length = np.concatenate([[0.0], np.cumsum(np.abs(middle) * interval)])
 
+    north, east = np.ascontiguousarray(way.real), np.ascontiguousarray(way.imag)  # or every call copies them
+
     def path(at_s: Floats) -> tuple[Complex, Floats]:
-        along = np.interp(at_s, time_s, way.real) + 1j * np.interp(at_s, time_s, way.imag)
+        along = np.interp(at_s, time_s, north) + 1j * np.interp(at_s, time_s, east)
         inside = (at_s >= time_s[0] - 1.0) & (at_s <= time_s[-1] + 1.0)
         return np.where(inside, along, np.nan), np.interp(at_s, time_s, length)
 
