@@ -240,11 +240,12 @@ class _Limits:
         """True where the velocity is measured throughout."""
         return self.path is not None and bool(np.isfinite(self.path(at_s + self.start_ns * 1e-9)[0]).all())
 
-    def ways(self, at_s: Floats) -> Complex:
-        """Return the ways by the velocity from each time to the next; 0 where it was not measured."""
-        if self.path is None:
-            return np.zeros(max(0, at_s.size - 1), dtype=np.complex128)
-        way = np.diff(self.path(at_s + self.start_ns * 1e-9)[0])
+    def ways(self, first_s: Floats, last_s: Floats) -> Complex:
+        """Return the ways by the velocity from first to last times; 0 where it was not measured."""
+        if self.path is None or first_s.size == 0:
+            return np.zeros(first_s.size, dtype=np.complex128)
+        start_s = self.start_ns * 1e-9
+        way = self.path(last_s + start_s)[0] - self.path(first_s + start_s)[0]
         return np.where(np.isfinite(way), way, 0.0)
 
     def travelled(self, first_s: float, last_s: float) -> float:
@@ -327,8 +328,8 @@ def _held(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[int, i
             step = abs(complex(_difference(values[last : last + 2], angle=limits.angle)[0]))
             lost = time_s[last + 1] - time_s[last] <= longest and limits.elsewhere(step)
             if lost and limits.path is not None:
-                way = limits.ways(time_s[[first - 1, last + 1]])
-                lost = not limits.known(time_s[[first - 1, last + 1]]) or abs(complex(way[0])) >= _HELD_WAY * step
+                sides = time_s[[first - 1, last + 1]]
+                lost = not limits.known(sides) or limits.travelled(*map(float, sides)) >= _HELD_WAY * step
         if lost:
             found.append((first, last))
     return found
@@ -344,11 +345,13 @@ def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, 
     if fixes.size < _FEWEST:
         return []
     move = _difference(values[fixes], angle=limits.angle)
-    way = limits.ways(time_s[fixes])
     # What a slow receiver repeats was measured at its first sample, but not what repeats far beyond the usual.
     lasts = np.minimum(np.diff(time_s[fixes]), time_s[fixes[1:]] - time_s[fixes[1:] - 1] + 2.0 * limits.period_s)
+    places = np.flatnonzero(limits.jump(np.abs(move), lasts))
+    way = limits.ways(time_s[fixes[places]], time_s[fixes[places + 1]])
     # What the measured velocity explains is no jump, however fast.
-    places = np.flatnonzero(limits.jump(np.abs(move), lasts) & (np.abs(move) > limits.floor + _WAYS * np.abs(way)))
+    unexplained = np.abs(move[places]) > limits.floor + _WAYS * np.abs(way)
+    places, way = places[unexplained], way[unexplained]
     if places.size == 0:
         return []
     if places.size > max(2, _JUMPS_AT_MOST * fixes.size):
@@ -356,7 +359,7 @@ def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, 
         return [("frequent", first, last, float(np.abs(move[places]).max()))] * int(places.size)
     starts = np.concatenate([[0], fixes[places + 1]])
     ends = np.concatenate([starts[1:] - 1, [values.size - 1]])
-    off = move[places] - way[places]
+    off = move[places] - way
     clear = limits.jump(np.abs(off) / _CLEAR, lasts[places])
     stretches = _Stretches(time_s, values, limits, starts, ends, off, clear)
     links = stretches.kept()
@@ -405,6 +408,7 @@ class _Stretches:
         size = (self.ends - self.starts + 1).astype(np.float64)
         cost = min(_ORIGIN_S * self.values.size / max(float(self.time_s[-1]), 1e-9), 0.25 * self.values.size)
         total = np.concatenate([[0.0], np.cumsum(size)])
+        long = np.concatenate([[0], np.cumsum(size > cost)])
         origin = np.concatenate([[0.0 + 0j], np.cumsum(self.off)])
         best, kept = size.copy(), size.copy()
         previous = np.full(len(size), -1)
@@ -416,7 +420,9 @@ class _Stretches:
                 apart = self._turn(origin[j] - origin[i])
                 flips = self.limits.angle and abs(self._turn(self.off[i]) - np.pi) < _FLIP
                 value = best[i] + size[j]
-                if j > i + 1 and self._fits(i, j, apart, flips=flips):
+                # Of many origins, some agree by chance.
+                near = flips or long[j] - long[i + 1] <= 1
+                if j > i + 1 and near and self._fits(i, j, apart, flips=flips):
                     value += 0.0 if flips else credit
                 elif self.limits.angle and abs(apart - np.pi) < _FLIP:
                     continue
