@@ -2,36 +2,40 @@
 
 A pose is compared with the vessel's own speeds in the same log, as they show over a second: where two successive fixes are
 further apart than the vessel can have moved, one side of the step is wrong, or both have different origins. A slow
-receiver repeats its fixes; that is no loss as long as it repeats them no longer than it usually does.
+receiver repeats its fixes; that is no loss as long as it repeats them no longer than it usually does. Jumps cut a log into
+stretches; the largest set of stretches that fit together, or are long enough for an origin of their own, is kept.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.vessel.frames import to_world, wrap
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Nanoseconds = NDArray[np.int64]
-Samples = Mapping[str, tuple[Nanoseconds, Floats]]
-"""Canonical name to times [ns] and cleaned values, NaN where missing."""
+from ferryid.signals.pose_limits import (
+    STEPS_HELD,
+    Complex,
+    Floats,
+    Limits,
+    Nanoseconds,
+    Path,
+    Samples,
+    between,
+    difference,
+    finite,
+    integral,
+    way_over_ground,
+)
+from ferryid.vessel.frames import wrap
 
 MARGIN_S = 0.5
 """So much on either side of a bad pose is left out too: filters of the sender carry a jump on, and the grid interpolates."""
 USED = ("x", "y", "psi", "u", "v", "r", "vel_N", "vel_E")
 
 _FEWEST = 20
-_NOISES = 10.0
-"""Steps beyond this many usual ones are jumps, if no motion explains them."""
-_SPEEDS = 3.0
-"""And beyond this many times the vessel's highest usual speed."""
-_QUANTILE = 0.98
 _JUMPS_AT_MOST = 0.02
 """With a larger share of jumps the signal is noise, and none of them is known to be wrong."""
 _AHEAD = 24
@@ -42,14 +46,8 @@ _ORIGIN_S = 10.0
 """A stretch after a jump is kept as one with another origin if it is longer [s], or than a quarter of the log."""
 _KEPT_AT_LEAST = 0.4
 """Where less than this share fits together, no part is known to be the right one, and only the jumps are left out."""
-_BACK = 0.4
-"""A pose is back if it misses its place by less than this share of the jump, and the vessel has not moved farther itself."""
-_DRIFT = 0.2
-"""Where the velocity is measured, this share of the way is uncertain."""
 _HELD_WAY = 0.25
-"""And if the measured velocity, where there is one, accounts for this share of that."""
-_STEPS_HELD = 5.0
-"""A fix that repeats too long was lost if the vessel is this many usual steps further afterwards."""
+"""A fix that repeats was lost only if the measured velocity, where there is one, accounts for this share of the step."""
 _PERIODS_HELD, _LEAST_HELD_S = 4.0, 0.5
 _CLEAR, _CANCEL, _CANCEL_S = 2.0, 0.1, 120.0
 """A jump this many times the limit, undone by the next but for this share and within this [s], leads away and back."""
@@ -104,12 +102,12 @@ def pose_faults(samples: Samples) -> tuple[PoseFault, ...]:
         Of the names in `USED` those that the log has.
     """
     found: list[PoseFault] = []
-    turning = _integral(samples, "r")
+    turning = integral(samples, "r")
     if "psi" in samples:
-        found += _faults("heading", *_finite(samples["psi"][0], samples["psi"][1].astype(np.complex128)), turning)
+        found += _faults("heading", *finite(samples["psi"][0], samples["psi"][1].astype(np.complex128)), turning)
     if "x" in samples and "y" in samples and samples["x"][1].size == samples["y"][1].size:
         place = samples["x"][1] + 1j * samples["y"][1]
-        found += _faults("position", *_finite(samples["x"][0], place), _way(samples))
+        found += _faults("position", *finite(samples["x"][0], place), way_over_ground(samples))
     return tuple(sorted(found, key=lambda fault: (fault.start_ns, fault.signal)))
 
 
@@ -150,30 +148,22 @@ _SAYS = {
     "frequent": "",
 }
 
-_Path = Callable[[Floats], tuple[Complex, Floats]]
-"""Times [s] to the integral of the velocity, and to the integral of its size."""
 
-
-def _finite(time_ns: Nanoseconds, values: Complex) -> tuple[Nanoseconds, Complex]:
-    finite = np.isfinite(values)
-    return time_ns[finite], values[finite]
-
-
-def _faults(signal: str, time_ns: Nanoseconds, values: Complex, path: _Path | None) -> list[PoseFault]:
+def _faults(signal: str, time_ns: Nanoseconds, values: Complex, path: Path | None) -> list[PoseFault]:
     """Return the faults of one signal; a heading is a complex number without imaginary part here."""
     if time_ns.size < _FEWEST:
         return []
     angle = signal == "heading"
     time_s = (time_ns - time_ns[0]) * 1e-9
     bad = np.zeros(time_ns.size, dtype=bool)
-    limits = _Limits.of(time_s, values, path, time_ns[0], angle=angle)
+    limits = Limits.of(time_s, values, path, time_ns[0], angle=angle)
     found: list[PoseFault] = []
     for kind, runs in (("zero", _zeros(values, limits)), ("held", _held(time_s, values, limits))):
         for first, last in runs:
             if not bad[first : last + 1].any():
                 bad[first : last + 1] = True
                 sides = [k for k in (first - 1, last + 1) if 0 <= k < values.size]
-                size = max(abs(complex(_difference(values[[last, k]], angle=angle)[0])) for k in sides)
+                size = max(abs(complex(difference(values[[last, k]], angle=angle)[0])) for k in sides)
                 found.append(_fault(signal, kind, time_ns, first, last, size))
     good = np.flatnonzero(~bad)
     for kind, first, last, size in _jumps(time_s[good], values[good], limits):
@@ -191,117 +181,13 @@ def _fault(signal: str, kind: str, time_ns: Nanoseconds, first: int, last: int, 
     return PoseFault(signal, kind, last - first + 1, start, end, size)
 
 
-@dataclass(frozen=True)
-class _Limits:
-    """How far a pose can move, from the log itself: metres for positions, radians for headings."""
-
-    angle: bool
-    start_ns: int
-    period_s: float
-    step: float
-    speed: float
-    floor: float
-    path: _Path | None
-
-    @staticmethod
-    def of(time_s: Floats, values: Complex, path: _Path | None, start_ns: int, *, angle: bool) -> _Limits:
-        fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
-        interval = np.diff(time_s[fixes])
-        floor, most, least = (0.35, 2.0, 0.5) if angle else (1.0, 15.0, 1.5)
-        if interval.size == 0:
-            return _Limits(angle, int(start_ns), float("inf"), 0.0, most, floor, path)
-        move = np.abs(_difference(values[fixes], angle=angle))
-        period = _mean_interval(interval)
-        # Over a second, noise weighs little.
-        later = np.minimum(np.searchsorted(time_s, time_s + 1.0), time_s.size - 1)
-        lasts = time_s[later] - time_s
-        way = np.abs(_between(values, np.arange(time_s.size), later, angle=angle))
-        whole = (lasts > 0.5) & (lasts < 2.0)
-        speed = float(np.quantile(way[whole] / lasts[whole], _QUANTILE)) if whole.any() else most
-        return _Limits(
-            angle,
-            int(start_ns),
-            period,
-            float(np.median(move)),
-            float(np.clip(_SPEEDS * speed, least, most)),
-            floor,
-            path,
-        )
-
-    def jump(self, move: Floats, lasts: Floats) -> NDArray[np.bool_]:
-        """True where a pose moves farther than the vessel can."""
-        return np.asarray(move > np.maximum(_NOISES * self.step, self.floor + self.speed * lasts), dtype=bool)
-
-    def elsewhere(self, move: float) -> bool:
-        """True where a pose is not where noise and a usual interval may bring it."""
-        return move > max(_STEPS_HELD * self.step, self.speed * self.period_s)
-
-    def known(self, at_s: Floats) -> bool:
-        """True where the velocity is measured throughout."""
-        return self.path is not None and bool(np.isfinite(self.path(at_s + self.start_ns * 1e-9)[0]).all())
-
-    def ways(self, first_s: Floats, last_s: Floats) -> Complex:
-        """Return the ways by the velocity from first to last times; 0 where it was not measured."""
-        if self.path is None or first_s.size == 0:
-            return np.zeros(first_s.size, dtype=np.complex128)
-        start_s = self.start_ns * 1e-9
-        way = self.path(last_s + start_s)[0] - self.path(first_s + start_s)[0]
-        return np.where(np.isfinite(way), way, 0.0)
-
-    def travelled(self, first_s: float, last_s: float) -> float:
-        """Return how far the velocity has brought the vessel in the meantime; 0 where that is not known."""
-        if self.path is None:
-            return 0.0
-        way = self.path(np.array([first_s, last_s]) + self.start_ns * 1e-9)[0]
-        return float(abs(way[1] - way[0])) if np.isfinite(way).all() else 0.0
-
-    def back(self, jump: float, move: complex, first_s: float, last_s: float) -> bool:
-        """True where a pose after a while is where the vessel's velocity would have brought it, and by that not anywhere.
-
-        Parameters
-        ----------
-        jump
-            How far it was off in between.
-        move
-            From the last pose before to the first one after.
-        first_s, last_s
-            Their times [s].
-        """
-        lasts = last_s - first_s
-        known = None if self.path is None else self.path(np.array([first_s, last_s]) + self.start_ns * 1e-9)
-        way, reach = 0j, self.speed / _SPEEDS * lasts
-        if known is not None and np.isfinite(known[0]).all():
-            way, reach = complex(known[0][1] - known[0][0]), _DRIFT * float(known[1][1] - known[1][0])
-        miss = move - way
-        away = abs(float(wrap(np.array([miss.real]))[0])) if self.angle else abs(miss)
-        return away <= _BACK * jump and reach <= _BACK * jump
-
-
-def _mean_interval(interval: Floats) -> float:
-    """Return the mean of the intervals [s] without the long ones."""
-    period = float(interval.mean())
-    for _ in range(5):
-        period = float(interval[interval <= 3.0 * period].mean())
-    return period
-
-
-def _between(values: Complex, first: NDArray[np.int64], last: NDArray[np.int64], *, angle: bool) -> Complex:
-    change = values[last] - values[first]
-    return np.asarray(wrap(change.real) + 0j if angle else change)
-
-
-def _difference(values: Complex, *, angle: bool) -> Complex:
-    change = np.diff(values)
-    return np.asarray(wrap(change.real) + 0j if angle else change)
-
-
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and last index of every run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _zeros(values: Complex, limits: _Limits) -> list[tuple[int, int]]:
+def _zeros(values: Complex, limits: Limits) -> list[tuple[int, int]]:
     """Return runs of positions that are exactly zero in both coordinates, or headings in theirs, and left by a jump."""
     if limits.angle:
         return []  # a heading of zero is north; zeros between which it jumps are found as jumps
@@ -314,7 +200,7 @@ def _zeros(values: Complex, limits: _Limits) -> list[tuple[int, int]]:
     return found
 
 
-def _held(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[int, int]]:
+def _held(time_s: Floats, values: Complex, limits: Limits) -> list[tuple[int, int]]:
     """Return runs of repeats that last longer than usual and after which the vessel is further on at once."""
     same = np.concatenate([[False], np.diff(values) == 0.0])
     longest = max(_PERIODS_HELD * limits.period_s, _LEAST_HELD_S)
@@ -323,9 +209,9 @@ def _held(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[int, i
         if time_s[last] - time_s[first - 1] <= longest:
             continue
         if last + 1 == values.size:
-            lost = limits.travelled(float(time_s[first - 1]), float(time_s[last])) > _STEPS_HELD * limits.floor
+            lost = limits.travelled(float(time_s[first - 1]), float(time_s[last])) > STEPS_HELD * limits.floor
         else:
-            step = abs(complex(_difference(values[last : last + 2], angle=limits.angle)[0]))
+            step = abs(complex(difference(values[last : last + 2], angle=limits.angle)[0]))
             lost = time_s[last + 1] - time_s[last] <= longest and limits.elsewhere(step)
             if lost and limits.path is not None:
                 sides = time_s[[first - 1, last + 1]]
@@ -335,7 +221,7 @@ def _held(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[int, i
     return found
 
 
-def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, int, int, float]]:
+def _jumps(time_s: Floats, values: Complex, limits: Limits) -> list[tuple[str, int, int, float]]:
     """Return kind, first and last index, and size, of the stretches between jumps that do not belong to the rest.
 
     For a jump to another origin, the last index is that before it, and the first that after it. Jumps that are too frequent
@@ -344,7 +230,7 @@ def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, 
     fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
     if fixes.size < _FEWEST:
         return []
-    move = _difference(values[fixes], angle=limits.angle)
+    move = difference(values[fixes], angle=limits.angle)
     # What a slow receiver repeats was measured at its first sample, but not what repeats far beyond the usual.
     lasts = np.minimum(np.diff(time_s[fixes]), time_s[fixes[1:]] - time_s[fixes[1:] - 1] + 2.0 * limits.period_s)
     places = np.flatnonzero(limits.jump(np.abs(move), lasts))
@@ -393,7 +279,7 @@ class _Stretches:
 
     time_s: Floats
     values: Complex
-    limits: _Limits
+    limits: Limits
     starts: NDArray[np.int64]
     ends: NDArray[np.int64]
     off: Complex
@@ -448,45 +334,5 @@ class _Stretches:
             return bool(apart < _FLIP)
         if self.clear[i] and apart <= _CANCEL * jump and lasts <= _CANCEL_S:
             return True
-        move = complex(_between(self.values, np.array([last]), np.array([first]), angle=self.limits.angle)[0])
+        move = complex(between(self.values, np.array([last]), np.array([first]), angle=self.limits.angle)[0])
         return self.limits.back(jump, move, float(self.time_s[last]), float(self.time_s[first]))
-
-
-def _integral(samples: Samples, name: str) -> _Path | None:
-    if name not in samples:
-        return None
-    time_ns, values = _finite(samples[name][0], samples[name][1].astype(np.complex128))
-    return _summed(time_ns, values)
-
-
-def _way(samples: Samples) -> _Path | None:
-    """Return the integral of the velocity over ground, north + i east."""
-    if "vel_N" in samples and "vel_E" in samples and samples["vel_N"][1].size == samples["vel_E"][1].size:
-        return _summed(*_finite(samples["vel_N"][0], samples["vel_N"][1] + 1j * samples["vel_E"][1]))
-    if not {"u", "v", "psi"} <= samples.keys() or samples["u"][1].size != samples["v"][1].size:
-        return None
-    time_ns, body = _finite(samples["u"][0], samples["u"][1] + 1j * samples["v"][1])
-    turned_ns, psi = _finite(samples["psi"][0], samples["psi"][1].astype(np.complex128))
-    if time_ns.size < 2 or turned_ns.size < 2:
-        return None
-    north, east = to_world(body.real, body.imag, np.interp(time_ns, turned_ns, psi.real))
-    return _summed(time_ns, north + 1j * east)
-
-
-def _summed(time_ns: Nanoseconds, rate: Complex) -> _Path | None:
-    if time_ns.size < 2:
-        return None
-    time_s = time_ns * 1e-9
-    interval = np.diff(time_ns) * 1e-9
-    middle = (rate[1:] + rate[:-1]) / 2
-    way = np.concatenate([[0.0], np.cumsum(middle * interval)])
-    length = np.concatenate([[0.0], np.cumsum(np.abs(middle) * interval)])
-
-    north, east = np.ascontiguousarray(way.real), np.ascontiguousarray(way.imag)  # or every call copies them
-
-    def path(at_s: Floats) -> tuple[Complex, Floats]:
-        along = np.interp(at_s, time_s, north) + 1j * np.interp(at_s, time_s, east)
-        inside = (at_s >= time_s[0] - 1.0) & (at_s <= time_s[-1] + 1.0)
-        return np.where(inside, along, np.nan), np.interp(at_s, time_s, length)
-
-    return path

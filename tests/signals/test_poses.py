@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.signals.poses import PoseFault, Samples, pose_faults, pose_sentences
+from ferryid.signals.pose_limits import Samples
+from ferryid.signals.poses import PoseFault, pose_faults, pose_sentences
 
 Floats = NDArray[np.float64]
 
