@@ -396,7 +396,7 @@ def _overlap(log: str, navigation: list[_Source], actuators: list[_Source]) -> t
 def _inside(faults: Sequence[PoseFault], t0_ns: int, count: int, rate: float) -> Flags:
     """True on the rows of wrong poses and within `MARGIN_S` of them, shape (count,)."""
     inside = np.zeros(count, dtype=bool)
-    for fault in faults:
+    for fault in (one for one in faults if one.left_out):
         first = ((fault.start_ns - t0_ns) * 1e-9 - MARGIN_S) * rate
         last = ((fault.end_ns - t0_ns) * 1e-9 + MARGIN_S) * rate
         inside[max(0, int(np.ceil(first))) : max(0, int(np.floor(last)) + 1)] = True

@@ -2,45 +2,52 @@
 
 A pose is compared with the vessel's own speeds in the same log, as they show over a second: where two successive fixes are
 further apart than the vessel can have moved, one side of the step is wrong, or both have different origins. A slow
-receiver repeats its fixes; that is no loss as long as it repeats them no longer than it usually does.
+receiver repeats its fixes; that is no loss as long as it repeats them no longer than it usually does. Jumps cut a log into
+stretches; the largest set of stretches that fit together, or are long enough for an origin of their own, is kept.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.vessel.frames import to_world, wrap
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Nanoseconds = NDArray[np.int64]
-Samples = Mapping[str, tuple[Nanoseconds, Floats]]
-"""Canonical name to times [ns] and cleaned values, NaN where missing."""
+from ferryid.signals.pose_limits import (
+    STEPS_HELD,
+    Complex,
+    Floats,
+    Limits,
+    Nanoseconds,
+    Path,
+    Samples,
+    between,
+    difference,
+    finite,
+    integral,
+    way_over_ground,
+)
+from ferryid.vessel.frames import wrap
 
 MARGIN_S = 0.5
 """So much on either side of a bad pose is left out too: filters of the sender carry a jump on, and the grid interpolates."""
 USED = ("x", "y", "psi", "u", "v", "r", "vel_N", "vel_E")
 
 _FEWEST = 20
-_NOISES = 10.0
-"""Steps beyond this many usual ones are jumps, if no motion explains them."""
-_SPEEDS = 3.0
-"""And beyond this many times the vessel's highest usual speed."""
-_QUANTILE = 0.98
 _JUMPS_AT_MOST = 0.02
 """With a larger share of jumps the signal is noise, and none of them is known to be wrong."""
-_AHEAD = 40
+_AHEAD = 24
 """So many jumps are looked past for the place where the pose comes back."""
-_BACK = 0.4
-"""A pose is back if it misses its place by less than this share of the jump, and the vessel has not moved farther itself."""
-_DRIFT = 0.2
-"""Where the velocity is measured, this share of the way is uncertain."""
-_STEPS_HELD = 5.0
-"""A fix that repeats too long was lost if the vessel is this many usual steps further afterwards."""
+_WAYS = 2.0
+"""A jump is farther than this many times the way that the measured velocity accounts for."""
+_ORIGIN_S = 10.0
+"""A stretch after a jump is kept as one with another origin if it is longer [s], or than a quarter of the log."""
+_KEPT_AT_LEAST = 0.4
+"""Where less than this share fits together, no part is known to be the right one, and only the jumps are left out."""
+_HELD_WAY = 0.25
+"""A fix that repeats was lost only if the measured velocity, where there is one, accounts for this share of the step."""
 _PERIODS_HELD, _LEAST_HELD_S = 4.0, 0.5
 _CLEAR, _CANCEL, _CANCEL_S = 2.0, 0.1, 120.0
 """A jump this many times the limit, undone by the next but for this share and within this [s], leads away and back."""
@@ -57,7 +64,9 @@ class PoseFault:
         ``"position"`` or ``"heading"``.
     kind
         ``"jump"``: a step after which the pose stays, so that the step alone is left out; ``"away"``: between a jump and the
-        one back; ``"flip"``: the same of a heading, by 180°; ``"zero"``: exactly zero; ``"held"``: repeats its last value.
+        one back; ``"flip"``: the same of a heading, by 180°; ``"off"``, ``"turned"``: the same as these two, but from the
+        start or to the end of the log; ``"zero"``: exactly zero; ``"held"``: repeats its last value; ``"frequent"``: jumps
+        so often that no sample is known to be wrong, one fault for each jump, of which none is left out.
     samples
         Wrong samples; none in a jump.
     start_ns, end_ns
@@ -74,6 +83,11 @@ class PoseFault:
     size: float
 
     @property
+    def left_out(self) -> bool:
+        """False where jumps are too frequent to know which samples are wrong."""
+        return self.kind != "frequent"
+
+    @property
     def seconds(self) -> float:
         """Length between the right samples on either side [s]."""
         return (self.end_ns - self.start_ns) * 1e-9
@@ -88,12 +102,12 @@ def pose_faults(samples: Samples) -> tuple[PoseFault, ...]:
         Of the names in `USED` those that the log has.
     """
     found: list[PoseFault] = []
-    turning = _integral(samples, "r")
+    turning = integral(samples, "r")
     if "psi" in samples:
-        found += _faults("heading", *_finite(samples["psi"][0], samples["psi"][1].astype(np.complex128)), turning)
+        found += _faults("heading", *finite(samples["psi"][0], samples["psi"][1].astype(np.complex128)), turning)
     if "x" in samples and "y" in samples and samples["x"][1].size == samples["y"][1].size:
         place = samples["x"][1] + 1j * samples["y"][1]
-        found += _faults("position", *_finite(samples["x"][0], place), _way(samples))
+        found += _faults("position", *finite(samples["x"][0], place), way_over_ground(samples))
     return tuple(sorted(found, key=lambda fault: (fault.start_ns, fault.signal)))
 
 
@@ -107,6 +121,13 @@ def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
                 continue
             times = "once" if len(those) == 1 else f"{len(those)} times"
             size = max(fault.size for fault in those)
+            if kind == "frequent":
+                far = f"{size:.2f} m" if signal == "position" else f"{np.degrees(size):.0f}°"
+                said.append(
+                    f"The {signal} jumps {len(those)} times farther than the vessel can move, by up to {far}: too often to "
+                    "know which samples are wrong, so that none is left out. Check the sensor and its fields in the profile."
+                )
+                continue
             text = f"The {signal} {what} {times}, by up to " + (
                 f"{size:.2f} m" if signal == "position" else f"{np.degrees(size):.0f}°"
             )
@@ -119,39 +140,36 @@ def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
 _SAYS = {
     "jump": "jumps farther than the vessel can move, without a jump back,",
     "away": "jumps farther than the vessel can move, and back,",
+    "off": "is farther from the rest of the log than the vessel can move, at its start or end,",
     "flip": "is turned by 180° and back",
+    "turned": "is turned by 180° against the longer part of the log, which is taken for right (check the sensor),",
     "zero": "is exactly zero while the vessel is elsewhere",
     "held": "repeats its last value while the vessel moves on",
+    "frequent": "",
 }
 
-_Path = Callable[[Floats], tuple[Complex, Floats]]
-"""Times [s] to the integral of the velocity, and to the integral of its size."""
 
-
-def _finite(time_ns: Nanoseconds, values: Complex) -> tuple[Nanoseconds, Complex]:
-    finite = np.isfinite(values)
-    return time_ns[finite], values[finite]
-
-
-def _faults(signal: str, time_ns: Nanoseconds, values: Complex, path: _Path | None) -> list[PoseFault]:
+def _faults(signal: str, time_ns: Nanoseconds, values: Complex, path: Path | None) -> list[PoseFault]:
     """Return the faults of one signal; a heading is a complex number without imaginary part here."""
     if time_ns.size < _FEWEST:
         return []
     angle = signal == "heading"
     time_s = (time_ns - time_ns[0]) * 1e-9
     bad = np.zeros(time_ns.size, dtype=bool)
-    limits = _Limits.of(time_s, values, path, time_ns[0], angle=angle)
+    limits = Limits.of(time_s, values, path, time_ns[0], angle=angle)
     found: list[PoseFault] = []
     for kind, runs in (("zero", _zeros(values, limits)), ("held", _held(time_s, values, limits))):
         for first, last in runs:
             if not bad[first : last + 1].any():
                 bad[first : last + 1] = True
                 sides = [k for k in (first - 1, last + 1) if 0 <= k < values.size]
-                size = max(abs(complex(_difference(values[[last, k]], angle=angle)[0])) for k in sides)
+                size = max(abs(complex(difference(values[[last, k]], angle=angle)[0])) for k in sides)
                 found.append(_fault(signal, kind, time_ns, first, last, size))
     good = np.flatnonzero(~bad)
     for kind, first, last, size in _jumps(time_s[good], values[good], limits):
-        if last < first:
+        if kind == "frequent":
+            found.append(PoseFault(signal, kind, 0, int(time_ns[good[first]]), int(time_ns[good[last]]), size))
+        elif last < first:
             found.append(PoseFault(signal, kind, 0, int(time_ns[good[last]]), int(time_ns[good[first]]), size))
         else:
             found.append(_fault(signal, kind, time_ns, int(good[first]), int(good[last]), size))
@@ -163,105 +181,13 @@ def _fault(signal: str, kind: str, time_ns: Nanoseconds, first: int, last: int, 
     return PoseFault(signal, kind, last - first + 1, start, end, size)
 
 
-@dataclass(frozen=True)
-class _Limits:
-    """How far a pose can move, from the log itself: metres for positions, radians for headings."""
-
-    angle: bool
-    start_ns: int
-    period_s: float
-    step: float
-    speed: float
-    floor: float
-    path: _Path | None
-
-    @staticmethod
-    def of(time_s: Floats, values: Complex, path: _Path | None, start_ns: int, *, angle: bool) -> _Limits:
-        fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
-        interval = np.diff(time_s[fixes])
-        floor, most, least = (0.35, 2.0, 0.5) if angle else (1.0, 15.0, 1.5)
-        if interval.size == 0:
-            return _Limits(angle, int(start_ns), float("inf"), 0.0, most, floor, path)
-        move = np.abs(_difference(values[fixes], angle=angle))
-        period = _mean_interval(interval)
-        # Over a second, noise weighs little.
-        later = np.minimum(np.searchsorted(time_s, time_s + 1.0), time_s.size - 1)
-        lasts = time_s[later] - time_s
-        way = np.abs(_between(values, np.arange(time_s.size), later, angle=angle))
-        whole = (lasts > 0.5) & (lasts < 2.0)
-        speed = float(np.quantile(way[whole] / lasts[whole], _QUANTILE)) if whole.any() else most
-        return _Limits(
-            angle,
-            int(start_ns),
-            period,
-            float(np.median(move)),
-            float(np.clip(_SPEEDS * speed, least, most)),
-            floor,
-            path,
-        )
-
-    def jump(self, move: Floats, lasts: Floats) -> NDArray[np.bool_]:
-        """True where a pose moves farther than the vessel can."""
-        return np.asarray(move > np.maximum(_NOISES * self.step, self.floor + self.speed * lasts), dtype=bool)
-
-    def elsewhere(self, move: float) -> bool:
-        """True where a pose is not where noise and a usual interval may bring it."""
-        return move > max(_STEPS_HELD * self.step, self.speed * self.period_s)
-
-    def travelled(self, first_s: float, last_s: float) -> float:
-        """Return how far the velocity has brought the vessel in the meantime; 0 where that is not known."""
-        if self.path is None:
-            return 0.0
-        way = self.path(np.array([first_s, last_s]) + self.start_ns * 1e-9)[0]
-        return float(abs(way[1] - way[0])) if np.isfinite(way).all() else 0.0
-
-    def back(self, jump: float, move: complex, first_s: float, last_s: float) -> bool:
-        """True where a pose after a while is where the vessel's velocity would have brought it, and by that not anywhere.
-
-        Parameters
-        ----------
-        jump
-            How far it was off in between.
-        move
-            From the last pose before to the first one after.
-        first_s, last_s
-            Their times [s].
-        """
-        lasts = last_s - first_s
-        known = None if self.path is None else self.path(np.array([first_s, last_s]) + self.start_ns * 1e-9)
-        way, reach = 0j, self.speed / _SPEEDS * lasts
-        if known is not None and np.isfinite(known[0]).all():
-            way, reach = complex(known[0][1] - known[0][0]), _DRIFT * float(known[1][1] - known[1][0])
-        miss = move - way
-        away = abs(float(wrap(np.array([miss.real]))[0])) if self.angle else abs(miss)
-        return away <= _BACK * jump and reach <= _BACK * jump
-
-
-def _mean_interval(interval: Floats) -> float:
-    """Return the mean of the intervals [s] without the long ones."""
-    period = float(interval.mean())
-    for _ in range(5):
-        period = float(interval[interval <= 3.0 * period].mean())
-    return period
-
-
-def _between(values: Complex, first: NDArray[np.int64], last: NDArray[np.int64], *, angle: bool) -> Complex:
-    change = values[last] - values[first]
-    return np.asarray(wrap(change.real) + 0j if angle else change)
-
-
-def _difference(values: Complex, *, angle: bool) -> Complex:
-    change = np.diff(values)
-    return np.asarray(wrap(change.real) + 0j if angle else change)
-
-
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and last index of every run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _zeros(values: Complex, limits: _Limits) -> list[tuple[int, int]]:
+def _zeros(values: Complex, limits: Limits) -> list[tuple[int, int]]:
     """Return runs of positions that are exactly zero in both coordinates, or headings in theirs, and left by a jump."""
     if limits.angle:
         return []  # a heading of zero is north; zeros between which it jumps are found as jumps
@@ -274,7 +200,7 @@ def _zeros(values: Complex, limits: _Limits) -> list[tuple[int, int]]:
     return found
 
 
-def _held(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[int, int]]:
+def _held(time_s: Floats, values: Complex, limits: Limits) -> list[tuple[int, int]]:
     """Return runs of repeats that last longer than usual and after which the vessel is further on at once."""
     same = np.concatenate([[False], np.diff(values) == 0.0])
     longest = max(_PERIODS_HELD * limits.period_s, _LEAST_HELD_S)
@@ -283,90 +209,130 @@ def _held(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[int, i
         if time_s[last] - time_s[first - 1] <= longest:
             continue
         if last + 1 == values.size:
-            lost = limits.travelled(float(time_s[first - 1]), float(time_s[last])) > _STEPS_HELD * limits.floor
+            lost = limits.travelled(float(time_s[first - 1]), float(time_s[last])) > STEPS_HELD * limits.floor
         else:
-            step = abs(complex(_difference(values[last : last + 2], angle=limits.angle)[0]))
+            step = abs(complex(difference(values[last : last + 2], angle=limits.angle)[0]))
             lost = time_s[last + 1] - time_s[last] <= longest and limits.elsewhere(step)
+            if lost and limits.path is not None:
+                sides = time_s[[first - 1, last + 1]]
+                lost = not limits.known(sides) or limits.travelled(*map(float, sides)) >= _HELD_WAY * step
         if lost:
             found.append((first, last))
     return found
 
 
-def _jumps(time_s: Floats, values: Complex, limits: _Limits) -> list[tuple[str, int, int, float]]:
-    """Return kind, first and last index, and size, of what lies between a jump and the one back.
+def _jumps(time_s: Floats, values: Complex, limits: Limits) -> list[tuple[str, int, int, float]]:
+    """Return kind, first and last index, and size, of the stretches between jumps that do not belong to the rest.
 
-    Where there is no way back, the last index is that before the jump, and the first that after it.
+    For a jump to another origin, the last index is that before it, and the first that after it. Jumps that are too frequent
+    come as one, whose indices are those of the first and the last.
     """
     fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
     if fixes.size < _FEWEST:
         return []
-    move = _difference(values[fixes], angle=limits.angle)
+    move = difference(values[fixes], angle=limits.angle)
     # What a slow receiver repeats was measured at its first sample, but not what repeats far beyond the usual.
     lasts = np.minimum(np.diff(time_s[fixes]), time_s[fixes[1:]] - time_s[fixes[1:] - 1] + 2.0 * limits.period_s)
     places = np.flatnonzero(limits.jump(np.abs(move), lasts))
-    if places.size == 0 or places.size > max(2, _JUMPS_AT_MOST * fixes.size):
+    way = limits.ways(time_s[fixes[places]], time_s[fixes[places + 1]])
+    # What the measured velocity explains is no jump, however fast.
+    unexplained = np.abs(move[places]) > limits.floor + _WAYS * np.abs(way)
+    places, way = places[unexplained], way[unexplained]
+    if places.size == 0:
         return []
-    clear = limits.jump(np.abs(move[places]) / _CLEAR, lasts[places])
-    starts = [0, *(int(fixes[k + 1]) for k in places)]
-    ends = [*(start - 1 for start in starts[1:]), values.size - 1]
+    if places.size > max(2, _JUMPS_AT_MOST * fixes.size):
+        first, last = int(fixes[places[0] + 1]), int(fixes[places[-1] + 1])
+        return [("frequent", first, last, float(np.abs(move[places]).max()))] * int(places.size)
+    starts = np.concatenate([[0], fixes[places + 1]])
+    ends = np.concatenate([starts[1:] - 1, [values.size - 1]])
+    off = move[places] - way
+    clear = limits.jump(np.abs(off) / _CLEAR, lasts[places])
+    stretches = _Stretches(time_s, values, limits, starts, ends, off, clear)
+    links = stretches.kept()
+    if sum(int(ends[k] - starts[k]) + 1 for k in links) < _KEPT_AT_LEAST * values.size:
+        links = list(range(len(starts)))  # no part is known to be the right one
+    sizes = np.abs(wrap(off.real)) if limits.angle else np.abs(off)
     found = []
-    k = 0
-    while k < len(starts) - 1:
-        size = abs(complex(move[places[k]]))
-        later = range(k + 2, min(k + 2 + _AHEAD, len(starts)))
-        back = next((j for j in later if _is_back(time_s, values, ends[k], starts[j], size, limits)), None)
-        if back is None and later and clear[k] and time_s[starts[k + 2]] - time_s[ends[k]] <= _CANCEL_S:
-            both = complex(move[places[k]] + move[places[k + 1]])
-            undone = abs(float(wrap(np.array([both.real]))[0])) if limits.angle else abs(both)
-            back = k + 2 if undone <= _CANCEL * size else None
-        if back is not None and time_s[ends[back - 1]] - time_s[starts[k + 1]] < 0.5 * time_s[-1]:
-            kind = "flip" if limits.angle and abs(size - np.pi) < _FLIP else "away"
-            found.append((kind, starts[k + 1], ends[back - 1], size))
-            k = back
-        else:
-            found.append(("jump", starts[k + 1], ends[k], size))
-            k += 1
+    for before, after in pairwise([-1, *links, len(starts)]):
+        size = float(sizes[before if before >= 0 else after - 1]) if after < len(starts) or before < after - 1 else 0.0
+        flip = limits.angle and abs(size - np.pi) < _FLIP
+        if after - before > 1:
+            inside = before >= 0 and after < len(starts)
+            kind = ("flip" if inside else "turned") if flip else ("away" if inside else "off")
+            found.append((kind, int(starts[before + 1]), int(ends[after - 1]), size))
+        elif before >= 0 and after < len(starts):
+            found.append(("jump", int(starts[after]), int(ends[before]), size))
     return found
 
 
-def _is_back(time_s: Floats, values: Complex, last: int, first: int, jump: float, limits: _Limits) -> bool:
-    move = complex(_between(values, np.array([last]), np.array([first]), angle=limits.angle)[0])
-    return limits.back(jump, move, float(time_s[last]), float(time_s[first]))
+@dataclass(frozen=True)
+class _Stretches:
+    """The stretches between jumps.
 
+    Attributes
+    ----------
+    starts, ends
+        First and last index of every stretch.
+    off, clear
+        By how much every jump between them leads away from where the vessel can be, and whether that is beyond doubt.
+    """
 
-def _integral(samples: Samples, name: str) -> _Path | None:
-    if name not in samples:
-        return None
-    time_ns, values = _finite(samples[name][0], samples[name][1].astype(np.complex128))
-    return _summed(time_ns, values)
+    time_s: Floats
+    values: Complex
+    limits: Limits
+    starts: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    off: Complex
+    clear: NDArray[np.bool_]
 
+    def kept(self) -> list[int]:
+        """Return the stretches whose samples are the most, of those that fit each other or are long on their own.
 
-def _way(samples: Samples) -> _Path | None:
-    """Return the integral of the velocity over ground, north + i east."""
-    if "vel_N" in samples and "vel_E" in samples and samples["vel_N"][1].size == samples["vel_E"][1].size:
-        return _summed(*_finite(samples["vel_N"][0], samples["vel_N"][1] + 1j * samples["vel_E"][1]))
-    if not {"u", "v", "psi"} <= samples.keys() or samples["u"][1].size != samples["v"][1].size:
-        return None
-    time_ns, body = _finite(samples["u"][0], samples["u"][1] + 1j * samples["v"][1])
-    turned_ns, psi = _finite(samples["psi"][0], samples["psi"][1].astype(np.complex128))
-    if time_ns.size < 2 or turned_ns.size < 2:
-        return None
-    north, east = to_world(body.real, body.imag, np.interp(time_ns, turned_ns, psi.real))
-    return _summed(time_ns, north + 1j * east)
+        A stretch that does not fit the one before costs `_ORIGIN_S`, that of a heading turned by 180° cannot follow at all.
+        A return to where the vessel must be is worth as much as what is left out before it, up to what agrees on both sides.
+        """
+        size = (self.ends - self.starts + 1).astype(np.float64)
+        cost = min(_ORIGIN_S * self.values.size / max(float(self.time_s[-1]), 1e-9), 0.25 * self.values.size)
+        total = np.concatenate([[0.0], np.cumsum(size)])
+        long = np.concatenate([[0], np.cumsum(size > cost)])
+        origin = np.concatenate([[0.0 + 0j], np.cumsum(self.off)])
+        best, kept = size.copy(), size.copy()
+        previous = np.full(len(size), -1)
+        for j in range(1, len(size)):
+            for i in range(j - 1, max(0, j - _AHEAD) - 1, -1):
+                credit = min(float(total[j] - total[i + 1]), kept[i] + size[j])
+                if best[i] + size[j] + credit <= best[j]:
+                    continue
+                apart = self._turn(origin[j] - origin[i])
+                flips = self.limits.angle and abs(self._turn(self.off[i]) - np.pi) < _FLIP
+                value = best[i] + size[j]
+                # Of many origins, some agree by chance.
+                near = flips or long[j] - long[i + 1] <= 1
+                if j > i + 1 and near and self._fits(i, j, apart, flips=flips):
+                    value += 0.0 if flips else credit
+                elif self.limits.angle and abs(apart - np.pi) < _FLIP:
+                    continue
+                else:
+                    value -= cost
+                if value > best[j]:
+                    best[j], kept[j], previous[j] = value, kept[i] + size[j], i
+        chain = [int(np.argmax(best))]
+        while previous[chain[-1]] >= 0:
+            chain.append(int(previous[chain[-1]]))
+        return chain[::-1]
 
+    def _turn(self, change: complex) -> float:
+        """Return the size of a change, of headings at most half a turn."""
+        return float(abs((change.real + np.pi) % (2.0 * np.pi) - np.pi)) if self.limits.angle else float(abs(change))
 
-def _summed(time_ns: Nanoseconds, rate: Complex) -> _Path | None:
-    if time_ns.size < 2:
-        return None
-    time_s = time_ns * 1e-9
-    interval = np.diff(time_ns) * 1e-9
-    middle = (rate[1:] + rate[:-1]) / 2
-    way = np.concatenate([[0.0], np.cumsum(middle * interval)])
-    length = np.concatenate([[0.0], np.cumsum(np.abs(middle) * interval)])
-
-    def path(at_s: Floats) -> tuple[Complex, Floats]:
-        along = np.interp(at_s, time_s, way.real) + 1j * np.interp(at_s, time_s, way.imag)
-        inside = (at_s >= time_s[0] - 1.0) & (at_s <= time_s[-1] + 1.0)
-        return np.where(inside, along, np.nan), np.interp(at_s, time_s, length)
-
-    return path
+    def _fits(self, i: int, j: int, apart: float, *, flips: bool) -> bool:
+        """True where stretch j goes on where stretch i ended, from the jumps between or from the way between."""
+        jump = self._turn(self.off[i])
+        last, first = int(self.ends[i]), int(self.starts[j])
+        lasts = float(self.time_s[first] - self.time_s[last])
+        if flips:
+            return bool(apart < _FLIP)
+        if self.clear[i] and apart <= _CANCEL * jump and lasts <= _CANCEL_S:
+            return True
+        move = complex(between(self.values, np.array([last]), np.array([first]), angle=self.limits.angle)[0])
+        return self.limits.back(jump, move, float(self.time_s[last]), float(self.time_s[first]))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.signals.poses import PoseFault, Samples, pose_faults, pose_sentences
+from ferryid.signals.pose_limits import Samples
+from ferryid.signals.poses import PoseFault, pose_faults, pose_sentences
 
 Floats = NDArray[np.float64]
 
@@ -176,3 +177,93 @@ def test_one_fault_hides_no_other() -> None:
     kinds = [(fault.signal, fault.kind) for fault in faults(columns)]
     assert kinds == [("position", "zero"), ("heading", "flip"), ("position", "away"), ("position", "jump")]
     assert len(pose_sentences(faults(columns))) == 4
+
+
+LONG = np.arange(12_000) / RATE
+
+
+def of(time_s: Floats, **columns: Floats) -> tuple[PoseFault, ...]:
+    """Return the faults of signals that share their times."""
+    return pose_faults({name: ((time_s * 1e9).astype(np.int64), values) for name, values in columns.items()})
+
+
+def left_out(faults: tuple[PoseFault, ...]) -> int:
+    return sum(fault.samples for fault in faults if fault.left_out)
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_log_that_starts_with_wrong_positions_loses_these_alone(*, measured: bool) -> None:
+    noise = 0.01 * np.random.default_rng(3).standard_normal((2, LONG.size))
+    x = LONG + noise[0]
+    for first in range(0, 12_000, 2_400):
+        x[first : first + 3] += 25.0
+    velocity = {"u": np.ones(LONG.size), "v": 0.0 * LONG, "psi": 0.0 * LONG} if measured else {}
+    assert left_out(of(LONG, x=x, y=noise[1], **velocity)) == 15
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_log_that_starts_with_a_turned_heading_loses_the_turned_samples_alone(*, measured: bool) -> None:
+    psi = 0.5 * np.sin(0.05 * LONG) + 0.001 * np.random.default_rng(3).standard_normal(LONG.size)
+    rate = {"r": 0.025 * np.cos(0.05 * LONG)} if measured else {}
+    for first in range(0, 12_000, 200):
+        psi[first : first + 3] += np.pi
+    assert left_out(of(LONG, psi=psi, **rate)) == 180
+
+
+@pytest.mark.parametrize(("since", "share"), [(200.0, 100.0), (80.0, 80.0), (152.0, 148.0)])
+@pytest.mark.parametrize("alone", [False, True])
+def test_of_a_heading_that_stays_turned_round_the_longer_part_is_kept(
+    since: float, share: float, *, alone: bool
+) -> None:
+    columns = voyage()
+    columns["psi"] += np.pi * (since <= T)
+    (fault,) = faults(columns, alone=alone)
+    assert (fault.signal, fault.kind, fault.samples) == ("heading", "turned", round(share * RATE))
+    (says,) = pose_sentences([fault])
+    assert "is turned by 180° against the longer part of the log" in says
+
+
+def test_positions_that_move_to_new_origins_are_kept() -> None:
+    columns = voyage()
+    columns["x"] += 3.0 * (T > 50.0) + 8.0 * (T > 90.0) - 5.0 * (T > 130.0) + 2.5 * (T > 200.0)
+    for alone in (False, True):
+        assert [(fault.kind, fault.samples) for fault in faults(columns, alone=alone)] == [("jump", 0)] * 4
+
+
+def test_a_sprint_after_a_slow_voyage_is_no_jump() -> None:
+    time_s = np.arange(1_830.0)
+    u = np.where(time_s < 1_800.0, 0.3, 5.0)
+    assert of(time_s, x=np.cumsum(u), y=0.0 * u, psi=0.0 * u, u=u, v=0.0 * u) == ()
+
+
+def test_a_recorder_that_pauses_while_the_vessel_moves_makes_no_jump() -> None:
+    time_s = np.arange(0.0, 1_800.0, 0.2)
+    u = np.where(time_s < 1_700.0, 0.3, 5.0)
+    runs = (time_s < 1_710.0) | (time_s > 1_790.0)
+    columns = {"x": np.cumsum(u) * 0.2, "y": 0.0 * u, "psi": 0.0 * u, "u": u, "v": 0.0 * u}
+    assert of(time_s[runs], **{name: values[runs] for name, values in columns.items()}) == ()
+
+
+def test_a_spin_of_which_the_heading_is_measured_every_second_is_no_jump() -> None:
+    r = np.where((LONG > 300.0) & (LONG < 308.0), 2.0, 0.01)
+    psi = np.cumsum(r) / RATE
+    assert of(LONG, psi=psi[np.arange(LONG.size) // 20 * 20], r=r) == ()
+
+
+def test_a_vessel_that_rests_is_not_lost_where_its_position_is_corrected_afterwards() -> None:
+    rests = (LONG >= 200.0) & (LONG < 320.0)
+    u = np.where(rests, 0.0, 0.3)
+    x = np.cumsum(u) / RATE + np.where(rests, 0.0, 0.01 * np.random.default_rng(3).standard_normal(LONG.size))
+    x[rests] = x[rests][0]
+    x += 0.5 * (LONG >= 320.0)
+    assert of(LONG, x=x, y=0.0 * x, psi=0.0 * x, u=u, v=0.0 * u) == ()
+
+
+def test_jumps_too_frequent_to_know_the_wrong_samples_are_reported_and_nothing_is_left_out() -> None:
+    columns = voyage()
+    columns["x"][::40] += 25.0
+    reported = faults(columns)
+    assert left_out(reported) == 0
+    (says,) = pose_sentences(reported)
+    assert says.startswith("The position jumps 299 times farther than the vessel can move, by up to 25.")
+    assert "none is left out. Check the sensor" in says
