@@ -25,9 +25,9 @@ def shared_data() -> Callable[[str], Path]:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Show how a test that drew at random is repeated, whether it passed or failed."""
+    """Show how a test with a seed is repeated, whether it passed or failed."""
     for outcome in ("passed", "failed"):
         for report in terminalreporter.stats.get(outcome, []):
             for name, value in report.user_properties:
                 if name == "repeat":
-                    terminalreporter.write_line(f"{report.nodeid} drew at random; to repeat it: {value}")
+                    terminalreporter.write_line(f"{report.nodeid} has a seed; to repeat it: {value}")
