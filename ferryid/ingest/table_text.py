@@ -33,7 +33,10 @@ _LONGEST_HEAD = 1 << 22
 _HEAD_LINES = 8
 """The head is read on to its greatest length where it holds fewer lines."""
 _SAMPLE_LINES = 400
+_DAMAGED_LINES = 2
+"""Lines without a number or the right number of fields that may stand between the column names and the rows."""
 _COMMA_NUMBER = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
+_BEGINS_NUMBER = re.compile(r"\s*[+-]?\.?\d")
 _WORDS = {"true", "false", "nan", "inf", "-inf", "null", "none", ""}
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -245,12 +248,7 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
             "Fix: pass a log, or describe the table under [table] in the profile (separator, skip_rows, columns)"
         )
     _, _, width, separator, decimal, first = best
-    # Between the line of names and the first intact row may stand damaged ones, which still hold a number; units do not.
-    top = first
-    while top > 0 and any(_is_measured(cell, decimal) for cell in _split(lines[top - 1], separator)):
-        top -= 1
-    if top > 0 and len(_split(lines[top - 1], separator)) == width:
-        first = top
+    first = _first_below_names(lines, separator, decimal, width, first)
     header = first
     while header > 0 and len(_split(lines[header - 1], separator)) == width:
         header -= 1
@@ -265,10 +263,7 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
         names = tuple(f"column {place}" for place in range(1, width + 1))
         notes.append("no header row: columns are named by their place")
     unread = ""
-    if header == first and any(
-        len(cells) > 1 and any(_is_measured(cell, decimal) for cell in cells)
-        for cells in (_split(line, separator) for line in lines[:first])
-    ):
+    if header == first and any(character.isdigit() for line in lines[:first] for character in line):
         unread = f"{first} line(s) before the first row cannot be read: names of columns and rows may be lost with them"
     if header > 0:
         notes.append(f"{header} line(s) before the table skipped")
@@ -281,12 +276,33 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     return _Shape(separator, decimal, first, names, filled_rows, tuple(notes), unread)
 
 
+def _first_below_names(lines: Sequence[str], separator: str, decimal: str, width: int, intact: int) -> int:
+    """Return the line below the column names, where damaged rows may stand above the first intact one; else `intact`.
+
+    A damaged row has another number of fields or holds a number still; a line of names or units does neither. Between
+    blanks any sentence has fields, so that only rows with a number are passed over in such a table.
+    """
+    top, unknown = intact, 0
+    while top > 0:
+        line = lines[top - 1]
+        cells = _split(line, separator)
+        if not any(_is_measured(cell, decimal) for cell in cells):
+            if len(cells) == width or _names_for(line, separator, width) is not None:
+                return top
+            unknown += bool(line.strip())
+            if unknown > _DAMAGED_LINES or separator == "whitespace":
+                break
+        top -= 1
+    return intact
+
+
 def _names_for(line: str, separator: str, width: int) -> tuple[str, ...] | None:
-    """Column names from a header line that lacks the name of a trailing, empty column; None if it is no header."""
+    """Column names from a header line that lacks the name of the last column; None if it is no header."""
     names = _split(line, separator)
-    if separator != "whitespace" and len(names) == width - 1 and not any(_is_number(n, ".") for n in names if n):
-        return (*names, "")
-    return None
+    if separator == "whitespace" or not 1 < len(names) == width - 1:
+        return None
+    # What begins with a digit is a damaged row.
+    return None if any(_BEGINS_NUMBER.match(name) for name in names) else (*names, "")
 
 
 def _stated(path: Path, lines: Sequence[str], layout: TableLayout) -> _Shape:

@@ -185,6 +185,52 @@ def test_a_damaged_first_row_is_lost_by_itself_and_leaves_the_names(tmp_path: Pa
     assert sum(loss.messages or 0 for loss in reader.losses) == 1
 
 
+@pytest.mark.parametrize(
+    ("damaged", "count"),
+    [
+        ("0;2;ok", 1),
+        ("\\xff\\xfe~)d0|\\x1a", 1),
+        ("0;2;ok\n1|3|ok", 2),
+        ("0;2;ok\n0.5,3", 2),
+        ("0;2,ok", 1),
+        ("\n0;2;ok", 1),
+    ],
+)
+def test_damaged_first_rows_without_a_number_are_lost_by_themselves_and_leave_the_names(
+    tmp_path: Path, damaged: str, count: int
+) -> None:
+    rows = "".join(f"{n},{n * 2},ok\n" for n in range(2, 40))
+    content = f"time,a,note\n{damaged}\n{rows}".encode().decode("unicode_escape").encode("latin-1")
+    series, reader = read(tmp_path, content)
+    assert series.columns["a"].tolist() == [n * 2 for n in range(2, 40)]
+    assert lost(reader) == count
+
+
+def test_a_damaged_first_row_of_two_columns_is_not_taken_for_their_names(tmp_path: Path) -> None:
+    series, reader = read(tmp_path, b"time,a\n0;0\n" + b"".join(b"%d,%d\n" % (n, n * 2) for n in range(1, 40)))
+    assert series.columns["a"].tolist() == [n * 2 for n in range(1, 40)]
+    assert lost(reader) == 1
+
+
+@pytest.mark.parametrize("separator", [",", " "])
+def test_names_and_first_row_that_cannot_be_told_apart_are_a_loss(tmp_path: Path, separator: str) -> None:
+    rows = "".join(separator.join((str(n / 20), "1.5", "7")) + "\n" for n in range(1, 40))
+    path = tmp_path / "t.csv"
+    path.write_text(f"time;a;note\n0;2;7\n{rows}", encoding="utf-8")
+    reader = open_log(path)
+    reader.read({"table": ()})
+    assert [(loss.messages, "names of columns and rows may be lost" in loss.what) for loss in reader.losses] == [
+        (None, True)
+    ]
+
+
+def test_a_header_without_the_name_of_the_last_column_stands_above_a_damaged_row(tmp_path: Path) -> None:
+    rows = "".join(f"{n},{n * 2},\n" for n in range(1, 40))
+    series, reader = read(tmp_path, f"time,a\n0;2;\n{rows}".encode())
+    assert series.columns["a"].tolist() == [n * 2 for n in range(1, 40)]
+    assert lost(reader) == 1
+
+
 def test_lines_before_the_first_row_that_hold_numbers_but_no_names_are_a_loss(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     path.write_text("time,a;0,1;1,2\n2,3;3,4\n" + "".join(f"{n},{n * 2}\n" for n in range(4, 40)), encoding="utf-8")
