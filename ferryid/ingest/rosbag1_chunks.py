@@ -65,7 +65,7 @@ class Content(NamedTuple):
     whole: bool
 
 
-def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool) -> Content:
+def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool, salvage: bool = True) -> Content:
     """Return the messages of a chunk, or what is left of them and what is wrong.
 
     Parameters
@@ -78,6 +78,9 @@ def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool) 
         Bytes that the chunk may expand to; what it expands to is taken off.
     exact
         Make sure of the length, for a chunk whose messages no index locates: ten times slower with lz4.
+    salvage
+        Return what comes before a damaged byte also where no checksum vouches for it: that of lz4 covers the whole chunk,
+        that of bz2 each block.
     """
     stored = memoryview(data)[chunk.start : min(chunk.end, len(data))]
     cut = "it is cut off" if chunk.end > len(data) else ""
@@ -95,7 +98,7 @@ def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool) 
             return Content(memoryview(_lz4().decompress(stored, chunk.size)), "", True)
         except DAMAGE:
             pass
-    content, fault, eof = _expanded(stored, chunk.compression, min(chunk.size, limit), limit)
+    content, fault, eof = _expanded(stored, chunk.compression, min(chunk.size, limit), limit, salvage)
     allowance.left -= len(content)
     if not fault and not eof:
         fault = (
@@ -139,7 +142,7 @@ def _feed(decoder: Any, stored: Any, first: int, limit: int) -> bytes:
     return b"".join(parts)
 
 
-def _expanded(stored: memoryview, compression: str, size: int, limit: int) -> tuple[bytes, str, bool]:
+def _expanded(stored: memoryview, compression: str, size: int, limit: int, salvage: bool) -> tuple[bytes, str, bool]:
     """Return the content, what is wrong with it, and whether its end was reached."""
     decoder = _decoder(compression)
     try:
@@ -149,8 +152,10 @@ def _expanded(stored: memoryview, compression: str, size: int, limit: int) -> tu
     except DAMAGE as error:
         fault = f"it does not decompress ({error})"
         if "contentChecksum" in str(error):
-            # All of it decompresses, and any part of it may be wrong.
-            return b"", "its content does not match its checksum", False
+            fault, salvage = "its content does not match its checksum", False
+        # All of it decompresses in these two cases, and any part of it may be wrong.
+        if "frameSize_wrong" in str(error) or (compression == "lz4" and not salvage):
+            return b"", fault, False
     # Up to the first damaged byte: in steps to near it, then from the start again and up to it byte by byte.
     good = _steps(stored, 0, SALVAGE_STEP, compression, limit)[1]
     return _steps(stored, good, 1, compression, limit)[0], fault, False

@@ -248,6 +248,9 @@ def test_blocks_before_the_damage_in_a_compressed_chunk_are_recovered(tmp_path: 
     assert 4 * 65536 // 54 - 10 < len(found) < len(speeds)
     np.testing.assert_array_equal(found, speeds[: len(found)])
     assert [loss.messages for loss in reader.losses] == [len(speeds) - len(found)]
+    # No checksum vouches for a part of a frame.
+    assert len(reader.read({"/speed": ["data"]}, verify=True)["/speed"].receive_ns) == 0
+    assert [loss.messages for loss in reader.losses] == [len(speeds)]
 
 
 def test_an_index_entry_that_contradicts_its_message_is_counted(tmp_path: Path) -> None:

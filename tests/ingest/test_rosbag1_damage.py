@@ -316,26 +316,32 @@ def test_a_message_cut_out_of_a_chunk_that_index_and_chunk_information_count_is_
     assert count + sum(loss.messages or 0 for loss in reader.losses) == ALL
 
 
-def test_verify_believes_nothing_of_a_chunk_whose_content_checksum_is_wrong(tmp_path: Path) -> None:
-    def flip(stored: bytes) -> bytes:
-        # A literal of the content; where one stands hangs on the compressor, so that it is searched.
-        for place in range(len(stored) - 8, 0, -1):
-            damaged = stored[:place] + bytes([stored[place] ^ 1]) + stored[place + 1 :]
-            try:
-                lz4.frame.decompress(damaged)
-            except RuntimeError as error:
-                if "contentChecksum" in str(error):
-                    return damaged
+@pytest.mark.parametrize("verify", [False, True])
+@pytest.mark.parametrize("fault", ["contentChecksum", "frameSize_wrong"])
+def test_nothing_is_believed_of_a_chunk_that_decompresses_to_what_its_frame_contradicts(
+    tmp_path: Path, fault: str, verify: bool
+) -> None:
+    def damage(stored: bytes) -> bytes:
+        # A literal, or the length of a match; where one stands hangs on the compressor, so that it is searched.
+        for place in range(len(stored) - 9, 15, -1):
+            for bit in range(8):
+                damaged = stored[:place] + bytes([stored[place] ^ 1 << bit]) + stored[place + 1 :]
+                try:
+                    lz4.frame.decompress(damaged)
+                except RuntimeError as error:
+                    if fault in str(error):
+                        return damaged
         pytest.fail("no byte of the chunk can be damaged alone")
 
     def recompress(stored: bytes) -> bytes:
-        return flip(lz4.frame.compress(lz4.frame.decompress(stored), content_checksum=True))
+        return damage(lz4.frame.compress(lz4.frame.decompress(stored), content_checksum=True))
 
     whole = write_bag(tmp_path / "whole.bag", "lz4").read_bytes()
-    count, reader = read_changed(tmp_path / "b.bag", whole, rewritten_chunk(recompress), verify=True)
-    assert count < ALL
+    (held,) = read_changed(tmp_path / "a.bag", whole, drop(CHUNK, 1))[:1]
+    count, reader = read_changed(tmp_path / "b.bag", whole, rewritten_chunk(recompress), verify=verify)
+    assert count == held < ALL
     assert count + sum(loss.messages or 0 for loss in reader.losses) == ALL
-    assert any("does not match its checksum" in loss.what for loss in reader.losses)
+    assert any("its checksum" in loss.what or fault in loss.what for loss in reader.losses)
 
 
 def test_a_damaged_time_is_no_repair_where_the_index_means_the_connection_record_before_the_message(

@@ -324,7 +324,7 @@ class Rosbag1Reader:
 
         def load(chunk: Chunk) -> Content:
             exact = verify or chunk.walked is not None or chunk.position in unsure
-            return decompressed(self._data, chunk, allowance, exact=exact)
+            return decompressed(self._data, chunk, allowance, exact=exact, salvage=not verify)
 
         slow = any(chunk.compression == "bz2" for chunk in chunks)
         # Chunks ahead of their turn are held in memory too.
