@@ -111,6 +111,9 @@ class Chunk:
         truncated chunk.
     indexed
         Channel id to (offset of its MessageIndex record, number of messages); None when the file has no index here.
+    partial_index
+        Channel id to number of messages by MessageIndex records behind the chunk that are damaged or perhaps not all;
+        then `indexed` is None.
     table
         The messages, found by walking the chunk; None as long as it was not walked.
     truncated
@@ -127,6 +130,7 @@ class Chunk:
     compressed_size: int
     uncompressed_size: int
     indexed: Mapping[int, tuple[int, int]] | None
+    partial_index: Mapping[int, int] = field(default_factory=dict)
     table: Messages | None = None
     truncated: bool = False
     refused: bool = False

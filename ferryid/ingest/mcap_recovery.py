@@ -211,11 +211,14 @@ def _walk_into(index: Index, number: int, file: memoryview, whole_file: Bytes, n
     if chunk.indexed is not None and walked.counts() == chunk.counts():
         return
     index.chunks[number] = walked
+    counts = walked.counts()
     if loss is None and chunk.indexed is not None:
-        counts = walked.counts()
         fewer = any(counts.get(channel, 0) < count for channel, count in chunk.counts().items())
         what = "the message index of a chunk and its messages disagree; the chunk was walked instead"
         loss = Loss(name, what, None, None if fewer else 0, chunk.start_ns, chunk.end_ns)
+    elif loss is None and any(counts.get(channel, 0) < count for channel, count in chunk.partial_index.items()):
+        what = "the message indexes behind a chunk count more messages than it holds"
+        loss = Loss(name, what, None, None, chunk.start_ns, chunk.end_ns)
     if loss is not None:
         index.losses.append(loss)
 

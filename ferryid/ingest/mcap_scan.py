@@ -312,18 +312,23 @@ def _chunks(file: memoryview, found: _Found, odd: list[Record], index: Index, na
         what = f"{len(groups) - len(distinct)} chunks are in the file twice, byte for byte; the copies were left out"
         index.losses.append(Loss(name, what, messages=0))
     broken = {start for start, _ in found.gaps}
-    return [replace(chunk, indexed=_indexed(file, records, broken)) for chunk, records in distinct]
+    return [_with_index(file, chunk, records, broken) for chunk, records in distinct]
 
 
-def _indexed(file: memoryview, records: Sequence[Record], broken: Container[int]) -> dict[int, tuple[int, int]] | None:
-    """Return the message indexes of a chunk, None where it has none, or they are damaged or perhaps not all."""
+def _with_index(file: memoryview, chunk: Chunk, records: Sequence[Record], broken: Container[int]) -> Chunk:
+    """Return a chunk with its message indexes; where they are damaged or perhaps not all, only with what they count."""
     indexed: dict[int, tuple[int, int]] = {}
+    sound = True
     for _, start, length in records:
         channel, size = struct.unpack_from("<HI", file, start + RECORD_HEADER)
-        if length < 6 + size or size % 16 or channel in indexed or start + RECORD_HEADER + length in broken:
-            return None
-        indexed[channel] = start, size // 16
-    return indexed or None
+        sound = sound and start + RECORD_HEADER + length not in broken
+        if length < 6 + size or size % 16 or channel in indexed:
+            sound = False
+        else:
+            indexed[channel] = start, size // 16
+    if sound:
+        return replace(chunk, indexed=indexed or None)
+    return replace(chunk, partial_index={channel: count for channel, (_, count) in indexed.items()})
 
 
 def _content(file: memoryview, chunk: Chunk) -> memoryview:

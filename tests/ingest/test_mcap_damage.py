@@ -78,6 +78,18 @@ def test_index_entries_that_name_a_message_twice_or_leave_one_out(summary: bool,
     assert any("walked" in loss.what for loss in losses)
 
 
+@pytest.mark.parametrize("place", [1, 3])
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_a_message_cut_out_of_a_chunk_of_a_file_that_was_not_closed_is_missed(compression: str, place: int) -> None:
+    chunks = chunk_records(compression)
+    first = place * PER_CHUNK
+    rest = b"".join(message(number) for number in range(first, first + PER_CHUNK) if number != first + 4)
+    chunks[place] = chunk(rest, compression, start=T0 + first), chunks[place][1]
+    got, losses = accounted(without_summary(chunks))
+    assert got == [number for number in ALL if number != first + 4]
+    assert any("message index" in loss.what and loss.messages is None for loss in losses)
+
+
 @pytest.mark.parametrize("summary", [True, False])
 def test_a_message_index_that_is_there_twice_or_not_at_all(summary: bool) -> None:
     chunks = chunk_records()
