@@ -30,4 +30,4 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
         for report in terminalreporter.stats.get(outcome, []):
             for name, value in report.user_properties:
                 if name == "repeat":
-                    terminalreporter.write_line(f"{report.nodeid} has a seed; to repeat it: {value}")
+                    terminalreporter.write_line(f"{report.nodeid} drew its cases from a seed; to repeat it: {value}")
