@@ -263,7 +263,7 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
         names = tuple(f"column {place}" for place in range(1, width + 1))
         notes.append("no header row: columns are named by their place")
     unread = ""
-    if header == first and any(character.isdigit() for line in lines[:first] for character in line):
+    if header == first and any(line.strip() for line in lines[:first]):
         unread = f"{first} line(s) before the first row cannot be read: names of columns and rows may be lost with them"
     if header > 0:
         notes.append(f"{header} line(s) before the table skipped")

@@ -213,10 +213,11 @@ def test_a_damaged_first_row_of_two_columns_is_not_taken_for_their_names(tmp_pat
 
 
 @pytest.mark.parametrize("separator", [",", " "])
-def test_names_and_first_row_that_cannot_be_told_apart_are_a_loss(tmp_path: Path, separator: str) -> None:
+@pytest.mark.parametrize("damaged", ["time;a;note\n0;2;7", "&}~(?\n|#^"])
+def test_names_and_first_row_that_cannot_be_told_apart_are_a_loss(tmp_path: Path, damaged: str, separator: str) -> None:
     rows = "".join(separator.join((str(n / 20), "1.5", "7")) + "\n" for n in range(1, 40))
     path = tmp_path / "t.csv"
-    path.write_text(f"time;a;note\n0;2;7\n{rows}", encoding="utf-8")
+    path.write_text(f"{damaged}\n{rows}", encoding="utf-8")
     reader = open_log(path)
     reader.read({"table": ()})
     assert [(loss.messages, "names of columns and rows may be lost" in loss.what) for loss in reader.losses] == [
