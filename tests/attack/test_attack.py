@@ -18,6 +18,7 @@ from ferryid.ingest.log import Loss, Series
 from tests.attack.case import EXACT, Case, Mutated, draw, formats
 from tests.attack.check import Outcome, examine
 from tests.attack.page import grouped, table
+from tests.attack.raw import text_total
 from tests.attack.run import Result, attack
 
 SEED = int(os.environ.get("ATTACK_SEED", int(time.time())))
@@ -168,6 +169,13 @@ def test_memory_beyond_the_limit_is_a_violation(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("tests.attack.check.BYTES", 100_000_000)
     outcome = _examined(_undamaged("text_table"), tmp_path, needs_memory)
     assert any("GB of memory" in violation for violation in outcome.violations)
+
+
+@pytest.mark.parametrize(("odd", "rows"), [(b"\r", 0), (b"\n", 0), (b'"\r', 1), (b'\r"', 1)])
+def test_a_line_end_in_a_quoted_cell_is_expected_to_end_no_row(odd: bytes, rows: int) -> None:
+    base = next(base for base in formats()["text_table"][0] if "quoted" in base.name)
+    content = base.files["log.csv"].replace(b'"0.25"', b'"' + odd + b'0.25"')
+    assert text_total(base, "log.csv", content) == base.count + rows
 
 
 def test_names_of_logs_differ() -> None:
