@@ -101,9 +101,16 @@ def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
         what = f"{count} message{'s' * (count > 1)} could not be read" + (", and perhaps more" if unknown else "")
     else:
         what = "messages may be lost" if unknown else "the log is damaged, and no message of it is known to be lost"
-    main = max(losses, key=lambda loss: (loss.messages or 0, loss.messages is None))
     others = len(losses) - 1
-    return (f"{what}: {loss_sentence(main)[:-1]}" + (f"; and {others} more, see ferryid inspect." if others else "."),)
+    return (
+        f"{what}: {loss_sentence(main_loss(losses))[:-1]}"
+        + (f"; and {others} more, see ferryid inspect." if others else "."),
+    )
+
+
+def main_loss(losses: Sequence[Loss]) -> Loss:
+    """Return the largest of the losses, or the least certain where none is known to have cost a message."""
+    return max(losses, key=lambda loss: (loss.messages or 0, loss.messages is None))
 
 
 def _of_clock(stream: Stream) -> list[str]:

@@ -18,7 +18,7 @@ from ferryid.ingest.log import Reader, Series, Topic
 from ferryid.signals.data_quality import grouped_notes, plain_loss, remarks, stream_quality
 from ferryid.signals.poses import USED, pose_faults, pose_sentences
 from ferryid.signals.quality import clean
-from ferryid.signals.recording import log_name, make_recording, name_of
+from ferryid.signals.recording import log_name, make_recording, selected
 from ferryid.signals.render import render_inspect
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.stream import Recording
@@ -171,7 +171,7 @@ def _vessel(
     """What the profile makes of the log: signals with their ranges, and why it would refuse the log, if it would."""
     usable, problem = True, ""
     try:
-        select(profile, reader.topics, name_of(reader))
+        selected(reader, profile)
     except FerryIdError as error:
         usable, problem = False, str(error)
     streams: dict[str, Any] = {}

@@ -14,7 +14,7 @@ from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Nanoseconds, Reader, Series, Topic
 from ferryid.signals import cache
-from ferryid.signals.data_quality import data_quality, grouped_notes
+from ferryid.signals.data_quality import data_quality, grouped_notes, loss_sentence, main_loss
 from ferryid.signals.stream import Recording, Stream
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, convert, select
@@ -73,9 +73,31 @@ def read_recording(reader: Reader, name: str, profile: Profile, *, verify: bool 
     FerryIdError
         As `record`.
     """
-    selection = select(profile, reader.topics, name_of(reader))
+    selection = selected(reader, profile)
     series = reader.read(selection.wanted, verify=verify)
     return make_recording(reader, name, profile, selection, series, repair_all(series))
+
+
+def selected(reader: Reader, profile: Profile) -> Selection:
+    """Find the profile's signals in an opened log.
+
+    Raises
+    ------
+    FerryIdError
+        For a log without a single message, and for a required signal that it does not have.
+    """
+    if not any(topic.count for topic in reader.topics):
+        there = f"{len(reader.topics)} topic{'s' * (len(reader.topics) != 1)} and no message"
+        if reader.losses:
+            raise FerryIdError(
+                f"{name_of(reader)}: the log holds no data that can be read, found {there}: "
+                f"{loss_sentence(main_loss(reader.losses)).removesuffix('.')}. Fix: copy it from the recorder again"
+            )
+        raise FerryIdError(
+            f"{name_of(reader)}: the log holds no data, found {there} in a complete file. "
+            "Fix: pass a log that was recorded while the topics were published"
+        )
+    return select(profile, reader.topics, name_of(reader))
 
 
 def make_recording(
