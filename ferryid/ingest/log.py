@@ -31,7 +31,7 @@ class Topic:
     count
         Number of messages (rows).
     start_ns, end_ns
-        First and last receive time [ns], None when the topic is empty.
+        First and last receive time [ns], None when the topic is empty, or no time of it agrees with those of the others.
     fields
         Leaf path to primitive type, in message order: ``{"pose.position.x": "float64"}``. Elements of arrays are
         addressed as ``name[3]``; a fixed array is listed once as ``name[36]`` with its length, a sequence

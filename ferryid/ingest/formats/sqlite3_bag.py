@@ -21,6 +21,7 @@ from ferryid.ingest.rosbag2_tables import Recorded, RecordedTopic, line, read_ta
 from ferryid.ingest.sqlite_data import read_data
 from ferryid.ingest.sqlite_database import FAULTS, MAGIC, Database
 from ferryid.ingest.sqlite_rows import Scan, Stretch, scan_rows
+from ferryid.ingest.stray_times import stray_times
 from ferryid.ingest.unpack import FORMATS, unpack_file, working_folder
 
 DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
@@ -182,11 +183,14 @@ class Sqlite3Log:
             entries.setdefault(topic.name, []).append(topic)
         counts = np.bincount(self._topic, minlength=len(entries))
         starts, ends = np.full(len(entries), np.iinfo(np.int64).max), np.full(len(entries), np.iinfo(np.int64).min)
-        order = np.argsort(self._compact(self._topic), kind="stable")
-        held = np.flatnonzero(counts)
+        # Rows of all topics were received in this order: a time that contradicts it says nothing of first and last.
+        consistent = np.flatnonzero(~stray_times(self._rows.time_ns)[0])
+        timed = np.bincount(self._topic[consistent], minlength=len(entries))
+        held = np.flatnonzero(timed)
         if held.size:
-            times = self._rows.time_ns[order]
-            edges = (np.cumsum(counts) - counts)[held]
+            order = np.argsort(self._compact(self._topic[consistent]), kind="stable")
+            times = self._rows.time_ns[consistent[order]]
+            edges = (np.cumsum(timed) - timed)[held]
             starts[held] = np.minimum.reduceat(times, edges)
             ends[held] = np.maximum.reduceat(times, edges)
         for i, (name, several) in enumerate(entries.items()):
@@ -197,8 +201,8 @@ class Sqlite3Log:
                 type=msgtype,
                 encoding=encoding,
                 count=int(counts[i]),
-                start_ns=int(starts[i]) if counts[i] else None,
-                end_ns=int(ends[i]) if counts[i] else None,
+                start_ns=int(starts[i]) if timed[i] else None,
+                end_ns=int(ends[i]) if timed[i] else None,
                 fields=found.fields,
                 note=found.note,
             )
