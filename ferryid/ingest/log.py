@@ -54,8 +54,8 @@ class Topic:
 class Loss:
     """Something of a file that could not be read: where it was, and how much.
 
-    ``messages`` and the times [ns] are None where the damage hides them. ``what`` is one plain sentence; what it quotes of
-    the file is escaped.
+    ``messages`` and the times [ns] are None where the damage hides them. ``lost_ns`` is the length of several lost stretches
+    between those times [ns], None where it is one. ``what`` is one plain sentence; what it quotes of the file is escaped.
     """
 
     file: str
@@ -64,6 +64,7 @@ class Loss:
     messages: int | None = None
     start_ns: int | None = None
     end_ns: int | None = None
+    lost_ns: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("file", "what"):
@@ -72,11 +73,16 @@ class Loss:
             object.__setattr__(self, "topic", one_line(self.topic))
 
     @property
-    def seconds(self) -> float | None:
-        """Length of the lost stretch [s], None where it is not known."""
+    def length_ns(self) -> int | None:
+        """Length of what is lost [ns], None where it is not known."""
         if self.start_ns is None or self.end_ns is None:
             return None
-        return (self.end_ns - self.start_ns) * 1e-9
+        return self.end_ns - self.start_ns if self.lost_ns is None else self.lost_ns
+
+    @property
+    def seconds(self) -> float | None:
+        """Length of what is lost [s], None where it is not known."""
+        return None if self.length_ns is None else self.length_ns * 1e-9
 
 
 @dataclass(frozen=True)

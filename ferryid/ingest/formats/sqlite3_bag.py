@@ -20,7 +20,7 @@ from ferryid.ingest.ros2_types import Definition, RecordedText, define, normaliz
 from ferryid.ingest.rosbag2_tables import Recorded, RecordedTopic, line, read_tables
 from ferryid.ingest.sqlite_data import read_data
 from ferryid.ingest.sqlite_database import FAULTS, MAGIC, Database
-from ferryid.ingest.sqlite_rows import Scan, Stretch, scan_rows
+from ferryid.ingest.sqlite_rows import Rows, Scan, Stretch, scan_rows
 from ferryid.ingest.stray_times import stray_times
 from ferryid.ingest.unpack import FORMATS, unpack_file, working_folder
 
@@ -151,9 +151,11 @@ class Sqlite3Log:
         known = sum(stretch.count or 0 for stretch in stretches)
         unknown = not scan.complete or any(stretch.count is None for stretch in stretches)
         rest = None if stated is None else stated - len(rows) - scan.invalid - known
+        lost_ns = None
         if len(stretches) > MAX_STRETCHES:
             count = None if any(stretch.count is None for stretch in stretches) else known
             cause = f"{cause}, in {len(stretches)} places"
+            lost_ns = _length_ns(rows, stretches)
             stretches = (Stretch(stretches[0].low, stretches[-1].high, count),)
         for stretch in stretches:
             first = int(np.searchsorted(rows.rowid, stretch.low, "right"))
@@ -165,6 +167,7 @@ class Sqlite3Log:
                 messages=count,
                 start_ns=int(rows.time_ns[first - 1]) if first else None,
                 end_ns=int(rows.time_ns[last]) if last < len(rows) else self._storage.end_ns,
+                lost_ns=lost_ns,
             )
         if scan.complete or not unknown:
             return
@@ -305,6 +308,14 @@ class Sqlite3Log:
                 if mine.size and (name := names.get(int(topic[mine[0]]))) is not None:
                     decoders[name].add(piece.data, starts[mine], piece.size[mine], times[mine])
         return dropped
+
+
+def _length_ns(rows: Rows, stretches: Sequence[Stretch]) -> int:
+    """Return how long lost stretches are together [ns], without those at the ends of the log."""
+    firsts = np.searchsorted(rows.rowid, [stretch.low for stretch in stretches], "right")
+    lasts = np.searchsorted(rows.rowid, [stretch.high for stretch in stretches], "left")
+    inside = (firsts > 0) & (lasts < len(rows))
+    return int((rows.time_ns[lasts[inside]] - rows.time_ns[firsts[inside] - 1]).sum())
 
 
 def _wal_frames(log: Path) -> int:
