@@ -73,6 +73,11 @@ class Loss:
             object.__setattr__(self, "topic", one_line(self.topic))
 
     @property
+    def costs_messages(self) -> bool:
+        """False where no message is lost: what was wrong was repaired, and is a remark."""
+        return self.messages != 0
+
+    @property
     def length_ns(self) -> int | None:
         """Length of what is lost [ns], None where it is not known."""
         if self.start_ns is None or self.end_ns is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sqlite3
 from collections.abc import Callable, Sequence
@@ -483,7 +484,8 @@ def test_a_broken_metadata_file_does_not_hide_the_recording(tmp_path: Path, text
     (folder / "metadata.yaml").write_text(text)
     log = open_log(folder)
     assert xs(log) == list(range(500))
-    assert [loss.file for loss in log.losses] == [str(folder / "metadata.yaml")]
+    assert [(loss.file, loss.messages) for loss in log.losses] == [(str(folder / "metadata.yaml"), 0)]
+    assert re.fullmatch(r"the file (is|lacks) .*; the recording was read without it", log.losses[0].what)
 
 
 def test_counts_that_contradict_the_files_are_told(tmp_path: Path) -> None:

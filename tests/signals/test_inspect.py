@@ -15,8 +15,9 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Loss
-from ferryid.signals.data_quality import loss_sentence
+from ferryid.signals.data_quality import loss_sentence, remarks
 from ferryid.signals.inspect import inspect, render_inspect
+from ferryid.signals.recording import record
 from ferryid.signals.render import table
 from ferryid.vessel.load import load_profile
 from tests.ingest.mcap_records import DATA_END, HEAD, T0, footer, message
@@ -82,6 +83,29 @@ def test_truncated_bag_says_what_is_recovered() -> None:
 @pytest.mark.parametrize(("messages", "told"), [(None, "x."), (0, "x."), (1, "x (1 message)."), (7, "x (7 messages).")])
 def test_amount_of_a_loss(messages: int | None, told: str) -> None:
     assert loss_sentence(Loss("a/b.bag", "x", None, messages)) == f"b.bag: {told}"
+
+
+@pytest.mark.parametrize("change", ["broken", "renamed"])
+def test_a_metadata_file_that_costs_no_message_is_a_remark(tmp_path: Path, change: str) -> None:
+    folder = tmp_path / "log"
+    shutil.copytree(FIXTURES / "short_ros2", folder)
+    if change == "broken":
+        (folder / "metadata.yaml").write_text("rosbag2_bagfile_information: [")
+    else:
+        (file,) = folder.glob("*.db3")
+        file.rename(folder / "other.db3")
+    result, text = look(folder, "milliampere")
+    assert "Lost: nothing" in text
+    notes = " ".join(text[text.index("Notes\n") :].split())
+    if change == "broken":
+        assert "metadata.yaml: the file is no YAML" in notes
+    else:
+        assert "the file is named in metadata.yaml but is not in the folder; other.db3 there was read instead" in notes
+    assert [loss["messages"] for loss in result["losses"]] == [0]
+    recorded = record(folder, load_profile("milliampere"))
+    said = remarks(recorded)
+    assert any("metadata.yaml" in one for one in said)
+    assert not any(one.startswith("Lost") for one in said)
 
 
 def with_stray_times(folder: Path, *changes: tuple[str, int]) -> Path:
