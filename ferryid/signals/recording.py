@@ -43,25 +43,29 @@ def record(path: str | Path, profile: Profile, out: Path | None = None, *, verif
         For a log that cannot be used: no known format, a required signal that it lacks, no row, an unwritable `out`.
     """
     name = log_name(path)
+    damage: cache.Damage = {}
     if out is not None and Path(path).is_file():
-        kept = cache.by_files(out, name, [Path(path)], profile, verify=verify)
+        kept = cache.by_files(out, name, [Path(path)], profile, damage, verify=verify)
         if kept is not None:
             return kept
     reader = open_log(path, profile.table)
     if out is not None:
-        kept = cache.by_files(out, name, reader.paths, profile, verify=verify)
+        kept = cache.by_files(out, name, reader.paths, profile, damage, verify=verify)
         if kept is not None:
             return kept
     with ThreadPoolExecutor(1) as pool:
         hashing: Future[str] = pool.submit(content_hash, reader.paths, verify=verify)
         if out is not None and cache.has_any(out, name, profile):
-            kept = cache.by_content(out, name, hashing.result(), reader.paths, profile, verify=verify)
+            kept = cache.by_content(out, name, hashing.result(), reader.paths, profile, damage, verify=verify)
             if kept is not None:
                 return kept
         signatures = cache.signatures(reader.paths)
         recording = replace(read_recording(reader, name, profile, verify=verify), sha256=hashing.result())
     if out is not None:
-        cache.store(out, recording, signatures, verify=verify)
+        folder = cache.store(out, recording, signatures, verify=verify)
+        if folder in damage:
+            said = f"the cached tables of the log in {folder.name} were damaged ({damage[folder]}): read from the log again."
+            recording = replace(recording, notes=(*recording.notes, said))
     return recording
 
 
