@@ -202,6 +202,12 @@ def _one_topic(
     reason, notes, stamp, facts = _judge(receive, stamp)
     if reason:
         return _ordered(receive, "receive", (f"{reason}: receive times are used", *notes), facts, drop_far_side=True)
+    astray = int(np.count_nonzero(stray_times(receive)[0]))
+    if astray:
+        notes = (
+            *notes,
+            f"{astray} of {len(receive)} receive times contradict those of the rows before and after: stamps are used",
+        )
     return _ordered(stamp, "stamp", notes, facts)
 
 

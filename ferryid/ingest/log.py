@@ -31,7 +31,7 @@ class Topic:
     count
         Number of messages (rows).
     start_ns, end_ns
-        First and last receive time [ns], None when the topic is empty.
+        First and last receive time [ns], None when the topic is empty, or no time of it agrees with those of the others.
     fields
         Leaf path to primitive type, in message order: ``{"pose.position.x": "float64"}``. Elements of arrays are
         addressed as ``name[3]``; a fixed array is listed once as ``name[36]`` with its length, a sequence
@@ -54,8 +54,8 @@ class Topic:
 class Loss:
     """Something of a file that could not be read: where it was, and how much.
 
-    ``messages`` and the times [ns] are None where the damage hides them. ``what`` is one plain sentence; what it quotes of
-    the file is escaped.
+    ``messages`` and the times [ns] are None where the damage hides them. ``lost_ns`` is the length of several lost stretches
+    between those times [ns], None where it is one. ``what`` is one plain sentence; what it quotes of the file is escaped.
     """
 
     file: str
@@ -64,6 +64,7 @@ class Loss:
     messages: int | None = None
     start_ns: int | None = None
     end_ns: int | None = None
+    lost_ns: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("file", "what"):
@@ -72,11 +73,21 @@ class Loss:
             object.__setattr__(self, "topic", one_line(self.topic))
 
     @property
-    def seconds(self) -> float | None:
-        """Length of the lost stretch [s], None where it is not known."""
+    def costs_messages(self) -> bool:
+        """False where no message is lost: what was wrong was repaired, and is a remark."""
+        return self.messages != 0
+
+    @property
+    def length_ns(self) -> int | None:
+        """Length of what is lost [ns], None where it is not known."""
         if self.start_ns is None or self.end_ns is None:
             return None
-        return (self.end_ns - self.start_ns) * 1e-9
+        return self.end_ns - self.start_ns if self.lost_ns is None else self.lost_ns
+
+    @property
+    def seconds(self) -> float | None:
+        """Length of what is lost [s], None where it is not known."""
+        return None if self.length_ns is None else self.length_ns * 1e-9
 
 
 @dataclass(frozen=True)

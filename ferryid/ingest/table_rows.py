@@ -77,7 +77,7 @@ class _Wrong:
     last: tuple[int | None, int, str] = (None, 0, "")
 
     def __call__(self, row: Any) -> str:
-        entry = (row.number, row.actual_columns, row.text[:200])
+        entry = (row.number, row.actual_columns, row.text)
         self.first = self.first if self.count else entry
         self.last = entry
         self.count += 1
@@ -140,7 +140,7 @@ def _load(sheet: TextSheet, names: tuple[str, ...]) -> Rows:
                 what = f'{unreadable} cells of column "{name}" are not numbers and count as missing'
                 losses.append(Loss(str(sheet.path), what, sheet.topic.name))
         columns[name] = values
-    losses += _wrong_rows(sheet, wrong, body.cut)
+    losses += _wrong_rows(sheet, wrong, _cut_line(body))
     for reason, lines in body.dropped.items():
         what = f"{len(lines)} rows with {reason} were left out (the first: {quoted(lines[0])})"
         losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=len(lines)))
@@ -150,12 +150,21 @@ def _load(sheet: TextSheet, names: tuple[str, ...]) -> Rows:
     return Rows(columns, tuple(losses))
 
 
-def _wrong_rows(sheet: TextSheet, wrong: _Wrong, cut: bool) -> list[Loss]:
+def _cut_line(body: _Body) -> str:
+    """Return the last line of a file that does not end with one, an empty string where it does."""
+    if not body.cut:
+        return ""
+    start = 1 + max(body.data.rfind(b"\n"), body.data.rfind(b"\r"), body.start - 1)
+    return bytes(body.data[start:]).decode("utf-8", "replace")
+
+
+def _wrong_rows(sheet: TextSheet, wrong: _Wrong, cut_line: str) -> list[Loss]:
     """Losses for rows with the wrong number of fields; a last row cut in mid-line is told apart."""
     losses = []
     count = wrong.count
-    number, fields, text = wrong.last
-    if cut and count and number is not None and text and fields < len(sheet.names):
+    _, fields, text = wrong.last
+    # The quoted cells of a row may go over several lines.
+    if cut_line and count and text.endswith(cut_line) and fields < len(sheet.names):
         what = f"the file ends in the middle of a row ({quoted(text)}): the last row was left out"
         losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=1))
         count -= 1
@@ -285,6 +294,7 @@ def _without_broken_lines(body: _Body, width: int) -> None:
         listed.append(line[:200].decode("utf-8", "replace") if len(listed) < 10 else "")
     body.data = data if kept.all() else b"\n".join(lines[number] for number in np.flatnonzero(kept))
     body.start = 0
+    body.cut = body.cut and bool(kept[-1])
 
 
 def _whole_row(delimiter: bytes) -> re.Pattern[bytes]:

@@ -13,6 +13,7 @@ from typing import Any
 from ferryid import __version__
 from ferryid.errors import FerryIdError
 from ferryid.files import remove_abandoned, replacing, write_text
+from ferryid.ingest.checksum import crc32
 from ferryid.ingest.clocks import ClockReport
 from ferryid.ingest.log import Loss, Topic
 from ferryid.signals.parquet import TIME_COLUMNS, read_table, table_checksum, unit_of, write_table
@@ -21,6 +22,9 @@ from ferryid.vessel.profile import Profile
 
 SCHEMA = "ferryid.recording/1"
 _NOTE = "recording.json"
+
+Damage = dict[Path, str]
+"""Folder of a recording that cannot be used to what is wrong with it."""
 
 
 def folder_of(out: Path, name: str, sha256: str, profile_sha256: str) -> Path:
@@ -39,49 +43,92 @@ def signatures(paths: Sequence[Path]) -> list[list[Any]]:
 
 def has_any(out: Path, name: str, profile: Profile) -> bool:
     """True where some recording of that name and profile is kept, perhaps of another content."""
-    return next(_kept(out, name, profile), None) is not None
+    return next(_kept(out, name, profile, {}), None) is not None
 
 
-def by_files(out: Path, name: str, paths: Sequence[Path], profile: Profile, *, verify: bool) -> Recording | None:
-    """Return the kept recording of files that did not change since, without reading any of them; None if there is none."""
+def by_files(
+    out: Path, name: str, paths: Sequence[Path], profile: Profile, damage: Damage, *, verify: bool
+) -> Recording | None:
+    """Return the kept recording of files that did not change since, without reading any of them; None if there is none.
+
+    Recordings that are damaged count as none, and are added to `damage`.
+    """
     remove_abandoned(out / "logs")
     try:
         now = signatures(paths)
     except OSError:
         return None  # whoever opens the log next says what is wrong with it
-    for folder, note in _kept(out, name, profile):
+    for folder, note in _kept(out, name, profile, damage):
         if note["files"] == now and (note["verified"] or not verify):
-            return _loaded(folder, paths)
+            return _loaded(folder, paths, damage)
     return None
 
 
 def by_content(
-    out: Path, name: str, sha256: str, paths: Sequence[Path], profile: Profile, *, verify: bool
+    out: Path, name: str, sha256: str, paths: Sequence[Path], profile: Profile, damage: Damage, *, verify: bool
 ) -> Recording | None:
-    """Return the kept recording of files that were touched but hold the same bytes; None if there is none."""
+    """Return the kept recording of files that were touched but hold the same bytes; None if there is none.
+
+    Recordings that are damaged count as none, and are added to `damage`.
+    """
     now = signatures(paths)
-    for folder, note in _kept(out, name, profile):
+    for folder, note in _kept(out, name, profile, damage):
         same_paths = [one[0] for one in note["files"]] == [one[0] for one in now]
         if note["recording"]["sha256"] == sha256 and same_paths and (note["verified"] or not verify):
-            kept = _loaded(folder, paths)
+            kept = _loaded(folder, paths, damage)
             # Noted anew so that the next time nothing is hashed; a folder that cannot be written is merely slower.
             with contextlib.suppress(FerryIdError):
-                write_text(folder / _NOTE, json.dumps({**note, "files": now}, indent=1) + "\n")
+                write_text(folder / _NOTE, note_text({**note, "files": now}))
             return kept
     return None
 
 
 def recordings(out: Path) -> dict[Path, dict[str, Any]]:
-    """Return every folder under ``out/logs`` that holds a recording, with its note, whatever its profile and version."""
+    """Return every folder under ``out/logs`` that holds a recording, with its note, whatever its profile and version.
+
+    Raises
+    ------
+    FerryIdError
+        For a note that is damaged.
+    """
     found = {}
     for path in sorted((out / "logs").glob(f"*/{_NOTE}")):
-        try:
-            note = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue  # an incomplete folder counts as none
-        if _is_whole(note):
+        note, fault = _read_note(path.parent)
+        if fault:
+            raise FerryIdError(
+                f"{path}: the description of a log in the cache is damaged, {fault}. "
+                "Fix: delete its folder, the next ingest writes it again"
+            )
+        if note is not None:
             found[path.parent] = note
     return found
+
+
+def note_text(note: Mapping[str, Any]) -> str:
+    """Return the text of a recording.json, with the checksum of what the note says."""
+    return json.dumps({**note, "checksum": _note_checksum(note)}, indent=1) + "\n"
+
+
+def _note_checksum(note: Mapping[str, Any]) -> int:
+    """CRC-32 of what a note says, however it is laid out."""
+    said = {key: value for key, value in note.items() if key != "checksum"}
+    return crc32(json.dumps(said, sort_keys=True).encode())
+
+
+def _read_note(folder: Path) -> tuple[dict[str, Any] | None, str]:
+    """Return the note of a folder, or None and what is wrong with it; nothing is wrong where there is none."""
+    try:
+        note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
+    except OSError:
+        return None, ""
+    except ValueError:
+        return None, "it is no JSON"
+    if not _is_whole(note):
+        return None, "a part of it is missing or wrong"
+    # Older versions wrote none.
+    if ("checksum" in note or note["version"] == __version__) and note.get("checksum") != _note_checksum(note):
+        return None, "its checksum differs"
+    return note, ""
 
 
 def _is_whole(note: Any) -> bool:
@@ -97,23 +144,26 @@ def _is_whole(note: Any) -> bool:
         return False
 
 
-def _loaded(folder: Path, paths: Sequence[Path]) -> Recording | None:
+def _loaded(folder: Path, paths: Sequence[Path], damage: Damage) -> Recording | None:
     """A kept recording under the present spelling of its paths; None for a damaged one, which is then made anew."""
     try:
         return replace(load(folder), files=tuple(str(path) for path in paths))
-    except FerryIdError:
+    except FerryIdError as error:
+        damage[folder] = str(error).removeprefix(f"{folder}/").partition(". Fix: ")[0]
         return None
 
 
-def _kept(out: Path, name: str, profile: Profile) -> Iterator[tuple[Path, dict[str, Any]]]:
+def _kept(out: Path, name: str, profile: Profile, damage: Damage) -> Iterator[tuple[Path, dict[str, Any]]]:
     """Folders of this name and profile that this version of ferryid wrote, with their notes."""
     for folder in sorted((out / "logs").glob(f"{_escaped(name)}-????????-{profile.sha256[:8]}")):
-        try:
-            note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue  # an incomplete folder counts as none and is replaced
-        fits = _is_whole(note) and note["version"] == __version__
-        if fits and note["recording"]["profile_sha256"] == profile.sha256:
+        note, fault = _read_note(folder)
+        if fault:
+            damage[folder] = f"{_NOTE}: {fault}"
+        elif (
+            note is not None
+            and note["version"] == __version__
+            and note["recording"]["profile_sha256"] == profile.sha256
+        ):
             yield folder, note
 
 
@@ -143,7 +193,7 @@ def store(out: Path, recording: Recording, files: list[list[Any]], *, verify: bo
             "checksums": {name: table_checksum(draft / name) for name in tables.values()},
             "recording": _plain(recording),
         }
-        (draft / _NOTE).write_text(json.dumps(note, indent=1) + "\n", encoding="utf-8")
+        (draft / _NOTE).write_text(note_text(note), encoding="utf-8")
     return folder
 
 
@@ -185,12 +235,12 @@ def load(folder: Path) -> Recording:
     FerryIdError
         For a folder that is incomplete or damaged.
     """
-    try:
-        note = json.loads((folder / _NOTE).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    note, fault = _read_note(folder)
+    if note is None:
         raise FerryIdError(
-            f"{folder}: this is no recording of ferryid ({error}). Fix: run ferryid ingest on the log again"
-        ) from error
+            f"{folder / _NOTE}: this describes no recording of ferryid, {fault or 'the file is not there'}. "
+            "Fix: delete its folder, the next ingest writes it again"
+        )
     try:
         return _recording(folder, note)
     except (LookupError, TypeError, ValueError, AttributeError) as error:

@@ -66,7 +66,8 @@ def stream_quality(stream: Stream) -> dict[str, Any]:
 
 def remarks(recording: Recording, repairs: Sequence[str] = ()) -> list[str]:
     """Return everything a user should know of a recording as sentences, losses first, each once."""
-    told = [f"Lost: {loss_sentence(loss)}" for loss in recording.losses]
+    told = [f"Lost: {loss_sentence(loss)}" for loss in recording.losses if loss.costs_messages]
+    told += [loss_sentence(loss) for loss in recording.losses if not loss.costs_messages]
     told += recording.notes
     told += grouped_notes({topic: stream.clock.notes for topic, stream in recording.streams.items()})
     for topic, stream in recording.streams.items():
@@ -100,10 +101,17 @@ def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
     if count:
         what = f"{count} message{'s' * (count > 1)} could not be read" + (", and perhaps more" if unknown else "")
     else:
-        what = "messages may be lost" if unknown else "the log is damaged, and no message of it is known to be lost"
-    main = max(losses, key=lambda loss: (loss.messages or 0, loss.messages is None))
+        what = "messages may be lost" if unknown else "no message is known to be lost"
     others = len(losses) - 1
-    return (f"{what}: {loss_sentence(main)[:-1]}" + (f"; and {others} more, see ferryid inspect." if others else "."),)
+    return (
+        f"{what}: {loss_sentence(main_loss(losses))[:-1]}"
+        + (f"; and {others} more, see ferryid inspect." if others else "."),
+    )
+
+
+def main_loss(losses: Sequence[Loss]) -> Loss:
+    """Return the largest of the losses, or the least certain where none is known to have cost a message."""
+    return max(losses, key=lambda loss: (loss.messages or 0, loss.messages is None))
 
 
 def _of_clock(stream: Stream) -> list[str]:

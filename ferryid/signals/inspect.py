@@ -15,10 +15,11 @@ from ferryid.ingest import open_log, supported_formats
 from ferryid.ingest.clocks import ClockReport, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Reader, Series, Topic
+from ferryid.ingest.stray_times import stray_times
 from ferryid.signals.data_quality import grouped_notes, plain_loss, remarks, stream_quality
 from ferryid.signals.poses import USED, pose_faults, pose_sentences
 from ferryid.signals.quality import clean
-from ferryid.signals.recording import log_name, make_recording, name_of
+from ferryid.signals.recording import log_name, make_recording, selected
 from ferryid.signals.render import render_inspect
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.stream import Recording
@@ -68,12 +69,12 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
         if profile is not None and selection is not None:
             vessel = _vessel(reader, log_name(path), profile, selection, series, repaired, problems)
         sha256 = hashing.result()
+    described = [_timed(topic, series, repaired) for topic in sorted(reader.topics, key=lambda one: one.name)]
     topics = [
-        _topic(topic, repaired[topic.name][2] if topic.name in repaired else None, problems)
-        for topic in sorted(reader.topics, key=lambda one: one.name)
+        _topic(topic, repaired[topic.name][2] if topic.name in repaired else None, problems) for topic in described
     ]
-    starts = [topic.start_ns for topic in reader.topics if topic.start_ns is not None]
-    ends = [topic.end_ns for topic in reader.topics if topic.end_ns is not None]
+    starts = [topic.start_ns for topic in described if topic.start_ns is not None]
+    ends = [topic.end_ns for topic in described if topic.end_ns is not None]
     return {
         "schema": SCHEMA,
         "path": str(path),
@@ -114,6 +115,19 @@ def _read(
             except FerryIdError as error:
                 problems[topic] = str(error)
         return series, problems
+
+
+def _timed(topic: Topic, series: Mapping[str, Series], repaired: Mapping[str, Any]) -> Topic:
+    """Put first and last time of a topic that was read to those of its consistent rows."""
+    if topic.name not in series:
+        return topic
+    receive_ns = series[topic.name].receive_ns
+    _, rows, clock = repaired[topic.name]
+    # Of rows on their stamps the receive time may still be a stray.
+    receive_ns = receive_ns[rows] if clock.source == "receive" else receive_ns[~stray_times(receive_ns)[0]]
+    if not len(receive_ns):
+        return topic
+    return replace(topic, start_ns=int(receive_ns.min()), end_ns=int(receive_ns.max()))
 
 
 def _topic(topic: Topic, clock: ClockReport | None, problems: Mapping[str, str]) -> dict[str, Any]:
@@ -171,7 +185,7 @@ def _vessel(
     """What the profile makes of the log: signals with their ranges, and why it would refuse the log, if it would."""
     usable, problem = True, ""
     try:
-        select(profile, reader.topics, name_of(reader))
+        selected(reader, profile)
     except FerryIdError as error:
         usable, problem = False, str(error)
     streams: dict[str, Any] = {}

@@ -14,7 +14,7 @@ from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Nanoseconds, Reader, Series, Topic
 from ferryid.signals import cache
-from ferryid.signals.data_quality import data_quality, grouped_notes
+from ferryid.signals.data_quality import data_quality, grouped_notes, loss_sentence, main_loss
 from ferryid.signals.stream import Recording, Stream
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, convert, select
@@ -43,25 +43,29 @@ def record(path: str | Path, profile: Profile, out: Path | None = None, *, verif
         For a log that cannot be used: no known format, a required signal that it lacks, no row, an unwritable `out`.
     """
     name = log_name(path)
+    damage: cache.Damage = {}
     if out is not None and Path(path).is_file():
-        kept = cache.by_files(out, name, [Path(path)], profile, verify=verify)
+        kept = cache.by_files(out, name, [Path(path)], profile, damage, verify=verify)
         if kept is not None:
             return kept
     reader = open_log(path, profile.table)
     if out is not None:
-        kept = cache.by_files(out, name, reader.paths, profile, verify=verify)
+        kept = cache.by_files(out, name, reader.paths, profile, damage, verify=verify)
         if kept is not None:
             return kept
     with ThreadPoolExecutor(1) as pool:
         hashing: Future[str] = pool.submit(content_hash, reader.paths, verify=verify)
         if out is not None and cache.has_any(out, name, profile):
-            kept = cache.by_content(out, name, hashing.result(), reader.paths, profile, verify=verify)
+            kept = cache.by_content(out, name, hashing.result(), reader.paths, profile, damage, verify=verify)
             if kept is not None:
                 return kept
         signatures = cache.signatures(reader.paths)
         recording = replace(read_recording(reader, name, profile, verify=verify), sha256=hashing.result())
     if out is not None:
-        cache.store(out, recording, signatures, verify=verify)
+        folder = cache.store(out, recording, signatures, verify=verify)
+        if folder in damage:
+            said = f"the cached tables of the log in {folder.name} were damaged ({damage[folder]}): read from the log again."
+            recording = replace(recording, notes=(*recording.notes, said))
     return recording
 
 
@@ -73,9 +77,31 @@ def read_recording(reader: Reader, name: str, profile: Profile, *, verify: bool 
     FerryIdError
         As `record`.
     """
-    selection = select(profile, reader.topics, name_of(reader))
+    selection = selected(reader, profile)
     series = reader.read(selection.wanted, verify=verify)
     return make_recording(reader, name, profile, selection, series, repair_all(series))
+
+
+def selected(reader: Reader, profile: Profile) -> Selection:
+    """Find the profile's signals in an opened log.
+
+    Raises
+    ------
+    FerryIdError
+        For a log without a single message, and for a required signal that it does not have.
+    """
+    if not any(topic.count for topic in reader.topics):
+        there = f"{len(reader.topics)} topic{'s' * (len(reader.topics) != 1)} and no message"
+        if reader.losses:
+            raise FerryIdError(
+                f"{name_of(reader)}: the log holds no data that can be read, found {there}: "
+                f"{loss_sentence(main_loss(reader.losses)).removesuffix('.')}. Fix: copy it from the recorder again"
+            )
+        raise FerryIdError(
+            f"{name_of(reader)}: the log holds no data, found {there} in a complete file. "
+            "Fix: pass a log that was recorded while the topics were published"
+        )
+    return select(profile, reader.topics, name_of(reader))
 
 
 def make_recording(

@@ -31,9 +31,13 @@ def render_inspect(result: Mapping[str, Any], width: int = 100) -> str:
     legend = "; ".join(f"{word}: {meaning}" for word, meaning in _LEGEND.items() if word in shown)
     blocks.append(textwrap.fill(legend, width))
     losses = [Loss(**{key: value for key, value in loss.items() if key != "seconds"}) for loss in result["losses"]]
-    lost = [loss_sentence(loss) for loss in losses]
-    blocks.append(_listed("Lost", lost, width) if losses else "Lost: nothing")
-    blocks.append(_listed("Notes", result["notes"], width))
+    lost = [loss_sentence(loss) for loss in losses if loss.costs_messages]
+    blocks.append(_listed("Lost", lost, width) if lost else "Lost: nothing")
+    blocks.append(
+        _listed(
+            "Notes", [*(loss_sentence(loss) for loss in losses if not loss.costs_messages), *result["notes"]], width
+        )
+    )
     return "\n\n".join(block for block in blocks if block)
 
 

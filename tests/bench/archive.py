@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import tempfile
@@ -21,7 +20,7 @@ from ferryid.identify.cross_products import CrossProducts
 from ferryid.identify.kept_pieces import Kept, kept
 from ferryid.identify.pieces import Pieces
 from ferryid.identify.settings import FitSettings
-from ferryid.signals.cache import recordings
+from ferryid.signals.cache import note_text, recordings
 from ferryid.signals.prepare import open_track
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.vessel import load_profile
@@ -126,7 +125,7 @@ def _season(out: Path, logs: int) -> None:
         place.mkdir()
         recording = {**note["recording"], "name": name, "sha256": sha256}
         (place / "recording.json").write_text(
-            json.dumps({**note, "files": [[name, 0, number, number]], "recording": recording}), encoding="utf-8"
+            note_text({**note, "files": [[name, 0, number, number]], "recording": recording}), encoding="utf-8"
         )
         kept_pieces.write(place / path.name, told["key"], replace(long, name=name, sha256=sha256))
     for file in folder.iterdir():

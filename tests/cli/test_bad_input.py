@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.ingest.mcap_records import DATA_END, MAGIC, footer, record, text
+
 
 def refused(run, *parts: str) -> None:
     """Check exit code and form of a refusal, and that it says `parts`."""
@@ -41,6 +43,25 @@ def test_what_is_not_a_log(ferryid, tmp_path: Path, command: str, name: str, con
     vessel = () if command == "inspect" else ("--vessel", "milliampere", "--out", tmp_path / "out")
     refused(ferryid(command, path, *vessel), name)
     assert not list((tmp_path / "out").rglob("*.parquet"))
+
+
+@pytest.mark.parametrize("size", [8, 20, 33])
+def test_an_mcap_that_was_cut_behind_its_first_bytes_holds_no_data(ferryid, tmp_path: Path, size: int) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes((MAGIC + record(1, text("ros2") + text("test")))[:size])
+    run = ferryid("fit", path, "--vessel", "milliampere", "--out", tmp_path / "out")
+    refused(run, "cut.mcap", "holds no data", "the file ends", "copy it from the recorder again")
+    assert "signal map" not in run.err
+    shown = ferryid("inspect", path, "--vessel", "milliampere")
+    assert shown.code == 0
+    assert "holds no data" in shown.out
+
+
+def test_a_finished_mcap_without_a_message_was_not_cut(ferryid, tmp_path: Path) -> None:
+    path = tmp_path / "finished.mcap"
+    path.write_bytes(MAGIC + record(1, text("ros2") + text("test")) + DATA_END + footer(0))
+    run = ferryid("fit", path, "--vessel", "milliampere", "--out", tmp_path / "out")
+    refused(run, "finished.mcap", "holds no data", "a complete file")
 
 
 def test_an_empty_folder(ferryid, tmp_path: Path) -> None:

@@ -142,15 +142,23 @@ def test_two_recordings_of_one_file_are_refused(tmp_path: Path, logs: list[str])
     assert [folder.name[:5] for folder in folders(tmp_path, PROFILE, ["day3"])] == ["day3-"]
 
 
-def test_a_folder_whose_note_is_damaged_is_none(season: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("change", [{"clocks": {}}, {"name": "day4"}, {"topics": []}])
+def test_a_damaged_description_of_a_log_is_refused(season: Path, tmp_path: Path, change: dict[str, object]) -> None:
     shutil.copytree(season / "logs", tmp_path / "logs")
     (note,) = tmp_path.glob("logs/day1*/recording.json")
     told = json.loads(note.read_text())
-    note.write_text(json.dumps({**told, "recording": {**told["recording"], "clocks": {}}}))
-    with pytest.raises(FerryIdError, match=r"recording.json: a part of it is missing or wrong .*Fix: delete"):
-        fit_archive(PROFILE, replace(SETTINGS, sigma=0.7), tmp_path)
-    note.write_text(json.dumps({**told, "recording": []}))
-    assert len(folders(tmp_path, PROFILE)) == 2
+    note.write_text(json.dumps({**told, "recording": {**told["recording"], **change}}))
+    with pytest.raises(FerryIdError, match=r"recording.json: .* is damaged, its checksum differs. Fix: delete"):
+        folders(tmp_path, PROFILE)
+
+
+@pytest.mark.parametrize(("text", "fault"), [("{", "no JSON"), ('{"recording": []}', "a part of it is missing")])
+def test_a_description_that_is_none_is_refused(season: Path, tmp_path: Path, text: str, fault: str) -> None:
+    shutil.copytree(season / "logs", tmp_path / "logs")
+    (note,) = tmp_path.glob("logs/day1*/recording.json")
+    note.write_text(text)
+    with pytest.raises(FerryIdError, match=fault):
+        folders(tmp_path, PROFILE)
 
 
 def test_whole_logs_validate(season: Path) -> None:

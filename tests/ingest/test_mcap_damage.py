@@ -151,6 +151,30 @@ def test_a_chunk_cut_out_of_a_finished_file_is_missed() -> None:
     assert any(f"{len(cut)} bytes before" in loss.what for loss in losses)
 
 
+def test_messages_are_counted_once_as_they_are_found() -> None:
+    chunks = chunk_records("zstd")
+    cut = chunks[1][0] + message_index(chunks[1][1])
+    log = McapLog(Path("log.mcap"), with_summary(chunks).replace(cut, b""))
+    (topic,) = log.topics
+    assert topic.count == COUNT - PER_CHUNK
+    for wanted in ({}, {"/a": ["data"]}):
+        log.read(wanted)
+        missing = [loss.messages for loss in log.losses if "messages more than are in it" in loss.what]
+        assert missing == [PER_CHUNK]
+
+
+def test_damaged_chunks_far_apart_are_as_long_as_they_are() -> None:
+    chunks = chunk_records("")
+    for number in (0, 3):
+        one = bytearray(chunks[number][0])
+        one[-1] ^= 1
+        chunks[number] = bytes(one), chunks[number][1]
+    _, losses = accounted(with_summary(chunks), verify=True)
+    (loss,) = (loss for loss in losses if loss.topic == "/a")
+    assert (loss.messages, loss.start_ns, loss.end_ns) == (2 * PER_CHUNK, T0, T0 + COUNT - 1)
+    assert loss.seconds == pytest.approx(2 * (PER_CHUNK - 1) * 1e-9)
+
+
 @pytest.mark.parametrize("stated", [2**60, 2**63, 2**64 - 1, COUNT + 5, COUNT - 5, 0])
 def test_statistics_that_lie_cost_neither_memory_nor_messages(stated: int) -> None:
     for lie in (statistics(stated), statistics(COUNT, stated), statistics(stated, COUNT), statistics(chunks=77)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sqlite3
 from collections.abc import Callable, Sequence
@@ -182,6 +183,22 @@ def test_a_destroyed_page_costs_its_own_messages_and_they_are_counted(tmp_path: 
     (loss,) = log.losses
     assert loss.start_ns == START + (missing[0] - 1) * 10_000_000
     assert loss.end_ns == START + (missing[-1] + 1) * 10_000_000
+
+
+def test_many_destroyed_pages_are_as_long_as_they_are_together(tmp_path: Path) -> None:
+    path = database(tmp_path / "log.db3", points(0, 6000), page_size=1024)
+    with closing(sqlite3.connect(path)) as connection:
+        (root,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name='messages'").fetchone()
+    leaves = [page for page, kind in enumerate(kinds(path, 1024)) if kind == 0x0D and page > root]
+    for leaf in leaves[100:400:5]:
+        damaged(path, leaf * 1024, bytes(1024))
+    log = open_log(path)
+    missing = np.setdiff1d(np.arange(6000), xs(log))
+    stretches = 1 + np.count_nonzero(np.diff(missing) > 1)
+    (loss,) = log.losses
+    assert f"in {stretches} places" in loss.what
+    assert loss.messages == len(missing)
+    assert loss.seconds == pytest.approx((len(missing) + stretches) * 0.01)
 
 
 def test_messages_below_a_destroyed_interior_page_are_counted(tmp_path: Path) -> None:
@@ -467,7 +484,8 @@ def test_a_broken_metadata_file_does_not_hide_the_recording(tmp_path: Path, text
     (folder / "metadata.yaml").write_text(text)
     log = open_log(folder)
     assert xs(log) == list(range(500))
-    assert [loss.file for loss in log.losses] == [str(folder / "metadata.yaml")]
+    assert [(loss.file, loss.messages) for loss in log.losses] == [(str(folder / "metadata.yaml"), 0)]
+    assert re.fullmatch(r"the file (is|lacks) .*; the recording was read without it", log.losses[0].what)
 
 
 def test_counts_that_contradict_the_files_are_told(tmp_path: Path) -> None:

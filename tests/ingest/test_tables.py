@@ -344,6 +344,24 @@ def test_a_row_cut_at_the_end_is_told_apart(tmp_path: Path) -> None:
     assert "ends in the middle of a row" in reader.losses[0].what
 
 
+@pytest.mark.parametrize("last", ["3,4,5", '3,4,"5'])
+def test_a_short_row_in_the_middle_is_not_taken_for_the_last(tmp_path: Path, last: str) -> None:
+    _, reader = read_all(write(tmp_path, "log.csv", f"time,a,b\n0,1,1\n1,2\n2,2,2\n2.5,2,2\n2.7,2,2\n{last}"))
+    short = reader.losses[0]
+    assert short.messages == 1
+    assert "without 3 fields" in short.what
+    assert "line 3" in short.what
+    assert not any("middle of a row" in loss.what for loss in reader.losses)
+
+
+@pytest.mark.parametrize("last", ["3,4", "3 , 4"])
+def test_the_last_row_is_told_apart_from_short_ones_before_it(tmp_path: Path, last: str) -> None:
+    _, reader = read_all(write(tmp_path, "log.csv", f"time,a,b\n0,1,1\n1,2\n2,2,2\n2.5,2,2\n2.7,2,2\n{last}"))
+    assert [loss.messages for loss in reader.losses] == [1, 1]
+    assert "ends in the middle of a row" in reader.losses[0].what
+    assert "line 3" in reader.losses[1].what
+
+
 def test_unreadable_numbers_and_times_are_counted(tmp_path: Path) -> None:
     series, reader = read_all(write(tmp_path, "log.csv", "time,a\n0,1\n1,ERR\n2,4\nreset,9\n4,5\n"))
     assert series.receive_ns.tolist() == [0, 10**9, 2 * 10**9, 4 * 10**9]

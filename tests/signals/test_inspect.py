@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +15,12 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Loss
-from ferryid.signals.data_quality import loss_sentence
+from ferryid.signals.data_quality import loss_sentence, remarks
 from ferryid.signals.inspect import inspect, render_inspect
+from ferryid.signals.recording import record
 from ferryid.signals.render import table
 from ferryid.vessel.load import load_profile
+from tests.ingest.mcap_records import DATA_END, HEAD, T0, footer, message
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 
@@ -78,6 +83,70 @@ def test_truncated_bag_says_what_is_recovered() -> None:
 @pytest.mark.parametrize(("messages", "told"), [(None, "x."), (0, "x."), (1, "x (1 message)."), (7, "x (7 messages).")])
 def test_amount_of_a_loss(messages: int | None, told: str) -> None:
     assert loss_sentence(Loss("a/b.bag", "x", None, messages)) == f"b.bag: {told}"
+
+
+@pytest.mark.parametrize("change", ["broken", "renamed"])
+def test_a_metadata_file_that_costs_no_message_is_a_remark(tmp_path: Path, change: str) -> None:
+    folder = tmp_path / "log"
+    shutil.copytree(FIXTURES / "short_ros2", folder)
+    if change == "broken":
+        (folder / "metadata.yaml").write_text("rosbag2_bagfile_information: [")
+    else:
+        (file,) = folder.glob("*.db3")
+        file.rename(folder / "other.db3")
+    result, text = look(folder, "milliampere")
+    assert "Lost: nothing" in text
+    notes = " ".join(text[text.index("Notes\n") :].split())
+    if change == "broken":
+        assert "metadata.yaml: the file is no YAML" in notes
+    else:
+        assert "the file is named in metadata.yaml but is not in the folder; other.db3 there was read instead" in notes
+    assert [loss["messages"] for loss in result["losses"]] == [0]
+    recorded = record(folder, load_profile("milliampere"))
+    said = remarks(recorded)
+    assert any("metadata.yaml" in one for one in said)
+    assert not any(one.startswith("Lost") for one in said)
+
+
+def with_stray_times(folder: Path, *changes: tuple[str, int]) -> Path:
+    """Return a copy of the ROS 2 fixture with a bit of one receive time flipped, per topic and row of it."""
+    shutil.copytree(FIXTURES / "short_ros2", folder)
+    (file,) = folder.glob("*.db3")
+    with closing(sqlite3.connect(file)) as connection, connection:
+        for topic, row in changes:
+            found = connection.execute(
+                "SELECT m.id, timestamp FROM messages m JOIN topics t ON t.id = topic_id WHERE name = ? ORDER BY m.id",
+                (topic,),
+            ).fetchall()
+            number, time_ns = found[row]
+            connection.execute("UPDATE messages SET timestamp = ? WHERE id = ?", (time_ns ^ 1 << 61, number))
+    return folder
+
+
+def test_a_stray_receive_time_does_not_make_the_log_longer(tmp_path: Path) -> None:
+    camera, thruster = "/camera/image/compressed", "/thruster1/state"
+    result, text = look(with_stray_times(tmp_path / "log", (camera, 2), (thruster, 100)), "milliampere")
+    assert 29 < result["duration_s"] < 30
+    durations = {topic["name"]: topic["duration_s"] for topic in result["topics"]}
+    assert 20 < durations[camera] < 30
+    assert 29 < durations[thruster] < 30
+    assert "1 of 300 receive times contradict" in " ".join(text.split())
+    sound, _ = look(FIXTURES / "short_ros2", "milliampere")
+    assert sound["start"] == result["start"]
+    assert "receive times contradict" not in str(sound)
+
+
+def test_rows_that_are_left_out_do_not_make_an_mcap_longer(tmp_path: Path) -> None:
+    times = [T0 + 100_000_000 * row for row in range(100)]
+    times[40] ^= 1 << 61
+    path = tmp_path / "log.mcap"
+    path.write_bytes(
+        HEAD + b"".join(message(row, time_ns=time) for row, time in enumerate(times)) + DATA_END + footer(0)
+    )
+    result, text = look(path)
+    assert result["duration_s"] == pytest.approx(9.9)
+    assert result["topics"][0]["duration_s"] == pytest.approx(9.9)
+    assert "1 of 100 rows left out" in text
 
 
 def test_wrong_profile_says_what_is_missing(tmp_path: Path) -> None:

@@ -238,8 +238,33 @@ def test_a_damaged_cache_is_made_anew(tmp_path: Path, log: Path, boat: Profile) 
     path.write_bytes(data)
     with pytest.raises(FerryIdError, match=r"delete its folder"):
         ferryid_parquet.read_table(path)
-    assert_same(first, record(log, boat, tmp_path))
+    assert_rebuilt(record(log, boat, tmp_path), first, f"{path.name}: ")
     ferryid_parquet.read_table(path)
+    assert_same(first, record(log, boat, tmp_path))
+
+
+def assert_rebuilt(again: Recording, first: Recording, fault: str) -> None:
+    """Check that a recording was read again because of damage, and says so."""
+    said = again.notes[-1]
+    assert fault in said
+    assert "were damaged" in said
+    assert said in data_quality(again)["remarks"]
+    assert_same(replace(again, notes=again.notes[:-1]), first)
+
+
+@pytest.mark.parametrize("touched", [False, True])
+def test_any_flipped_byte_of_a_cached_description_is_found(
+    tmp_path: Path, log: Path, boat: Profile, touched: bool
+) -> None:
+    first = record(log, boat, tmp_path)
+    (path,) = (tmp_path / "logs").rglob("recording.json")
+    written = path.read_bytes()
+    if touched:
+        os.utime(log, ns=(0, 0))
+    for place in range(5, len(written), len(written) // 40):
+        path.write_bytes(written[:place] + bytes([written[place] ^ 4]) + written[place + 1 :])
+        assert_rebuilt(record(log, boat, tmp_path), first, "recording.json: ")
+        assert_same(record(log, boat, tmp_path), first)
 
 
 def test_any_flipped_byte_of_a_cached_table_is_found(tmp_path: Path, log: Path, boat: Profile) -> None:

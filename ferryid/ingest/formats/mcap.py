@@ -83,7 +83,7 @@ class McapLog:
         return self._index.schemas.get(channel.schema_id) if channel.schema_id else None
 
     def _describe(self) -> tuple[Topic, ...]:
-        counts = self._counts()
+        counts = self._index.counts()
         extents = spans(self._index, self._file, self._index.channels)
         topics = []
         for channels in self._by_topic().values():
@@ -118,15 +118,6 @@ class McapLog:
             fields=mcap_types.fields_of(channel, schema, lambda: self._first(channel.id)),
             note=mcap_types.problem(channel, schema) or mcap_types.remark(channel, schema),
         )
-
-    def _counts(self) -> dict[int, int]:
-        """Return messages per channel: as many as the statistics record has, or the indexes and the walk if more."""
-        found = self._index.counts()
-        statistics = self._index.statistics
-        if statistics is not None:
-            for channel, count in statistics.channel_message_counts.items():
-                found[channel] = max(count, found.get(channel, 0))
-        return found
 
     def _by_topic(self) -> dict[str, list[Channel]]:
         topics: dict[str, list[Channel]] = {}
@@ -165,7 +156,10 @@ class McapLog:
                 found[key] += len(messages)
         if verify:
             losses += self._data_checksum()
-        differing = self._shortfall(found, losses)
+        # Topics that are not wanted have the messages that the index or a walk over their chunks shows.
+        counts = self._index.counts()
+        others = {channel: counts.get(channel, 0) for channel in self._index.channels if channel not in found}
+        differing = self._shortfall(found | others, losses)
         surplus = {loss.topic for loss in differing if loss.messages == 0}
         losses += differing
         pieces: dict[str, list[Series]] = {}
@@ -179,7 +173,7 @@ class McapLog:
 
     def _groups(self, wanted: Mapping[str, Sequence[str]]) -> tuple[list[_Group], list[Loss]]:
         topics = self._by_topic()
-        counts = self._counts()
+        counts = self._index.counts()
         groups: list[_Group] = []
         losses: list[Loss] = []
         for name, paths in wanted.items():
@@ -331,8 +325,15 @@ def _joined(losses: Sequence[Loss]) -> list[Loss]:
             messages=None if counts[0] is None or counts[1] is None else counts[0] + counts[1],
             start_ns=None if before.start_ns is None else min(before.start_ns, loss.start_ns),
             end_ns=None if before.end_ns is None or loss.end_ns is None else max(before.end_ns, loss.end_ns),
+            lost_ns=_both_ns(before, loss),
         )
     return joined
+
+
+def _both_ns(first: Loss, second: Loss) -> int | None:
+    """Return how long two lost stretches are together [ns], None where that is not known."""
+    lengths = [first.length_ns, second.length_ns]
+    return None if None in lengths else sum(length for length in lengths if length is not None)
 
 
 def open_mcap(path: Path, layout: TableLayout | None = None, *, content: Any = None) -> Reader:

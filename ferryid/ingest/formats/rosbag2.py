@@ -42,7 +42,7 @@ class FolderLog:
         stated = read_metadata(folder / NAME)
         losses: list[Loss] = []
         if isinstance(stated, str):
-            losses.append(Loss(str(folder / NAME), f"{stated}: the files beside it were read without it", messages=0))
+            losses.append(Loss(str(folder / NAME), f"the file {stated}; the recording was read without it", messages=0))
             stated = Metadata((), (), {}, "", "", "")
         if stated.mode and stated.codec not in FORMATS:
             raise FerryIdError(
@@ -59,7 +59,7 @@ class FolderLog:
             except FerryIdError as error:
                 if len(files) == 1:
                     raise
-                losses.append(_loss(path, about, f"cannot be read: {_cause(error, path)}"))
+                losses.append(_loss(path, about, f"the file cannot be read: {_cause(error, path)}"))
         if not parts:
             raise FerryIdError(
                 f"{folder}: none of the recording's {len(files)} files can be read; {losses[-1].file}: "
@@ -85,7 +85,7 @@ class FolderLog:
             bare = about.name.removesuffix(".zstd").removesuffix(".lz4")
             name = next((n for n in (about.name, bare, bare + ".zstd", bare + ".lz4") if n in there), None)
             if name is None:
-                what = "is named in metadata.yaml but not in the folder"
+                what = "the file is named in metadata.yaml but is not in the folder"
                 losses.append(_loss(self._folder / about.name, about, what))
             else:
                 found.append((there.pop(name), about))
@@ -93,7 +93,7 @@ class FolderLog:
             losses += [
                 Loss(
                     str(path),
-                    "is not named in metadata.yaml and was not read; without a metadata.yaml it would be",
+                    "the file is not named in metadata.yaml and was not read; without a metadata.yaml it would be",
                 )
                 for path in there.values()
             ]
@@ -179,7 +179,7 @@ class FolderLog:
         stated = sum(topic.count for topic in self._stated.topics)
         reported = sum(loss.messages or 0 for loss in losses)
         rest = min(sum(short.values()), stated - sum(held.values())) - reported
-        where, what = str(self._folder / NAME), "counts more messages than the files hold"
+        where, what = str(self._folder / NAME), "the file counts more messages than the recording holds"
         if rest == sum(short.values()):
             for topic, count in short.items():
                 yield Loss(where, what, topic, count)

@@ -20,7 +20,8 @@ from ferryid.ingest.ros2_types import Definition, RecordedText, define, normaliz
 from ferryid.ingest.rosbag2_tables import Recorded, RecordedTopic, line, read_tables
 from ferryid.ingest.sqlite_data import read_data
 from ferryid.ingest.sqlite_database import FAULTS, MAGIC, Database
-from ferryid.ingest.sqlite_rows import Scan, Stretch, scan_rows
+from ferryid.ingest.sqlite_rows import Rows, Scan, Stretch, scan_rows
+from ferryid.ingest.stray_times import stray_times
 from ferryid.ingest.unpack import FORMATS, unpack_file, working_folder
 
 DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
@@ -150,9 +151,11 @@ class Sqlite3Log:
         known = sum(stretch.count or 0 for stretch in stretches)
         unknown = not scan.complete or any(stretch.count is None for stretch in stretches)
         rest = None if stated is None else stated - len(rows) - scan.invalid - known
+        lost_ns = None
         if len(stretches) > MAX_STRETCHES:
             count = None if any(stretch.count is None for stretch in stretches) else known
             cause = f"{cause}, in {len(stretches)} places"
+            lost_ns = _length_ns(rows, stretches)
             stretches = (Stretch(stretches[0].low, stretches[-1].high, count),)
         for stretch in stretches:
             first = int(np.searchsorted(rows.rowid, stretch.low, "right"))
@@ -164,6 +167,7 @@ class Sqlite3Log:
                 messages=count,
                 start_ns=int(rows.time_ns[first - 1]) if first else None,
                 end_ns=int(rows.time_ns[last]) if last < len(rows) else self._storage.end_ns,
+                lost_ns=lost_ns,
             )
         if scan.complete or not unknown:
             return
@@ -182,11 +186,14 @@ class Sqlite3Log:
             entries.setdefault(topic.name, []).append(topic)
         counts = np.bincount(self._topic, minlength=len(entries))
         starts, ends = np.full(len(entries), np.iinfo(np.int64).max), np.full(len(entries), np.iinfo(np.int64).min)
-        order = np.argsort(self._compact(self._topic), kind="stable")
-        held = np.flatnonzero(counts)
+        # Rows of all topics were received in this order: a time that contradicts it says nothing of first and last.
+        consistent = np.flatnonzero(~stray_times(self._rows.time_ns)[0])
+        timed = np.bincount(self._topic[consistent], minlength=len(entries))
+        held = np.flatnonzero(timed)
         if held.size:
-            times = self._rows.time_ns[order]
-            edges = (np.cumsum(counts) - counts)[held]
+            order = np.argsort(self._compact(self._topic[consistent]), kind="stable")
+            times = self._rows.time_ns[consistent[order]]
+            edges = (np.cumsum(timed) - timed)[held]
             starts[held] = np.minimum.reduceat(times, edges)
             ends[held] = np.maximum.reduceat(times, edges)
         for i, (name, several) in enumerate(entries.items()):
@@ -197,8 +204,8 @@ class Sqlite3Log:
                 type=msgtype,
                 encoding=encoding,
                 count=int(counts[i]),
-                start_ns=int(starts[i]) if counts[i] else None,
-                end_ns=int(ends[i]) if counts[i] else None,
+                start_ns=int(starts[i]) if timed[i] else None,
+                end_ns=int(ends[i]) if timed[i] else None,
                 fields=found.fields,
                 note=found.note,
             )
@@ -301,6 +308,14 @@ class Sqlite3Log:
                 if mine.size and (name := names.get(int(topic[mine[0]]))) is not None:
                     decoders[name].add(piece.data, starts[mine], piece.size[mine], times[mine])
         return dropped
+
+
+def _length_ns(rows: Rows, stretches: Sequence[Stretch]) -> int:
+    """Return how long lost stretches are together [ns], without those at the ends of the log."""
+    firsts = np.searchsorted(rows.rowid, [stretch.low for stretch in stretches], "right")
+    lasts = np.searchsorted(rows.rowid, [stretch.high for stretch in stretches], "left")
+    inside = (firsts > 0) & (lasts < len(rows))
+    return int((rows.time_ns[lasts[inside]] - rows.time_ns[firsts[inside] - 1]).sum())
 
 
 def _wal_frames(log: Path) -> int:
