@@ -17,6 +17,7 @@ from ferryid.simulate.trial import Simulation
 Columns = Mapping[str, NDArray[Any]]
 NAVIGATION, THRUSTER = "/navigation/odometry", "/thruster1/state"
 _HEADING = "pose.pose.orientation"
+SURGE, SWAY, YAW_RATE = "twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.angular.z"
 X, Y = "pose.pose.position.x", "pose.pose.position.y"
 
 
@@ -67,10 +68,30 @@ def without_heading(made: Simulation, gaps: Sequence[tuple[float, float]]) -> Si
 
 
 def turned(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
-    """Turn the heading of some rows by 180°: about the vertical, (x, y, z, w) becomes (-y, x, w, -z)."""
-    x, y, z, w = (columns[f"{_HEADING}.{name}"] for name in "xyzw")
-    half = {"x": -y, "y": x, "z": w, "w": -z}
-    return {f"{_HEADING}.{name}": np.where(rows, half[name], columns[f"{_HEADING}.{name}"]) for name in "xyzw"}
+    """Turn the heading of some rows by 180°."""
+    return turned_by(180.0)(columns, rows)
+
+
+def turned_by(degrees: float) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
+    """Return an edit that turns the heading of some rows about the vertical: q becomes (0, 0, sin a/2, cos a/2) q."""
+    sine, cosine = np.sin(np.radians(degrees) / 2), np.cos(np.radians(degrees) / 2)
+
+    def edit(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
+        x, y, z, w = (columns[f"{_HEADING}.{name}"] for name in "xyzw")
+        after = {
+            "x": cosine * x - sine * y,
+            "y": cosine * y + sine * x,
+            "z": cosine * z + sine * w,
+            "w": cosine * w - sine * z,
+        }
+        return {f"{_HEADING}.{name}": np.where(rows, after[name], columns[f"{_HEADING}.{name}"]) for name in "xyzw"}
+
+    return edit
+
+
+def stuck(names: Sequence[str], value: float) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
+    """Return an edit that writes one value for some columns on some rows."""
+    return lambda columns, rows: {name: np.where(rows, value, columns[name]) for name in names}
 
 
 def moved(by_m: float) -> Callable[[Columns, NDArray[np.bool_]], Columns]:

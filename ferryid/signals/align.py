@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, plural
 from ferryid.errors import FerryIdError
+from ferryid.signals.faults import find_faults
 from ferryid.signals.grid import EXACT_S, on_grid
-from ferryid.signals.poses import MARGIN_S, USED, PoseFault, pose_faults, pose_sentences
-from ferryid.signals.quality import NAVIGATION, POSE, REFERENCE, cross_checks, is_actuator, is_load, is_order
+from ferryid.signals.poses import step_doubts
+from ferryid.signals.quality import NAVIGATION, POSE, REFERENCE, cross_checks, is_actuator, is_order
 from ferryid.signals.sampling import check_advancing
-from ferryid.signals.source import Source, source_of
+from ferryid.signals.source import Held, Source
 from ferryid.signals.track import LeftOut, Track
 from ferryid.vessel import actuator_columns, resolve, resolve_notes
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
-    from ferryid.signals.stream import Recording, Stream
+    from ferryid.signals.stream import Recording
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -31,6 +33,9 @@ MOST_EMPTY_ROWS, MOST_SPARSE = 2_000_000, 50
 """A grid beyond both limits, the second in rows per sample, comes of wrong times, not of gaps."""
 _ENDS_S = 2.0
 """Rows at either end of the common time that lack a signal count as left out from this length [s] on."""
+HELD = "velocity repeats an old value, or stays at one while the pose moves"
+_PAUSE_SHARE = 0.5
+"""A pause that is this share of a log is what makes it too long; otherwise its times are wrong."""
 _HEADING_SHARE = 0.8
 """A heading that was measured on this share of the rows is needed; one that was measured on fewer is left out by others."""
 
@@ -65,8 +70,9 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     FerryIdError
         Where navigation or actuators are missing or empty, or never measured at the same time.
     """
-    repairs: list[str] = []
-    sources = [source_of(stream, repairs) for stream in recording.streams.values() if _enough(stream)]
+    faults = find_faults(recording)
+    sources = faults.sources
+    repairs = [*faults.taken_out, *faults.remarks]
     navigation = [s for s in sources if _has(s, NAVIGATION)]
     actuators = [s for s in sources if any(is_actuator(name) or is_order(name) for name in {*s.columns} - {*REFERENCE})]
     check_advancing(recording)
@@ -84,17 +90,13 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     t0_ns = max(start, first)
     count = int((end - t0_ns) * 1e-9 * rate + EXACT_S) + 1
     if count < 2 or count > max(MOST_EMPTY_ROWS, MOST_SPARSE * len(lead.time_ns)):
-        raise FerryIdError(
-            f"{recording.name}: its times cannot be right, {len(lead.time_ns)} samples of the velocity are spread over "
-            f"{max(0.0, (end - t0_ns) * 1e-9):.4g} s. Fix: look for wrong clocks with ferryid inspect, or cut the log"
-        )
+        raise FerryIdError(_spread(recording.name, lead, max(0.0, (end - t0_ns) * 1e-9)))
     t = np.arange(count) / rate
     columns: dict[str, Floats] = {}
     for source in sources:
         columns.update(on_grid(source, t0_ns, t, rate, repairs))
-    faults = pose_faults({name: (s.time_ns, s.columns[name]) for s in sources for name in USED if name in s.columns})
-    repairs.extend(pose_sentences(faults))
-    wrong = _inside(faults, t0_ns, count, rate)
+    around = faults.wrong_poses()
+    wrong, held = (_inside(spans, t0_ns, count, rate) for spans in (around, faults.held))
     for name in POSE:
         if name in columns:
             columns[name][wrong] = np.nan
@@ -114,32 +116,25 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
         # Topics never begin and end with the same row; more than that is a loss.
         if np.count_nonzero(lost[side]) < _ENDS_S * rate:
             lost[side] = False
+    first_row = kept.start
+    lacking = _Lacking(profile, columns)
     left_out = (
-        *LeftOut.of(_unmeasured(profile, columns, lost), lost, rate),
-        *LeftOut.of("the pose cannot be true", wrong, rate),
+        *LeftOut.of(lacking.reason(lost & ~held), lost & ~held, rate, first_row, lacking.cause),
+        *LeftOut.of(lacking.reason(lost & held, HELD), lost & held, rate, first_row, _cause(faults.held, t0_ns, rate)),
+        *LeftOut.of("the pose cannot be true", wrong, rate, first_row, _cause(around, t0_ns, rate)),
     )
     total = sum(one.rows for one in left_out) + int(np.count_nonzero(valid))
     columns = {name: np.ascontiguousarray(values[kept]) for name, values in columns.items()}
     valid = valid[kept]
     t0_ns += round(int(rows[0]) * 1e9 / rate)
     repairs.extend(
-        f"{one.rows} of {total} rows ({one.seconds:.1f} s in {one.stretches} stretches) are not used: {one.reason}."
+        f"{one.rows} of {counted(total, 'row')} ({one.seconds:.1f} s in {counted(one.stretches, 'stretch')}) "
+        f"{plural(one.rows, 'is')} not used: {one.reason}."
         for one in left_out
     )
     track = Track(recording.name, t[: valid.size], t0_ns, rate, columns, valid, tuple(repairs), left_out=left_out)
-    doubts = cross_checks(track)
+    doubts = (*step_doubts(faults.poses, t0_ns), *cross_checks(track))
     return replace(track, repairs=(*repairs, *(doubt.says for doubt in doubts)), doubts=doubts)
-
-
-def segments(valid: Flags) -> list[slice]:
-    """Return the unbroken stretches of True, in order."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], valid, [False]]).astype(np.int8)))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _enough(stream: Stream) -> bool:
-    """One message is enough for what holds until the next: a payload that was weighed once."""
-    return len(stream.time_ns) > 1 or (len(stream.time_ns) == 1 and all(is_load(name) for name in stream.columns))
 
 
 def _round_rate(rate_hz: float) -> float:
@@ -155,7 +150,7 @@ def _has(source: Source, names: tuple[str, ...]) -> bool:
     return any(name in source.columns for name in names)
 
 
-def _overlap(log: str, navigation: list[Source], actuators: list[Source]) -> tuple[int, int]:
+def _overlap(log: str, navigation: Sequence[Source], actuators: Sequence[Source]) -> tuple[int, int]:
     spans = []
     for group in (navigation, actuators):
         starts = min(int(s.time_ns[0]) for s in group)
@@ -176,14 +171,41 @@ def _overlap(log: str, navigation: list[Source], actuators: list[Source]) -> tup
     return start, end
 
 
-def _inside(faults: Sequence[PoseFault], t0_ns: int, count: int, rate: float) -> Flags:
-    """True on the rows of wrong poses and within `MARGIN_S` of them, shape (count,)."""
+def _spread(log: str, lead: Source, seconds: float) -> str:
+    """Return the message on a velocity whose samples are far apart: a long pause, or wrong times."""
+    pause = np.diff(lead.time_ns).max() * 1e-9 if lead.time_ns.size > 1 else 0.0
+    found = f"{len(lead.time_ns)} samples of the velocity over {seconds:.4g} s"
+    if pause < _PAUSE_SHARE * seconds:
+        return (
+            f"{log}: its times cannot be right, found {found}. "
+            "Fix: look for wrong clocks with ferryid inspect, or cut the log"
+        )
+    before = (lead.time_ns[int(np.argmax(np.diff(lead.time_ns)))] - lead.time_ns[0]) * 1e-9
+    return (
+        f"{log}: a pause of {pause / 3600.0:.1f} h is too long for one log, found {found}, with nothing measured from "
+        f"{before:.0f} s on. Fix: record or cut the parts before and after it as two logs, and give both"
+    )
+
+
+def _inside(spans: Sequence[Held], t0_ns: int, count: int, rate: float) -> Flags:
+    """True on the rows inside spans of time, shape (count,)."""
     inside = np.zeros(count, dtype=bool)
-    for fault in (one for one in faults if one.left_out):
-        first = ((fault.start_ns - t0_ns) * 1e-9 - MARGIN_S) * rate
-        last = ((fault.end_ns - t0_ns) * 1e-9 + MARGIN_S) * rate
+    for span in spans:
+        first, last = ((time_ns - t0_ns) * 1e-9 * rate for time_ns in (span.start_ns, span.end_ns))
         inside[max(0, int(np.ceil(first))) : max(0, int(np.floor(last)) + 1)] = True
     return inside
+
+
+def _cause(spans: Sequence[Held], t0_ns: int, rate: float) -> Callable[[slice], tuple[Sequence[str], str]]:
+    """Return a function that gives signals and reasons of the spans that a stretch of rows meets."""
+
+    def cause(rows: slice) -> tuple[Sequence[str], str]:
+        first_ns, last_ns = (t0_ns + row / rate * 1e9 for row in (rows.start, rows.stop - 1))
+        met = [span for span in spans if span.start_ns <= last_ns + 1.0 and span.end_ns >= first_ns - 1.0]
+        signals = dict.fromkeys(name for span in met for name in span.signals)
+        return tuple(signals), "; ".join(dict.fromkeys(span.reason for span in met))
+
+    return cause
 
 
 def _measured(log: str, profile: Profile, columns: Mapping[str, Floats], wrong: Flags) -> Flags:
@@ -205,16 +227,27 @@ def _measured(log: str, profile: Profile, columns: Mapping[str, Floats], wrong: 
     return valid
 
 
-def _unmeasured(profile: Profile, columns: Mapping[str, Floats], rows: Flags) -> str:
-    """Return why rows are left out: the signals of which they lack a value, and how many."""
-    counts = {
-        name: int(np.count_nonzero(rows & ~np.isfinite(columns[name])))
-        for name in dict.fromkeys([*_needed(profile, columns), "psi"])
-        if name in columns
-    }
-    most = sorted((name for name in counts if counts[name]), key=lambda name: -counts[name])
-    shown = ", ".join(f"{name} {counts[name]}" for name in most[:4]) + (", ..." if len(most) > 4 else "")
-    return f"velocity, heading or an actuator was not measured ({shown})"
+@dataclass(frozen=True)
+class _Lacking:
+    """Which signals lack a value on rows that are left out."""
+
+    profile: Profile
+    columns: Mapping[str, Floats]
+
+    def reason(self, rows: Flags, what: str = "velocity, heading or an actuator was not measured") -> str:
+        """Return why rows are left out: the signals of which they lack a value, and how many."""
+        counts = {name: int(np.count_nonzero(rows & ~np.isfinite(self.columns[name]))) for name in self._names()}
+        most = sorted((name for name in counts if counts[name]), key=lambda name: -counts[name])
+        shown = ", ".join(f"{name} {counts[name]}" for name in most[:4]) + (", ..." if len(most) > 4 else "")
+        return f"{what} ({shown})"
+
+    def cause(self, rows: slice) -> tuple[Sequence[str], str]:
+        """Return the signals that lack a value in a stretch of rows, and the reason."""
+        names = tuple(name for name in self._names() if not np.isfinite(self.columns[name][rows]).all())
+        return names, "not measured"
+
+    def _names(self) -> list[str]:
+        return [name for name in dict.fromkeys([*_needed(self.profile, self.columns), "psi"]) if name in self.columns]
 
 
 def _needed(profile: Profile, columns: Mapping[str, Floats]) -> list[str]:

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, plural
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.track import Doubt, Track
@@ -97,32 +98,40 @@ class ColumnQuality:
     longest_held_s: float = 0.0
     constant: bool = False
 
-    def sentences(self) -> tuple[str, ...]:
-        """Return the findings as sentences with numbers; empty for a clean column."""
-        name, of = self.name, f"of {self.count} samples"
+    def taken_out(self) -> tuple[str, ...]:
+        """Return what is missing or was removed as sentences with numbers; empty for a clean column."""
+        name, of = self.name, f"of {counted(self.count, 'sample')}"
         said = []
         if self.missing:
             bridged = "the value before holds" if is_load(name) else "short ones are interpolated"
-            said.append(f"{name}: {self.missing} {of} are missing (NaN); {bridged}.")
+            said.append(f"{name}: {self.missing} {of} {plural(self.missing, 'is')} missing (NaN); {bridged}.")
         if self.through_wrap:
             said.append(
-                f"{name}: {self.through_wrap} {of} were interpolated the wrong way round between 359° and 1°; "
-                "removed and interpolated."
+                f"{name}: {self.through_wrap} {of} {plural(self.through_wrap, 'was')} interpolated the wrong way round "
+                "between 359° and 1°; removed and interpolated."
             )
         if self.spikes:
             bridged = "held over" if is_load(name) else "interpolated"
-            said.append(f"{name}: {self.spikes} {of} are single implausible spikes; removed and {bridged}.")
+            what = "is a single implausible spike" if self.spikes == 1 else "are single implausible spikes"
+            said.append(f"{name}: {self.spikes} {of} {what}; removed and {bridged}.")
+        return tuple(said)
+
+    def remarks(self) -> tuple[str, ...]:
+        """Return what was found and kept as sentences with numbers; empty for a clean column."""
+        name = self.name
+        said = []
         if self.jumps:
             kept = "" if name in POSE else " and kept"
-            said.append(f"{name}: {self.jumps} implausible steps were found{kept}.")
+            said.append(f"{name}: {counted(self.jumps, 'implausible step')} {plural(self.jumps, 'was')} found{kept}.")
         if self.held:
             share = self.held / max(1, self.count)
             which = (
-                "most samples repeat the one before: it is updated slower than it is recorded" if share > 0.5 else ""
+                "; most samples repeat the one before: it is updated slower than it is recorded" if share > 0.5 else ""
             )
+            repeat = "repeats" if self.held == 1 else "repeat"
             said.append(
-                f"{name}: {self.held} {of} repeat the one before, at most for {self.longest_held_s:.2f} s"
-                + (f"; {which}." if which else ".")
+                f"{name}: {self.held} of {counted(self.count, 'sample')} {repeat} the one before, at most for "
+                f"{self.longest_held_s:.2f} s{which}."
             )
         if self.constant and self.count > 1:
             said.append(f"{name}: never changes.")

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 import ferryid
 from ferryid.errors import FerryIdError
 from ferryid.ingest.clocks import ClockReport
-from ferryid.signals.align import align, segments
+from ferryid.signals.align import align
 from ferryid.signals.recording import record
 from ferryid.signals.stream import Recording, Stream
-from ferryid.signals.track import Track
+from ferryid.signals.track import Track, segments
 from ferryid.vessel import load_profile
 
 Floats = NDArray[np.float64]
@@ -200,7 +200,7 @@ def test_a_single_spike_is_taken_out_and_counted_and_the_callers_data_stay() -> 
     track = align(recording(navigation(t, u=wild), thrusters(t)), PROFILE)
     assert np.abs(track.columns["u"]).max() < 0.11
     assert track.valid.all()
-    assert any(said.startswith("u: 1 of 600 samples are single implausible spikes") for said in track.repairs)
+    assert any(said.startswith("u: 1 of 600 samples is a single implausible spike") for said in track.repairs)
     np.testing.assert_array_equal(wild, kept)
 
 

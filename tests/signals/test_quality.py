@@ -133,7 +133,7 @@ def test_a_lasting_step_is_reported_and_kept() -> None:
     result, quality = clean("u", T, values)
     assert (quality.spikes, quality.jumps) == (0, 1)
     np.testing.assert_array_equal(result, values)
-    assert quality.sentences() == ("u: 1 implausible steps were found and kept.",)
+    assert quality.remarks() == ("u: 1 implausible step was found and kept.",)
 
 
 def test_two_steps_the_same_way_are_no_spike() -> None:
@@ -169,7 +169,7 @@ def test_held_and_missing_samples_are_counted() -> None:
 def test_a_slow_sensor_in_a_fast_stream_is_told_by_its_repeats() -> None:
     quality = clean("x", T, np.repeat(np.sin(T[::4]), 4))[1]
     assert quality.held == 1800
-    assert "updated slower than it is recorded" in quality.sentences()[0]
+    assert "updated slower than it is recorded" in quality.remarks()[0]
 
 
 def test_a_constant_is_called_one() -> None:
