@@ -45,6 +45,16 @@ def silent(made: Simulation, topic: str, gaps: Sequence[tuple[float, float]]) ->
     return replace(made, streams=tuple(streams))
 
 
+def paused(made: Simulation, at_s: float, seconds: float) -> Simulation:
+    """Return a trial in which every clock goes on later from a time on, as when a recorder rested."""
+    streams = []
+    for stream in made.streams:
+        first = made.streams[0].stamp_ns[0]
+        late = (stream.stamp_ns - first > at_s * 1e9) * np.int64(seconds * 1e9)
+        streams.append(replace(stream, stamp_ns=stream.stamp_ns + late, receive_ns=stream.receive_ns + late))
+    return replace(made, streams=tuple(streams))
+
+
 def changed(
     made: Simulation, gaps: Sequence[tuple[float, float]], edit: Callable[[Columns, Any], Columns]
 ) -> Simulation:
@@ -106,8 +116,17 @@ def zeros(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
 
 def repeated(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
     """Repeat the last pose before some rows."""
-    last = np.maximum.accumulate(np.where(rows, 0, np.arange(rows.size)))
-    return {name: values[last] for name, values in columns.items() if name.startswith("pose.pose")}
+    return held_at_its_last("pose.pose")(columns, rows)
+
+
+def held_at_its_last(prefix: str) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
+    """Return an edit that repeats the last value before some rows in the columns whose names begin so."""
+
+    def edit(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
+        last = np.maximum.accumulate(np.where(rows, 0, np.arange(rows.size)))
+        return {name: values[last] for name, values in columns.items() if name.startswith(prefix)}
+
+    return edit
 
 
 def inside(stamp_ns: NDArray[np.int64], gaps: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted, plural
 from ferryid.errors import FerryIdError
-from ferryid.signals.faults import find_faults
+from ferryid.signals.faults import Faults, find_faults
 from ferryid.signals.grid import EXACT_S, on_grid
 from ferryid.signals.poses import step_doubts
 from ferryid.signals.quality import NAVIGATION, POSE, REFERENCE, cross_checks, is_actuator, is_order
@@ -40,7 +40,7 @@ _HEADING_SHARE = 0.8
 """A heading that was measured on this share of the rows is needed; one that was measured on fewer is left out by others."""
 
 
-def align(recording: Recording, profile: Profile, rate_hz: float | None = None) -> Track:
+def align(recording: Recording, profile: Profile, rate_hz: float | None = None, faults: Faults | None = None) -> Track:
     """Bring all streams of a recording onto one uniform grid, in the frames of the vessel.
 
     The grid covers the time for which there are both navigation and actuator signals, and starts on a sample of the
@@ -59,6 +59,8 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
         Resolves frames that need several signals.
     rate_hz
         Rows per second; None takes the rate of the velocity, rounded, at most 20 Hz.
+    faults
+        What `ferryid.signals.faults.find_faults` found in the recording, where that is known.
 
     Returns
     -------
@@ -70,7 +72,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None) 
     FerryIdError
         Where navigation or actuators are missing or empty, or never measured at the same time.
     """
-    faults = find_faults(recording)
+    faults = find_faults(recording) if faults is None else faults
     sources = faults.sources
     repairs = [*faults.taken_out, *faults.remarks]
     navigation = [s for s in sources if _has(s, NAVIGATION)]

@@ -35,7 +35,7 @@ def heading_steps(samples: Samples) -> tuple[tuple[int, int, float], ...]:
     if turning is None or "psi" not in samples:
         return ()
     time_ns, psi = samples["psi"]
-    apart = psi - turning(time_ns * 1e-9)[0].real
+    apart = psi - turning(np.asarray(time_ns * 1e-9, dtype=np.float64))[0].real
     known = np.isfinite(apart)
     time_ns, apart = time_ns[known], apart[known]
     if time_ns.size < _FEWEST:

@@ -134,7 +134,7 @@ def _path(samples: Samples, name: str) -> tuple[Floats, Floats] | None:
         return None
     time_ns, x, y = samples["x"][0], samples["x"][1], samples["y"][1]
     both = np.isfinite(x) & np.isfinite(y)
-    time_s = time_ns[both] * 1e-9
+    time_s = _seconds(time_ns[both])
     if time_s.size < _FEWEST_POSES:
         return None
     pointing = np.interp((time_s[1:] + time_s[:-1]) / 2, *psi)
@@ -147,7 +147,11 @@ def _known(samples: Samples, name: str) -> tuple[Floats, Floats] | None:
         return None
     time_ns, values = samples[name]
     finite = np.isfinite(values)
-    return (time_ns[finite] * 1e-9, values[finite]) if np.count_nonzero(finite) >= _FEWEST_POSES else None
+    return (_seconds(time_ns[finite]), values[finite]) if np.count_nonzero(finite) >= _FEWEST_POSES else None
+
+
+def _seconds(time_ns: Nanoseconds) -> Floats:
+    return np.asarray(time_ns * 1e-9, dtype=np.float64)
 
 
 def _held(
@@ -156,7 +160,7 @@ def _held(
     known = np.flatnonzero(np.isfinite(values))
     if known.size < _FEWEST_POSES:
         return []
-    time_s, value = time_ns[known] * 1e-9, values[known]
+    time_s, value = _seconds(time_ns[known]), values[known]
     step = np.diff(value)
     fresh = time_s[np.concatenate([[True], step != 0.0])]
     if fresh.size < _FEWEST_POSES:
