@@ -119,6 +119,11 @@ def repeated(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
     return held_at_its_last("pose.pose")(columns, rows)
 
 
+def scaled(name: str, factor: float) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
+    """Return an edit that multiplies a column on some rows."""
+    return lambda columns, rows: {name: np.where(rows, factor * columns[name], columns[name])}
+
+
 def held_at_its_last(prefix: str) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
     """Return an edit that repeats the last value before some rows in the columns whose names begin so."""
 

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted, plural
 from ferryid.errors import FerryIdError
+from ferryid.signals.consistency import cross_checks
 from ferryid.signals.faults import Faults, find_faults
 from ferryid.signals.grid import EXACT_S, on_grid
 from ferryid.signals.poses import step_doubts
-from ferryid.signals.quality import NAVIGATION, POSE, REFERENCE, cross_checks, is_actuator, is_order
+from ferryid.signals.quality import NAVIGATION, POSE, REFERENCE, is_actuator, is_order
 from ferryid.signals.sampling import check_advancing
 from ferryid.signals.source import Held, Source
 from ferryid.signals.track import LeftOut, Track
