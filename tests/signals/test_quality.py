@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.signals.quality import clean, require_excited, stale, stuck, unwrapped
+from ferryid.signals.track import Track
 
 Floats = NDArray[np.float64]
 
