@@ -12,6 +12,7 @@ import numpy as np
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.data_quality import left_out_sentences
+from ferryid.signals.faults import Faults
 from ferryid.signals.quality import POSE
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_sampling
@@ -90,10 +91,12 @@ def open_track(path: str, profile: Profile, out: Path, *, rate_hz: float | None 
     return track_of(record(path, profile, out, verify=verify), profile, rate_hz)
 
 
-def track_of(recording: Recording, profile: Profile, rate_hz: float | None = None) -> Opened:
-    """Align a recording and reconstruct its forces; arguments and errors are those of `prepare`."""
+def track_of(
+    recording: Recording, profile: Profile, rate_hz: float | None = None, faults: Faults | None = None
+) -> Opened:
+    """Align a recording and reconstruct its forces; arguments and errors are those of `prepare` and `align`."""
     check_sampling(recording, profile)
-    track = align(recording, profile, rate_hz)
+    track = align(recording, profile, rate_hz, faults)
     for doubt in track.doubts:
         if doubt.certain:
             raise FerryIdError(

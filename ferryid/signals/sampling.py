@@ -29,15 +29,10 @@ def check_sampling(recording: Recording, profile: Profile) -> None:
     Raises
     ------
     FerryIdError
-        Where all navigation or all actuator signals have fewer than two times, and where the samples of the velocity
-        (or the position) are further apart than 2 sqrt(L/g).
+        As `check_advancing`, and where the samples of the velocity (or the position) are further apart than 2 sqrt(L/g).
     """
-    streams = list(recording.streams.values())
-    navigation = [stream for stream in streams if set(stream.columns) & set(NAVIGATION)]
-    actuators = [stream for stream in streams if any(is_actuator(name) or is_order(name) for name in stream.columns)]
-    for group in (navigation, actuators):
-        if group and all(len(stream.time_ns) < 2 for stream in group):
-            raise FerryIdError(_standing(recording, group))
+    check_advancing(recording)
+    navigation = [stream for stream in recording.streams.values() if set(stream.columns) & set(NAVIGATION)]
     lead = next((one for name in _LEAD for one in navigation if name in one.columns and len(one.time_ns) > 1), None)
     if lead is None:
         return
@@ -51,6 +46,22 @@ def check_sampling(recording: Recording, profile: Profile) -> None:
         f"{period_s:.4g} s, where a vessel of {length_m:.3g} m needs at least {least_hz:.2g} Hz. "
         f"Fix: {_remedy(recording, lead, period_s)}"
     )
+
+
+def check_advancing(recording: Recording) -> None:
+    """Refuse a recording without two times in it: one row, or a clock that stands still.
+
+    Raises
+    ------
+    FerryIdError
+        Where all navigation or all actuator signals have fewer than two times.
+    """
+    streams = list(recording.streams.values())
+    navigation = [stream for stream in streams if set(stream.columns) & set(NAVIGATION)]
+    actuators = [stream for stream in streams if any(is_actuator(name) or is_order(name) for name in stream.columns)]
+    for group in (navigation, actuators):
+        if group and all(len(stream.time_ns) < 2 for stream in group):
+            raise FerryIdError(_standing(recording, group))
 
 
 def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
@@ -71,13 +82,14 @@ def _standing(recording: Recording, streams: Sequence[Stream]) -> str:
     if rows < 2:
         found = "one row only" if rows else "no row"
         return f"{_file(recording)}: {stream.topic} holds {found}, and motion needs many. Fix: use a longer log"
-    return (
-        f"{_file(recording)}: time does not advance, found {rows} rows of {stream.topic} with the same time. "
-        "Fix: name another time column under [table] in the profile, or record the log again"
-        if any(topic.encoding == "table" for topic in recording.topics)
-        else f"{_file(recording)}: time does not advance, found {rows} messages on {stream.topic} with the same time. "
-        "Fix: record the log again with a running clock"
+    is_table = any(topic.encoding == "table" for topic in recording.topics)
+    found = f"{rows} rows of {stream.topic}" if is_table else f"{rows} messages on {stream.topic}"
+    remedy = (
+        "name another time column under [table] in the profile, or record the log again"
+        if is_table
+        else "record the log again with a running clock"
     )
+    return f"{_file(recording)}: time does not advance, found {found} with the same time. Fix: {remedy}"
 
 
 def _length(profile: Profile) -> float:

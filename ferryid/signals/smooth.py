@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.signals.align import segments
 from ferryid.signals.kalman import fit_levels, smooth_runs
 from ferryid.signals.quality import REFERENCE, require_excited
-from ferryid.signals.track import LeftOut, Motion, Track
+from ferryid.signals.track import LeftOut, Motion, Track, segments
 from ferryid.vessel import applied_force, speed_doubts
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
