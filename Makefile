@@ -4,13 +4,22 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
+.PHONY: test docs evidence demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest -n 2
+
+# The documents as a site, in build/site; a broken link is an error.
+docs: $(VENV)/installed
+	$(BIN)/python -m tests.docs.drawing
+	$(BIN)/mkdocs build --strict
+
+# Which pages in reports/ are older than the sources that they were made from.
+evidence: $(VENV)/installed
+	$(BIN)/python -m tests.evidence
 
 demo: $(VENV)/installed
 	$(BIN)/ferryid simulate twelve-corner --out $(DEMO)/twelve-corner.mcap --overwrite
