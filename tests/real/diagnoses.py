@@ -17,6 +17,7 @@ from ferryid.diagnose.scene import scene_of
 from ferryid.report import diagnosis_figures
 from ferryid.report.diagnosis_words import numbers, probability
 from ferryid.vessel import load_profile
+from tests.evidence import stamp
 from tests.real import esso, pictures, witnesses
 from tests.real.places import DATA, FOLDER
 
@@ -60,6 +61,7 @@ def write() -> None:
     minutes = (time.monotonic() - began) / 60.0
     text = "\n".join([HEAD, *sections, f"\nMade in {minutes:.0f} minutes.\n"])
     (FOLDER / "diagnosis.md").write_text(text, encoding="utf-8")
+    stamp(FOLDER / "diagnosis.md")
 
 
 HEAD = """# Diagnoses of recordings of real vessels
