@@ -18,7 +18,8 @@ def command(
         str | None, typer.Option(help="Model to examine: path, name or name@version; the profile's hull if left out.")
     ] = None,
     against: Annotated[
-        str | None, typer.Option(help="A simulated log of the trial to hold the recording against, instead of a model.")
+        str | None,
+        typer.Option(help="A simulated log of the same trial to compare the recording with, instead of a model."),
     ] = None,
     together: Annotated[
         bool,

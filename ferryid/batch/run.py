@@ -130,7 +130,7 @@ def _patients(entries: Sequence[Entry], recipe: Recipe, out: Path) -> dict[str |
         if entry.vessel not in found:
             if entry.vessel is None and not recipe.model:
                 raise FerryIdError(
-                    f"batch: nothing says whose log {entry.log} is, found neither --vessel nor a model nor a manifest "
+                    f"batch: no vessel is given for the log {entry.log}, found neither --vessel nor a model nor a manifest "
                     "that names it. Fix: give --vessel a bundled profile's name or a TOML file"
                 )
             found[entry.vessel] = patient(entry.vessel, recipe.model or None, out)

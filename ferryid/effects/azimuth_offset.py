@@ -1,4 +1,4 @@
-"""Azimuth offset: one thruster points elsewhere than its encoder says."""
+"""Azimuth offset: one thruster points elsewhere than its encoder reads."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     side = "clockwise" if values["angle"] > 0.0 else "counterclockwise"
-    return f"{instance} points {abs(values['angle']):.1f} deg further {side} than its encoder says."
+    return f"{instance} points {abs(values['angle']):.1f} deg further {side} than its encoder reads."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

@@ -30,7 +30,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    return f"{instance} gives {100.0 * values['factor']:.0f} % of the force that its curve says."
+    return f"{instance} gives {100.0 * values['factor']:.0f} % of the force of its thrust curve."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def export(
         )
     if mcap is None and to is None:
         raise FerryIdError(
-            f"{what}: nothing says what to write. Fix: give --to {'|'.join(formats())} for a model, --mcap FILE for a log"
+            f"{what}: the form is missing. Fix: give --to {'|'.join(formats())} for a model, --mcap FILE for a log"
         )
     if json is not None:
         check_result(json)

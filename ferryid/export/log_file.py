@@ -82,7 +82,7 @@ def export_log(
         profile = signal_map(model, profile)
     if profile is None:
         raise FerryIdError(
-            f"{log}: nothing tells where its signals are, found neither model nor profile. Fix: give --model or --vessel"
+            f"{log}: where its signals are is not known, found neither model nor profile. Fix: give --model or --vessel"
         )
     _check_place(log, mcap, overwrite=overwrite)
     found = None if diagnosis is None else read_diagnosis(diagnosis, log_name(log))

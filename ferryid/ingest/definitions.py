@@ -170,7 +170,7 @@ def checked(types: Types, *, empty_bytes: int) -> Types:
         classes.add(name.replace("/", "__"))
         kept[name] = ([entry for entry in constants if _writable(entry[2])], fields)
     if len(classes) < len(types):
-        raise DefinitionError("holds two types whose names rosbags cannot tell apart")
+        raise DefinitionError("holds two types whose names rosbags cannot distinguish")
     _Extents(kept, empty_bytes).check()
     return kept
 

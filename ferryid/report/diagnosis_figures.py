@@ -327,7 +327,7 @@ def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
     for k, one in enumerate(located.profiles[:PROFILES], 1):
         caption = (
             f"Its mean square by {one.name}, over that of the noise that remains; shaded: what noise alone would give. Bins "
-            f"with too few windows to tell are left out.{both}"
+            f"with too few windows are left out.{both}"
         )
         shown.append((f"regime-{k}", in_regime(diagnosis, one), caption))
     if located.bands:

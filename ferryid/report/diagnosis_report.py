@@ -52,7 +52,7 @@ def patient(vessel: str | None, model: str | None, out: Path) -> tuple[Profile, 
     profile = load_profile(vessel) if vessel else own
     if profile.name != own.name:
         raise FerryIdError(
-            f"{loaded.name}@{loaded.version}: a model of {own.name} says nothing about {profile.name}. "
+            f"{loaded.name}@{loaded.version}: a model of {own.name} does not apply to {profile.name}. "
             "Fix: give a model and logs of one vessel"
         )
     return profile, loaded

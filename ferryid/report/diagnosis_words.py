@@ -208,7 +208,7 @@ def rivals(finding: Finding) -> list[str]:
     lines = []
     if finding.unresolved_with:
         names = listed([_inline(one) for name in finding.unresolved_with for one in _meant(finding, name)], "or")
-        lines.append(f"This log cannot tell it from {names}.")
+        lines.append(f"This log cannot distinguish it from {names}.")
     shown = sorted(finding.rivals, key=lambda rival: -rival.delta_score)[:RIVALS]
     near = [one for one in shown if one.delta_score > -log(FAR)]
     far = [_inline(title(one.effect, one.instance)) for one in shown if one not in near]
@@ -220,7 +220,7 @@ def rivals(finding: Finding) -> list[str]:
         lines.append(f"{other} is less likely by a factor of more than a million: {listed(far, 'or')} would be next.")
     if finding.separating_manoeuvre:
         manoeuvre = finding.separating_manoeuvre.rstrip(".")
-        lines.append(f"To tell them apart, record this: {manoeuvre}.")
+        lines.append(f"To separate them, record this: {manoeuvre}.")
     return lines
 
 
@@ -304,7 +304,7 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
         lines.append(
             "The hull's coefficients were refitted too, by themselves for the errors without the findings and together with "
             f"them for the others. There, the coefficient {one.coefficient} moved farthest, from {one.before:.4g} to "
-            f"{one.value:.4g} {one.unit}: {abs(one.deviations):.2g} standard deviations of what was believed of it before"
+            f"{one.value:.4g} {one.unit}: {abs(one.deviations):.2g} prior standard deviations"
             f"{', farther than is credible' if abs(one.deviations) > INCREDIBLE else ''}."
         )
     if "window_s" in diagnosis.before:

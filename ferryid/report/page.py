@@ -95,7 +95,7 @@ def _context(result: FitResult) -> dict[str, Any]:
                 "file": "residual-autocorrelation",
                 "svg": figures.residual_autocorrelation(drawn),
                 "caption": "Autocorrelation of the same residual. White noise would stay inside the dashed band; a slow "
-                "decay says that something with a memory was left out, and that neighbouring samples are no independent "
+                "decay shows that something with a memory was left out, and that neighbouring samples are no independent "
                 "evidence.",
             },
         ],
@@ -116,7 +116,7 @@ def _context(result: FitResult) -> dict[str, Any]:
                     frozenset(result.excitation.undetermined),
                 ),
                 "caption": "Coefficients of the correction, each over half the width of its own 95 % block-bootstrap "
-                "interval; an arrow goes on beyond the frame. Grey ones are not told apart from zero, pale orange ones "
+                "interval; an arrow goes on beyond the frame. Grey ones are not distinguishable from zero, pale orange ones "
                 "not from each other: the data do not determine them. Intervals hold the scatter at this number of "
                 "components, not the shrinkage that few components bring.",
             },
@@ -132,7 +132,7 @@ def _context(result: FitResult) -> dict[str, Any]:
                 "file": "excitation",
                 "svg": figures.excitation(result.excitation, drawn),
                 "caption": "Top left: singular values of the standardised basis; a value near zero is a combination of "
-                "terms that this trial cannot tell apart. The rest: velocities in the training rows, each pair against "
+                "terms that this trial does not identify. The rest: velocities in the training rows, each pair against "
                 "the other; a model is only as good as the cloud it saw.",
             },
             {

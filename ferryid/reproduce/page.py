@@ -9,7 +9,7 @@ from ferryid.reproduce.study import Row, Study, Table, high, low, number, percen
 HEAD = """# The thesis reproduced
 
 Made by `make thesis` (`ferryid reproduce thesis`): the trials of Aurlien (2021), *Multivariate Modeling and Adaptive Control of
-Autonomous Ferries*, flown again in the built-in simulator, logged, and learnt from the logs as from any recording. *Theirs* is
+Autonomous Ferries*, flown again in the built-in simulator, logged, and fitted to the logs as from any recording. *Theirs* is
 what the thesis states, one trial each; *ours* is the median of {runs} with other weather and noise, least and greatest in
 brackets. No setting was chosen to bring the two together; where they differ, the text says what was found out. What the
 thesis leaves open and we had to choose stands [at the end](#chosen).

@@ -119,7 +119,7 @@ def read_table(path: Path, checksum: int | None = None) -> tuple[dict[str, NDArr
     except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, MemoryError) as error:
         raise FerryIdError(
             f"{path}: this table of the log cache cannot be read ({one_line(str(error))}). "
-            "Fix: delete its folder, the next ingest writes it anew"
+            "Fix: delete its folder, the next ingest writes it again"
         ) from error
     return columns, metadata
 

@@ -100,7 +100,7 @@ def track_of(
     for doubt in track.doubts:
         if doubt.certain:
             raise FerryIdError(
-                f"{recording.name}: signals contradict each other, so nothing can be learnt from them. {doubt.says} "
+                f"{recording.name}: signals contradict each other, so they cannot be used. {doubt.says} "
                 f"Fix: correct unit, frame or sign of the signal in the profile {profile.name}"
             )
     return Opened(recording, track, measure(track, profile))

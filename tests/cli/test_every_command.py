@@ -39,7 +39,7 @@ def test_has_help_and_is_documented(ferryid, command: str) -> None:
     run = ferryid(command, "--help")
     assert run.code == 0
     assert len(run.out.split("\n\n")[0]) > 20
-    assert f"ferryid {command}" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"ferryid {command}" in (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
 
 
 def test_shell_completion_knows_commands_and_options(ferryid, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -233,7 +233,7 @@ def test_the_letter_has_its_order() -> None:
             wind().says,
             "North -3.02 m/s",
             "<svg",
-            "This log cannot tell it from current.",
+            "This log cannot distinguish it from current.",
             gain().says,
             "Current was not tested",
             "with over without",
@@ -276,16 +276,16 @@ def test_a_finding_is_told_in_numbers() -> None:
 def test_another_thruster_that_does_as_well_is_told_by_its_name() -> None:
     other = (Rival("thruster_gain", "thruster2", -1.0), Rival("thruster_gain", "bow", -9.0))
     told = rivals(replace(gain(), unresolved_with=("thruster_gain",), rivals=other))
-    assert told[0] == "This log cannot tell it from thruster force (thruster2)."
+    assert told[0] == "This log cannot distinguish it from thruster force (thruster2)."
 
 
 def test_rivals_are_told_by_how_much_less_likely_they_are() -> None:
     told = rivals(wind())
-    assert told[0] == "This log cannot tell it from current."
+    assert told[0] == "This log cannot distinguish it from current."
     # exp(4) is 54.6; exp(310) is 10 to the 134.6, which nobody needs to know.
     assert told[1] == "Of the other effects that were tried in its place, heading bias is 55 times less likely."
     assert told[2] == "Any other is less likely by a factor of more than a million: current would be next."
-    assert told[3] == "To tell them apart, record this: a slow turn on the spot through all headings."
+    assert told[3] == "To separate them, record this: a slow turn on the spot through all headings."
     assert rivals(gain()) == []
     far = rivals(replace(wind(), rivals=(Rival("current", None, -310.0),), unresolved_with=()))
     assert far[0] == (
@@ -411,10 +411,7 @@ def test_the_table_says_what_its_errors_are_of_and_what_is_not_in_them() -> None
     )
     absent, hull, windows = about_errors(one)
     assert absent == "Gusts and what has no name: not subtracted from these errors, and left in both rows."
-    assert (
-        "the coefficient Y_v moved farthest, from -200 to -230 kg/s: 1.2 standard deviations of what was believed"
-        in hull
-    )
+    assert "the coefficient Y_v moved farthest, from -200 to -230 kg/s: 1.2 prior standard deviations" in hull
     assert "windows of 8 s" in windows
     assert "ferryid evaluate" in windows
     page, text = unbroken(render((one,), "trial")[0]), unbroken(as_text((one,)))

@@ -16,7 +16,7 @@ from ferryid.simulate.scenario import MASS, Environment, Scenario, check_against
 from ferryid.simulate.sections import ALWAYS_S, Gains
 from ferryid.vessel import load_profile
 
-PAGE = (Path(__file__).parents[2] / "SCENARIOS.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text(encoding="utf-8")
 EXAMPLE = "\n".join(re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL))
 UNITS = {
     "_degpmin": "°/min",

@@ -227,7 +227,7 @@ def _tables(outcomes: list[Outcome]) -> tuple[Table, ...]:
             "Round by round; round 1 has the base model; median (least to greatest).", ("", *numbers), tuple(by_round)
         ),
         Table(
-            "Force MSE of Model 1 over the true hull's (on a log that neither learnt from, window 1.0 s), with true signals "
+            "Force MSE of Model 1 over the true hull's (on a log that neither was fitted to, window 1.0 s), with true signals "
             "put in place of what round 1 measured; by window of training.",
             ("made true", *header),
             tuple(causes),
@@ -273,7 +273,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
     told.append(
         f"Without any noise (one run) ISE goes {_series(silent[:ROUNDS])} m² s from round 1 to round 4. With the true hull "
         f"as feedforward it is {number(float(silent[ROUNDS]))}, and {number(float(silent[ROUNDS + 1]))} where the thrusters "
-        "follow at once: what the true hull leaves is the thrusters' lag, of which it knows nothing and a learnt model may."
+        "follow at once: what the true hull leaves is the thrusters' lag, of which it knows nothing and a fitted model may."
     )
     return told
 

@@ -117,7 +117,7 @@ def study(lab: Lab) -> Study:
     return Study(
         "waves",
         "Waves break the model (Experiment 2)",
-        "How much worse is a model that learnt in waves, and does this tool notice?",
+        "How much worse is a model that was fitted in waves, and does this tool notice?",
         (
             "Rounds 4 to 7 are adaptive in a breeze of 3 m/s from NE, waves of 0.1 m (significant, peak period 2 "
             "s) and two boats "
@@ -281,7 +281,7 @@ def _states(flight: Flight) -> Drawing:
     truth = flight.simulation.truth
     return Drawing(
         "5-15-states",
-        "True velocities, and roll as a witness of the waves, in round 8, as in figure 5.15.",
+        "True velocities, and roll as an indicator of the waves, in round 8, as in figure 5.15.",
         "time [s]",
         (
             Panel("u [m/s]", (Line("true", truth.t, truth.nu[:, 0]),)),
