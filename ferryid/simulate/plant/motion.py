@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.simulate.elementary import cos, sin
 from ferryid.simulate.plant import rolling
 from ferryid.simulate.plant.current import current_series, turn_rate
 from ferryid.simulate.plant.hull import (
