@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.simulate.environment import CURRENT, PAYLOAD, WIND, Link, current_samples, payload_samples
 from ferryid.simulate.noise import gaps, generator, interpolated, sample_times
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.states import Control, Truth
-from ferryid.simulate.surroundings import CURRENT, PAYLOAD, WIND, Link, current_samples, payload_samples
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
