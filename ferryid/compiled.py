@@ -76,8 +76,8 @@ class _StampedCache(FunctionCache):  # type: ignore[misc]
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function of numbers, arrays and named tuples at its first call.
 
-    Strict arithmetic (no reordering, no fused multiply-add) gives the same numbers on every machine and the same as plain
-    Python would. Where nothing can be written beside the source or in the user's cache, it is compiled anew each time.
+    Strict arithmetic (no reordering, no fused multiply-add) gives the same numbers as plain Python would. Where nothing can be
+    written beside the source or in the user's cache, it is compiled anew each time.
     """
     return _compiled(function)
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
-from ferryid.effects.balance import Places, to_ground
+from ferryid.effects.equations_of_motion import Places, to_ground
 from ferryid.effects.picture import Picture, Scene, as_measured, hull_changes
 from ferryid.vessel.profile import Floats
 

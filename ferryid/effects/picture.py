@@ -13,7 +13,7 @@ from math import cos, inf, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.balance import Places, accelerations, from_antenna, required, slopes
+from ferryid.effects.equations_of_motion import Places, accelerations, from_antenna, required, slopes
 from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.profile import Floats, Profile
 from ferryid.vessel.wind import wind_force
@@ -248,7 +248,7 @@ def required_force(picture: Picture, nu_dot: Floats) -> Floats:
 
 
 def _forces(picture: Picture) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return external forces, flow along the vessel's axes, load, and factor on damping, for `ferryid.effects.balance`."""
+    """Return external forces, flow along the vessel's axes, load, and factor on damping, for the equations of motion."""
     n = len(picture.scene.t)
     flow = _NO_FLOW if picture.flow is None else np.column_stack(body_current(picture))
     load = _NO_LOAD if picture.load is None else picture.load

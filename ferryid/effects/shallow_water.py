@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
+from ferryid.effects.linear_evidence import hull_jacobian, log_evidence_gains
 from ferryid.effects.picture import Picture, Scene, added_mass
-from ferryid.effects.scan import by_hull, linear_gains
 from ferryid.vessel.profile import Floats, Profile
 
 Places = NDArray[np.int64]
@@ -110,7 +110,8 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
         return Choice(parameters_of(scene.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
     columns = (sums[north, east] - sums[south, east] - sums[north, west] + sums[south, west]).T
-    gains = linear_gains(*by_hull(picture, believed, residual, np.flatnonzero(believed).tolist()), columns, FACTOR.size)
+    J, linear = hull_jacobian(picture, believed, residual, np.flatnonzero(believed).tolist())
+    gains = log_evidence_gains(J, linear, columns, FACTOR.size)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
     sizes = np.repeat((high - low) / CELLS, 2)

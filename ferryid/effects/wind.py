@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
+from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.picture import Picture, Scene
-from ferryid.effects.scan import by_hull, refitted
 from ferryid.effects.wording import bearing
 from ferryid.vessel.profile import Floats, Profile, WindAreas
 from ferryid.vessel.wind import wind_force
@@ -45,12 +45,12 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
         for speed in SPEEDS_MPS
         for angle in (angles if speed > 0.0 else angles[:1])
     ]
-    J, e = by_hull(picture, believed, residual, np.flatnonzero(believed).tolist())
+    J, e = hull_jacobian(picture, believed, residual, np.flatnonzero(believed).tolist())
     calm = residual(picture)
     left = np.column_stack([e + residual(apply(picture, wind, None)) - calm for wind in winds])
     sizes = np.array([one.size for one in parameters[:2]])
     away = np.array([float(np.sum((wind / sizes) ** 2)) for wind in winds])
-    best = winds[int(np.argmin(refitted(J, left) + 0.5 * away))]
+    best = winds[int(np.argmin(profiled_loss(J, left) + 0.5 * away))]
     begun = (replace(one, start=float(at)) for one, at in zip(parameters[:2], best, strict=True))
     return Choice((*begun, *parameters[2:]), 0.0)
 

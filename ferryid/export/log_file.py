@@ -20,7 +20,7 @@ from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.recording import log_name
 from ferryid.signals.track import Motion
 from ferryid.simulate.logs import CHUNK_BYTES
-from ferryid.simulate.places import check_output
+from ferryid.simulate.output_paths import check_output
 from ferryid.simulate.recorders import write_mcap
 from ferryid.simulate.sensors import Stream
 from ferryid.vessel.profile import Floats, Profile

@@ -27,7 +27,6 @@ from ferryid.ingest.tables import (
     with_stated_unit,
 )
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab", ".prn", ".log", ".out")
 _HEAD_BYTES = 1 << 16
 _LONGEST_HEAD = 1 << 22
 _HEAD_LINES = 8

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ferryid.errors import FerryIdError
-from ferryid.ingest import open_log
+from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Nanoseconds, Reader, Series, Topic
@@ -173,7 +173,8 @@ def log_name(path: str | Path) -> str:
     """Name of a log for folders and reports: file or folder name without suffixes, parts counted."""
     text = str(path)
     first, _, more = text.partition("+") if not Path(text).exists() else (text, "", "")
-    stem = re.sub(r"\.(bag|mcap|db3|csv|parquet|txt|dat|tsv|zstd|active)$", "", Path(first).resolve().name)
+    file = Path(first).resolve()
+    stem = file.stem if file.suffix in {Path(f"_{suffix}").suffix for suffix in log_suffixes()} else file.name
     clean = re.sub(r"[^A-Za-z0-9._-]+", "_", stem).strip("._") or "log"
     return f"{clean}-and-{more.count('+') + 1}-more" if more else clean
 

@@ -12,7 +12,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.identify.store import load_file
 from ferryid.simulate.logs import write_log
-from ferryid.simulate.places import check_output
+from ferryid.simulate.output_paths import check_output
 from ferryid.simulate.scenario import Scenario, check_seed, list_scenarios, load_scenario
 from ferryid.simulate.trial import Simulation, simulate
 from ferryid.simulate.vessel_model import sailed_by

@@ -11,7 +11,7 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
 from ferryid.ingest.unpack import codec_of, unpack_file, working_folder
 
-_SUFFIXES = (".zstd", ".zst", ".lz4")
+SUFFIXES = (".zstd", ".zst", ".lz4")
 
 
 class UnpackedLog:
@@ -65,8 +65,8 @@ class UnpackedLog:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return codec_of(head) is not None and path.name.endswith(_SUFFIXES)
+    return codec_of(head) is not None and path.name.endswith(SUFFIXES)
 
 
 # After SQLite, which unpacks its own files.
-FORMAT = Format(name="log compressed by zstd or lz4", matches=_matches, open=UnpackedLog, order=60)
+FORMAT = Format(name="log compressed by zstd or lz4", matches=_matches, open=UnpackedLog, order=60, suffixes=SUFFIXES)

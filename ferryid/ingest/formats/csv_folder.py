@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from ferryid.errors import FerryIdError
+from ferryid.ingest import log_suffixes
 from ferryid.ingest.log import Format, Loss, TableLayout
 from ferryid.ingest.table_rows import TextSheet
 from ferryid.ingest.table_text import open_text
 from ferryid.ingest.tables import TableReader
-
-_BAG_SUFFIXES = (".bag", ".bag.active", ".mcap", ".mcap.zstd", ".db3", ".db3.zstd")
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -22,7 +21,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    if not path.is_dir() or any(name.endswith(_BAG_SUFFIXES) for name in (file.name for file in path.iterdir())):
+    if not path.is_dir() or any(file.name.endswith(log_suffixes(parts=True)) for file in path.iterdir()):
         return False  # notes in a CSV beside bags do not make the bags a table
     return next(_files(path), None) is not None
 

@@ -22,6 +22,8 @@ from ferryid.ingest.mcap_index import DATA_END, MAGIC, RECORD_HEADER, Messages, 
 from ferryid.ingest.mcap_recovery import read_index
 from ferryid.ingest.mcap_spans import spans
 
+SUFFIX = ".mcap"
+
 
 @dataclass(frozen=True)
 class _Group:
@@ -359,4 +361,6 @@ FORMAT = Format(
     matches=lambda path, head: head.startswith(MAGIC),
     open=open_mcap,
     order=10,
+    suffixes=(SUFFIX, f"{SUFFIX}.zstd"),
+    parts=True,
 )

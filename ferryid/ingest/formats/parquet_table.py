@@ -24,6 +24,7 @@ from ferryid.ingest.tables import (
     with_stated_unit,
 )
 
+SUFFIXES = (".parquet", ".pq")
 _LARGE_BYTES = 1 << 30
 _MOST_TIMES_LARGER = 100
 """Columns of more than `_LARGE_BYTES` in memory that need this many times the size of their file are not read."""
@@ -171,7 +172,7 @@ def _damaged(path: Path, error: Exception) -> FerryIdError:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return path.is_file() and (head[:4] in (b"PAR1", b"PARE") or path.suffix.lower() in (".parquet", ".pq"))
+    return path.is_file() and (head[:4] in (b"PAR1", b"PARE") or path.suffix.lower() in SUFFIXES)
 
 
 def _open(path: Path, layout: TableLayout | None) -> TableReader:
@@ -268,4 +269,4 @@ def _first_rows(path: Path, file: Any, places: Mapping[str, tuple[str, int]], ti
     raise _damaged(path, first) from first
 
 
-FORMAT = Format(name="Parquet table", matches=_matches, open=_open, order=20)
+FORMAT = Format(name="Parquet table", matches=_matches, open=_open, order=20, suffixes=SUFFIXES)

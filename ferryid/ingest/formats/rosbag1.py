@@ -69,7 +69,7 @@ def open_bag(path: Path, layout: TableLayout | None) -> Rosbag1Reader:
     return Rosbag1Reader(path)
 
 
-FORMAT = Format(name="ROS1 bag (.bag)", matches=matches, open=open_bag, order=20)
+FORMAT = Format(name="ROS1 bag (.bag)", matches=matches, open=open_bag, order=20, suffixes=SUFFIXES, parts=True)
 
 
 @dataclass

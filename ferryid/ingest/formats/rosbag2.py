@@ -11,7 +11,9 @@ from typing import Any
 
 from ferryid.errors import FerryIdError
 from ferryid.files import scratch_folder
+from ferryid.ingest.formats.mcap import SUFFIX as MCAP
 from ferryid.ingest.formats.mcap import McapLog
+from ferryid.ingest.formats.sqlite3_bag import SUFFIX as SQLITE
 from ferryid.ingest.formats.sqlite3_bag import Sqlite3Log, Storage, refuse_foreign
 from ferryid.ingest.formats.sqlite3_bag import matches as is_sqlite
 from ferryid.ingest.join import join
@@ -20,7 +22,7 @@ from ferryid.ingest.message_compression import UnpackingDecoder
 from ferryid.ingest.rosbag2_metadata import KEY, NAME, File, Metadata, read_metadata
 from ferryid.ingest.unpack import FORMATS, unpack_file
 
-ENDINGS = tuple(end + packed for end in (".db3", ".mcap") for packed in ("", *FORMATS.values()))
+ENDINGS = tuple(end + packed for end in (SQLITE, MCAP) for packed in ("", *FORMATS.values()))
 
 
 class FolderLog:

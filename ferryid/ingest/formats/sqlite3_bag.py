@@ -24,6 +24,7 @@ from ferryid.ingest.sqlite_rows import Rows, Scan, Stretch, scan_rows
 from ferryid.ingest.stray_times import stray_times
 from ferryid.ingest.unpack import FORMATS, unpack_file, working_folder
 
+SUFFIX = ".db3"
 DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
 # More lost stretches than these are reported as one.
 MAX_STRETCHES = 50
@@ -333,7 +334,7 @@ def _wal_frames(log: Path) -> int:
 def matches(path: Path, head: bytes) -> bool:
     """Take SQLite files by their first bytes, and compressed or damaged ones by their name."""
     name = path.name.removesuffix(".zstd").removesuffix(".lz4")
-    return head.startswith(MAGIC) or (bool(head) and name.endswith(".db3"))
+    return head.startswith(MAGIC) or (bool(head) and name.endswith(SUFFIX))
 
 
 def open_file(path: Path, layout: TableLayout | None = None) -> Sqlite3Log:
@@ -359,4 +360,6 @@ def refuse_foreign(path: Path, topics: Sequence[Topic]) -> None:
         )
 
 
-FORMAT = Format("ROS2 SQLite file (.db3)", matches, open_file, order=30)
+FORMAT = Format(
+    "ROS2 SQLite file (.db3)", matches, open_file, order=30, suffixes=(SUFFIX, f"{SUFFIX}.zstd"), parts=True
+)

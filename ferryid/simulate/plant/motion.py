@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.simulate.elementary import cos, sin
+from ferryid.simulate.environment import wind_series
 from ferryid.simulate.plant import rolling
 from ferryid.simulate.plant.current import current_series, turn_rate
 from ferryid.simulate.plant.hull import (
@@ -28,7 +29,6 @@ from ferryid.simulate.plant.shallow import Patch, damping_factor, patch_of
 from ferryid.simulate.plant.thrusters import Gear, gear_of, move, thrust_load
 from ferryid.simulate.plant.waves import Sea, sea_of, wave_load
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
-from ferryid.simulate.surroundings import wind_series
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:

@@ -6,14 +6,13 @@ to the force follows the state of each Runge-Kutta stage.
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import cos, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
-from ferryid.simulate.elementary import cos, sin
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.lags import Weights, decay_of, follow, lag_weights
 from ferryid.simulate.plant.rudder import COLUMNS, rudder_load, rudder_row

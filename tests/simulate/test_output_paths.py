@@ -8,7 +8,7 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.files import replacing
-from ferryid.simulate.places import check_output
+from ferryid.simulate.output_paths import check_output
 
 RECORDING = """rosbag2_bagfile_information:
   version: 9

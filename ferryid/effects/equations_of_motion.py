@@ -1,4 +1,4 @@
-"""The balance of forces in every row of a picture, compiled: one pass instead of some hundred over short-lived arrays.
+"""The equations of motion in every row of a picture, compiled: one pass instead of some hundred over short-lived arrays.
 
 The coefficients of the hull are in the order of `ferryid.effects.picture.COEFFICIENTS`; what a picture has not got is an array
 without rows.

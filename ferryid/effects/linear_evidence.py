@@ -1,4 +1,4 @@
-"""Quick scans of alternatives by the evidence of a model that is linear in an effect and in the hull."""
+"""Evidence of many alternatives at once, by a model that is linear in an effect and in the hull."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ferryid.effects.effect import Residual
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
 
-USUAL = 0.12
+HULL_STD = 0.12
 """Standard deviation of what is believed of a coefficient of the hull that nothing is wrong with, as a share of it."""
 TINY = 0.01
 
 
-def by_hull(picture: Picture, believed: Floats, residual: Residual, places: list[int]) -> tuple[Floats, Floats]:
+def hull_jacobian(picture: Picture, believed: Floats, residual: Residual, places: list[int]) -> tuple[Floats, Floats]:
     """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
 
     The line is drawn at the picture's hull, which is the fitted one, as acceleration is far from linear in mass.
@@ -31,35 +31,35 @@ def by_hull(picture: Picture, believed: Floats, residual: Residual, places: list
     return J, e - J @ np.array(away)
 
 
-def refitted(J: Floats, residuals: Floats) -> Floats:
-    """Return what is left of the logarithm of the likelihood to lose, of each of some residuals with the hull refitted to it.
+def profiled_loss(J: Floats, residuals: Floats) -> Floats:
+    """Return the negative logarithm of the likelihood of each of some residuals, with the hull refitted to it.
 
     Parameters
     ----------
     J
-        From `by_hull`.
+        From `hull_jacobian`.
     residuals
         With the hull as believed, shape (w, q).
     """
-    H = USUAL * J
+    H = HULL_STD * J
     product = H.T @ residuals
     share = np.einsum("pq,pq->q", product, np.linalg.solve(H.T @ H + np.eye(H.shape[1]), product))
     return np.asarray(0.5 * (np.einsum("wq,wq->q", residuals, residuals) - share))
 
 
-def linear_gains(J: Floats, e: Floats, columns: Floats, size: float) -> Floats:
+def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float) -> Floats:
     """Return the evidence of each of some alternatives, with the hull's coefficients refitted beside it.
 
     Parameters
     ----------
     J, e
-        From `by_hull`.
+        From `hull_jacobian`.
     columns
         Derivatives of the residual by the one parameter of each alternative, shape (w, q).
     size
         Standard deviation of what is believed of that parameter.
     """
-    H, every = USUAL * J, np.column_stack([e, columns])
+    H, every = HULL_STD * J, np.column_stack([e, columns])
     free = every - H @ np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ every)
     power = np.einsum("wq,wq->q", columns, free[:, 1:])
     product = columns.T @ free[:, 0]
