@@ -50,7 +50,7 @@ thesis: $(VENV)/installed
 	$(BIN)/ferryid reproduce thesis --out reports --json reports/thesis.json
 	$(BIN)/python -m tests.evidence reports/thesis.md
 
-# Conceals physics in trials of a plant of its own, seals the answers and diagnoses blind: writes reports/proof.md and its
+# Injects effects into trials of an independent plant and diagnoses them blind: writes reports/proof.md and its
 # figures. SEED=N draws other cases, RUNS=N more of them. It goes on where it was interrupted.
 SEED ?= 20261223
 RUNS ?= 1
