@@ -18,6 +18,7 @@ import numpy as np
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.hypothesis import HULL_SPREAD, Suspect, imagined, trial_of
+from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
 from ferryid.diagnose.result import Estimate
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import search, suspects_of
@@ -32,7 +33,6 @@ from ferryid.vessel.profile import Floats, Profile
 
 FREER = 2.5
 """A simulator's hull may be this much further from the profile's than a vessel's."""
-FEWEST_WINDOWS = 60
 FOREIGN = 0.35
 """A log is of another vessel if this share of its mean square acceleration follows neither from hull, force nor any effect."""
 RATE_HZ = 2.0
@@ -116,7 +116,7 @@ def learn(
     profile
         The vessel that it simulates.
     out, verify, progress
-        As in `ferryid.diagnose.diagnose.diagnose`.
+        As in `ferryid.diagnose.pipeline.diagnose`.
 
     Raises
     ------
@@ -240,19 +240,15 @@ def differing(simulated: Simulated, scene: Scene, shift_s: float = 0.0) -> list[
     return [_relative(one, carried, known[one.key], bare) if one.key in known else one for one in suspects]
 
 
-def differing_sensors(
-    simulated: Simulated, sensors: Sequence[SensorFinding], scene: Scene
-) -> tuple[tuple[SensorFinding, ...], list[str]]:
-    """Return the recording's sensor findings that the simulation does not have, and what else differs, in sentences."""
-    own = {one.effect: one for one in simulated.sensors}
+def difference_notes(simulated: Simulated, scene: Scene) -> list[str]:
+    """Return the errors of the simulation's sensors, and conditions that differ by what was measured, in sentences."""
     told = [f"The simulation's log: {one.says}" for one in simulated.sensors]
-    told += [
+    return told + [
         f"The {one.suspect.effect.id} differs by what was measured, and is no finding: "
         f"{_described(one, simulated.scene)} in the simulation; the recording's own is part of its picture."
         for one in simulated.conditions
         if one.suspect.effect.cannot(scene) and not one.in_hull
     ]
-    return tuple(one for one in sensors if not _alike(one, own.get(one.effect))), told
 
 
 def _described(one: Condition, scene: Scene) -> str:
@@ -261,13 +257,6 @@ def _described(one: Condition, scene: Scene) -> str:
         f"{parameter.name} {_told(value, parameter.unit)}"
         for parameter, value in zip(one.suspect.parameters, one.values.tolist(), strict=True)
         if parameter.name not in untold
-    )
-
-
-def _alike(one: SensorFinding, other: SensorFinding | None) -> bool:
-    return other is not None and all(
-        name in other.parameters and mine.low <= other.parameters[name].high and other.parameters[name].low <= mine.high
-        for name, mine in one.parameters.items()
     )
 
 

@@ -39,11 +39,6 @@ PLAIN = 8.0
 """Logarithm of a likelihood ratio that needs no bootstrap to be believed."""
 MATCHED = 0.7
 """Share of an improvement as of which a placebo is said to match it, whatever the interval of the difference."""
-STRONG = 5.0 * PLAIN
-"""The same, where neither force nor free run is seen to improve: what acts seldom, as a wake on another thruster, is lost in
-their means over the log."""
-CLAIMED = 1.0 / 3.0
-"""Share of a finding's improvement that an axis must have for the finding to claim it; one of three has as much."""
 SAME = 0.3
 """A placebo whose force differs by less than this from its effect's, as a share of it in the root mean square, is none."""
 
@@ -125,24 +120,6 @@ class Proof:
     beaten: float
     holds: bool
     free_runs: FreeRuns
-
-    def shows(self, shares: Floats) -> bool:
-        """Tell whether it is seen to improve, with an interval that excludes none, force or free run on an axis that it claims.
-
-        The score adds up what every channel gains, in errors that the noise's autoregression weighs: a little on all of them
-        makes a likelihood on none of which anything is seen to improve. Only a strong one needs no more.
-
-        Parameters
-        ----------
-        shares
-            Of the axes in the improvement, shape (3,).
-        """
-        if self.improvement.score > STRONG:
-            return True
-        claimed = shares >= CLAIMED if shares.any() else np.ones(3, dtype=np.bool_)
-        # Position and speed belong to surge and sway, heading and yaw rate to yaw.
-        runs = np.any(self.free_runs.low > 0.0, axis=0).reshape(2, 2).any(axis=0)[[0, 0, 1]]
-        return bool((claimed & ((self.improvement.low > 0.0) | runs)).any())
 
 
 @dataclass(frozen=True)

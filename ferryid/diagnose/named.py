@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import inf
+from typing import Any
 
 import numpy as np
 
+from ferryid.diagnose.evidence import Proof
+from ferryid.diagnose.folds import block_s
 from ferryid.diagnose.hypothesis import WIDER, Fit, Suspect, Trial, fit, imagined, near
 from ferryid.diagnose.judged import Judged
+from ferryid.diagnose.judging.confidence_rules import Claim, Figures
 from ferryid.diagnose.locate import locate
-from ferryid.diagnose.result import AXES, HINT, NEAR, Estimate, Finding, Rival
+from ferryid.diagnose.result import AXES, NEAR, Estimate, Finding, Rival
 from ferryid.diagnose.ridge import intervals
 from ferryid.diagnose.separate import manoeuvre
 from ferryid.diagnose.shown import columns_of, regressor_of
-from ferryid.diagnose.spans import brief, lasts_s, swapped
+from ferryid.diagnose.spans import lasts_s, swapped
 from ferryid.effects.picture import Scene
+from ferryid.vessel.profile import Floats
 
 TIME_DROP = 50.0
 """Fall of the logarithm of the evidence as of which no time farther away comes into question; smaller dips may lie between."""
@@ -24,100 +30,102 @@ TIME_STEP, TIME_FIT = 0.125, 3
 TIME_NEAR, TIME_FINE_S = 10.0, 0.2
 """Fall of the logarithm of the evidence up to which times are weighed in fine steps, and these [s]: the forces' own."""
 SHOWN_RIVALS = 3
-HARM = 0.2
-"""Share by which the held-out squared error on an axis may grow with a finding by chance, and because the others move too."""
 
 
-def forces_of(trial: Trial, stands: Judged, scene: Scene) -> tuple[list[Finding], tuple[str, ...]]:
-    """Return the findings of forces, that which removes most of the error first, and why some are hints only.
+def force_claims(trial: Trial, stands: Judged, scene: Scene) -> list[Claim]:
+    """Return the findings of forces with their figures, that which removes most of the error first.
 
-    What makes held-out stretches a little likelier, yet is not seen to improve force or free run on an axis that it claims, is
-    a hint.
+    Parameters
+    ----------
+    trial
+        With the noise that the selection leaves.
+    stands
+        What is left of the selection.
+    scene
+        The log's scene at its full rate.
     """
-    made, told = [], []
-    kept, proof = stands.fit, stands.proof
-    harmed = removed(trial, stands)
-    for i, (suspect, standing) in enumerate(zip(kept.suspects, stands.standings, strict=True)):
-        others = [j for j in range(len(kept.suspects)) if j != i]
-        rest = [kept.suspects[j] for j in others]
-        rivals = tuple(
-            Rival(one.suspect.effect.id, one.suspect.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
-        )
-        unresolved = tuple(dict.fromkeys(one.suspect.effect.id for one in standing.rivals if one.gain > -NEAR))
-        # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
-        bare = replace(kept, suspects=tuple(rest), values=tuple(kept.values[j] for j in others))
-        place = locate(trial, bare, kept, scene)
-        estimates = _estimates(trial, suspect, kept, i)
-        if not estimates:
-            # Every one of its parameters may be too near the neutral value to be worth a name: the hull's, for one.
-            continue
-        named = zip((p.name for p in suspect.parameters), kept.values[i].tolist(), strict=True)
-        values = {name: value for name, value in named if name in estimates}
-        improved = None if proof is None else proof.proofs[i].improvement
-        unseen = proof is not None and not proof.proofs[i].shows(place.shares)
-        if unseen:
-            told.append(
-                f"{suspect.title} makes held-out stretches a little likelier, but on the axes that it "
-                "claims neither the squared force error nor the free run improves by an interval that excludes none: "
-                "it is a hint."
-            )
-        short = brief(trial, suspect)
-        if short:
-            told.append(
-                f"{suspect.title} acts for {lasts_s(trial, suspect):.0f} s only, too short a time to judge it on data that a "
-                "fit has not seen: it is a hint."
-            )
-        single = suspect.effect.once(trial.plain.scene, kept.values[i])
-        if single:
-            told.append(
-                f"{suspect.title}: the vessel was in that place once, or hardly at all, so that something else may have come "
-                "just then: it is a hint."
-            )
-        first = suspect.parameters[0]
-        faint = (
-            not short
-            and len(suspect.times) == 2
-            and abs(values.get(first.name, first.neutral) - first.neutral) < suspect.effect.passing
-        )
-        if faint:
-            told.append(
-                f"{suspect.title} comes and goes, by less than hull and formulas may be off in a part of the manoeuvres: it "
-                "is a hint."
-            )
-        shares = harmed.get(suspect.key, {})
-        worse = min(shares, key=lambda axis: shares[axis], default="")
-        harms = bool(worse) and shares[worse] < -HARM
-        if harms:
-            told.append(
-                f"{suspect.title} makes the held-out squared error in {worse} {-100.0 * shares[worse]:.0f} % larger while it "
-                "acts, and what is there makes no axis worse: it is a hint."
-            )
-        made.append(
-            Finding(
-                effect=suspect.effect.id,
-                instance=suspect.instance,
-                probability=min(standing.probability, HINT)
-                if unseen or short or single or faint or harms
-                else standing.probability,
-                parameters=estimates,
-                axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
-                intervals=_intervals(trial, estimates),
-                onset_s=_value(estimates, "onset"),
-                offset_s=_value(estimates, "offset"),
-                regime=place.regime,
-                improvement={} if improved is None else dict(zip(AXES, improved.removed.tolist(), strict=True)),
-                held_out=improved is not None,
-                rivals=rivals,
-                unresolved_with=unresolved,
-                separating_manoeuvre=manoeuvre(suspect.effect.id, unresolved),
-                says=suspect.effect.says(values, suspect.instance),
-                **columns_of(trial, place, regressor_of(suspect, imagined(trial.plain, bare), kept.values[i], place)),
-            )
-        )
-    return sorted(made, key=lambda one: -sum(one.improvement.values())), tuple(told)
+    removed = removed_shares(trial, stands)
+    claims = [
+        _force_claim(trial, stands, scene, i, removed.get(one.key, {})) for i, one in enumerate(stands.fit.suspects)
+    ]
+    return sorted(claims, key=lambda one: -sum(one.finding.improvement.values()))
 
 
-def removed(trial: Trial, stands: Judged) -> dict[tuple[str, str | None], dict[str, float]]:
+def _force_claim(trial: Trial, stands: Judged, scene: Scene, i: int, removed: Mapping[str, float]) -> Claim:
+    kept, standing = stands.fit, stands.standings[i]
+    suspect, values = kept.suspects[i], kept.values[i]
+    others = [j for j in range(len(kept.suspects)) if j != i]
+    rivals = tuple(
+        Rival(one.suspect.effect.id, one.suspect.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
+    )
+    unresolved = tuple(dict.fromkeys(one.suspect.effect.id for one in standing.rivals if one.gain > -NEAR))
+    # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
+    bare = replace(
+        kept,
+        suspects=tuple(kept.suspects[j] for j in others),
+        values=tuple(kept.values[j] for j in others),
+    )
+    place = locate(trial, bare, kept, scene)
+    estimates = _estimates(trial, suspect, kept, i)
+    by_name = dict(zip((p.name for p in suspect.parameters), values.tolist(), strict=True))
+    told = {name: value for name, value in by_name.items() if name in estimates}
+    proof = None if stands.proof is None else stands.proof.proofs[i]
+    finding = Finding(
+        effect=suspect.effect.id,
+        instance=suspect.instance,
+        probability=standing.probability,
+        parameters=estimates,
+        axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
+        intervals=_intervals(trial, estimates),
+        onset_s=_value(estimates, "onset"),
+        offset_s=_value(estimates, "offset"),
+        regime=place.regime,
+        improvement={} if proof is None else dict(zip(AXES, proof.improvement.removed.tolist(), strict=True)),
+        held_out=proof is not None,
+        rivals=rivals,
+        unresolved_with=unresolved,
+        separating_manoeuvre=manoeuvre(suspect.effect.id, unresolved),
+        says=suspect.effect.says(told, suspect.instance) if told else "",
+        **columns_of(trial, place, regressor_of(suspect, imagined(trial.plain, bare), values, place)),
+    )
+    return Claim(finding, _figures(trial, suspect, values, told, proof, removed))
+
+
+def _figures(
+    trial: Trial,
+    suspect: Suspect,
+    values: Floats,
+    told: Mapping[str, float],
+    proof: Proof | None,
+    removed: Mapping[str, float],
+) -> Figures:
+    first = suspect.parameters[0]
+    passes = inf
+    if len(suspect.times) == 2 and suspect.effect.passing > 0.0:
+        passes = abs(told.get(first.name, first.neutral) - first.neutral) / suspect.effect.passing
+    shown = {} if proof is None else _lower_ends(proof)
+    return Figures(
+        kind="force",
+        removed=removed,
+        lasts_s=lasts_s(trial, suspect) if suspect.times else inf,
+        block_s=block_s(trial.windows),
+        once=suspect.effect.once(trial.plain.scene, values),
+        passes=passes,
+        **shown,
+    )
+
+
+def _lower_ends(proof: Proof) -> dict[str, Any]:
+    # Position and speed belong to surge and sway, heading and yaw rate to yaw; some horizons have no data.
+    runs = np.max(np.nan_to_num(proof.free_runs.low, nan=-inf), axis=0).reshape(2, 2).max(axis=0)[[0, 0, 1]]
+    return {
+        "score": proof.improvement.score,
+        "force_low": dict(zip(AXES, proof.improvement.low.tolist(), strict=True)),
+        "free_run_low": dict(zip(AXES, runs.tolist(), strict=True)),
+    }
+
+
+def removed_shares(trial: Trial, stands: Judged) -> dict[tuple[str, str | None], dict[str, float]]:
     """Return how much of the held-out squared force error each suspect removes while it acts, by axis."""
     times, shares = trial.windows.middle_s, {}
     for proof in () if stands.proof is None else stands.proof.proofs:

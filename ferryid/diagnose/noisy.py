@@ -7,7 +7,6 @@ controller that answers this noise makes it look like a change of mass, delay or
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from math import sqrt
 
@@ -21,8 +20,6 @@ from ferryid.signals.smooth import odd_rows, steady_mean
 
 MEAN_S = 2.0
 """Time over which a slope of positions is about as noisy as the velocity in use."""
-DROWNED = 0.15
-"""Noise of the acceleration that a picture gives, as a share of what moves the vessel, beyond which nothing is certain."""
 
 
 def noise_shares(trial: Trial) -> dict[str, float]:
@@ -47,20 +44,3 @@ def noise_shares(trial: Trial) -> dict[str, float]:
     moved = np.maximum(thrust, np.std(seen.mean(here), axis=0))
     # Where nothing pushes, noise is not taken for what a push does.
     return {axis: float(noise[j] / moved[j]) for j, axis in enumerate(AXES) if thrust[j] > 0.0}
-
-
-def drowned_axes(trial: Trial) -> dict[str, float]:
-    """Return the axes that the noise drowns, with its share.
-
-    Such an axis spoils the findings on the others, too: a mass or a delay that it asks for belongs to all of them.
-    """
-    return {axis: share for axis, share in noise_shares(trial).items() if share > DROWNED}
-
-
-def says_drowned(shares: Mapping[str, float]) -> str:
-    """Return a sentence on the axes that the noise drowns."""
-    told = " and ".join(f"{100.0 * share:.0f} % of what moves the vessel in {axis}" for axis, share in shares.items())
-    return (
-        f"The noise of the velocity, times damping, is {told}: all that is found of forces is a hint. "
-        "Record larger motions, or a velocity with less noise."
-    )

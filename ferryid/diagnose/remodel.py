@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ferryid import __version__
+from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.learnt import Learnt
-from ferryid.diagnose.result import Diagnosis
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.files import alone

@@ -8,7 +8,6 @@ from math import exp
 
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, near, settled, without
 from ferryid.diagnose.parallel import over
-from ferryid.diagnose.result import HINT
 from ferryid.diagnose.search import FAR, ODDS
 from ferryid.diagnose.spans import brief
 
@@ -54,12 +53,13 @@ class Standing:
 def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect]) -> Standing:
     """Return how a suspect stands against every other of the library in its place, in its span.
 
-    One that is too brief to be judged has no rivals: it is no name, whatever else could stand there.
+    One that is too brief to be judged is weighed against none at all only: it is no name, whatever else could stand there.
     """
     suspect = kept.suspects[index]
-    if brief(trial, suspect):
-        return Standing((), HINT)
     bare = without(trial, kept, index)
+    none = exp(min(bare.evidence - kept.evidence + ODDS, 50.0))
+    if brief(trial, suspect):
+        return Standing((), 1.0 / (1.0 + none))
     begin = near(trial, bare)
     taken = {one.key for one in kept.suspects}
 
@@ -81,6 +81,5 @@ def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect])
     # How far behind the others are does not matter to the digit.
     rivals[:NEAREST] = over(settled_in, rivals[:NEAREST])
     rivals.sort(key=lambda one: -one.gain)
-    none = bare.evidence - kept.evidence + ODDS
-    against = exp(min(none, 50.0)) + sum(exp(min(one.gain, 50.0)) for one in rivals)
+    against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
     return Standing(tuple(rivals), 1.0 / (1.0 + against))

@@ -73,6 +73,28 @@ class Survey:
     left_out: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class MeasuredLog:
+    """A log as it was measured: the first stage of a diagnosis."""
+
+    path: str
+    scene: Scene
+    survey: Survey
+
+
+def measure_log(
+    path: str,
+    profile: Profile,
+    out: Path | None,
+    *,
+    withhold: Sequence[str] = (),
+    verify: bool = False,
+    progress: Callable[[str], None],
+) -> MeasuredLog:
+    """Read and align a log; parameters and errors as of `scene_of`."""
+    return MeasuredLog(path, *scene_of(path, profile, out, withhold=withhold, verify=verify, progress=progress))
+
+
 def quiet(_stage: str) -> None:
     """Show no progress."""
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
-from pathlib import Path
 
 import numpy as np
 
-from ferryid.diagnose.checks import examine
 from ferryid.diagnose.hypothesis import Suspect
+from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.noise import ORDER
-from ferryid.diagnose.scene import dimensions, plain_picture, scene_of, window_lengths
+from ferryid.diagnose.scene import dimensions, plain_picture
 from ferryid.diagnose.shared_hull import INDUCED, Member, SharedHull, fit_together, induced_spread
-from ferryid.diagnose.weak import Windows, windows
+from ferryid.diagnose.weak import Windows
 from ferryid.effects import effects
 from ferryid.effects.picture import Picture
 from ferryid.errors import FerryIdError
@@ -54,37 +53,32 @@ class Together:
         )
 
 
-def together(
-    logs: Sequence[str],
-    profile: Profile,
-    out: Path | None,
-    *,
-    withhold: Sequence[str] = (),
-    verify: bool = False,
-    progress: Callable[[str], None],
-) -> Together:
-    """Read logs of one vessel and fit one hull to all of them, with a steady wind of its own to each that did not measure it.
+def together(logs: Sequence[AveragedLog], profile: Profile, progress: Callable[[str], None]) -> Together:
+    """Fit one hull to all logs of a vessel, with a steady wind of its own to each that did not measure it.
 
     Parameters
     ----------
-    logs, profile, out, withhold, verify, progress
-        As in `ferryid.diagnose.diagnose.diagnose`.
+    logs
+        In the weak form; those with fewer than `FEWEST_WINDOWS` windows have no say.
+    profile
+        The vessel.
+    progress
+        Called with the name of the stage.
 
     Raises
     ------
     FerryIdError
-        For logs that cannot be used, and for fewer than two with enough in them.
+        For fewer than two logs with enough in them.
     """
     members: list[Member] = []
     spreads: list[Floats] = []
     place: dict[str, int] = {}
-    for path in logs:
-        scene, _ = scene_of(path, profile, out, withhold=withhold, verify=verify, progress=progress)
-        seen = windows(examine(scene)[1], *window_lengths(profile))
-        if len(seen.starts) < FEWEST_WINDOWS or path in place:
+    for log in logs:
+        seen = log.windows
+        if len(seen.starts) < FEWEST_WINDOWS or log.path in place:
             continue
         plain, spread = plain_picture(seen.scene, profile)
-        place[path] = len(members)
+        place[log.path] = len(members)
         members.append(Member(seen, plain, own_of(seen, profile)))
         spreads.append(spread)
     if len(members) < 2:

@@ -15,10 +15,11 @@ import numpy as np
 from ferryid.diagnose.bands import BURST_HZ, Band, Burst, bursts_of
 from ferryid.diagnose.folds import Folds, folds_of
 from ferryid.diagnose.hypothesis import Fit, Trial, fit, imagined
+from ferryid.diagnose.judging.confidence_rules import Claim, Figures, OtherLogs
 from ferryid.diagnose.law import Law, law_of
 from ferryid.diagnose.locate import Location, locate
 from ferryid.diagnose.profiles import TELLS
-from ferryid.diagnose.result import AXES, HINT, Estimate, Finding, LawTerm
+from ferryid.diagnose.result import AXES, UNKNOWN, Estimate, Finding, LawTerm
 from ferryid.diagnose.search import ODDS
 from ferryid.diagnose.shared_laws import Heard
 from ferryid.diagnose.shown import columns_of
@@ -33,8 +34,6 @@ BAND_SHARE = 0.5
 """A band is told that holds this share of the power."""
 SPANS = 5
 """Intervals that are told."""
-FAST_HZ = 0.2
-"""Frequency above which no force of the library has most of its power: they change with motion, heading and thrust."""
 BURSTS = 5.0
 """Standard deviations from even as of which bursts are told."""
 
@@ -45,21 +44,17 @@ class Unknown:
 
     Attributes
     ----------
-    findings
-        Without a name.
+    claims
+        Findings without a name, with their figures.
     left
         What the errors look like.
     unsteady
         True where they come and go.
-    holds
-        Share of the squared error left that is a force's, by axis, as far as that force is more than a hint and as slow as
-        those of the library are: no bursts, and not above `FAST_HZ`. Empty where there is none.
     """
 
-    findings: tuple[Finding, ...]
+    claims: tuple[Claim, ...]
     left: Location
     unsteady: bool
-    holds: dict[str, float]
 
 
 def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None) -> Unknown:
@@ -76,32 +71,31 @@ def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None
     heard
         What the vessel's other logs say; None where there are none.
     """
-    findings = []
+    claims = []
     folds = folds_of(trial.windows)
     after, seen = kept, trial
     if folds is not None and heard is not None and (common := heard.common(trial, kept, folds)) is not None:
-        findings.append(_lawful(common, after, scene, f"that holds in all {heard.able} logs that can show it"))
+        shared = _lawful(common, after, scene, f"that holds in all {heard.able} logs that can show it")
+        claims.append(Claim(shared, Figures("law")))
         after, seen = common.fit, common.trial
     if folds is not None and (law := law_of(seen, after, folds)) is not None:
         own = _lawful(law, after, scene, "that was seen in this log only")
-        findings.append(own if heard is None else _of_one(own, *heard.of_others(law)))
+        claims.append(
+            Claim(own, Figures("law", other_logs=None if heard is None else OtherLogs(*heard.of_others(law))))
+        )
         after, seen = law.fit, law.trial
     left = locate(seen, after, after, scene)
     # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
     known = bool(trial.filter.processes)
     uneven = bool(left.profiles) and left.profiles[0].statistic >= TELLS
-    bursts: list[Finding] = []
     burst = bursts_of(seen, imagined(seen.plain, after), scene)
     if burst is not None and burst.deviations >= BURSTS:
         uneven = True
-        bursts = [] if known else [_in_bursts(burst)]
+        if not known:
+            claims.append(Claim(_in_bursts(burst), Figures("bursts")))
     elif uneven and not known:
-        findings.append(_unsteady(seen, left))
-    slow = [one for one in findings if one.sure and (one.law or one.band_hz is None or one.band_hz[0] < FAST_HZ)]
-    # What no law describes may be all that is left; and of a law that all logs of a vessel have, there may be more.
-    described = heard is None and all(one.law for one in slow)
-    holds = {axis: max(one.improvement[axis] if described else 1.0 for one in slow) for axis in AXES} if slow else {}
-    return Unknown((*findings, *bursts), left, uneven, {axis: max(share, 0.0) for axis, share in holds.items()})
+        claims.append(Claim(_unsteady(seen, left), Figures("unsteady")))
+    return Unknown(tuple(claims), left, uneven)
 
 
 def impostors(trial: Trial, kept: Fit) -> tuple[int, ...]:
@@ -140,13 +134,6 @@ def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
     return better and with_both - with_law < ODDS
 
 
-def _of_one(finding: Finding, others: int, able: int, hold: int) -> Finding:
-    """Return a law that is one log's alone as a hint, with what the vessel's other logs say of it."""
-    shown = f", and {hold or 'none'} {'does' if hold < 2 else 'do'}" if able else ""
-    told = f"Of {others} other log{'s' if others > 1 else ''} {able or 'none'} could show it at this size{shown}."
-    return replace(finding, probability=min(finding.probability, HINT), says=f"{finding.says} {told}")
-
-
 def _lawful(law: Law, kept: Fit, scene: Scene, whose: str) -> Finding:
     trial = law.trial
     # The hull stays as it is with the law: refitted without, it would bend to it on axes where it does not act.
@@ -163,7 +150,7 @@ def _lawful(law: Law, kept: Fit, scene: Scene, whose: str) -> Finding:
     parts = [one.says for one in terms]
     told = "; ".join(parts)
     return Finding(
-        effect="unknown",
+        effect=UNKNOWN,
         instance=None,
         probability=1.0 - exp(-min(law.gain - max(law.chance, 0.0), 700.0)),
         parameters={},
@@ -218,7 +205,7 @@ def _in_bursts(burst: Burst) -> Finding:
     loud = burst.force[np.any(inside, axis=0), axis] if inside else burst.force[:, axis]
     size = float(np.sqrt(np.mean(loud**2)))
     return Finding(
-        effect="unknown",
+        effect=UNKNOWN,
         instance=None,
         probability=_no_chance(burst.deviations, len(BURST_HZ) - 1),
         parameters={},
@@ -254,7 +241,7 @@ def _unsteady(trial: Trial, left: Location) -> Finding:
     fast = f", mostly at {band[0]:g} to {band[1]:g} Hz" if band else ""
     axis = AXES[int(np.argmax(left.shares))]
     return Finding(
-        effect="unknown",
+        effect=UNKNOWN,
         instance=None,
         probability=_no_chance(left.profiles[0].statistic, len(left.profiles)),
         parameters={},

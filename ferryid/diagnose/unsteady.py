@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, log
+from math import exp, inf, log
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from ferryid.diagnose.bands import fine_windows, spectrum_of
 from ferryid.diagnose.evidence import force_errors
 from ferryid.diagnose.filter import Filter, learn, learn_with, likelihood, stride_s
 from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, imagined
-from ferryid.diagnose.result import AXES, HINT, Estimate, Finding
+from ferryid.diagnose.judging.confidence_rules import Claim, Figures
+from ferryid.diagnose.result import AXES, Estimate, Finding
 from ferryid.diagnose.weak import Windows
 from ferryid.effects.effect import Process
 from ferryid.effects.picture import Picture, Scene
@@ -31,9 +32,6 @@ WIDEST = 9.0
 ABOUT_PEAK = 0.1
 """Share of its peak's power down to which a disturbance is compared with the velocities: a navigation that smooths them shifts
 a peak a little, and a narrow one then misses itself."""
-LACKING = 0.3
-"""A disturbance of which the velocities show less than this share of the power is a hint."""
-UNSEEN = " The velocities do not show it: it may be an error of the positions."
 VAGUE = 0.5
 """A disturbance whose parameters are known no better than within this factor (as a logarithm) was not seen."""
 
@@ -173,7 +171,7 @@ def _sizes(suspect: Suspect) -> Floats:
     return np.array([parameter.size for parameter in suspect.parameters])
 
 
-def unsteady_of(trial: Trial, made: Fit, states: Sequence[State], scene: Scene) -> tuple[Finding, ...]:
+def disturbance_claims(trial: Trial, made: Fit, states: Sequence[State], scene: Scene) -> list[Claim]:
     """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over.
 
     Parameters
@@ -189,7 +187,7 @@ def unsteady_of(trial: Trial, made: Fit, states: Sequence[State], scene: Scene) 
     """
     short = fine_windows(trial, scene)
     frequency, power = spectrum_of(short, force_errors(short, imagined(trial.plain, made), trial.plain))
-    return tuple(_finding(trial, state, short, frequency, power) for state in states)
+    return [_claim(trial, state, short, frequency, power) for state in states]
 
 
 def density(process: Process, frequency_hz: Floats) -> Floats:
@@ -228,7 +226,7 @@ def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[
     }
 
 
-def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spectrum: Floats) -> Finding:
+def _claim(trial: Trial, state: State, short: Windows, frequency: Floats, spectrum: Floats) -> Claim:
     scene = trial.windows.scene
     suspect = state.suspect
     assert suspect.effect.unsteady is not None
@@ -241,12 +239,10 @@ def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spec
     power = np.sum(pushed, axis=0) * arm**2
     values = {name: one.value for name, one in parameters.items()}
     shown = _columns(short, frequency, spectrum, pushes, int(np.argmax(power)))
-    probability = 1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0)))
-    unseen = bool(shown) and _unseen(shown["evidence"])
-    return Finding(
+    finding = Finding(
         effect=suspect.effect.id,
         instance=None,
-        probability=min(probability, HINT) if unseen else probability,
+        probability=1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0))),
         parameters=parameters,
         axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
         intervals=((float(scene.t[0]), float(scene.t[-1])),),
@@ -257,15 +253,17 @@ def _finding(trial: Trial, state: State, short: Windows, frequency: Floats, spec
         rivals=(),
         unresolved_with=(),
         separating_manoeuvre=None,
-        says=suspect.effect.says(values, None) + (UNSEEN if unseen else ""),
+        says=suspect.effect.says(values, None),
         **shown,
     )
+    power_in_velocities = _power_in_velocities(shown["evidence"]) if shown else inf
+    return Claim(finding, Figures("disturbance", power_in_velocities=power_in_velocities))
 
 
-def _unseen(evidence: Mapping[str, Floats]) -> bool:
-    """Tell whether the velocities lack most of what a disturbance does about its peak.
+def _power_in_velocities(evidence: Mapping[str, Floats]) -> float:
+    """Return the share of what a disturbance does about its peak that the velocities show.
 
     It was found in positions, whose errors in a narrow band look like a force; a force moves velocities as well.
     """
     strong = evidence["explained"] >= ABOUT_PEAK * evidence["explained"].max()
-    return float(evidence["before"][strong].sum()) < LACKING * float(evidence["explained"][strong].sum())
+    return float(evidence["before"][strong].sum() / max(evidence["explained"][strong].sum(), 1e-300))

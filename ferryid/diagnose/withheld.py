@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.result import Estimate, Finding, Withheld
+from ferryid.diagnose.judging.diagnosis import Withheld
+from ferryid.diagnose.result import Estimate, Finding
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats

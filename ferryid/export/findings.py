@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.result import HINT, SCHEMA
+from ferryid.diagnose.judging.diagnosis import SCHEMA
+from ferryid.diagnose.result import HINT
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.errors import FerryIdError

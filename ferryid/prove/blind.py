@@ -53,17 +53,16 @@ def diagnosed(log: Path, profile: Path, out: Path) -> dict[str, Any]:
     UnwritableError
         Where the model could not be written.
     """
-    from ferryid.diagnose.diagnose import diagnose
-    from ferryid.diagnose.remodel import keep
-    from ferryid.diagnose.result import to_json
+    from ferryid.diagnose.judging.diagnosis import to_json
+    from ferryid.diagnose.pipeline import diagnose_and_store
     from ferryid.vessel import load_profile
 
     start = time.perf_counter()
     try:
         vessel = load_profile(profile)
-        found = diagnose([str(log)], vessel, None, progress=lambda stage: None)
+        (found,) = diagnose_and_store([str(log)], vessel, out, tables=None, progress=lambda stage: None)
         seconds = time.perf_counter() - start
-        told = to_json(keep(found, vessel, None, out)[0])
+        told = to_json(found)
     except UnwritableError:
         raise
     except FerryIdError as error:

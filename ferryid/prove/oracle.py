@@ -18,8 +18,8 @@ from typing import Any
 from scipy.stats import chi2
 
 from ferryid.diagnose.checks import resteadied
-from ferryid.diagnose.diagnose import FEWEST_WINDOWS
 from ferryid.diagnose.hypothesis import Suspect, Trial, trial_of
+from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
 from ferryid.diagnose.result import Estimate
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.weak import Windows, windows

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.result import AXES, Diagnosis, Finding
+from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.verdict import campaign_verdict
+from ferryid.diagnose.result import AXES, Finding
 from ferryid.identify.result import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
 from ferryid.report.figures import Floats
@@ -31,7 +33,7 @@ def render(
     left = [one.log for one in diagnoses[MAX_LOGS:]]
     page = template("diagnosis.html").render(
         title=title,
-        verdict=diagnosis_words.overall(diagnoses),
+        verdict=campaign_verdict([one.verdict for one in diagnoses]),
         headline=diagnosis_words.summary(diagnoses),
         several=several,
         logs=logs,

@@ -11,8 +11,8 @@ import pytest
 
 from ferryid.diagnose import against
 from ferryid.diagnose.against import Paths, Simulated, base_picture, differing, learn, paths
-from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.hypothesis import trial_of
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import Search, search
 from ferryid.diagnose.weak import windows
@@ -72,7 +72,7 @@ def found(simulated: Simulated, log: str) -> Search:
 
 def test_only_the_fault_is_found_where_both_have_the_wind(folder: Path, windy: str) -> None:
     log = sailed(folder, "recording", wind(2.0) + FAULT, 4)
-    result = diagnose([log], FERRY, None, against=windy, progress=quietly)[0]
+    result = diagnose([log], FERRY, None, DiagnosisSettings(against=windy), progress=quietly)[0]
     assert result.verdict == "explained"
     (fault,) = result.findings
     assert (fault.effect, fault.instance) == ("thruster_gain", "thruster1")
@@ -163,7 +163,7 @@ def test_a_simulation_of_another_vessel_is_refused(folder: Path) -> None:
 
 def test_model_and_simulation_exclude_each_other(windy: str) -> None:
     with pytest.raises(FerryIdError, match="both --model and --against"):
-        diagnose([windy], FERRY, None, model=object(), against=windy, progress=quietly)  # type: ignore[arg-type]
+        diagnose([windy], FERRY, None, DiagnosisSettings(model=object(), against=windy), progress=quietly)  # type: ignore[arg-type]
 
 
 def test_a_load_that_a_simulation_records_for_a_part_of_it_is_aboard_for_that_part() -> None:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.hypothesis import HULL_SPREAD
-from ferryid.diagnose.result import Diagnosis
+from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.pipeline import diagnose
 from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 

@@ -1,4 +1,4 @@
-"""How findings are told: what improves nothing that it claims is a hint, whatever its likelihood."""
+"""What was measured of findings of forces, and which of it makes them hints."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from math import inf
 import numpy as np
 import pytest
 
-from ferryid.diagnose.evidence import Proof, evidence
+from ferryid.diagnose.evidence import evidence
 from ferryid.diagnose.hypothesis import Trial, fit
 from ferryid.diagnose.judged import Judged
-from ferryid.diagnose.named import forces_of
-from ferryid.diagnose.result import HINT
+from ferryid.diagnose.judging.confidence_rules import Context, LogFigures, apply_rules, improves_no_claimed_axis
+from ferryid.diagnose.named import force_claims
+from ferryid.diagnose.result import AXES, HINT, Finding
 from ferryid.diagnose.rivals import Standing
 from ferryid.effects import effects
 from tests.diagnose.test_evidence import WIND, sailed, suspect, trial_on
@@ -39,20 +40,24 @@ def with_lows(stands: Judged, forces: list[float], runs: list[float], score: flo
     return replace(stands, proof=replace(stands.proof, proofs=(other,)))
 
 
+def judged_by_rules(trial: Trial, stands: Judged) -> tuple[Finding, tuple[str, ...]]:
+    (finding,), notes = apply_rules(force_claims(trial, stands, trial.windows.scene), LogFigures())
+    return finding, notes
+
+
 def test_a_wind_that_blew_is_told_for_sure(windy: tuple[Trial, Judged]) -> None:
-    trial, stands = windy
-    (finding,), told = forces_of(trial, stands, trial.windows.scene)
+    finding, notes = judged_by_rules(*windy)
     assert finding.sure
-    assert told == ()
+    assert notes == ()
 
 
 def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[Trial, Judged]) -> None:
     trial, stands = windy
-    (finding,), told = forces_of(trial, with_lows(stands, [-0.1] * 3, [np.nan, -0.1, -0.1, -0.1]), trial.windows.scene)
+    finding, (note,) = judged_by_rules(trial, with_lows(stands, [-0.1] * 3, [np.nan, -0.1, -0.1, -0.1]))
     assert finding.probability == HINT
-    assert told == (
-        "Steady wind makes held-out stretches a little likelier, but on the axes that it claims neither the squared force "
-        "error nor the free run improves by an interval that excludes none: it is a hint.",
+    assert note == (
+        "Steady wind is a hint: on the axes that it claims, neither the held-out squared force error nor the free run "
+        "improves by an interval that excludes zero."
     )
 
 
@@ -60,14 +65,19 @@ def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[Tria
     trial, stands = windy
     (blown,) = stands.fit.suspects
     brief = replace(blown, effect=replace(blown.effect, once=lambda scene, p: True))
-    (finding,), told = forces_of(
-        trial, replace(stands, fit=replace(stands.fit, suspects=(brief,))), trial.windows.scene
-    )
+    finding, (note,) = judged_by_rules(trial, replace(stands, fit=replace(stands.fit, suspects=(brief,))))
     assert finding.probability == HINT
-    assert told == (
-        "Steady wind: the vessel was in that place once, or hardly at all, so that something else may have come just then: "
-        "it is a hint.",
-    )
+    assert "the vessel was in that place once" in note
+
+
+def test_what_acts_for_less_than_two_blocks_is_a_hint(windy: tuple[Trial, Judged]) -> None:
+    trial, stands = windy
+    (blown,) = stands.fit.suspects
+    for offset_s, sure in ((150.0, False), (300.0, True)):
+        brief = replace(blown, onset_s=100.0, offset_s=offset_s)
+        finding, notes = judged_by_rules(trial, replace(stands, fit=replace(stands.fit, suspects=(brief,))))
+        assert finding.sure == sure
+        assert any("held-out data judge nothing below 80 s" in note for note in notes) != sure
 
 
 @pytest.mark.parametrize(
@@ -84,15 +94,9 @@ def test_what_comes_and_goes_by_little_is_a_hint(
         blown, effect=replace(blown.effect, passing=passing, onset=True), onset_s=onset_s, offset_s=offset_s
     )
     made = replace(stands.fit, suspects=(suspect,), values=(np.array([2.5, 0.0, 1.0, 1.0, 1.0]),))
-    (finding,), told = forces_of(trial, replace(stands, fit=made), trial.windows.scene)
+    finding, notes = judged_by_rules(trial, replace(stands, fit=made))
     assert finding.sure == sure
-    assert told == (
-        ()
-        if sure
-        else (
-            "Steady wind comes and goes, by less than hull and formulas may be off in a part of the manoeuvres: it is a hint.",
-        )
-    )
+    assert any("by less than hull and formulas may be off" in note for note in notes) != sure
 
 
 @pytest.mark.parametrize(("grown", "sure"), [(1.2, False), (1.05, True)])
@@ -104,17 +108,10 @@ def test_what_makes_an_axis_worse_is_a_hint(windy: tuple[Trial, Judged], grown: 
     after = proof.improvement.after.copy()
     after[:, 2] = grown * proof.improvement.before[:, 2]
     other = replace(proof, improvement=replace(proof.improvement, after=after))
-    (finding,), told = forces_of(
-        trial, replace(stands, proof=replace(stands.proof, proofs=(other,))), trial.windows.scene
-    )
+    finding, notes = judged_by_rules(trial, replace(stands, proof=replace(stands.proof, proofs=(other,))))
     assert finding.sure == sure
-    assert told == (
-        ()
-        if sure
-        else (
-            "Steady wind makes the held-out squared error in yaw 44 % larger while it acts, and what is there makes no axis "
-            "worse: it is a hint.",
-        )
+    assert notes == (
+        () if sure else ("Steady wind is a hint: it makes the held-out squared force error in yaw 44 % larger.",)
     )
 
 
@@ -133,16 +130,18 @@ def test_what_makes_an_axis_worse_is_a_hint(windy: tuple[Trial, Judged], grown: 
 def test_only_an_axis_that_is_claimed_shows_a_finding(
     windy: tuple[Trial, Judged], shares: list[float], forces: list[float], runs: list[float], shows: bool
 ) -> None:
-    stands = with_lows(windy[1], forces, runs)
-    assert stands.proof is not None
-    proof: Proof = stands.proof.proofs[0]
-    assert proof.shows(np.array(shares)) is shows
+    trial, stands = windy
+    (claim,) = force_claims(trial, with_lows(stands, forces, runs), trial.windows.scene)
+    finding = replace(claim.finding, axes=dict(zip(AXES, shares, strict=True)))
+    judged, _ = improves_no_claimed_axis(finding, Context(claim.figures))
+    assert judged is not None
+    assert judged.sure is shows
 
 
 def test_a_strong_likelihood_needs_no_more(windy: tuple[Trial, Judged]) -> None:
-    stands = with_lows(windy[1], [-0.1] * 3, [-0.1] * 4, score=45.0)
-    assert stands.proof is not None
-    assert stands.proof.proofs[0].shows(np.ones(3) / 3.0)
+    trial, stands = windy
+    (claim,) = force_claims(trial, with_lows(stands, [-0.1] * 3, [-0.1] * 4, score=45.0), trial.windows.scene)
+    assert improves_no_claimed_axis(claim.finding, Context(claim.figures)) == (claim.finding, "")
 
 
 def test_a_motion_before_its_force_is_a_clocks() -> None:

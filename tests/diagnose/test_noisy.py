@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.noisy import DROWNED, drowned_axes, noise_shares, says_drowned
+from ferryid.diagnose.judging.confidence_rules import LogFigures, drowned_axes, log_notes, noise_drowns_an_axis
+from ferryid.diagnose.noisy import noise_shares
 from ferryid.diagnose.weak import windows
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene
 from tests.diagnose.trials import FERRY
 
 MASS, DAMPING, THRUST_N, NOISE_MPS = 1000.0, 400.0, 100.0, 0.02
 T = np.arange(20000) * 0.2
+DROWNED = noise_drowns_an_axis.threshold or 0.0
 
 
 def still(*, noise_mps: float = NOISE_MPS, damping: float = DAMPING, mass: float = MASS, placed: bool = True) -> Any:
@@ -38,7 +40,7 @@ def test_noise_times_damping_is_held_against_the_thrust() -> None:
     share = np.sqrt(np.sum(np.convolve(trial.windows.weight * 0.2, np.full(11, 1.0 / 11.0)) ** 2))
     assert noise_shares(trial)["sway"] == pytest.approx(NOISE_MPS * DAMPING * share / np.sqrt(2.0) / THRUST_N, rel=0.05)
     assert list(noise_shares(trial)) == ["sway"], "nothing pushes along or turns"
-    assert drowned_axes(trial) == {}
+    assert drowned_axes(LogFigures(velocity_noise=noise_shares(trial)), DROWNED) == {}
 
 
 def test_mass_plays_no_part_and_noise_and_damping_do() -> None:
@@ -49,12 +51,11 @@ def test_mass_plays_no_part_and_noise_and_damping_do() -> None:
 
 
 def test_an_axis_that_noise_drowns_is_told() -> None:
-    drowned = drowned_axes(still(noise_mps=20.0 * NOISE_MPS))
+    figures = LogFigures(velocity_noise=noise_shares(still(noise_mps=20.0 * NOISE_MPS)))
+    drowned = drowned_axes(figures, DROWNED)
     assert list(drowned) == ["sway"]
-    assert drowned["sway"] > DROWNED
-    assert says_drowned({"sway": 0.221}).startswith(
-        "The noise of the velocity, times damping, is 22 % of what moves the vessel in sway"
-    )
+    (note,) = log_notes(figures)
+    assert f"times damping, is {100.0 * drowned['sway']:.0f} % of what moves the vessel in sway" in note
 
 
 def test_without_positions_nothing_is_known_of_the_noise() -> None:

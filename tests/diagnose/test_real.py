@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import examine
-from ferryid.diagnose.diagnose import diagnose
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.diagnose.scene import scene_of
 from ferryid.diagnose.shared_evidence import MIRRORED, placebos
 from ferryid.diagnose.shared_hull import INDUCED, SharedHull, fit_together
 from ferryid.diagnose.together import together
 from ferryid.effects import effects
 from ferryid.vessel import load_profile
+from tests.diagnose.trials import averaged
 
 Locate = Callable[[str], Path]
 ENVIRONMENT = {"wind", "current", "gusts", "waves", "mooring", "shallow_water"}
@@ -46,7 +47,7 @@ def test_no_environment_is_named_in_a_towing_tank(run: str, shared_data: Locate)
 
 def test_zigzags_of_one_tanker_show_one_law_and_no_log_has_its_own(shared_data: Locate) -> None:
     logs = [str(shared_data(f"kvlcc2/HSVA_CPMC_KVLCC2_Z_{run}.dat")) for run in ("10_05", "20_10_S", "30_05", "35_05")]
-    every = diagnose(logs, load_profile("kvlcc2-model"), None, shared=True, progress=quiet)
+    every = diagnose(logs, load_profile("kvlcc2-model"), None, DiagnosisSettings(together=True), progress=quiet)
     laws = {tuple((term.on, term.quantity) for term in one.law) for made in every for one in made.findings if one.sure}
     # Nothing with a name is sure; the law is the same wherever it is told.
     assert len(laws) == 1
@@ -85,7 +86,7 @@ def test_the_receiver_of_milliampere_is_late(shared_data: Locate) -> None:
 def test_a_common_hull_points_to_the_hidden_wind_and_a_mirrored_one_does_not(shared_data: Locate) -> None:
     vessel = load_profile("esso-osaka")
     logs = [str(shared_data(f"esso_osaka/random/random_06-Aug-2020_16_24_25_{k}.csv")) for k in (1, 3, 4, 5, 6)]
-    joint = together(logs, vessel, None, withhold=("wind",), progress=quiet)
+    joint = together(averaged(logs, vessel, withhold=("wind",)), vessel, quiet)
     hidden = [scene_of(log, vessel, None)[0].wind for log in logs]
     true = np.array([wind.mean(axis=0) for wind in hidden if wind is not None])
     mirrored = placebos(joint.members)[MIRRORED]

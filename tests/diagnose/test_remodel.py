@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit, trial_of
+from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.learnt import Learnt, learnt
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.diagnose.remodel import keep, remodelled
-from ferryid.diagnose.result import AXES, Diagnosis, Finding
+from ferryid.diagnose.result import AXES, Finding
 from ferryid.diagnose.scene import Survey, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.unsteady import State
 from ferryid.diagnose.weak import windows
@@ -424,7 +425,7 @@ def test_nothing_is_left_to_find_in_a_log_of_the_model(model: Model, folder: Pat
     quick = replace(sailing.scenario.sensors, imu_rate_hz=0.0, camera_rate_hz=0.0)
     log = folder / "of-the-model.mcap"
     write_log(simulate(replace(sailing.scenario, sensors=quick, duration_s=720.0), 21, vessel=sailing.vessel), log)
-    (with_model,) = diagnose([str(log)], FERRY, None, model=model, progress=quiet)
+    (with_model,) = diagnose([str(log)], FERRY, None, DiagnosisSettings(model=model), progress=quiet)
     assert with_model.verdict == "matched"
     assert with_model.learnt is None
     entry = judged(model, str(log), folder / "out")["logs"][0]

@@ -10,8 +10,8 @@ from typing import cast
 import numpy as np
 import pytest
 
-from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.hypothesis import Suspect, fit, trial_of
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.diagnose.scene import window_lengths
 from ferryid.diagnose.shared_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 from ferryid.diagnose.shared_hull import INDUCED, Member, SharedHull, fit_together
@@ -136,12 +136,12 @@ def test_winds_hold_on_held_out_stretches_and_placebos_do_not() -> None:
 
 def test_a_common_hull_needs_two_logs() -> None:
     with pytest.raises(FerryIdError, match="needs two logs"):
-        together([], FERRY, None, progress=lambda stage: None)
+        together([], FERRY, lambda stage: None)
 
 
 def test_a_common_hull_and_another_model_exclude_each_other() -> None:
     with pytest.raises(FerryIdError, match="--together"):
-        diagnose(["a", "b"], FERRY, None, against="c", shared=True, progress=lambda stage: None)
+        diagnose(["a", "b"], FERRY, None, DiagnosisSettings(against="c", together=True), progress=lambda stage: None)
 
 
 @pytest.mark.parametrize(

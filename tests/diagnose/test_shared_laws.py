@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.hypothesis import Fit, Trial, fit, trial_of
+from ferryid.diagnose.judging.confidence_rules import LogFigures, apply_rules
 from ferryid.diagnose.law import GAIN
 from ferryid.diagnose.result import HINT
 from ferryid.diagnose.scene import plain_picture
@@ -98,18 +99,19 @@ def test_what_a_law_explains_is_not_said_twice() -> None:
 def test_others_are_counted_by_what_they_can_show() -> None:
     logs = with_force(1)
     trial, kept = logs["0"]
-    alone = unknown_of(trial, kept, sailed(0)).findings[0]
+    alone = unknown_of(trial, kept, sailed(0)).claims[0].finding
     assert "that was seen in this log only" in alone.says
     assert alone.sure
     told = heard(logs)
     assert told["0"].law is None
-    finding = unknown_of(trial, kept, sailed(0), told["0"]).findings[0]
+    (finding, *_), _ = apply_rules(unknown_of(trial, kept, sailed(0), told["0"]).claims, LogFigures(joint=True))
     assert (finding.law[0].on, finding.law[0].quantity) == ("yaw", "uv")
     assert finding.probability == HINT
     assert finding.says.endswith("Of 2 other logs 2 could show it at this size, and none does.")
     other = told["1"].said[1]
     deaf = replace(other, normal=1e-9 * other.normal, slope=1e-9 * other.slope)
-    finding = unknown_of(trial, kept, sailed(0), Heard((told["0"].said[0], deaf), 0, None)).findings[0]
+    unheard = unknown_of(trial, kept, sailed(0), Heard((told["0"].said[0], deaf), 0, None))
+    (finding, *_), _ = apply_rules(unheard.claims, LogFigures(joint=True))
     assert finding.says.endswith("Of 1 other log none could show it at this size.")
 
 
@@ -123,7 +125,8 @@ def test_a_law_of_all_logs_is_told_in_each_of_them_and_fitted_to_the_others() ->
     assert law.errors[0] < 0.1 * SIZE
     assert law.total > GAIN
     for seed, (trial, kept) in enumerate(logs.values()):
-        (finding,) = unknown_of(trial, kept, sailed(seed), told[str(seed)]).findings
+        (claim,) = unknown_of(trial, kept, sailed(seed), told[str(seed)]).claims
+        finding = claim.finding
         assert finding.sure
         assert "that holds in all 3 logs that can show it" in finding.says
         assert finding.improvement["yaw"] > 0.05

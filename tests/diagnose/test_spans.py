@@ -12,8 +12,7 @@ import pytest
 
 from ferryid.diagnose.folds import block_s
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit, near
-from ferryid.diagnose.result import HINT
-from ferryid.diagnose.rivals import Standing, standing_of
+from ferryid.diagnose.rivals import standing_of
 from ferryid.diagnose.search import search, suspects_of
 from ferryid.diagnose.spans import brief, ground_of, lasts_s, part_s, promising, sharpened
 from ferryid.diagnose.weak import windows
@@ -68,9 +67,9 @@ def test_what_lasts_less_than_two_blocks_is_brief() -> None:
     assert brief(case, replace(PUSH, onset_s=100.0, offset_s=97.0 + two_s))
     assert not brief(case, replace(PUSH, onset_s=100.0, offset_s=103.0 + two_s))
     assert not brief(case, PUSH)
-    # It has no rivals, and nothing is judged by it.
+    # It has no rivals: no name could be judged there.
     made = fit(case, [replace(PUSH, onset_s=100.0, offset_s=130.0)])
-    assert standing_of(case, made, 0, [PUSH]) == Standing((), HINT)
+    assert standing_of(case, made, 0, [PUSH]).rivals == ()
 
 
 def test_where_nothing_pushes_no_span_is_promising() -> None:

@@ -11,6 +11,7 @@ import pytest
 from ferryid.diagnose.bands import bursts_of
 from ferryid.diagnose.folds import folds_of
 from ferryid.diagnose.hypothesis import Suspect, Trial, fit, imagined, trial_of
+from ferryid.diagnose.judging.confidence_rules import Context, Figures, LogFigures, unexplained_shares
 from ferryid.diagnose.law import GAIN, law_of
 from ferryid.diagnose.scene import plain_picture
 from ferryid.diagnose.terms import terms_of
@@ -89,9 +90,10 @@ def test_a_law_comes_back(force: Floats, on: str, name: str, size: float) -> Non
     assert law.gain > max(GAIN, law.chance)
     assert law.held_out.score_low > 0.0
     made = unknown_of(trial, fit(trial, ()), sailed(0))
-    told = made.findings[0]
+    told = made.claims[0].finding
     # What it holds of the error is what it removes, where it does.
-    assert made.holds == {axis: max(share, 0.0) for axis, share in told.improvement.items()}
+    left = unexplained_shares(Context(Figures("force"), LogFigures(), made.claims))
+    assert left == {axis: max(share, 0.0) for axis, share in told.improvement.items()}
     assert told.effect == "unknown"
     assert told.parameters == {}
     assert (told.law[0].on, told.law[0].quantity) == (on, name)
@@ -107,7 +109,7 @@ def test_noise_and_a_hull_that_is_off_have_no_law(seed: int) -> None:
     off = np.random.default_rng(seed).choice([0.92, 1.08], len(plain.hull))
     trial = trial_of(cut, replace(plain, hull=plain.hull * off), spread)
     made = unknown_of(trial, fit(trial, ()), sailed(seed))
-    assert made.findings == ()
+    assert made.claims == ()
     assert not made.unsteady
 
 
@@ -118,7 +120,8 @@ def test_bursts_are_told_by_band_and_time() -> None:
     alone = fit(trial, ())
     made = unknown_of(trial, alone, sailed(0))
     assert made.unsteady
-    (told,) = made.findings
+    (claim,) = made.claims
+    told = claim.finding
     assert told.law == ()
     assert told.band_hz == (0.2, 0.4)
     assert max(told.axes, key=lambda axis: told.axes[axis]) == "sway"

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.hypothesis import Suspect, trial_of
+from ferryid.diagnose.judging.confidence_rules import absent_in_velocities
 from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
 from ferryid.diagnose.search import Search, search, suspects_of
-from ferryid.diagnose.unsteady import State, _seen, _unseen, density, unsteady_of
+from ferryid.diagnose.unsteady import State, _power_in_velocities, _seen, density, disturbance_claims
 from ferryid.diagnose.weak import windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Process
@@ -51,7 +52,8 @@ def values_of(state: State) -> dict[str, float]:
 
 def spectrum_in(result: Search) -> Mapping[str, Floats]:
     """Return the figure of the only disturbance."""
-    (finding,) = unsteady_of(result.trial, result.fit, result.states, result.trial.windows.scene)
+    (claim,) = disturbance_claims(result.trial, result.fit, result.states, result.trial.windows.scene)
+    finding = claim.finding
     assert (np.diff(finding.evidence["frequency"]) > 0.0).all()
     return finding.evidence
 
@@ -107,7 +109,7 @@ def test_what_the_velocities_lack_is_unseen(share: float, unseen: bool) -> None:
     frequency = np.linspace(0.05, 1.0, 96)
     peak = np.exp(-(((frequency - 0.45) / 0.02) ** 2))
     evidence = {"frequency": frequency, "explained": peak, "before": share * peak + 1.0 * (frequency < 0.2)}
-    assert _unseen(evidence) == unseen
+    assert (_power_in_velocities(evidence) < (absent_in_velocities.threshold or 0.0)) == unseen
 
 
 @pytest.mark.parametrize(("at_hz", "unseen"), [(0.35, False), (0.2, True)])
@@ -115,7 +117,8 @@ def test_a_peak_that_the_navigation_shifts_a_little_is_seen(at_hz: float, unseen
     """The narrow band of a disturbance of 0.4 Hz, with memory of 6 s, and as much power in the velocities elsewhere."""
     frequency = np.linspace(0.05, 1.0, 96)
     explained, before = (1.0 / (1.0 + (2.0 * np.pi * (frequency - peak) * 6.0) ** 2) for peak in (0.4, at_hz))
-    assert _unseen({"frequency": frequency, "explained": explained, "before": before}) == unseen
+    share = _power_in_velocities({"frequency": frequency, "explained": explained, "before": before})
+    assert (share < (absent_in_velocities.threshold or 0.0)) == unseen
 
 
 def test_waves_slower_than_any_sea_are_none() -> None:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from ferryid.diagnose.checks.screening import screen_sensors
 from ferryid.diagnose.hypothesis import Trial, trial_of
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
+from ferryid.diagnose.inference.stages import AveragedLog, average
+from ferryid.diagnose.scene import measure_log, plain_picture, scene_of, window_lengths
 from ferryid.diagnose.weak import windows
 from ferryid.effects.picture import Scene
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Profile
 
 FERRY = load_profile("milliampere")
 OFF = {
@@ -32,6 +36,18 @@ def sailed(folder: Path, name: str, scenario: str, seed: int) -> Scene:
     log = folder / f"{name}.mcap"
     write_log(simulate(replace(parse_scenario(scenario, name), true_hull=OFF), seed), log)
     return scene_of(str(log), FERRY, None)[0]
+
+
+def averaged(paths: Sequence[str], vessel: Profile, withhold: Sequence[str] = ()) -> list[AveragedLog]:
+    """Return logs as the first stages of a diagnosis leave them."""
+
+    def quiet(_stage: str) -> None:
+        pass
+
+    return [
+        average(screen_sensors(measure_log(path, vessel, None, withhold=withhold, progress=quiet), quiet))
+        for path in paths
+    ]
 
 
 def trial_on(scene: Scene) -> Trial:

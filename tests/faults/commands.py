@@ -64,7 +64,7 @@ def archived(folder: Path, out: Path) -> None:
 
 
 def diagnose(folder: Path, out: Path) -> None:
-    from ferryid.diagnose.diagnose import diagnose
+    from ferryid.diagnose.pipeline import diagnose
     from ferryid.diagnose.remodel import keep
     from ferryid.report.diagnosis_report import report
     from ferryid.vessel import load_profile

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.diagnose import diagnose
+from ferryid.diagnose.pipeline import diagnose
 from ferryid.diagnose.remodel import keep
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model, blank

@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 from rosbags.highlevel import AnyReader
 
-from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.result import Diagnosis, Estimate, Finding
+from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
+from ferryid.diagnose.result import Estimate, Finding
 from ferryid.diagnose.scene import scene_of
 from ferryid.report import diagnosis_figures
 from ferryid.report.diagnosis_words import numbers, probability
@@ -74,7 +75,13 @@ def told(
     vessel: str, logs: Sequence[str], judge: Judge, *, together: bool = False, withhold: Sequence[str] = ()
 ) -> tuple[str, tuple[Diagnosis, ...]]:
     """Diagnose logs; return a table of findings with what is to be said of each, and write the figures of forces."""
-    made = diagnose(logs, load_profile(vessel), None, shared=together, withhold=withhold, progress=lambda stage: None)
+    made = diagnose(
+        logs,
+        load_profile(vessel),
+        None,
+        DiagnosisSettings(together=together, withhold=tuple(withhold)),
+        progress=lambda stage: None,
+    )
     lines = ["| log | verdict | finding | probability | |", "|---|---|---|---|---|"]
     for one in made:
         rows = [(finding.says, probability(finding.probability), judge(one, finding)) for finding in one.findings] or [

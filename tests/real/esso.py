@@ -21,6 +21,7 @@ from ferryid.effects.picture import COEFFICIENTS, Picture
 from ferryid.signals.smooth import moving_mean
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
+from tests.diagnose.trials import averaged
 from tests.real.places import DATA
 
 Floats = NDArray[np.float64]
@@ -93,7 +94,7 @@ class Course:
 def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]]:
     """Fit runs together with the wind hidden, and with controls in its place; hold out where `judged`."""
     paths = logs(kind)
-    joint = together(paths, ESSO, None, withhold=("wind",), progress=lambda stage: None)
+    joint = together(averaged(paths, ESSO, withhold=("wind",)), ESSO, lambda stage: None)
     kept = sorted(joint.place, key=lambda path: joint.place[path])
     members = list(joint.members)
     hidden = [hidden_wind(path, member) for path, member in zip(kept, members, strict=True)]

@@ -1,0 +1,1 @@
+"""What a log speaks for: the weak form, whitening, likelihood, search and evidence."""

@@ -1,0 +1,112 @@
+"""What recordings are compared with: see `ferryid.diagnose.inference.stages.Baseline`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ferryid.diagnose.against import (
+    Paths,
+    Simulated,
+    base_picture,
+    difference_notes,
+    differing,
+    paths,
+    plain_against,
+)
+from ferryid.diagnose.hypothesis import Suspect
+from ferryid.diagnose.inference.stages import AveragedLog, Expectation
+from ferryid.diagnose.result import Estimate
+from ferryid.diagnose.scene import plain_picture
+from ferryid.diagnose.search import suspects_of
+from ferryid.diagnose.together import Together
+from ferryid.identify.model import Model
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class HullBaseline:
+    """The profile's hull, or a fitted model."""
+
+    profile: Profile
+    model: Model | None = None
+    joint: bool = False
+    updates_model: bool = True
+
+    @property
+    def hull_known(self) -> bool:
+        """True where the profile has a hull model, or there is a fitted one."""
+        return self.model is not None or self.profile.hull.has_model
+
+    @property
+    def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
+        """None."""
+        return {}
+
+    def expect(self, log: AveragedLog) -> Expectation:
+        """Return the forces of the hull, in still air and water where none was measured."""
+        seen = log.windows
+        sha256 = log.screened.measured.survey.recording.sha256
+        return Expectation(*plain_picture(seen.scene, self.profile, self.model, sha256), _library(log))
+
+
+@dataclass(frozen=True)
+class SimulationBaseline:
+    """A simulation of the same trial, with what was learnt from its log."""
+
+    simulated: Simulated
+    joint: bool = False
+    updates_model: bool = False
+
+    @property
+    def hull_known(self) -> bool:
+        """True where the profile has a hull model."""
+        return self.simulated.scene.profile.hull.has_model
+
+    @property
+    def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
+        """Errors of the simulated sensors."""
+        return {one.effect: one.parameters for one in self.simulated.sensors}
+
+    def expect(self, log: AveragedLog) -> Expectation:
+        """Return the simulation's forces, with its own conditions as neutral values of the candidates."""
+        scene, seen = log.screened.scene, log.windows
+        path_errors = paths(self.simulated.scene, scene)
+        shift_s = path_errors.shift_s if isinstance(path_errors, Paths) else 0.0
+        comparison = plain_against(self.simulated, path_errors)
+        return Expectation(
+            *base_picture(self.simulated, seen.scene, shift_s),
+            tuple(differing(self.simulated, seen.scene, shift_s)),
+            (comparison["says"], *difference_notes(self.simulated, scene)),
+            comparison,
+        )
+
+
+@dataclass(frozen=True)
+class CampaignBaseline:
+    """One hull for all logs of a campaign; each is compared with what the others say of it."""
+
+    profile: Profile
+    campaign: Together
+    joint: bool = True
+    updates_model: bool = False  # The lift of a common hull is in no model file.
+
+    @property
+    def hull_known(self) -> bool:
+        """True where the profile has a hull model."""
+        return self.profile.hull.has_model
+
+    @property
+    def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
+        """None."""
+        return {}
+
+    def expect(self, log: AveragedLog) -> Expectation:
+        """Return the forces of the hull that the other logs speak for."""
+        plain, _ = plain_picture(log.windows.scene, self.profile)
+        picture, spread = self.campaign.picture(log.path, plain)
+        return Expectation(picture, spread, _library(log), (self.campaign.says(log.path),))
+
+
+def _library(log: AveragedLog) -> tuple[Suspect, ...]:
+    return tuple(suspects_of(log.windows.scene)[0])

@@ -1,0 +1,1 @@
+"""Whether what was selected stands: held-out tests, rivals, confidence rules, and the verdict."""

@@ -1,0 +1,105 @@
+"""Judging: what of a selection stands, and what was measured of it for the confidence rules to weigh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ferryid.diagnose.checks import SensorFinding
+from ferryid.diagnose.hypothesis import Fit, fit
+from ferryid.diagnose.inference.stages import SelectedLog
+from ferryid.diagnose.judged import Judged, judged
+from ferryid.diagnose.judging.confidence_rules import Claim, Figures, LogFigures
+from ferryid.diagnose.named import force_claims
+from ferryid.diagnose.noisy import noise_shares
+from ferryid.diagnose.result import AXES, Finding
+from ferryid.diagnose.shared_laws import Heard, heard
+from ferryid.diagnose.unknown import Unknown, unknown_of
+from ferryid.diagnose.unsteady import disturbance_claims
+
+
+@dataclass(frozen=True)
+class JudgedLog:
+    """A log with what stands of its selection, before the confidence rules.
+
+    Attributes
+    ----------
+    selected
+        The selection.
+    base
+        The fit without any effect.
+    stands
+        What is left of the selection.
+    unknown
+        What is left of the log.
+    claims
+        All findings with their figures: of sensors, of forces, of disturbances, and those without a name.
+    figures
+        Of the log as a whole.
+    """
+
+    selected: SelectedLog
+    base: Fit
+    stands: Judged
+    unknown: Unknown
+    claims: tuple[Claim, ...]
+    figures: LogFigures
+
+
+def judge(logs: Sequence[SelectedLog], progress: Callable[[str], None]) -> tuple[JudgedLog, ...]:
+    """Judge the selections of the logs of a campaign: one by one, and by laws that hold in all of them."""
+    stand = [judged(log.search.trial, log.search.fit, log.steady, progress) for log in logs]
+    laws: Mapping[str, Heard] = {}
+    if any(log.estimated.baseline.joint for log in logs):
+        progress("looking for laws that hold in all logs")
+        laws = heard({log.path: (log.search.trial, one.fit) for log, one in zip(logs, stand, strict=True)})
+    return tuple(_judged(log, one, laws.get(log.path), progress) for log, one in zip(logs, stand, strict=True))
+
+
+def _judged(log: SelectedLog, stands: Judged, laws: Heard | None, progress: Callable[[str], None]) -> JudgedLog:
+    trial, states, scene = log.search.trial, log.search.states, log.estimated.averaged.screened.scene
+    base = fit(trial, ())
+    progress("looking for what has no name")
+    unknown = unknown_of(trial, stands.fit, scene, laws)
+    progress("locating")
+    claims = (
+        *sensor_claims(log.estimated.averaged.screened.sensors),
+        *force_claims(trial, stands, scene),
+        *disturbance_claims(trial, stands.fit, states, scene),
+        *unknown.claims,
+    )
+    baseline = log.estimated.baseline
+    figures = LogFigures(
+        hull_known=baseline.hull_known,
+        joint=baseline.joint,
+        velocity_noise=noise_shares(trial),
+        unsteady=unknown.unsteady or bool(states),
+        baseline_sensors=baseline.sensors,
+    )
+    return JudgedLog(log, base, stands, unknown, claims, figures)
+
+
+def sensor_claims(sensors: Sequence[SensorFinding]) -> tuple[Claim, ...]:
+    """Return what the checks found as findings: kinematics alone shows them, so that no force is improved."""
+    return tuple(
+        Claim(
+            Finding(
+                effect=one.effect,
+                instance=None,
+                probability=1.0,
+                parameters=one.parameters,
+                axes=dict.fromkeys(AXES, 0.0),
+                intervals=(),
+                onset_s=None,
+                regime="",
+                improvement={},
+                held_out=False,
+                rivals=(),
+                unresolved_with=(),
+                separating_manoeuvre=None,
+                says=one.says,
+            ),
+            Figures("sensor"),
+        )
+        for one in sensors
+    )
