@@ -6,16 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ferryid.diagnose.against import learn
 from ferryid.diagnose.checks.screening import screen_sensors
+from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline, SimulationBaseline
+from ferryid.diagnose.inference.campaign import together as joint_hull
+from ferryid.diagnose.inference.simulation_baseline import learn
 from ferryid.diagnose.inference.stages import Baseline, average, estimate, select
 from ferryid.diagnose.judging.conclude import conclude
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.judge import judge
-from ferryid.diagnose.remodel import keep
-from ferryid.diagnose.scene import measure_log
-from ferryid.diagnose.together import together as joint_hull
+from ferryid.diagnose.judging.model_update import keep
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.identify.store import checked_name

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.diagnose.judging.diagnosis import SCHEMA
-from ferryid.diagnose.result import HINT
+from ferryid.diagnose.judging.finding import HINT
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.errors import FerryIdError

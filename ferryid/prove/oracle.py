@@ -18,11 +18,12 @@ from typing import Any
 from scipy.stats import chi2
 
 from ferryid.diagnose.checks import resteadied
-from ferryid.diagnose.hypothesis import Suspect, Trial, trial_of
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.measurements import scene_of, window_lengths
+from ferryid.diagnose.inference.estimation import Suspect, Trial, trial_of
+from ferryid.diagnose.inference.prior import plain_picture
 from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
-from ferryid.diagnose.result import Estimate
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
-from ferryid.diagnose.weak import Windows, windows
+from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError, did_you_mean

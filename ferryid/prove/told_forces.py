@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ferryid.diagnose.filter import Filter, learn_with, likelihood
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, settled
-from ferryid.diagnose.result import Estimate
-from ferryid.diagnose.ridge import intervals
-from ferryid.diagnose.search import void
-from ferryid.diagnose.unsteady import BANDS, STRENGTHS, State
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial, fit, imagined, settled
+from ferryid.diagnose.inference.noise_model import Filter, learn_with, likelihood
+from ferryid.diagnose.inference.profile_likelihood import intervals
+from ferryid.diagnose.inference.search import void
+from ferryid.diagnose.inference.stochastic_disturbance import BANDS, STRENGTHS, State
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD, Processes
 from ferryid.effects.picture import Picture
@@ -70,7 +70,7 @@ def weighed(trial: Trial, told: Sequence[Suspect]) -> tuple[float, tuple[Weighed
     Parameters
     ----------
     trial
-        From `ferryid.diagnose.hypothesis.trial_of`.
+        From `ferryid.diagnose.inference.estimation.trial_of`.
     told
         Effects that are in the log.
     """
@@ -172,7 +172,7 @@ def _shaken(
     """Return the trial with unsteady effects in its filter that are likeliest beside a fit, and these.
 
     One after the other they are learnt together with each channel's own noise, the others as they are `near`; `worth` as in
-    `ferryid.diagnose.filter.learn_with`.
+    `ferryid.diagnose.inference.noise_model.learn_with`.
     """
     picture = imagined(trial.plain, made)
     within = picture if pushing is None else pushing

@@ -17,7 +17,7 @@ from ferryid.diagnose.checks.kinematics import ANGLE, NEUTRAL, SCALE, Kinematics
 from ferryid.diagnose.checks.lever_arm import least_m
 from ferryid.diagnose.checks.yaw_rate_scale import compared
 from ferryid.diagnose.checks.yaw_rate_scale import corrected as rescaled
-from ferryid.diagnose.result import Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.picture import Scene
 from ferryid.vessel.frames import to_world
 

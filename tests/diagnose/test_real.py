@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import examine
+from ferryid.diagnose.data.measurements import scene_of
+from ferryid.diagnose.inference.campaign import together
+from ferryid.diagnose.inference.campaign_hull import INDUCED, SharedHull, fit_together
+from ferryid.diagnose.judging.campaign_evidence import MIRRORED, placebos
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
-from ferryid.diagnose.scene import scene_of
-from ferryid.diagnose.shared_evidence import MIRRORED, placebos
-from ferryid.diagnose.shared_hull import INDUCED, SharedHull, fit_together
-from ferryid.diagnose.together import together
 from ferryid.effects import effects
 from ferryid.vessel import load_profile
 from tests.diagnose.trials import averaged

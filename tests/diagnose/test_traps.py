@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import ferryid.diagnose.search as search_module
-from ferryid.diagnose.evidence import HEADING, evidence
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
-from ferryid.diagnose.search import search, suspects_of
+import ferryid.diagnose.inference.search as search_module
+from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial, fit, imagined
+from ferryid.diagnose.inference.search import search, suspects_of
+from ferryid.diagnose.judging.held_out import HEADING, evidence
 from ferryid.effects.picture import COEFFICIENTS, Scene
 from tests.diagnose.trials import FERRY, OFF, sailed, trial_on
 

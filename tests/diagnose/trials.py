@@ -7,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from ferryid.diagnose.checks.screening import screen_sensors
-from ferryid.diagnose.hypothesis import Trial, trial_of
+from ferryid.diagnose.data.measurements import measure_log, scene_of, window_lengths
+from ferryid.diagnose.inference.estimation import Trial, trial_of
+from ferryid.diagnose.inference.prior import plain_picture
 from ferryid.diagnose.inference.stages import AveragedLog, average
-from ferryid.diagnose.scene import measure_log, plain_picture, scene_of, window_lengths
-from ferryid.diagnose.weak import windows
+from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects.picture import Scene
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile

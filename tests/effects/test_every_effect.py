@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import trial_of
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
-from ferryid.diagnose.search import Search, search
-from ferryid.diagnose.weak import windows
+from ferryid.diagnose.data.measurements import scene_of, window_lengths
+from ferryid.diagnose.inference.estimation import trial_of
+from ferryid.diagnose.inference.prior import plain_picture
+from ferryid.diagnose.inference.search import Search, search
+from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS
 from ferryid.simulate import parse_scenario, simulate, write_log

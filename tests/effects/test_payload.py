@@ -9,7 +9,7 @@ import pytest
 
 from ferryid.effects import effects
 from ferryid.effects.picture import Picture, hull_of
-from tests.diagnose.test_unknown import FERRY, sailed
+from tests.diagnose.judging.test_unexplained import FERRY, sailed
 
 PAYLOAD = effects()["payload"]
 

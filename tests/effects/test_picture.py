@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import Suspect, acted
+from ferryid.diagnose.inference.estimation import Suspect, acted
 from ferryid.effects import effects
 from ferryid.effects.picture import (
     COEFFICIENTS,

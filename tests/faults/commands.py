@@ -64,8 +64,8 @@ def archived(folder: Path, out: Path) -> None:
 
 
 def diagnose(folder: Path, out: Path) -> None:
+    from ferryid.diagnose.judging.model_update import keep
     from ferryid.diagnose.pipeline import diagnose
-    from ferryid.diagnose.remodel import keep
     from ferryid.report.diagnosis_report import report
     from ferryid.vessel import load_profile
 

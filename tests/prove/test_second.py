@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ferryid.diagnose.judging.model_update import keep
 from ferryid.diagnose.pipeline import diagnose
-from ferryid.diagnose.remodel import keep
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model, blank
 from ferryid.identify.predict import Prediction

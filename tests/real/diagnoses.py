@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 from rosbags.highlevel import AnyReader
 
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.measurements import scene_of
 from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
-from ferryid.diagnose.result import Estimate, Finding
-from ferryid.diagnose.scene import scene_of
 from ferryid.report import diagnosis_figures
 from ferryid.report.diagnosis_words import numbers, probability
 from ferryid.vessel import load_profile

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.checks import examine
-from ferryid.diagnose.hypothesis import Suspect
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
-from ferryid.diagnose.shared_evidence import Gains, held_out_gains, on_heading, placebos
-from ferryid.diagnose.shared_hull import Member, SharedHull, fit_together, induced_spread
-from ferryid.diagnose.together import together
-from ferryid.diagnose.weak import windows
+from ferryid.diagnose.data.measurements import scene_of, window_lengths
+from ferryid.diagnose.inference.campaign import together
+from ferryid.diagnose.inference.campaign_hull import Member, SharedHull, fit_together, induced_spread
+from ferryid.diagnose.inference.estimation import Suspect
+from ferryid.diagnose.inference.prior import plain_picture
+from ferryid.diagnose.inference.weak_form import windows
+from ferryid.diagnose.judging.campaign_evidence import Gains, held_out_gains, on_heading, placebos
 from ferryid.effects.effect import Parameter
 from ferryid.effects.picture import COEFFICIENTS, Picture
 from ferryid.signals.smooth import moving_mean

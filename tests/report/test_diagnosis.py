@@ -18,12 +18,13 @@ import numpy as np
 import pytest
 
 from ferryid import __version__
-from ferryid.diagnose.bands import Band
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.inference.spectra import Band
 from ferryid.diagnose.judging.diagnosis import Diagnosis, Moved, Withheld
+from ferryid.diagnose.judging.error_profiles import profile_of
+from ferryid.diagnose.judging.finding import Finding, LawTerm, Rival
+from ferryid.diagnose.judging.locate import Location
 from ferryid.diagnose.judging.verdict import VERDICTS
-from ferryid.diagnose.locate import Location
-from ferryid.diagnose.profiles import profile_of
-from ferryid.diagnose.result import AXES, Estimate, Finding, LawTerm, Rival
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS
 from ferryid.errors import FerryIdError

@@ -17,7 +17,7 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.contradiction import opposed
-from ferryid.diagnose.velocity import MEAN_S, steadied
+from ferryid.diagnose.data.complementary_filter import MEAN_S, steadied
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored

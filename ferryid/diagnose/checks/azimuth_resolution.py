@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.result import Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
 

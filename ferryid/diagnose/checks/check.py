@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from ferryid.diagnose.result import Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.result import Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.picture import Scene
 from ferryid.vessel.frames import wrap
 from ferryid.vessel.profile import Floats

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ferryid.diagnose.checks import SensorFinding, examine
-from ferryid.diagnose.scene import MeasuredLog
+from ferryid.diagnose.data.measurements import MeasuredLog
 from ferryid.effects.picture import Scene
 
 

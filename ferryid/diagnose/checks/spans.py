@@ -1,4 +1,4 @@
-"""Windows for the checks; `ferryid.diagnose.weak` has those for forces."""
+"""Windows for the checks; `ferryid.diagnose.inference.weak_form` has those for forces."""
 
 from __future__ import annotations
 

@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ferryid.diagnose.against import (
-    Paths,
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.path_comparison import Paths, paths
+from ferryid.diagnose.inference.campaign import Together
+from ferryid.diagnose.inference.estimation import Suspect
+from ferryid.diagnose.inference.prior import plain_picture
+from ferryid.diagnose.inference.search import suspects_of
+from ferryid.diagnose.inference.simulation_baseline import (
     Simulated,
     base_picture,
     difference_notes,
     differing,
-    paths,
     plain_against,
 )
-from ferryid.diagnose.hypothesis import Suspect
 from ferryid.diagnose.inference.stages import AveragedLog, Expectation
-from ferryid.diagnose.result import Estimate
-from ferryid.diagnose.scene import plain_picture
-from ferryid.diagnose.search import suspects_of
-from ferryid.diagnose.together import Together
 from ferryid.identify.model import Model
 from ferryid.vessel.profile import Profile
 

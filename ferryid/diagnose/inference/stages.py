@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from ferryid.diagnose.checks.screening import ScreenedLog
-from ferryid.diagnose.hypothesis import Suspect, Trial, trial_of
-from ferryid.diagnose.result import Estimate
-from ferryid.diagnose.scene import window_lengths
-from ferryid.diagnose.search import Search, search
-from ferryid.diagnose.weak import Windows, windows
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.measurements import window_lengths
+from ferryid.diagnose.inference.estimation import Suspect, Trial, trial_of
+from ferryid.diagnose.inference.search import Search, search
+from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
 

@@ -9,19 +9,20 @@ from typing import Any
 import numpy as np
 
 from ferryid.diagnose.checks.screening import ScreenedLog
-from ferryid.diagnose.evidence import Evidence, Improvement, force_errors, mass_of
-from ferryid.diagnose.free_runs import FreeRuns
-from ferryid.diagnose.hypothesis import Fit, Trial, imagined
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.inference.estimation import Fit, Trial, imagined
+from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
 from ferryid.diagnose.judging.confidence_rules import Claim, Key, LogFigures, apply_rules, lasting, log_notes
+from ferryid.diagnose.judging.detection_power import advice, powers, says_untested, tells, unexcited
 from ferryid.diagnose.judging.diagnosis import Diagnosis, Moved
+from ferryid.diagnose.judging.free_runs import FreeRuns
+from ferryid.diagnose.judging.held_out import Evidence, Improvement
+from ferryid.diagnose.judging.hidden_signal import withheld as withheld_beside
 from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
+from ferryid.diagnose.judging.locate import locate
+from ferryid.diagnose.judging.posterior import learnt
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
-from ferryid.diagnose.learnt import learnt
-from ferryid.diagnose.locate import locate
-from ferryid.diagnose.result import AXES, Estimate
-from ferryid.diagnose.testable import advice, powers, says_untested, tells, unexcited
-from ferryid.diagnose.withheld import withheld as withheld_beside
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.vessel.profile import Floats
 

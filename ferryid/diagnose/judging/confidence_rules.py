@@ -12,8 +12,9 @@ from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Literal
 
-from ferryid.diagnose.result import AXES, HINT, Estimate, Finding
-from ferryid.diagnose.spans import LEAST_BLOCKS
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.inference.onset_estimation import LEAST_BLOCKS
+from ferryid.diagnose.judging.finding import HINT, Finding
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 

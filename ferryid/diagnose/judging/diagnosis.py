@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.locate import Location, plain_location
+from ferryid.diagnose.judging.posterior import Learnt
 from ferryid.diagnose.judging.verdict import Remainder
-from ferryid.diagnose.learnt import Learnt
-from ferryid.diagnose.locate import Location, plain_location
-from ferryid.diagnose.result import Estimate, Finding
 from ferryid.vessel.profile import Floats
 
 SCHEMA = "ferryid.diagnosis/1"
@@ -85,7 +86,8 @@ class Diagnosis:
     withheld
         Signals that were hidden from the diagnosis.
     against
-        The simulation that a recording was held against, as `ferryid.diagnose.against.plain_against` gives it, or empty.
+        The simulation that a recording was compared with, as
+        `ferryid.diagnose.inference.simulation_baseline.plain_against` gives it, or empty.
     learnt
         What a model can learn from it; None where it found no force left out, was held against a simulation, or shares
         the hull of other logs.

@@ -6,16 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ferryid.diagnose.checks import SensorFinding
-from ferryid.diagnose.hypothesis import Fit, fit
+from ferryid.diagnose.data.estimate import AXES
+from ferryid.diagnose.inference.estimation import Fit, fit
 from ferryid.diagnose.inference.stages import SelectedLog
-from ferryid.diagnose.judged import Judged, judged
+from ferryid.diagnose.judging.backward_elimination import Judged, judged
+from ferryid.diagnose.judging.campaign_laws import Heard, heard
 from ferryid.diagnose.judging.confidence_rules import Claim, Figures, LogFigures
-from ferryid.diagnose.named import force_claims
-from ferryid.diagnose.noisy import noise_shares
-from ferryid.diagnose.result import AXES, Finding
-from ferryid.diagnose.shared_laws import Heard, heard
-from ferryid.diagnose.unknown import Unknown, unknown_of
-from ferryid.diagnose.unsteady import disturbance_claims
+from ferryid.diagnose.judging.disturbance_findings import disturbance_claims
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.findings import force_claims
+from ferryid.diagnose.judging.signal_to_noise import noise_shares
+from ferryid.diagnose.judging.unexplained import Unknown, unknown_of
 
 
 @dataclass(frozen=True)

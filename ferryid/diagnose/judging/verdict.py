@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite, nan
 
-from ferryid.diagnose.result import AXES, UNKNOWN, Estimate, Finding
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 
 VERDICTS = ("matched", "explained", "partly_explained", "unexplained", "not_testable")
 CHANGED = 0.02

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import SensorFinding, checks, examine
-from ferryid.diagnose.velocity import steadied
+from ferryid.diagnose.data.complementary_filter import steadied
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored

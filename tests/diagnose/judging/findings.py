@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ferryid.diagnose.result import Estimate, Finding
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.finding import Finding
 
 SOME = {"value": Estimate(1.0, 0.8, 1.2, "-")}
 

@@ -7,6 +7,7 @@ from math import inf, nextafter
 
 import pytest
 
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.confidence_rules import (
     RULES,
     STRONG,
@@ -37,7 +38,7 @@ from ferryid.diagnose.judging.confidence_rules import (
     unexplained_shares,
     worse_on_an_axis,
 )
-from ferryid.diagnose.result import HINT, UNKNOWN, Estimate, Finding, LawTerm
+from ferryid.diagnose.judging.finding import HINT, UNKNOWN, Finding, LawTerm
 from tests.diagnose.judging.findings import found
 
 

@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ferryid.diagnose.data.estimate import AXES, Estimate
 from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.verdict import (
     CHANGED,
     MUCH,
@@ -21,7 +23,6 @@ from ferryid.diagnose.judging.verdict import (
     verdict_of,
     worse_axes,
 )
-from ferryid.diagnose.result import AXES, UNKNOWN, Estimate, Finding
 from ferryid.report.diagnosis_words import headline, summary, title
 from tests.diagnose.judging.findings import found
 
