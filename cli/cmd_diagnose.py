@@ -35,7 +35,7 @@ def command(
     json: Json = None,
 ) -> None:
     """Say which physics a model left out of a recording, and what shows it."""
-    from ferryid.diagnose.pipeline import DiagnosisSettings
+    from ferryid.diagnose import DiagnosisSettings
     from ferryid.report.diagnosis_report import diagnose_and_report, patient
 
     profile, examined = patient(vessel, model, out)

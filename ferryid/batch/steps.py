@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.batch.recipe import Recipe
-from ferryid.diagnose.pipeline import DiagnosisSettings
+from ferryid.diagnose import DiagnosisSettings
 from ferryid.files import dump_json, write_text
 from ferryid.identify.evaluate import evaluate
 from ferryid.identify.kept_pieces import kept

@@ -9,13 +9,13 @@ from pathlib import Path
 from ferryid.diagnose.checks.screening import screen_sensors
 from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline, SimulationBaseline
-from ferryid.diagnose.inference.campaign import together as joint_hull
-from ferryid.diagnose.inference.simulation_baseline import learn
+from ferryid.diagnose.inference.campaign import fit_campaign
+from ferryid.diagnose.inference.simulation_baseline import learn_simulation
 from ferryid.diagnose.inference.stages import Baseline, average, estimate, select
 from ferryid.diagnose.judging.conclude import conclude
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.judge import judge
-from ferryid.diagnose.judging.model_update import keep
+from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.identify.store import checked_name
@@ -96,7 +96,7 @@ def diagnose_campaign(
     screened = [screen_sensors(log, progress) for log in measured]
     averaged = [average(log) for log in screened]
     if baseline is None:
-        baseline = CampaignBaseline(profile, joint_hull(averaged, profile, progress))
+        baseline = CampaignBaseline(profile, fit_campaign(averaged, profile, progress))
     estimated = [estimate(log, baseline) for log in averaged if log.long_enough]
     selected = [select(log, progress) for log in estimated]
     judged = judge(selected, progress)
@@ -129,7 +129,9 @@ def diagnose(
     chosen.check()
     baseline: Baseline | None = None if chosen.together else HullBaseline(profile, chosen.model)
     if chosen.against is not None:
-        baseline = SimulationBaseline(learn(chosen.against, profile, tables, verify=chosen.verify, progress=progress))
+        baseline = SimulationBaseline(
+            learn_simulation(chosen.against, profile, tables, verify=chosen.verify, progress=progress)
+        )
     return tuple(
         diagnosis
         for campaign in ([logs] if chosen.together else [[log] for log in logs])
@@ -167,4 +169,4 @@ def diagnose_and_store(
     if name:
         checked_name(name)
     found = diagnose(logs, profile, tables, chosen, progress=progress)
-    return keep(found, profile, chosen.model, out, name=name)
+    return store_updated_model(found, profile, chosen.model, out, name=name)

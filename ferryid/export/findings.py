@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.judging.diagnosis import SCHEMA
-from ferryid.diagnose.judging.finding import HINT
+from ferryid.diagnose import HINT, SCHEMA
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.errors import FerryIdError

@@ -53,8 +53,7 @@ def diagnosed(log: Path, profile: Path, out: Path) -> dict[str, Any]:
     UnwritableError
         Where the model could not be written.
     """
-    from ferryid.diagnose.judging.diagnosis import to_json
-    from ferryid.diagnose.pipeline import diagnose_and_store
+    from ferryid.diagnose import diagnose_and_store, to_json
     from ferryid.vessel import load_profile
 
     start = time.perf_counter()
@@ -118,7 +117,7 @@ def main(diagnosis: Callable[[Path, Path, Path], dict[str, Any]] = diagnosed) ->
     hook = Hook(Rooms(python.reads, (*python.writes, rooms["temporary"])))
     _answer(answers, {"guard": "landlock+audit" if kernel else "audit", "sources": stamp})
 
-    from ferryid.diagnose.parallel import keep_to_one_thread
+    from ferryid.diagnose import keep_to_one_thread
     from ferryid.files import finite
 
     keep_to_one_thread()

@@ -8,7 +8,7 @@ from typing import Any
 
 from scipy.stats import beta
 
-from ferryid.diagnose.judging.finding import HINT
+from ferryid.diagnose import HINT
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 

@@ -17,13 +17,15 @@ from typing import Any
 
 from scipy.stats import chi2
 
-from ferryid.diagnose.checks import resteadied
-from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.data.measurements import scene_of, window_lengths
-from ferryid.diagnose.inference.estimation import Suspect, Trial, trial_of
-from ferryid.diagnose.inference.prior import plain_picture
-from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
-from ferryid.diagnose.inference.weak_form import Windows, windows
+from ferryid.diagnose import Estimate
+from ferryid.diagnose.checks import refilter_velocity as resteadied
+from ferryid.diagnose.data import read_measurements as scene_of
+from ferryid.diagnose.data import window_lengths
+from ferryid.diagnose.inference import FEWEST_WINDOWS, Windows, windows
+from ferryid.diagnose.inference import Candidate as Suspect
+from ferryid.diagnose.inference import EstimationProblem as Trial
+from ferryid.diagnose.inference import estimation_problem as trial_of
+from ferryid.diagnose.inference import prior_force_model as plain_picture
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError, did_you_mean

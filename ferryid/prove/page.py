@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.data.estimate import AXES
+from ferryid.diagnose import AXES
 from ferryid.prove.conceal import HIDINGS
 from ferryid.prove.curves import Curve
 from ferryid.prove.draw import KINDS, cells

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binom
 
-from ferryid.diagnose.data.estimate import AXES
+from ferryid.diagnose import AXES
 from ferryid.prove.names import Line, Share, key_of, named, names, truths, wrong
 
 KEPT = 0.8

@@ -12,12 +12,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial, fit, imagined, settled
-from ferryid.diagnose.inference.noise_model import Filter, learn_with, likelihood
-from ferryid.diagnose.inference.profile_likelihood import intervals
-from ferryid.diagnose.inference.search import void
-from ferryid.diagnose.inference.stochastic_disturbance import BANDS, STRENGTHS, State
+from ferryid.diagnose import Estimate
+from ferryid.diagnose.inference import BANDS, STRENGTHS, Fit, fit, intervals, likelihood
+from ferryid.diagnose.inference import Candidate as Suspect
+from ferryid.diagnose.inference import DisturbanceState as State
+from ferryid.diagnose.inference import EstimationProblem as Trial
+from ferryid.diagnose.inference import NoiseModel as Filter
+from ferryid.diagnose.inference import choose_parameters as settled
+from ferryid.diagnose.inference import fit_noise_with as learn_with
+from ferryid.diagnose.inference import fitted_force_model as imagined
+from ferryid.diagnose.inference import is_negligible as void
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD, Processes
 from ferryid.effects.picture import Picture
@@ -133,7 +137,7 @@ def _modelled(
     states: tuple[State, ...] = ()
     if near is not None and unsteady:
         keys = {one.key for one in unsteady}
-        states = tuple(state for state in near.states if state.suspect.key in keys)
+        states = tuple(state for state in near.states if state.candidate.key in keys)
         trial = replace(trial, filter=Filter(near.trial.filter.channels))
     # As long as the fit still moves much, a glimpse is enough.
     for worth in (*(GLIMPSES * (np.inf,)), -np.inf) if unsteady else ():
@@ -172,14 +176,14 @@ def _shaken(
     """Return the trial with unsteady effects in its filter that are likeliest beside a fit, and these.
 
     One after the other they are learnt together with each channel's own noise, the others as they are `near`; `worth` as in
-    `ferryid.diagnose.inference.noise_model.learn_with`.
+    `ferryid.diagnose.inference.noise_model.fit_noise_with`.
     """
     picture = imagined(trial.plain, made)
     within = picture if pushing is None else pushing
     steps = trial.excerpt
     gaps = steps.gap(picture)
-    states = {state.suspect.key: state for state in near}
-    pushes = {suspect.key: _pushes(suspect, within) for suspect in (*unsteady, *(state.suspect for state in near))}
+    states = {state.candidate.key: state for state in near}
+    pushes = {suspect.key: _pushes(suspect, within) for suspect in (*unsteady, *(state.candidate for state in near))}
     noise = trial.filter
     for suspect in unsteady:
         others = tuple(one for key, state in states.items() if key != suspect.key for one in pushes[key](state.values))
@@ -196,7 +200,7 @@ def _shaken(
     plain = calm
     for state in states.values():
         # On average, too, they may do something.
-        plain = state.suspect.act(plain, state.values)
+        plain = state.candidate.act(plain, state.values)
     return replace(trial, filter=noise, plain=plain), tuple(states.values())
 
 
@@ -219,8 +223,8 @@ def _places(suspect: Suspect) -> list[Floats]:
 
 def _weighed(trial: Trial, full: _Model, suspect: Suspect) -> Weighed:
     """Return what one effect of a hypothesis gains, added last."""
-    others = [one for one in full.fit.suspects if one.key != suspect.key]
-    shaking = [state.suspect for state in full.states if state.suspect.key != suspect.key]
+    others = [one for one in full.fit.candidates if one.key != suspect.key]
+    shaking = [state.candidate for state in full.states if state.candidate.key != suspect.key]
     untold = suspect.effect.untold(trial.plain.scene, suspect.start)
     free = sum(one.size > HELD and one.name not in untold for one in suspect.parameters)
     # Without the wind that they are one of, gusts push as they did about it.
@@ -228,11 +232,11 @@ def _weighed(trial: Trial, full: _Model, suspect: Suspect) -> Weighed:
     rest = _modelled(trial, others, shaking, imagined(full.trial.plain, full.fit) if blown else None, full)
     if suspect.effect.unsteady is not None:
         gain = _likelihood(full, rest) - _likelihood(rest)
-        parameters = next(state.estimates for state in full.states if state.suspect.key == suspect.key)
+        parameters = next(state.estimates for state in full.states if state.candidate.key == suspect.key)
         idle = False
     else:
         gain = _likelihood(full, rest) - _likelihood(rest, full)
-        index = [one.key for one in full.fit.suspects].index(suspect.key)
+        index = [one.key for one in full.fit.candidates].index(suspect.key)
         parameters = _estimates(full, index)
         idle = void(full.trial, full.fit, index)
     return Weighed(max(gain, 0.0), free, parameters, idle)
@@ -242,7 +246,7 @@ def _likelihood(model: _Model, other: _Model | None = None) -> float:
     """Return the logarithm of the likelihood of a hypothesis, under the noise of another one if that is likelier."""
     best = _log_likelihood(model.trial, model.fit)
     if other is not None:
-        again = fit(other.trial, model.fit.suspects, model.fit.values)
+        again = fit(other.trial, model.fit.candidates, model.fit.values)
         best = max(best, _log_likelihood(other.trial, again))
     return best
 
@@ -250,17 +254,17 @@ def _likelihood(model: _Model, other: _Model | None = None) -> float:
 def _log_likelihood(trial: Trial, made: Fit) -> float:
     left, free = trial.white(imagined(trial.plain, made)), trial.hull_spread > 0.0
     away = (made.hull - trial.plain.hull)[free] / trial.hull_spread[free]
-    return -0.5 * float(left @ left + away @ away) - trial.sieve.log_scale
+    return -0.5 * float(left @ left + away @ away) - trial.whitening_filter.log_scale
 
 
 def _estimates(model: _Model, index: int) -> dict[str, Estimate]:
     """Return the parameters of a steady effect with intervals as a diagnosis tells them, those that the log tells."""
-    suspect, values = model.fit.suspects[index], model.fit.values[index]
+    suspect, values = model.fit.candidates[index], model.fit.values[index]
     followed = intervals(model.trial, model.fit, index) if suspect.effect.ridge and not suspect.times else {}
     untold = suspect.effect.untold(model.trial.plain.scene, values)
     found = {}
     for one, value, error in zip(
-        suspect.parameters, values.tolist(), model.fit.told_errors(index).tolist(), strict=True
+        suspect.parameters, values.tolist(), model.fit.reported_errors(index).tolist(), strict=True
     ):
         if one.size <= HELD or one.name in untold:
             continue

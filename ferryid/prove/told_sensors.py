@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
+from ferryid.diagnose import Estimate
 from ferryid.diagnose.checks import azimuth_resolution, heading_bias, velocity_scale, yaw_rate_scale
 from ferryid.diagnose.checks.azimuth_resolution import corrected as straightened
 from ferryid.diagnose.checks.azimuth_resolution import error_of, estimate, off_grid, step_of
@@ -17,7 +18,6 @@ from ferryid.diagnose.checks.kinematics import ANGLE, NEUTRAL, SCALE, Kinematics
 from ferryid.diagnose.checks.lever_arm import least_m
 from ferryid.diagnose.checks.yaw_rate_scale import compared
 from ferryid.diagnose.checks.yaw_rate_scale import corrected as rescaled
-from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.picture import Scene
 from ferryid.vessel.frames import to_world
 

@@ -12,10 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.judging.diagnosis import Diagnosis
-from ferryid.diagnose.judging.error_profiles import Profiled
-from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose import AXES, Diagnosis, Finding, Profiled
 from ferryid.report.figures import (
     BASE,
     MEASURED,

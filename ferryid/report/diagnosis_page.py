@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.judging.diagnosis import Diagnosis
-from ferryid.diagnose.judging.finding import Finding
-from ferryid.diagnose.judging.verdict import campaign_verdict
+from ferryid.diagnose import AXES, Diagnosis, Finding, campaign_verdict
 from ferryid.identify.result import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
 from ferryid.report.figures import Floats

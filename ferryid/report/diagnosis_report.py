@@ -12,10 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid import __version__
-from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, to_json
-from ferryid.diagnose.judging.verdict import campaign_verdict
-from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose_and_store
+from ferryid.diagnose import AXES, SCHEMA, Diagnosis, DiagnosisSettings, campaign_verdict, diagnose_and_store, to_json
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
 from ferryid.identify.model import Model

@@ -7,10 +7,7 @@ from math import exp, isfinite, log
 from pathlib import PurePath
 from typing import Any
 
-from ferryid.diagnose.data.estimate import AXES, Estimate
-from ferryid.diagnose.judging.diagnosis import Diagnosis
-from ferryid.diagnose.judging.finding import NEAR, UNKNOWN, Finding
-from ferryid.diagnose.judging.verdict import CHANGED, error_ratio, worse_axes
+from ferryid.diagnose import AXES, CHANGED, NEAR, UNKNOWN, Diagnosis, Estimate, Finding, error_ratio, worse_axes
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS
 from ferryid.effects.wording import listed, timed, titled

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from ferryid.diagnose.checks.screening import screen_sensors
-from ferryid.diagnose.data.measurements import measure_log, scene_of, window_lengths
-from ferryid.diagnose.inference.estimation import Trial, trial_of
-from ferryid.diagnose.inference.prior import plain_picture
+from ferryid.diagnose.data.measurements import measure_log, read_measurements, window_lengths
+from ferryid.diagnose.inference.estimation import EstimationProblem, estimation_problem
+from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects.picture import Scene
@@ -36,7 +36,7 @@ def sailed(folder: Path, name: str, scenario: str, seed: int) -> Scene:
     """Simulate a scenario, TOML without a true hull, and return the scene that its log shows."""
     log = folder / f"{name}.mcap"
     write_log(simulate(replace(parse_scenario(scenario, name), true_hull=OFF), seed), log)
-    return scene_of(str(log), FERRY, None)[0]
+    return read_measurements(str(log), FERRY, None)[0]
 
 
 def averaged(paths: Sequence[str], vessel: Profile, withhold: Sequence[str] = ()) -> list[AveragedLog]:
@@ -51,7 +51,7 @@ def averaged(paths: Sequence[str], vessel: Profile, withhold: Sequence[str] = ()
     ]
 
 
-def trial_on(scene: Scene) -> Trial:
+def trial_on(scene: Scene) -> EstimationProblem:
     """Return a scene ready for hypotheses."""
     seen = windows(scene, *window_lengths(FERRY))
-    return trial_of(seen, *plain_picture(seen.scene, FERRY))
+    return estimation_problem(seen, *prior_force_model(seen.scene, FERRY))

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.measurements import scene_of, window_lengths
-from ferryid.diagnose.inference.estimation import trial_of
-from ferryid.diagnose.inference.prior import plain_picture
+from ferryid.diagnose.data.measurements import read_measurements as scene_of
+from ferryid.diagnose.data.measurements import window_lengths
+from ferryid.diagnose.inference.estimation import estimation_problem as trial_of
+from ferryid.diagnose.inference.prior import prior_force_model as plain_picture
 from ferryid.diagnose.inference.search import Search, search
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects

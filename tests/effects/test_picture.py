@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Suspect, acted
+from ferryid.diagnose.inference.estimation import Candidate as Suspect
+from ferryid.diagnose.inference.estimation import apply_candidates as acted
 from ferryid.effects import effects
 from ferryid.effects.picture import (
     COEFFICIENTS,

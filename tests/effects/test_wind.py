@@ -7,7 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Suspect, fit, settled, trial_of
+from ferryid.diagnose.inference.estimation import Candidate as Suspect
+from ferryid.diagnose.inference.estimation import choose_parameters as settled
+from ferryid.diagnose.inference.estimation import estimation_problem as trial_of
+from ferryid.diagnose.inference.estimation import fit
 from ferryid.effects import effects
 from ferryid.effects.wind import SPEEDS_MPS
 from tests.diagnose.judging.test_unexplained import FERRY, pushes, trial_with

@@ -12,7 +12,7 @@ import pandas as pd
 from rosbags.highlevel import AnyReader
 
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.data.measurements import scene_of
+from ferryid.diagnose.data.measurements import read_measurements
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
@@ -136,7 +136,7 @@ def osaka() -> str:
         pictures.course(true, random.names, (3, 4, 5)), encoding="utf-8"
     )
     profile = load_profile("esso-osaka")
-    lags = [witnesses.velocity_lag(scene_of(path, profile, None)[0]) for path in esso.logs("random")]
+    lags = [witnesses.velocity_lag(read_measurements(path, profile, None)[0]) for path in esso.logs("random")]
     (FOLDER / "diagnosis-esso-osaka-lag.svg").write_text(pictures.lag(lags, random.names), encoding="utf-8")
     seconds = [one.seconds for one in lags]
     by_log = dict(zip(random.names, seconds, strict=True))
@@ -254,7 +254,7 @@ def milliampere() -> str:
     """Return the section on the ferry with four thrusters."""
     folder = DATA / MILLIAMPERE
     profile = load_profile("milliampere-2025")
-    scene = scene_of(str(folder), profile, None)[0]
+    scene = read_measurements(str(folder), profile, None)[0]
     lag, gain = witnesses.velocity_lag(scene), witnesses.slow_gain(scene)
     at, offsets, used = witnesses.antenna(folder), witnesses.encoder_offsets(folder), witnesses.sectors(scene)
     sectors = "; ".join(f"{name} {low:.0f} to {high:.0f}" for name, (low, high) in zip(scene.names, used, strict=True))
@@ -391,7 +391,7 @@ def pool() -> str:
     ]
     steps, shown = [], None
     for log in logs:
-        scene = scene_of(log, profile, None)[0]
+        scene = read_measurements(log, profile, None)[0]
         steps.append(witnesses.position_steps(_poses(log)))
         told_ = witnesses.idle(scene)
         if told_ is not None:

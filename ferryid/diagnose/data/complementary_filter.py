@@ -18,7 +18,7 @@ SLOW_S = 5.0
 """Time over which the two are compared [s]."""
 
 
-def steadied(nu: Floats, nu_raw: Floats, eta: Floats, rate_hz: float, slow_s: float = SLOW_S) -> Floats:
+def complementary_filter(nu: Floats, nu_raw: Floats, eta: Floats, rate_hz: float, slow_s: float = SLOW_S) -> Floats:
     """Return `nu` with its slow errors replaced by those of the position, which are smaller; shape (n, 3).
 
     Parameters
@@ -37,12 +37,12 @@ def steadied(nu: Floats, nu_raw: Floats, eta: Floats, rate_hz: float, slow_s: fl
     rows = odd_rows(slow_s, rate_hz)
     if len(nu) < rows:
         return nu
-    apart = nu_raw - placed(eta, rate_hz)
+    apart = nu_raw - velocity_from_pose(eta, rate_hz)
     apart = np.where(np.isfinite(apart), apart, 0.0)
     return nu - steady_mean(apart, rows)
 
 
-def placed(eta: Floats, rate_hz: float) -> Floats:
+def velocity_from_pose(eta: Floats, rate_hz: float) -> Floats:
     """Return the velocities that positions and headings give [m/s, m/s, rad/s], shape (n, 3); NaN at the ends."""
     north, east, turn = (derivative(column, rate_hz) for column in eta.T)
     surge, sway = to_body(north, east, eta[:, 2])

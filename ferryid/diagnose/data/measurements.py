@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.data.complementary_filter import MEAN_S, steadied
+from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.pictured import bridged, pushes
@@ -89,15 +89,17 @@ def measure_log(
     verify: bool = False,
     progress: Callable[[str], None],
 ) -> MeasuredLog:
-    """Read and align a log; parameters and errors as of `scene_of`."""
-    return MeasuredLog(path, *scene_of(path, profile, out, withhold=withhold, verify=verify, progress=progress))
+    """Read and align a log; parameters and errors as of `read_measurements`."""
+    return MeasuredLog(
+        path, *read_measurements(path, profile, out, withhold=withhold, verify=verify, progress=progress)
+    )
 
 
 def quiet(_stage: str) -> None:
     """Show no progress."""
 
 
-def scene_of(
+def read_measurements(
     path: str,
     profile: Profile,
     out: Path | None,
@@ -226,7 +228,7 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         t=measured.t,
         eta=eta,
         nu_raw=nu_raw,
-        nu=steadied(steady_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
+        nu=complementary_filter(steady_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
         parts=parts,
         angles=angles,
         usable=usable,

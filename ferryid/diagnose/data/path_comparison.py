@@ -19,7 +19,7 @@ SAME_PATH = 0.5
 
 
 @dataclass(frozen=True)
-class Paths:
+class PathComparison:
     """Two logs of one manoeuvre, row by row.
 
     Attributes
@@ -39,7 +39,7 @@ class Paths:
     speed_mps: Floats
 
 
-def paths(simulated: Scene, recorded: Scene) -> Paths | str:
+def compare_paths(simulated: Scene, recorded: Scene) -> PathComparison | str:
     """Compare the paths of a simulation and a recording of one manoeuvre.
 
     The simulation's clock may have started up to `MOST_SHIFT_S` earlier or later.
@@ -74,7 +74,7 @@ def paths(simulated: Scene, recorded: Scene) -> Paths | str:
     both = np.isfinite(own).all(axis=1) & np.isfinite(other).all(axis=1)
     own, other, t = own[both], other[both], t[both]
     away = own - other
-    return Paths(shift, t, np.hypot(away[:, 0], away[:, 1]), wrap(away[:, 2]), away[:, 3])
+    return PathComparison(shift, t, np.hypot(away[:, 0], away[:, 1]), wrap(away[:, 2]), away[:, 3])
 
 
 def _sampled(scene: Scene, t: Floats) -> Floats:

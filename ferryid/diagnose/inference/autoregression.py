@@ -13,7 +13,7 @@ ORDER = 4
 
 
 @dataclass(frozen=True)
-class Noise:
+class AutoregressiveNoise:
     """Autoregression of every channel, coefficients (c, ORDER), and the inverse Cholesky factor of what it leaves (c, c)."""
 
     coefficients: Floats
@@ -45,7 +45,7 @@ class Noise:
         return np.asarray(mixed.reshape(-1, *gaps.shape[2:]))
 
 
-def noise_of(gaps: Floats, runs: tuple[tuple[int, int], ...]) -> Noise:
+def fit_autoregression(gaps: Floats, runs: tuple[tuple[int, int], ...]) -> AutoregressiveNoise:
     """Return the noise that gaps, shape (J, c), have if nothing but noise is in them."""
     c = gaps.shape[1]
     pairs = [(gaps[a:b], b - a) for a, b in runs if b - a > ORDER]
@@ -62,4 +62,4 @@ def noise_of(gaps: Floats, runs: tuple[tuple[int, int], ...]) -> Noise:
         left.append(now - past @ coefficients[channel])
     rest = np.column_stack(left)
     covariance = rest.T @ rest / len(rest)
-    return Noise(coefficients, np.linalg.inv(np.linalg.cholesky(covariance)))
+    return AutoregressiveNoise(coefficients, np.linalg.inv(np.linalg.cholesky(covariance)))

@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.data.path_comparison import Paths, paths
-from ferryid.diagnose.inference.campaign import Together
-from ferryid.diagnose.inference.estimation import Suspect
-from ferryid.diagnose.inference.prior import plain_picture
-from ferryid.diagnose.inference.search import suspects_of
+from ferryid.diagnose.data.path_comparison import PathComparison, compare_paths
+from ferryid.diagnose.inference.campaign import Campaign
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.search import list_candidates
 from ferryid.diagnose.inference.simulation_baseline import (
-    Simulated,
-    base_picture,
+    Simulation,
     difference_notes,
-    differing,
-    plain_against,
+    differing_candidates,
+    simulated_force_model,
+    simulation_as_json,
 )
 from ferryid.diagnose.inference.stages import AveragedLog, Expectation
 from ferryid.identify.model import Model
@@ -46,14 +46,14 @@ class HullBaseline:
         """Return the forces of the hull, in still air and water where none was measured."""
         seen = log.windows
         sha256 = log.screened.measured.survey.recording.sha256
-        return Expectation(*plain_picture(seen.scene, self.profile, self.model, sha256), _library(log))
+        return Expectation(*prior_force_model(seen.scene, self.profile, self.model, sha256), _library(log))
 
 
 @dataclass(frozen=True)
 class SimulationBaseline:
     """A simulation of the same trial, with what was learnt from its log."""
 
-    simulated: Simulated
+    simulated: Simulation
     joint: bool = False
     updates_model: bool = False
 
@@ -70,12 +70,12 @@ class SimulationBaseline:
     def expect(self, log: AveragedLog) -> Expectation:
         """Return the simulation's forces, with its own conditions as neutral values of the candidates."""
         scene, seen = log.screened.scene, log.windows
-        path_errors = paths(self.simulated.scene, scene)
-        shift_s = path_errors.shift_s if isinstance(path_errors, Paths) else 0.0
-        comparison = plain_against(self.simulated, path_errors)
+        path_errors = compare_paths(self.simulated.scene, scene)
+        shift_s = path_errors.shift_s if isinstance(path_errors, PathComparison) else 0.0
+        comparison = simulation_as_json(self.simulated, path_errors)
         return Expectation(
-            *base_picture(self.simulated, seen.scene, shift_s),
-            tuple(differing(self.simulated, seen.scene, shift_s)),
+            *simulated_force_model(self.simulated, seen.scene, shift_s),
+            tuple(differing_candidates(self.simulated, seen.scene, shift_s)),
             (comparison["says"], *difference_notes(self.simulated, scene)),
             comparison,
         )
@@ -86,7 +86,7 @@ class CampaignBaseline:
     """One hull for all logs of a campaign; each is compared with what the others say of it."""
 
     profile: Profile
-    campaign: Together
+    campaign: Campaign
     joint: bool = True
     updates_model: bool = False  # The lift of a common hull is in no model file.
 
@@ -102,10 +102,10 @@ class CampaignBaseline:
 
     def expect(self, log: AveragedLog) -> Expectation:
         """Return the forces of the hull that the other logs speak for."""
-        plain, _ = plain_picture(log.windows.scene, self.profile)
+        plain, _ = prior_force_model(log.windows.scene, self.profile)
         picture, spread = self.campaign.picture(log.path, plain)
         return Expectation(picture, spread, _library(log), (self.campaign.says(log.path),))
 
 
-def _library(log: AveragedLog) -> tuple[Suspect, ...]:
-    return tuple(suspects_of(log.windows.scene)[0])
+def _library(log: AveragedLog) -> tuple[Candidate, ...]:
+    return tuple(list_candidates(log.windows.scene)[0])

@@ -10,9 +10,9 @@ import numpy as np
 
 from ferryid.diagnose.data.measurements import dimensions
 from ferryid.diagnose.inference.autoregression import ORDER
-from ferryid.diagnose.inference.campaign_hull import INDUCED, Member, SharedHull, fit_together, induced_spread
-from ferryid.diagnose.inference.estimation import Suspect
-from ferryid.diagnose.inference.prior import plain_picture
+from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, Member, fit_campaign_hull, induced_spread
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
@@ -27,15 +27,15 @@ OWN = "wind"
 
 
 @dataclass(frozen=True)
-class Together:
+class Campaign:
     """Logs of one vessel and their common hull; `place` gives each path's place in it, for logs that have a say."""
 
     members: tuple[Member, ...]
-    hull: SharedHull
+    hull: CampaignHull
     place: Mapping[str, int]
 
     def picture(self, path: str, plain: Picture) -> tuple[Picture, Floats]:
-        """Return a log's picture with the hull that the other logs speak for, as `SharedHull.picture` does."""
+        """Return a log's picture with the hull that the other logs speak for, as `CampaignHull.picture` does."""
         return self.hull.picture(plain, self.place.get(path))
 
     def says(self, path: str) -> str:
@@ -54,7 +54,7 @@ class Together:
         )
 
 
-def together(logs: Sequence[AveragedLog], profile: Profile, progress: Callable[[str], None]) -> Together:
+def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callable[[str], None]) -> Campaign:
     """Fit one hull to all logs of a vessel, with a steady wind of its own to each that did not measure it.
 
     Parameters
@@ -78,9 +78,9 @@ def together(logs: Sequence[AveragedLog], profile: Profile, progress: Callable[[
         seen = log.windows
         if len(seen.starts) < FEWEST_WINDOWS or log.path in place:
             continue
-        plain, spread = plain_picture(seen.scene, profile)
+        plain, spread = prior_force_model(seen.scene, profile)
         place[log.path] = len(members)
-        members.append(Member(seen, plain, own_of(seen, profile)))
+        members.append(Member(seen, plain, own_candidates(seen, profile)))
         spreads.append(spread)
     if len(members) < 2:
         raise FerryIdError(
@@ -90,10 +90,10 @@ def together(logs: Sequence[AveragedLog], profile: Profile, progress: Callable[[
     progress(f"fitting one hull to {len(members)} logs")
     length, _, draught = dimensions(profile)
     induced_size = np.zeros(len(INDUCED)) if profile.hull.has_model else induced_spread(length, draught)
-    return Together(tuple(members), fit_together(members, np.max(spreads, axis=0), induced_size), place)
+    return Campaign(tuple(members), fit_campaign_hull(members, np.max(spreads, axis=0), induced_size), place)
 
 
-def own_of(seen: Windows, profile: Profile) -> tuple[Suspect, ...]:
+def own_candidates(seen: Windows, profile: Profile) -> tuple[Candidate, ...]:
     """Return what a log is given of its own while the hull is fitted to all."""
     effect = effects()[OWN]
-    return () if effect.cannot(seen.scene) else (Suspect(effect, None, effect.parameters_of(profile)),)
+    return () if effect.cannot(seen.scene) else (Candidate(effect, None, effect.parameters_of(profile)),)

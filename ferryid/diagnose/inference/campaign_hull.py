@@ -24,8 +24,8 @@ from itertools import product
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ferryid.diagnose.inference.autoregression import Noise, noise_of
-from ferryid.diagnose.inference.estimation import Suspect, acted
+from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
+from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.picture import COEFFICIENTS, Picture
@@ -46,11 +46,11 @@ class Member:
 
     windows: Windows
     plain: Picture
-    suspects: tuple[Suspect, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
 
 
 @dataclass(frozen=True)
-class SharedHull:
+class CampaignHull:
     """What several logs say of one hull.
 
     Attributes
@@ -79,7 +79,7 @@ class SharedHull:
     gradient: Floats
     values: tuple[tuple[Floats, ...], ...]
     errors: tuple[tuple[Floats, ...], ...]
-    noise: Noise
+    noise: AutoregressiveNoise
     gaps: tuple[Floats, ...]
 
     @property
@@ -123,15 +123,15 @@ class SharedHull:
         """Return a log's picture with the hull that is believed in, and the standard deviations of `COEFFICIENTS`.
 
         The induced drag is an external force at the measured motion. Standard deviations alone say less than the covariance
-        does: `suspect` keeps all of it.
+        does: `candidate` keeps all of it.
         """
         mean, covariance = self.belief(without)
         h = len(COEFFICIENTS)
         pictured = induced(replace(plain, hull=mean[:h]), mean[h:])
         return pictured, np.sqrt(np.diag(covariance))[:h]
 
-    def suspect(self, without: int | None = None) -> Suspect:
-        """Return the hull as a suspect with the whole covariance, for `ferryid.diagnose.inference.estimation.fit`.
+    def candidate(self, without: int | None = None) -> Candidate:
+        """Return the hull as a candidate with the whole covariance, for `ferryid.diagnose.inference.estimation.fit`.
 
         Its parameters are independent and of unit variance; a trial that holds it needs no spread of its own.
         """
@@ -145,7 +145,7 @@ class SharedHull:
 
         parameters = tuple(Parameter(name, "-", 1.0, -np.inf, np.inf) for name in self.names)
         effect = Effect("hull", "Hull", lambda profile: parameters, apply, _says, lambda values, instance: {})
-        return Suspect(effect, None, parameters)
+        return Candidate(effect, None, parameters)
 
 
 def _says(values: Values, instance: str | None) -> str:
@@ -167,7 +167,7 @@ def induced_spread(length_m: float, draught_m: float, water_density: float = 100
     return np.array([plate * length_m / 2.0, plate / 2.0])
 
 
-def fit_together(members: Sequence[Member], spread: Floats, induced_size: Floats) -> SharedHull:
+def fit_campaign_hull(members: Sequence[Member], spread: Floats, induced_size: Floats) -> CampaignHull:
     """Fit one hull to all logs, and to each the effects of its own.
 
     Parameters
@@ -184,13 +184,13 @@ def fit_together(members: Sequence[Member], spread: Floats, induced_size: Floats
     )
     z = np.zeros(len(joint.before))
     own = [np.zeros(0) for _ in members]
-    empty = [replace(member, suspects=()) for member in members]
+    empty = [replace(member, candidates=()) for member in members]
     bare = replace(joint, members=empty)
     noise = joint.noise(bare, z, own)
     for _ in range(ROUNDS):
         z, own_none = bare.solve(z, own, noise)
         noise = joint.noise(bare, z, own_none)
-    if any(member.suspects for member in members):
+    if any(member.candidates for member in members):
         own = [joint.start(i, z, noise) for i in range(len(members))]
         for _ in range(ROUNDS):
             z, own = joint.solve(z, own, noise)
@@ -198,7 +198,7 @@ def fit_together(members: Sequence[Member], spread: Floats, induced_size: Floats
     return joint.result(z, own, noise)
 
 
-def left_over(member: Member, hull: SharedHull, place: int) -> Floats:
+def residual_gaps(member: Member, hull: CampaignHull, place: int) -> Floats:
     """Return the gaps that are left in some windows of a log, shape (J, c), with its hull and effects fitted elsewhere.
 
     Parameters
@@ -211,7 +211,7 @@ def left_over(member: Member, hull: SharedHull, place: int) -> Floats:
     h = len(COEFFICIENTS)
     mean = hull.before + hull.spread * hull.step
     picture = induced(replace(member.plain, hull=mean[:h]), mean[h:])
-    return member.windows.gap(acted(picture, member.suspects, hull.values[place]))
+    return member.windows.gap(apply_candidates(picture, member.candidates, hull.values[place]))
 
 
 @dataclass(frozen=True)
@@ -226,28 +226,28 @@ class _Joint:
         member, h = self.members[i], len(COEFFICIENTS)
         hull = self.before + self.spread * z
         picture = induced(replace(member.plain, hull=hull[:h]), hull[h:])
-        return member.windows.gap(acted(picture, member.suspects, self.values(i, own)))
+        return member.windows.gap(apply_candidates(picture, member.candidates, self.values(i, own)))
 
     def values(self, i: int, own: Floats) -> tuple[Floats, ...]:
         found, first = [], 0
-        for suspect in self.members[i].suspects:
-            q = len(suspect.parameters)
-            limits = np.array([(p.neutral, p.size, p.low, p.high) for p in suspect.parameters])
+        for candidate in self.members[i].candidates:
+            q = len(candidate.parameters)
+            limits = np.array([(p.neutral, p.size, p.low, p.high) for p in candidate.parameters])
             found.append(np.clip(limits[:, 0] + limits[:, 1] * own[first : first + q], limits[:, 2], limits[:, 3]))
             first += q
         return tuple(found)
 
-    def noise(self, joint: _Joint, z: Floats, own: Sequence[Floats]) -> Noise:
+    def noise(self, joint: _Joint, z: Floats, own: Sequence[Floats]) -> AutoregressiveNoise:
         gaps, runs, count = [], [], 0
         for i, member in enumerate(joint.members):
             gaps.append(joint.gap(i, z, own[i]))
             runs += [(first + count, end + count) for first, end in member.windows.runs]
             count += len(member.windows.starts)
-        return noise_of(np.vstack(gaps), tuple(runs))
+        return fit_autoregression(np.vstack(gaps), tuple(runs))
 
-    def start(self, i: int, z: Floats, noise: Noise) -> Floats:
+    def start(self, i: int, z: Floats, noise: AutoregressiveNoise) -> Floats:
         """Return where to begin with a log's own effects: what explains most beside a hull that may move."""
-        q = sum(len(suspect.parameters) for suspect in self.members[i].suspects)
+        q = sum(len(candidate.parameters) for candidate in self.members[i].candidates)
         around = product((-1.0, 0.0, 1.0), repeat=q) if q <= 3 else [*np.eye(q).tolist(), *(-np.eye(q)).tolist()]
         tried = [START * np.array(one) for one in around]
         J = self.by_hull(i, z, tried[0], noise)
@@ -259,10 +259,10 @@ class _Joint:
             cost.append(float(w @ w + own @ own - g @ cho_solve(factor, g)))
         return tried[int(np.argmin(cost))]
 
-    def white(self, i: int, z: Floats, own: Floats, noise: Noise) -> Floats:
+    def white(self, i: int, z: Floats, own: Floats, noise: AutoregressiveNoise) -> Floats:
         return noise.white(self.gap(i, z, own), self.members[i].windows.runs)
 
-    def by_hull(self, i: int, z: Floats, own: Floats, noise: Noise) -> Floats:
+    def by_hull(self, i: int, z: Floats, own: Floats, noise: AutoregressiveNoise) -> Floats:
         """Return the derivatives of the whitened gaps of a log by the hull, shape (w, h)."""
         w = self.white(i, z, own, noise)
         J = np.zeros((len(w), len(z)))
@@ -272,7 +272,7 @@ class _Joint:
             J[:, k] = (self.white(i, moved, own, noise) - w) / TINY
         return J
 
-    def by_own(self, i: int, z: Floats, own: Floats, noise: Noise) -> tuple[Floats, Floats]:
+    def by_own(self, i: int, z: Floats, own: Floats, noise: AutoregressiveNoise) -> tuple[Floats, Floats]:
         """Return the whitened gaps of a log and their derivatives by its own effects, shapes (w,) and (w, q)."""
         w = self.white(i, z, own, noise)
         J = np.empty((len(w), len(own)))
@@ -282,7 +282,7 @@ class _Joint:
             J[:, k] = (self.white(i, z, moved, noise) - w) / TINY
         return w, J
 
-    def solve(self, z: Floats, own: Sequence[Floats], noise: Noise) -> tuple[Floats, list[Floats]]:
+    def solve(self, z: Floats, own: Sequence[Floats], noise: AutoregressiveNoise) -> tuple[Floats, list[Floats]]:
         """Return better values by Gauss-Newton steps."""
         now = list(own)
         cost = self._cost(z, now, noise)
@@ -307,11 +307,11 @@ class _Joint:
                 break
         return z, now
 
-    def _cost(self, z: Floats, own: Sequence[Floats], noise: Noise) -> float:
+    def _cost(self, z: Floats, own: Sequence[Floats], noise: AutoregressiveNoise) -> float:
         logs = (float(np.sum(self.white(i, z, mine, noise) ** 2) + mine @ mine) for i, mine in enumerate(own))
         return float(z @ z) + sum(logs)
 
-    def _part(self, i: int, z: Floats, own: Floats, noise: Noise, Jh: Floats) -> _Part:
+    def _part(self, i: int, z: Floats, own: Floats, noise: AutoregressiveNoise, Jh: Floats) -> _Part:
         w, Jq = self.by_own(i, z, own, noise)
         H, g = Jh.T @ Jh, Jh.T @ w
         if len(own) == 0:
@@ -320,16 +320,16 @@ class _Joint:
         factor = cho_factor(Q)
         return _Part(H - cross.T @ cho_solve(factor, cross), g - cross.T @ cho_solve(factor, gq), Q, cross, gq)
 
-    def result(self, z: Floats, own: Sequence[Floats], noise: Noise) -> SharedHull:
+    def result(self, z: Floats, own: Sequence[Floats], noise: AutoregressiveNoise) -> CampaignHull:
         parts = [self._part(i, z, mine, noise, self.by_hull(i, z, mine, noise)) for i, mine in enumerate(own)]
         normal = np.stack([part.normal for part in parts])
         A = np.eye(len(z)) + normal.sum(axis=0)
         errors = []
         for member, part in zip(self.members, parts, strict=True):
-            size = np.array([p.size for suspect in member.suspects for p in suspect.parameters])
-            cuts = np.cumsum([len(suspect.parameters) for suspect in member.suspects])[:-1].tolist()
-            errors.append(tuple(np.split(size * part.own_errors(A), cuts)) if member.suspects else ())
-        return SharedHull(
+            size = np.array([p.size for candidate in member.candidates for p in candidate.parameters])
+            cuts = np.cumsum([len(candidate.parameters) for candidate in member.candidates])[:-1].tolist()
+            errors.append(tuple(np.split(size * part.own_errors(A), cuts)) if member.candidates else ())
+        return CampaignHull(
             names=(*COEFFICIENTS, *INDUCED),
             before=self.before,
             spread=self.spread,

@@ -18,7 +18,7 @@ ACTS = 0.25
 """An interval acts whose mean excess is more than this part of the strongest one's."""
 
 
-def acting(
+def active_intervals(
     times: Floats, strength: Floats, reach_s: float, whole: tuple[float, float], *, steady: bool = False
 ) -> tuple[tuple[float, float], ...]:
     """Return the intervals [s] in which a strength's mean is large, by binary segmentation at changes of its mean.

@@ -9,8 +9,14 @@ from math import inf, isfinite, log
 
 import numpy as np
 
-from ferryid.diagnose.inference.autoregression import Noise, noise_of
-from ferryid.diagnose.inference.noise_model import Filter, Sieve, excerpt, learn, sieve_of
+from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
+from ferryid.diagnose.inference.noise_model import (
+    NoiseModel,
+    WhiteningFilter,
+    excerpt,
+    fit_noise,
+    make_whitening_filter,
+)
 from ferryid.diagnose.inference.weak_form import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.picture import Picture
@@ -37,7 +43,7 @@ TRUST = 4.0
 
 
 @dataclass(frozen=True)
-class Suspect:
+class Candidate:
     """An effect in one instance; `doubt` as in `ferryid.effects.effect.Choice`.
 
     It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end).
@@ -55,8 +61,8 @@ class Suspect:
         """Which of the two ends of its span lie within the log."""
         return (*(("onset_s",) if self.onset_s > 0.0 else ()), *(("offset_s",) if isfinite(self.offset_s) else ()))
 
-    def moved(self, end: str, time_s: float) -> Suspect:
-        """Return the suspect with one of its `times` elsewhere."""
+    def moved(self, end: str, time_s: float) -> Candidate:
+        """Return the candidate with one of its `times` elsewhere."""
         return replace(self, onset_s=time_s) if end == "onset_s" else replace(self, offset_s=time_s)
 
     @property
@@ -85,10 +91,10 @@ class Fit:
 
     Attributes
     ----------
-    suspects
+    candidates
         What it holds responsible.
     values
-        Parameters of each suspect, in its own units.
+        Parameters of each candidate, in its own units.
     spread
         Covariance of all of them together, in their own units, in the same order, shape (q, q).
     hull
@@ -98,7 +104,7 @@ class Fit:
         windows each onset and offset was chosen from.
     """
 
-    suspects: tuple[Suspect, ...]
+    candidates: tuple[Candidate, ...]
     values: tuple[Floats, ...]
     spread: Floats
     hull: Floats
@@ -107,28 +113,28 @@ class Fit:
     @property
     def keys(self) -> frozenset[tuple[str, str | None]]:
         """Effects and instances."""
-        return frozenset(suspect.key for suspect in self.suspects)
+        return frozenset(candidate.key for candidate in self.candidates)
 
     def errors(self, index: int) -> Floats:
-        """Return the posterior's standard deviations of one suspect's parameters."""
+        """Return the posterior's standard deviations of one candidate's parameters."""
         first = sum(len(values) for values in self.values[:index])
         return np.sqrt(np.diag(self.spread)[first : first + len(self.values[index])])
 
-    def told_errors(self, index: int) -> Floats:
+    def reported_errors(self, index: int) -> Floats:
         """Return the standard deviations that are told: `WIDER`, and with what no log tells of an effect's size.
 
         That is its formula (``form``), and what hull or instruments may be off anyway (``idle``, about a 95 % interval). A
         place has no size.
         """
-        suspect, values = self.suspects[index], self.values[index]
-        sized = np.array([one.unit == suspect.parameters[0].unit for one in suspect.parameters])
-        away = values - np.array([one.neutral for one in suspect.parameters])
-        beyond = np.where(sized, np.hypot(suspect.effect.form * away, 0.5 * suspect.effect.idle), 0.0)
+        candidate, values = self.candidates[index], self.values[index]
+        sized = np.array([one.unit == candidate.parameters[0].unit for one in candidate.parameters])
+        away = values - np.array([one.neutral for one in candidate.parameters])
+        beyond = np.where(sized, np.hypot(candidate.effect.form * away, 0.5 * candidate.effect.idle), 0.0)
         return np.hypot(WIDER * self.errors(index), beyond)
 
 
 @dataclass(frozen=True)
-class Trial:
+class EstimationProblem:
     """All that hypotheses about one log share.
 
     Attributes
@@ -147,9 +153,9 @@ class Trial:
 
     windows: Windows
     plain: Picture
-    noise: Noise
+    noise: AutoregressiveNoise
     hull_spread: Floats
-    filter: Filter
+    filter: NoiseModel
 
     @cached_property
     def steps(self) -> Windows:
@@ -162,9 +168,9 @@ class Trial:
         return excerpt(self.steps)
 
     @cached_property
-    def sieve(self) -> Sieve:
+    def whitening_filter(self) -> WhiteningFilter:
         """The filter, ready for the steps."""
-        return sieve_of(self.filter, self.steps)
+        return make_whitening_filter(self.filter, self.steps)
 
     @cached_property
     def by_hull(self) -> Floats:
@@ -180,44 +186,44 @@ class Trial:
         every = np.zeros((self.steps.measured[:, self.steps.channels].size, len(self.hull_spread)))
         if free.size:
             moves = MOVED * self.hull_spread[free]
-            every[:, free] = self.sieve.white(self.steps.hull_changes(picture, free, moves) / MOVED)
+            every[:, free] = self.whitening_filter.white(self.steps.hull_changes(picture, free, moves) / MOVED)
         return every
 
     def white(self, picture: Picture) -> Floats:
         """Return the whitened prediction errors of a picture, flat."""
-        return self.sieve.white(self.steps.gap(picture))
+        return self.whitening_filter.white(self.steps.gap(picture))
 
-    def with_noise_of(self, made: Fit) -> Trial:
+    def with_noise_of(self, made: Fit) -> EstimationProblem:
         """Return the trial with the noise that a fit leaves; a filter that has shared disturbances stays as it is."""
-        picture = imagined(self.plain, made)
-        own = self.filter if self.filter.processes else learn(self.excerpt, self.excerpt.gap(picture), self.filter)
-        return replace(self, noise=noise_of(self.windows.gap(picture), self.windows.runs), filter=own)
+        picture = fitted_force_model(self.plain, made)
+        own = self.filter if self.filter.processes else fit_noise(self.excerpt, self.excerpt.gap(picture), self.filter)
+        return replace(self, noise=fit_autoregression(self.windows.gap(picture), self.windows.runs), filter=own)
 
-    def part(self, windows: Windows) -> Trial:
+    def part(self, windows: Windows) -> EstimationProblem:
         """Return the trial of some of its windows, with the same noise."""
         return replace(self, windows=windows)
 
 
 @dataclass(frozen=True)
-class Near:
-    """A hull to begin with, shape (26,), and the prediction errors' derivatives by it, as of `Trial.hull_slopes`."""
+class StartingPoint:
+    """A hull to begin with, shape (26,), and the prediction errors' derivatives by it (`EstimationProblem.hull_slopes`)."""
 
     hull: Floats
     by_hull: Floats
 
 
-def near(trial: Trial, made: Fit) -> Near:
+def starting_point(problem: EstimationProblem, made: Fit) -> StartingPoint:
     """Return where to begin a fit that is not far from another."""
-    return Near(made.hull, trial.hull_slopes(imagined(trial.plain, made)))
+    return StartingPoint(made.hull, problem.hull_slopes(fitted_force_model(problem.plain, made)))
 
 
 def fit(
-    trial: Trial,
-    suspects: Sequence[Suspect],
+    problem: EstimationProblem,
+    candidates: Sequence[Candidate],
     start: Sequence[Floats] | None = None,
     *,
     steps: int = STEPS,
-    begin: Near | None = None,
+    begin: StartingPoint | None = None,
 ) -> Fit:
     """Fit a hypothesis by Gauss-Newton steps on the posterior.
 
@@ -226,48 +232,48 @@ def fit(
 
     Parameters
     ----------
-    trial
-        From `trial_of`.
-    suspects
+    problem
+        From `estimation_problem`.
+    candidates
         Effects, in the order in which they act.
     start
-        Parameters to begin with; the suspects' own where None.
+        Parameters to begin with; the candidates' own where None.
     steps
         Most Gauss-Newton steps; with 0 the spread is that at the start.
     begin
         The hull to begin with; the profile's where None.
     """
-    every = [parameter for suspect in suspects for parameter in suspect.parameters]
+    every = [parameter for candidate in candidates for parameter in candidate.parameters]
     size = np.array([parameter.size for parameter in every])
     neutral = np.array([parameter.neutral for parameter in every])
     low = (np.array([parameter.low for parameter in every]) - neutral) / size if every else np.empty(0)
     high = (np.array([parameter.high for parameter in every]) - neutral) / size if every else np.empty(0)
-    cuts = np.cumsum([len(suspect.parameters) for suspect in suspects])[:-1].tolist()
-    q, h = len(every), len(trial.hull_spread)
+    cuts = np.cumsum([len(candidate.parameters) for candidate in candidates])[:-1].tolist()
+    q, h = len(every), len(problem.hull_spread)
     # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
-    bends = any(suspect.effect.bends_hull for suspect in suspects)
+    bends = any(candidate.effect.bends_hull for candidate in candidates)
 
     def picture_of(z: Floats) -> Picture:
-        picture = replace(trial.plain, hull=trial.plain.hull + trial.hull_spread * z[:h])
-        return acted(picture, suspects, np.split(neutral + size * z[h:], cuts)) if every else picture
+        picture = replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])
+        return apply_candidates(picture, candidates, np.split(neutral + size * z[h:], cuts)) if every else picture
 
     def white(z: Floats) -> Floats:
-        return trial.white(picture_of(z))
+        return problem.white(picture_of(z))
 
     z = np.zeros(h + q)
     if every:
-        z[h:] = (np.concatenate([one.start for one in suspects] if start is None else start) - neutral) / size
+        z[h:] = (np.concatenate([one.start for one in candidates] if start is None else start) - neutral) / size
     if begin is not None:
-        moves = trial.hull_spread > 0.0
-        z[:h][moves] = (begin.hull - trial.plain.hull)[moves] / trial.hull_spread[moves]
+        moves = problem.hull_spread > 0.0
+        z[:h][moves] = (begin.hull - problem.plain.hull)[moves] / problem.hull_spread[moves]
     w = white(z)
     cost = float(w @ w + z @ z)
     A = np.eye(h + q)
     # The hull's derivatives cost most: they are taken anew only now and then, and before the fit ends.
-    by_hull, fresh = (trial.by_hull if begin is None else begin.by_hull), False
+    by_hull, fresh = (problem.by_hull if begin is None else begin.by_hull), False
     for count in range(max(steps, 1)):
         if count > 0 and (bends or count % ANEW == 0):
-            by_hull, fresh = trial.hull_slopes(picture_of(z)), True
+            by_hull, fresh = problem.hull_slopes(picture_of(z)), True
         J = np.zeros((len(w), h + q))
         J[:, :h] = by_hull
         free = np.flatnonzero(size > HELD)
@@ -275,8 +281,8 @@ def fit(
             d = np.where(z[h + free] + NUDGE <= high[free], NUDGE, -NUDGE)
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
-            gaps = np.stack([trial.steps.gap(picture_of(one)) for one in moved], axis=2)
-            J[:, h + free] = (trial.sieve.white(gaps) - w[:, None]) / d
+            gaps = np.stack([problem.steps.gap(picture_of(one)) for one in moved], axis=2)
+            J[:, h + free] = (problem.whitening_filter.white(gaps) - w[:, None]) / d
         A = J.T @ J + np.eye(h + q)
         if count == steps:
             break
@@ -298,33 +304,35 @@ def fit(
         if gained < ENOUGH:
             if fresh or steps <= ANEW:
                 break
-            by_hull, fresh = trial.hull_slopes(picture_of(z)), True
+            by_hull, fresh = problem.hull_slopes(picture_of(z)), True
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
-    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - trial.sieve.log_scale
-    evidence -= sum(suspect.doubt + len(suspect.times) * log(len(trial.windows.starts)) for suspect in suspects)
+    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - problem.whitening_filter.log_scale
+    evidence -= sum(
+        candidate.doubt + len(candidate.times) * log(len(problem.windows.starts)) for candidate in candidates
+    )
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
-    hull = trial.plain.hull + trial.hull_spread * z[:h]
-    return Fit(tuple(suspects), values, covariance, hull, evidence)
+    hull = problem.plain.hull + problem.hull_spread * z[:h]
+    return Fit(tuple(candidates), values, covariance, hull, evidence)
 
 
-def effect_slopes(trial: Trial, kept: Fit) -> Floats:
+def effect_slopes(problem: EstimationProblem, kept: Fit) -> Floats:
     """Return derivatives of the prediction errors by the parameters of a fit's effects, in their sizes, shape (w, q)."""
-    left = trial.white(imagined(trial.plain, kept))
+    left = problem.white(fitted_force_model(problem.plain, kept))
     columns = []
-    for i, suspect in enumerate(kept.suspects):
-        for k, one in enumerate(suspect.parameters):
+    for i, candidate in enumerate(kept.candidates):
+        for k, one in enumerate(candidate.parameters):
             d = NUDGE if kept.values[i][k] + NUDGE * one.size <= one.high else -NUDGE
             moved = kept.values[i].copy()
             moved[k] += d * one.size
             changed = (*kept.values[:i], moved, *kept.values[i + 1 :])
-            columns.append((trial.white(imagined(trial.plain, replace(kept, values=changed))) - left) / d)
+            columns.append((problem.white(fitted_force_model(problem.plain, replace(kept, values=changed))) - left) / d)
     return np.stack(columns, axis=1) if columns else np.empty((len(left), 0))
 
 
-def without(trial: Trial, made: Fit, index: int) -> Fit:
-    """Return the fit of a hypothesis that lacks one of its suspects."""
-    rest = [k for k in range(len(made.suspects)) if k != index]
-    return fit(trial, [made.suspects[k] for k in rest], [made.values[k] for k in rest])
+def without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
+    """Return the fit of a hypothesis that lacks one of its candidates."""
+    rest = [k for k in range(len(made.candidates)) if k != index]
+    return fit(problem, [made.candidates[k] for k in rest], [made.values[k] for k in rest])
 
 
 def _step(A: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
@@ -340,41 +348,41 @@ def _step(A: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
     return step
 
 
-def settled(trial: Trial, beside: Fit, suspect: Suspect) -> Suspect:
-    """Return a suspect with the parameters that its effect chooses beside a fit; the same one where there is no choice."""
-    if suspect.effect.choose is None:
-        return suspect
-    believed = imagined(trial.plain, replace(beside, hull=trial.plain.hull)).hull
-    made = suspect.effect.choose(imagined(trial.plain, beside), believed, trial.white)
-    return replace(suspect, parameters=made.parameters, doubt=made.doubt)
+def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candidate) -> Candidate:
+    """Return a candidate with the parameters that its effect chooses beside a fit; the same one where there is no choice."""
+    if candidate.effect.choose is None:
+        return candidate
+    believed = fitted_force_model(problem.plain, replace(beside, hull=problem.plain.hull)).hull
+    made = candidate.effect.choose(fitted_force_model(problem.plain, beside), believed, problem.white)
+    return replace(candidate, parameters=made.parameters, doubt=made.doubt)
 
 
-def imagined(plain: Picture, made: Fit) -> Picture:
+def fitted_force_model(plain: Picture, made: Fit) -> Picture:
     """Return the picture that a fit has of the log."""
-    return acted(replace(plain, hull=made.hull), made.suspects, made.values)
+    return apply_candidates(replace(plain, hull=made.hull), made.candidates, made.values)
 
 
-def acted(picture: Picture, suspects: Sequence[Suspect], values: Sequence[Floats]) -> Picture:
-    """Return the picture with some suspects in it, each in its turn."""
-    for suspect, p in sorted(zip(suspects, values, strict=True), key=lambda one: one[0].effect.turn):
-        picture = suspect.act(picture, p)
+def apply_candidates(picture: Picture, candidates: Sequence[Candidate], values: Sequence[Floats]) -> Picture:
+    """Return the picture with some candidates in it, each in its turn."""
+    for candidate, p in sorted(zip(candidates, values, strict=True), key=lambda one: one[0].effect.turn):
+        picture = candidate.act(picture, p)
     return picture
 
 
-def trial_of(windows: Windows, plain: Picture, hull_spread: Floats) -> Trial:
+def estimation_problem(windows: Windows, plain: Picture, hull_spread: Floats) -> EstimationProblem:
     """Return the trial with the noise that is left when the hull alone is refitted.
 
     What an effect leaves in the gaps is in that noise too, until a hypothesis that holds takes it out: see
     `ferryid.diagnose.inference.search`.
     """
     first = excerpt(steps_of(windows))
-    trial = Trial(
+    problem = EstimationProblem(
         windows,
         plain,
-        noise_of(windows.gap(plain), windows.runs),
+        fit_autoregression(windows.gap(plain), windows.runs),
         hull_spread,
-        learn(first, first.gap(plain)),
+        fit_noise(first, first.gap(plain)),
     )
     for _ in range(2):
-        trial = trial.with_noise_of(fit(trial, ()))
-    return trial
+        problem = problem.with_noise_of(fit(problem, ()))
+    return problem

@@ -39,7 +39,7 @@ LONGEST = 500.0
 
 
 @dataclass(frozen=True)
-class Filter:
+class NoiseModel:
     """The noise of the steps of a trial.
 
     Attributes
@@ -69,8 +69,8 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Sieve:
-    """A filter with its gains for the steps of one trial; see `sieve_of`."""
+class WhiteningFilter:
+    """A filter with its gains for the steps of one trial; see `make_whitening_filter`."""
 
     steps: Windows
     parts: tuple[Part, ...]
@@ -101,30 +101,32 @@ class Sieve:
         return sum(float(np.log(spread[DIFFUSE:]).sum()) for part in self.parts for _, spread in part.gains)
 
 
-def sieve_of(noise: Filter, steps: Windows, pushes: Floats | None = None) -> Sieve:
+def make_whitening_filter(noise: NoiseModel, steps: Windows, pushes: Floats | None = None) -> WhiteningFilter:
     """Return a filter with its gains for some steps. Channels that share no disturbance are filtered by themselves.
 
-    `pushes` are those of `pushes_of`, for whoever knows them already.
+    `pushes` are those of `disturbance_columns`, for whoever knows them already.
     """
     h, integrals = stride_s(steps), integrals_of(steps)
     scale = _scales(steps)
     if noise.processes and noise.picture is not None:
-        columns = pushes_of(noise, steps) if pushes is None else pushes
+        columns = disturbance_columns(noise, steps) if pushes is None else pushes
         blocks, drive = _blocks(noise.processes, h)
         by_run = tuple(
             gains(scale, noise.channels, integrals, blocks, drive, np.ascontiguousarray(columns[a:b]), h)
             for a, b in steps.runs
         )
-        return Sieve(steps, (Part(tuple(range(len(noise.channels))), noise.channels, blocks, columns, by_run),))
+        return WhiteningFilter(
+            steps, (Part(tuple(range(len(noise.channels))), noise.channels, blocks, columns, by_run),)
+        )
     parts = []
     for j in range(len(noise.channels)):
         own = noise.channels[j : j + 1]
         by_run = tuple(_alone(scale[j : j + 1], own, integrals, b - a, h) for a, b in steps.runs)
         parts.append(Part((j,), own, np.empty((0, 0)), _no_columns(len(steps.starts)), by_run))
-    return Sieve(steps, tuple(parts))
+    return WhiteningFilter(steps, tuple(parts))
 
 
-def pushes_of(noise: Filter, steps: Windows) -> Floats:
+def disturbance_columns(noise: NoiseModel, steps: Windows) -> Floats:
     """Return the acceleration of every channel by a unit of every state of the shared disturbances, shape (J, c, states)."""
     assert noise.picture is not None
     columns = []
@@ -137,7 +139,7 @@ def pushes_of(noise: Filter, steps: Windows) -> Floats:
     return np.concatenate(columns, axis=2)
 
 
-def learn(steps: Windows, gaps: Floats, near: Filter | None = None) -> Filter:
+def fit_noise(steps: Windows, gaps: Floats, near: NoiseModel | None = None) -> NoiseModel:
     """Return the noise that gaps have if each channel has its own, by maximum likelihood.
 
     Parameters
@@ -174,18 +176,18 @@ def learn(steps: Windows, gaps: Floats, near: Filter | None = None) -> Filter:
 
         ends = np.array(over(searched, begin))
         channels[own] = np.exp(ends[np.argmin(costs(ends))])
-    return Filter(channels)
+    return NoiseModel(channels)
 
 
-def learn_with(
+def fit_noise_with(
     steps: Windows,
     gaps: Floats,
-    alone: Filter,
+    alone: NoiseModel,
     made: Callable[[Floats], tuple[Process, ...]],
     start: Floats,
     picture: Picture,
     worth: float = -np.inf,
-) -> tuple[Filter, Floats, Floats, float]:
+) -> tuple[NoiseModel, Floats, Floats, float]:
     """Return the noise that gaps have if disturbances push beside each channel's own noise.
 
     Parameters
@@ -205,7 +207,7 @@ def learn_with(
 
     Returns
     -------
-    Filter
+    NoiseModel
         With the processes.
     ndarray
         The parameters, shape (k,).
@@ -217,12 +219,12 @@ def learn_with(
     h = stride_s(steps)
     first = [GROUPS.index(group) for group in sorted(set(GROUPS))]
 
-    def noise(z: Floats) -> Filter:
+    def noise(z: Floats) -> NoiseModel:
         own, rest = np.exp(z[: 5 * len(first)].reshape(-1, 5)), np.exp(z[5 * len(first) :])
-        return Filter(own[list(GROUPS)], (*alone.processes, *made(rest)), picture)
+        return NoiseModel(own[list(GROUPS)], (*alone.processes, *made(rest)), picture)
 
     # How a disturbance pushes does not depend on its parameters.
-    pushes = pushes_of(Filter(alone.channels, (*alone.processes, *made(start)), picture), steps)
+    pushes = disturbance_columns(NoiseModel(alone.channels, (*alone.processes, *made(start)), picture), steps)
 
     def cost(z: Floats) -> float:
         return -likelihood(noise(z), steps, gaps, pushes)
@@ -290,9 +292,9 @@ def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> 
     return width
 
 
-def likelihood(noise: Filter, steps: Windows, gaps: Floats, pushes: Floats | None = None) -> float:
-    """Return the logarithm of the likelihood of gaps, but for a constant; `pushes` as in `sieve_of`."""
-    ready = sieve_of(noise, steps, pushes)
+def likelihood(noise: NoiseModel, steps: Windows, gaps: Floats, pushes: Floats | None = None) -> float:
+    """Return the logarithm of the likelihood of gaps, but for a constant; `pushes` as in `make_whitening_filter`."""
+    ready = make_whitening_filter(noise, steps, pushes)
     return -0.5 * float(np.sum(ready.white(gaps) ** 2)) - ready.log_scale
 
 

@@ -16,10 +16,10 @@ from ferryid.identify.pictured import Pictured, bare_picture
 from ferryid.vessel.profile import Floats, Profile
 
 
-def plain_picture(
+def prior_force_model(
     scene: Scene, profile: Profile, model: Model | None = None, sha256: str = ""
 ) -> tuple[Picture, Floats]:
-    """Return the picture before any suspect, and how far each of its hull's coefficients is believed to be off.
+    """Return the picture before any candidate, and how far each of its hull's coefficients is believed to be off.
 
     The air is still where no wind was measured, and the water too. A model is imagined as `Pictured` has it, with its vessel's
     properties and, in a log that it was diagnosed on, that log's conditions.
@@ -27,7 +27,7 @@ def plain_picture(
     Parameters
     ----------
     scene
-        From `scene_of`.
+        From `read_measurements`.
     profile
         The vessel.
     model
@@ -38,7 +38,7 @@ def plain_picture(
     Returns
     -------
     Picture
-        Without suspects.
+        Without candidates.
     ndarray
         Standard deviations, shape (26,), in the units of the coefficients: `HULL_SPREAD` of each where a hull model is
         known (with the model's own intervals added), and what a vessel of this size may have at most where it is not.
@@ -51,11 +51,11 @@ def plain_picture(
     if model is not None:
         return _modelled(scene, profile, model, sha256)
     bare = bare_picture(scene, hull_of(profile))
-    spread = HULL_SPREAD * np.abs(bare.hull) if profile.hull.has_model else broad_spread(scene, profile)
+    spread = HULL_SPREAD * np.abs(bare.hull) if profile.hull.has_model else default_hull_spread(scene, profile)
     return replace(bare, external=scene.air_load, ambient=lambda now: now.air_load), spread
 
 
-def broad_spread(scene: Scene, profile: Profile) -> Floats:
+def default_hull_spread(scene: Scene, profile: Profile) -> Floats:
     """Return how large the hull's coefficients may be for a vessel of this size and speed, shape (26,).
 
     Added mass of a half-immersed cylinder of the hull's draught, cross-flow drag with a coefficient of 1 along the hull, lift
@@ -122,5 +122,5 @@ def _modelled(scene: Scene, profile: Profile, model: Model, sha256: str) -> tupl
     spread = np.sqrt((HULL_SPREAD * picture.hull) ** 2 + known.variance)
     if not known.force.profile.hull.has_model:
         # What the base does not know, the fit had to learn; terms that it left out may be anything.
-        spread = np.where(picture.hull == 0.0, broad_spread(scene, profile), spread)
+        spread = np.where(picture.hull == 0.0, default_hull_spread(scene, profile), spread)
     return picture, spread

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.stats import norm
 
-from ferryid.diagnose.inference.estimation import WIDER, Fit, Trial, fit, near
-from ferryid.diagnose.inference.onset_estimation import swapped
+from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fit, starting_point
+from ferryid.diagnose.inference.onset_estimation import replace_candidate
 from ferryid.effects.effect import HELD
 from ferryid.vessel.profile import Floats
 
@@ -28,32 +28,32 @@ PARTS = 41
 """Parts of equal probability into which what is left free is cut."""
 
 
-def intervals(trial: Trial, kept: Fit, index: int) -> dict[str, tuple[float, float]]:
-    """Return 95 % intervals of a suspect's parameters by name, along the ridge of its posterior.
+def intervals(problem: EstimationProblem, kept: Fit, index: int) -> dict[str, tuple[float, float]]:
+    """Return 95 % intervals of a candidate's parameters by name, along the ridge of its posterior.
 
     Parameters
     ----------
-    trial
+    problem
         The log.
     kept
         What was found.
     index
-        Of a suspect whose effect has a ``ridge``.
+        Of a candidate whose effect has a ``ridge``.
     """
-    suspect = kept.suspects[index]
-    names = [one.name for one in suspect.parameters]
-    place = names.index(suspect.effect.ridge)
-    own = suspect.parameters[place]
+    candidate = kept.candidates[index]
+    names = [one.name for one in candidate.parameters]
+    place = names.index(candidate.effect.ridge)
+    own = candidate.parameters[place]
     top = float(kept.values[index][place])
     first = max(FIRST * float(kept.errors(index)[place]), 0.01 * own.size)
 
     def held(value: float, beside: Fit) -> tuple[float, Fit]:
         still = replace(own, size=HELD, neutral=value, start=value)
-        parameters = tuple(still if k == place else one for k, one in enumerate(suspect.parameters))
+        parameters = tuple(still if k == place else one for k, one in enumerate(candidate.parameters))
         start = list(beside.values)
         start[index] = np.where(np.arange(len(names)) == place, value, beside.values[index])
-        suspects = swapped(kept.suspects, index, replace(suspect, parameters=parameters))
-        made = fit(trial, suspects, start, begin=near(trial, beside))
+        candidates = replace_candidate(kept.candidates, index, replace(candidate, parameters=parameters))
+        made = fit(problem, candidates, start, begin=starting_point(problem, beside))
         return made.evidence - 0.5 * ((value - own.neutral) / own.size) ** 2, made
 
     found = {top: held(top, kept)}
@@ -88,7 +88,7 @@ def intervals(trial: Trial, kept: Fit, index: int) -> dict[str, tuple[float, flo
             ends[name] = _interval(fine, weights)
             continue
         middle = np.array([found[value][1].values[index][k] for value in values.tolist()])
-        spread = np.array([found[value][1].told_errors(index)[k] for value in values.tolist()])
+        spread = np.array([found[value][1].reported_errors(index)[k] for value in values.tolist()])
         spots = np.interp(fine, values, middle)[:, None] + np.interp(fine, values, spread)[:, None] * cut
         ends[name] = _interval(spots.ravel(), np.repeat(weights, PARTS))
     return ends

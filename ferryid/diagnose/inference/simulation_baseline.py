@@ -18,12 +18,12 @@ import numpy as np
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.data.measurements import scene_of, window_lengths
-from ferryid.diagnose.data.path_comparison import Paths
+from ferryid.diagnose.data.measurements import read_measurements, window_lengths
+from ferryid.diagnose.data.path_comparison import PathComparison
 from ferryid.diagnose.data.payload import aboard
-from ferryid.diagnose.inference.estimation import HULL_SPREAD, Suspect, imagined, trial_of
-from ferryid.diagnose.inference.prior import plain_picture
-from ferryid.diagnose.inference.search import search, suspects_of
+from ferryid.diagnose.inference.estimation import HULL_SPREAD, Candidate, estimation_problem, fitted_force_model
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.search import list_candidates, search
 from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
@@ -43,17 +43,17 @@ SHOWN_ROWS = 400
 class Condition:
     """An effect that the simulation has, with its values and their standard deviations.
 
-    `in_hull` where it is one of the hull's coefficients alone, so that it is in `Simulated.hull` already.
+    `in_hull` where it is one of the hull's coefficients alone, so that it is in `Simulation.hull` already.
     """
 
-    suspect: Suspect
+    candidate: Candidate
     values: Floats
     errors: Floats
     in_hull: bool = False
 
 
 @dataclass(frozen=True)
-class Simulated:
+class Simulation:
     """What was learnt from a simulated log.
 
     Attributes
@@ -78,9 +78,9 @@ class Simulated:
     sensors: tuple[SensorFinding, ...]
 
 
-def learn(
+def learn_simulation(
     path: str, profile: Profile, out: Path | None, *, verify: bool = False, progress: Callable[[str], None]
-) -> Simulated:
+) -> Simulation:
     """Return the picture that a simulated log shows.
 
     Parameters
@@ -97,7 +97,7 @@ def learn(
     FerryIdError
         For a log that cannot be used, is too short, or moves like no vessel of this profile.
     """
-    scene, survey = scene_of(path, profile, out, verify=verify, progress=progress)
+    scene, survey = read_measurements(path, profile, out, verify=verify, progress=progress)
     sensors, scene = examine(scene)
     name = survey.motion.log
     seen = windows(scene, *window_lengths(profile))
@@ -107,12 +107,12 @@ def learn(
             f"{window_lengths(profile)[0]:.0f} s without a gap where {FEWEST_WINDOWS} are needed. "
             "Fix: simulate and record the whole trial"
         )
-    plain, spread = plain_picture(seen.scene, profile)
+    plain, spread = prior_force_model(seen.scene, profile)
     wide = FREER * spread if profile.hull.has_model else spread
     progress(f"learning what {name} simulates")
-    result = search(trial_of(seen, plain, wide), progress)
+    result = search(estimation_problem(seen, plain, wide), progress)
     made = result.fit
-    left = float(np.mean((seen.gap(imagined(plain, made)) / _size(seen.measured[:, seen.channels])) ** 2))
+    left = float(np.mean((seen.gap(fitted_force_model(plain, made)) / _size(seen.measured[:, seen.channels])) ** 2))
     if left > FOREIGN:
         raise FerryIdError(
             f"{name}: --against needs a simulation of {profile.name}, found a motion of which its hull and the actuators' "
@@ -120,15 +120,15 @@ def learn(
             "moves, with signals as the profile maps them"
         )
     conditions = [
-        Condition(suspect, values, made.errors(k), _in_hull(suspect, values, plain))
-        for k, (suspect, values) in enumerate(zip(made.suspects, made.values, strict=True))
+        Condition(candidate, values, made.errors(k), _in_hull(candidate, values, plain))
+        for k, (candidate, values) in enumerate(zip(made.candidates, made.values, strict=True))
     ]
     hull = made.hull
     for one in conditions:
         if one.in_hull:
-            hull = one.suspect.act(replace(plain, hull=hull), one.values).hull
-    posterior = np.sqrt(np.diag(np.linalg.inv(result.trial.by_hull.T @ result.trial.by_hull + np.eye(len(wide)))))
-    return Simulated(
+            hull = one.candidate.act(replace(plain, hull=hull), one.values).hull
+    posterior = np.sqrt(np.diag(np.linalg.inv(result.problem.by_hull.T @ result.problem.by_hull + np.eye(len(wide)))))
+    return Simulation(
         name,
         scene,
         hull,
@@ -138,8 +138,8 @@ def learn(
     )
 
 
-def _in_hull(suspect: Suspect, values: Floats, plain: Picture) -> bool:
-    after = suspect.act(plain, values)
+def _in_hull(candidate: Candidate, values: Floats, plain: Picture) -> bool:
+    after = candidate.act(plain, values)
     same = all(
         getattr(after, field.name) is getattr(plain, field.name) for field in fields(plain) if field.name != "hull"
     )
@@ -160,16 +160,16 @@ def _measured(scene: Scene) -> tuple[Condition, ...]:
         if values is None:
             continue
         effect = effects()[name]
-        suspect, rows = Suspect(effect, None, effect.parameters_of(scene.profile)), scene.usable
+        candidate, rows = Candidate(effect, None, effect.parameters_of(scene.profile)), scene.usable
         if name == "payload":
             rows, ends = aboard(scene.t, values, rows)
-            suspect = replace(suspect, onset_s=ends.get("onset", 0.0), offset_s=ends.get("offset", inf))
+            candidate = replace(candidate, onset_s=ends.get("onset", 0.0), offset_s=ends.get("offset", inf))
         mean = np.asarray(values[rows].mean(axis=0))
-        found.append(Condition(suspect, mean, np.zeros_like(mean)))
+        found.append(Condition(candidate, mean, np.zeros_like(mean)))
     return tuple(found)
 
 
-def base_picture(simulated: Simulated, scene: Scene, shift_s: float = 0.0) -> tuple[Picture, Floats]:
+def simulated_force_model(simulated: Simulation, scene: Scene, shift_s: float = 0.0) -> tuple[Picture, Floats]:
     """Return the simulation's picture of what a recording shows, and how far its hull's coefficients may be off.
 
     What the recording measured itself (wind, current, payload) is the recording's.
@@ -183,91 +183,91 @@ def base_picture(simulated: Simulated, scene: Scene, shift_s: float = 0.0) -> tu
     shift_s
         What is added to the simulation's times, of onsets and offsets.
     """
-    plain, _ = plain_picture(scene, scene.profile)
+    plain, _ = prior_force_model(scene, scene.profile)
     picture = replace(plain, hull=simulated.hull)
     for one in _carried(simulated, scene, shift_s):
-        picture = one.suspect.act(picture, one.values)
+        picture = one.candidate.act(picture, one.values)
     return picture, simulated.spread
 
 
-def _carried(simulated: Simulated, scene: Scene, shift_s: float) -> list[Condition]:
+def _carried(simulated: Simulation, scene: Scene, shift_s: float) -> list[Condition]:
     return [
-        replace(one, suspect=_later(one.suspect, shift_s))
+        replace(one, candidate=_later(one.candidate, shift_s))
         for one in simulated.conditions
-        if not one.in_hull and not one.suspect.effect.cannot(scene)
+        if not one.in_hull and not one.candidate.effect.cannot(scene)
     ]
 
 
-def _later(suspect: Suspect, shift_s: float) -> Suspect:
-    for end in suspect.times:
-        suspect = suspect.moved(end, max(getattr(suspect, end) + shift_s, 0.0))
-    return suspect
+def _later(candidate: Candidate, shift_s: float) -> Candidate:
+    for end in candidate.times:
+        candidate = candidate.moved(end, max(getattr(candidate, end) + shift_s, 0.0))
+    return candidate
 
 
-def differing(simulated: Simulated, scene: Scene, shift_s: float = 0.0) -> list[Suspect]:
-    """Return every suspect of a recording, those that the simulation has already as differences to it."""
-    plain, _ = plain_picture(scene, scene.profile)
+def differing_candidates(simulated: Simulation, scene: Scene, shift_s: float = 0.0) -> list[Candidate]:
+    """Return every candidate of a recording, those that the simulation has already as differences to it."""
+    plain, _ = prior_force_model(scene, scene.profile)
     bare = replace(plain, hull=simulated.hull)
     carried = _carried(simulated, scene, shift_s)
-    known = {one.suspect.key: k for k, one in enumerate(carried)}
-    suspects, _ = suspects_of(scene)
-    return [_relative(one, carried, known[one.key], bare) if one.key in known else one for one in suspects]
+    known = {one.candidate.key: k for k, one in enumerate(carried)}
+    candidates, _ = list_candidates(scene)
+    return [_relative(one, carried, known[one.key], bare) if one.key in known else one for one in candidates]
 
 
-def difference_notes(simulated: Simulated, scene: Scene) -> list[str]:
+def difference_notes(simulated: Simulation, scene: Scene) -> list[str]:
     """Return the errors of the simulation's sensors, and conditions that differ by what was measured, in sentences."""
     told = [f"The simulation's log: {one.says}" for one in simulated.sensors]
     return told + [
-        f"The {one.suspect.effect.id} differs by what was measured, and is no finding: "
+        f"The {one.candidate.effect.id} differs by what was measured, and is no finding: "
         f"{_described(one, simulated.scene)} in the simulation; the recording's own is part of its picture."
         for one in simulated.conditions
-        if one.suspect.effect.cannot(scene) and not one.in_hull
+        if one.candidate.effect.cannot(scene) and not one.in_hull
     ]
 
 
 def _described(one: Condition, scene: Scene) -> str:
-    untold = one.suspect.effect.untold(scene, one.values)
+    untold = one.candidate.effect.untold(scene, one.values)
     return ", ".join(
         f"{parameter.name} {_told(value, parameter.unit)}"
-        for parameter, value in zip(one.suspect.parameters, one.values.tolist(), strict=True)
+        for parameter, value in zip(one.candidate.parameters, one.values.tolist(), strict=True)
         if parameter.name not in untold
     )
 
 
-def _relative(suspect: Suspect, carried: Sequence[Condition], index: int, bare: Picture) -> Suspect:
+def _relative(candidate: Candidate, carried: Sequence[Condition], index: int, bare: Picture) -> Candidate:
     """Return an effect that takes the simulation's values for neutral, and changes a picture from these to its own."""
     own = carried[index]
-    neutral = dict(zip((one.name for one in suspect.parameters), own.values.tolist(), strict=True))
+    neutral = dict(zip((one.name for one in candidate.parameters), own.values.tolist(), strict=True))
 
     def pictured(hull: Floats, p: Floats) -> Picture:
         picture = replace(bare, hull=hull)
         for k, one in enumerate(carried):
-            picture = one.suspect.act(picture, p if k == index else one.values)
+            picture = one.candidate.act(picture, p if k == index else one.values)
         return picture
 
     def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
         return _changed(picture, pictured(picture.hull, own.values), pictured(picture.hull, p))
 
     def says(values: Values, instance: str | None) -> str:
-        name = suspect.effect.title + (f" ({instance})" if instance else "")
+        name = candidate.effect.title + (f" ({instance})" if instance else "")
         parts = [
             f"{one.name.replace('_', ' ')} {_told(neutral[one.name], one.unit)} in the simulation, "
             f"{_told(values[one.name], one.unit)} in the recording"
-            for one in suspect.parameters
+            for one in candidate.parameters
             if one.name in values
         ]
         return f"{name} differs: {'; '.join(parts)}."
 
     def kick(picture: Picture, p: Floats) -> Floats:
         # What the simulation has aboard already gives none.
-        assert suspect.effect.kick is not None
-        return suspect.effect.kick(picture, p) - suspect.effect.kick(picture, own.values)
+        assert candidate.effect.kick is not None
+        return candidate.effect.kick(picture, p) - candidate.effect.kick(picture, own.values)
 
     # Where the simulation has it for a while, no other span of it can be told, and its own has its own kick.
-    kicks = suspect.effect.kick is not None and not own.suspect.times
-    effect = replace(suspect.effect, apply=apply, says=says, kick=kick if kicks else None)
-    parameters = tuple(replace(one, neutral=neutral[one.name]) for one in suspect.parameters)
-    return Suspect(effect, suspect.instance, parameters)
+    kicks = candidate.effect.kick is not None and not own.candidate.times
+    effect = replace(candidate.effect, apply=apply, says=says, kick=kick if kicks else None)
+    parameters = tuple(replace(one, neutral=neutral[one.name]) for one in candidate.parameters)
+    return Candidate(effect, candidate.instance, parameters)
 
 
 def _told(value: float, unit: str) -> str:
@@ -295,20 +295,20 @@ def _changed(picture: Picture, old: Picture, new: Picture) -> Picture:
     return replace(picture, **changed)
 
 
-def plain_against(simulated: Simulated, compared: Paths | str) -> dict[str, Any]:
+def simulation_as_json(simulated: Simulation, compared: PathComparison | str) -> dict[str, Any]:
     """Return the simulation and its path against the recording's as plain values, for JSON."""
     conditions = [
         {
-            "effect": one.suspect.effect.id,
-            "instance": one.suspect.instance,
-            "onset": one.suspect.onset_s if one.suspect.onset_s > 0.0 else None,
-            "offset": one.suspect.offset_s if isfinite(one.suspect.offset_s) else None,
+            "effect": one.candidate.effect.id,
+            "instance": one.candidate.instance,
+            "onset": one.candidate.onset_s if one.candidate.onset_s > 0.0 else None,
+            "offset": one.candidate.offset_s if isfinite(one.candidate.offset_s) else None,
             "parameters": {
                 parameter.name: vars(Estimate(value, value - 1.96 * error, value + 1.96 * error, parameter.unit))
                 for parameter, value, error in zip(
-                    one.suspect.parameters, one.values.tolist(), one.errors.tolist(), strict=True
+                    one.candidate.parameters, one.values.tolist(), one.errors.tolist(), strict=True
                 )
-                if parameter.name not in one.suspect.effect.untold(simulated.scene, one.values)
+                if parameter.name not in one.candidate.effect.untold(simulated.scene, one.values)
             },
         }
         for one in simulated.conditions

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import polygamma
 
-from ferryid.diagnose.inference.estimation import Trial
+from ferryid.diagnose.inference.estimation import EstimationProblem
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.picture import Picture, Scene
@@ -64,13 +64,13 @@ class Burst:
     force: Floats
 
 
-def bands_of(trial: Trial, pictures: Sequence[Picture], scene: Scene | None) -> tuple[Band, ...]:
+def bands_of(problem: EstimationProblem, pictures: Sequence[Picture], scene: Scene | None) -> tuple[Band, ...]:
     """Return the power of the force errors in frequency bands, by windows short enough to let them through.
 
     The weight of a window of length T passes frequencies up to about 1/T; the power of each is that of the filtered error.
     """
-    short = fine_windows(trial, trial.windows.scene if scene is None else scene)
-    spectra = [spectrum_of(short, force_errors(short, picture, trial.plain)) for picture in pictures]
+    short = fine_windows(problem, problem.windows.scene if scene is None else scene)
+    spectra = [spectrum_of(short, force_errors(short, picture, problem.plain)) for picture in pictures]
     if not spectra[0][0].size:
         return ()
     frequency = spectra[0][0]
@@ -83,20 +83,20 @@ def bands_of(trial: Trial, pictures: Sequence[Picture], scene: Scene | None) -> 
     return tuple(bands)
 
 
-def fine_windows(trial: Trial, scene: Scene) -> Windows:
+def fine_windows(problem: EstimationProblem, scene: Scene) -> Windows:
     """Return windows of the scene that are short enough to show what is fast."""
-    step_s = trial.windows.scene.step_s
-    return windows(scene, max(len(trial.windows.weight) * step_s / FINE, 8.0 * step_s), step_s)
+    step_s = problem.windows.scene.step_s
+    return windows(scene, max(len(problem.windows.weight) * step_s / FINE, 8.0 * step_s), step_s)
 
 
-def bursts_of(trial: Trial, picture: Picture, scene: Scene) -> Burst | None:
+def bursts_of(problem: EstimationProblem, picture: Picture, scene: Scene) -> Burst | None:
     """Return the most telling band in which the power of the force error comes and goes; None where there are no bands.
 
     The power of blocks is compared with an even one, as that of noise would be: of a band of width B, a block of length T holds
     2 B T independent values, of which the mean square's logarithm has a known variance.
     """
-    short = fine_windows(trial, scene)
-    errors = force_errors(short, picture, trial.plain)
+    short = fine_windows(problem, scene)
+    errors = force_errors(short, picture, problem.plain)
     found = []
     for low, high in pairwise(BURST_HZ):
         block_s = max(BURST_S, BURST_PERIODS / high)
@@ -109,7 +109,7 @@ def bursts_of(trial: Trial, picture: Picture, scene: Scene) -> Burst | None:
 def _uneven(short: Windows, errors: Floats, low_hz: float, high_hz: float, block_s: float) -> Burst | None:
     step_s = short.scene.step_s
     size = round(block_s / step_s)
-    edges, powers, times, forces = [], [], [], []
+    edges, detection_powers, times, forces = [], [], [], []
     for a, b in short.runs:
         if b - a < 2 * size:
             continue
@@ -117,19 +117,19 @@ def _uneven(short: Windows, errors: Floats, low_hz: float, high_hz: float, block
         times.append(short.middle_s[a:b])
         forces.append(part)
         for k in range(0, b - a - size + 1, size):
-            powers.append(np.mean(part[k : k + size] ** 2, axis=0))
+            detection_powers.append(np.mean(part[k : k + size] ** 2, axis=0))
             edges.append((float(short.middle_s[a + k]), float(short.middle_s[a + k + size - 1])))
-    if len(powers) < FEWEST_BLOCKS:
+    if len(detection_powers) < FEWEST_BLOCKS:
         return None
-    level = np.log(np.maximum(powers, 1e-12))
+    level = np.log(np.maximum(detection_powers, 1e-12))
     held = max(1.0, 2.0 * (high_hz - low_hz) * block_s)
     chi = np.sum((level - level.mean(axis=0)) ** 2, axis=0) / float(polygamma(1, 0.5 * held))
-    total = float(chi.sum()) / (3.0 * (len(powers) - 1))
-    spread = 2.0 / (27.0 * (len(powers) - 1))
+    total = float(chi.sum()) / (3.0 * (len(detection_powers) - 1))
+    spread = 2.0 / (27.0 * (len(detection_powers) - 1))
     # Wilson and Hilferty (1931): as many standard deviations of a normal variable are as rare.
     deviations = float((np.cbrt(total) - (1.0 - spread)) / np.sqrt(spread))
     above = np.exp(level - np.median(level, axis=0))
-    shares = np.maximum(chi - (len(powers) - 1), 0.0)
+    shares = np.maximum(chi - (len(detection_powers) - 1), 0.0)
     axes = shares / shares.sum() if shares.sum() > 0.0 else np.full(3, 1.0 / 3.0)
     loud = above @ axes >= LOUD
     spans: list[tuple[float, float]] = []

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import window_lengths
-from ferryid.diagnose.inference.estimation import Suspect, Trial, trial_of
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem
 from ferryid.diagnose.inference.search import Search, search
 from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.picture import Picture
@@ -57,7 +57,7 @@ class Expectation:
 
     picture: Picture
     hull_spread: Floats
-    library: tuple[Suspect, ...]
+    library: tuple[Candidate, ...]
     notes: tuple[str, ...] = ()
     comparison: Mapping[str, Any] = field(default_factory=dict)
 
@@ -98,7 +98,7 @@ class EstimatedLog:
     averaged: AveragedLog
     baseline: Baseline
     expectation: Expectation
-    trial: Trial
+    problem: EstimationProblem
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class SelectedLog:
         return self.estimated.averaged.path
 
     @property
-    def steady(self) -> list[Suspect]:
+    def steady(self) -> list[Candidate]:
         """Candidates that are forces or sensor errors, not disturbances that come and go by chance."""
         return [one for one in self.estimated.expectation.library if one.effect.unsteady is None]
 
@@ -127,9 +127,11 @@ def average(log: ScreenedLog) -> AveragedLog:
 def estimate(log: AveragedLog, baseline: Baseline) -> EstimatedLog:
     """Estimate the hull and the noise of a log as if nothing were missing."""
     expectation = baseline.expect(log)
-    return EstimatedLog(log, baseline, expectation, trial_of(log.windows, expectation.picture, expectation.hull_spread))
+    return EstimatedLog(
+        log, baseline, expectation, estimation_problem(log.windows, expectation.picture, expectation.hull_spread)
+    )
 
 
 def select(log: EstimatedLog, progress: Callable[[str], None]) -> SelectedLog:
     """Select the effects that a log speaks for."""
-    return SelectedLog(log, search(log.trial, progress, known=log.expectation.library))
+    return SelectedLog(log, search(log.problem, progress, known=log.expectation.library))

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial, imagined
-from ferryid.diagnose.inference.noise_model import Filter, learn, learn_with, likelihood, stride_s
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.noise_model import NoiseModel, fit_noise, fit_noise_with, likelihood, stride_s
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Process
 from ferryid.effects.picture import Picture
@@ -30,10 +30,10 @@ VAGUE = 0.5
 
 
 @dataclass(frozen=True)
-class State:
+class DisturbanceState:
     """A disturbance with its parameters, the standard deviations of their logarithms, and the evidence for it."""
 
-    suspect: Suspect
+    candidate: Candidate
     values: Floats
     widths: Floats
     gain: float
@@ -41,42 +41,42 @@ class State:
     @property
     def known(self) -> frozenset[str]:
         """Names of the parameters that the log tells."""
-        named = zip(self.suspect.parameters, self.widths.tolist(), strict=True)
+        named = zip(self.candidate.parameters, self.widths.tolist(), strict=True)
         return frozenset(one.name for one, width in named if width < VAGUE)
 
     @property
     def estimates(self) -> dict[str, Estimate]:
         """Parameters with their 95 % intervals, which are even in the logarithm."""
-        away = np.exp(1.96 * np.minimum(np.hypot(self.widths, self.suspect.effect.form), WIDEST))
+        away = np.exp(1.96 * np.minimum(np.hypot(self.widths, self.candidate.effect.form), WIDEST))
         low, high = self.values / away, self.values * away
         return {
             one.name: Estimate(value, max(a, one.low), min(b, one.high), one.unit)
             for one, value, a, b in zip(
-                self.suspect.parameters, self.values.tolist(), low.tolist(), high.tolist(), strict=True
+                self.candidate.parameters, self.values.tolist(), low.tolist(), high.tolist(), strict=True
             )
         }
 
 
-def disturbed(
-    trial: Trial,
+def fit_disturbances(
+    problem: EstimationProblem,
     made: Fit,
-    suspects: Sequence[Suspect],
+    candidates: Sequence[Candidate],
     calm: Picture,
     least: float = WORTH,
     *,
-    near: Sequence[State] = (),
-) -> tuple[Trial, tuple[State, ...]]:
+    near: Sequence[DisturbanceState] = (),
+) -> tuple[EstimationProblem, tuple[DisturbanceState, ...]]:
     """Return the trial with the disturbances in its filter that what a fit leaves speaks for, and these.
 
     Each is weighed by its likelihood, at its most likely parameters and noise, less Schwarz's penalty for its parameters.
 
     Parameters
     ----------
-    trial
+    problem
         Its filter is learnt anew.
     made
         What has been found.
-    suspects
+    candidates
         Disturbances that the scene can show.
     calm
         The plain picture without any of them.
@@ -85,31 +85,31 @@ def disturbed(
     near
         What they were beside another fit: where the search begins.
     """
-    picture = imagined(trial.plain, made)
-    steps = trial.excerpt
+    picture = fitted_force_model(problem.plain, made)
+    steps = problem.excerpt
     gaps = steps.gap(picture)
-    noise = learn(steps, gaps, trial.filter)
-    before = {state.suspect.key: [state.values] for state in near}
+    noise = fit_noise(steps, gaps, problem.filter)
+    before = {state.candidate.key: [state.values] for state in near}
     best = likelihood(noise, steps, gaps)
-    states: list[State] = []
-    left = list(suspects)
+    states: list[DisturbanceState] = []
+    left = list(candidates)
     while left:
         worth = WORTH if states else least
         tried = []
-        for suspect in left:
-            assert suspect.effect.unsteady is not None
-            processes = suspect.effect.unsteady(picture)
-            if not processes(_sizes(suspect)):
+        for candidate in left:
+            assert candidate.effect.unsteady is not None
+            processes = candidate.effect.unsteady(picture)
+            if not processes(_sizes(candidate)):
                 continue
-            places = before.get(suspect.key, _starts(suspect))
+            places = before.get(candidate.key, _starts(candidate))
             begin = max(places, key=lambda one: _glance(steps, gaps, noise, processes(one), picture))
             price = 0.5 * len(begin) * log(len(steps.starts))
-            told, values, widths, after = learn_with(
+            told, values, widths, after = fit_noise_with(
                 steps, gaps, noise, processes, begin, picture, best + price + worth
             )
             gain = after - best - price
-            if _seen(suspect, values, widths, stride_s(steps)):
-                tried.append((gain, told, State(suspect, values, widths, gain), after))
+            if _seen(candidate, values, widths, stride_s(steps)):
+                tried.append((gain, told, DisturbanceState(candidate, values, widths, gain), after))
         if not tried:
             break
         gain, told, state, after = max(tried, key=lambda one: one[0])
@@ -117,45 +117,47 @@ def disturbed(
             break
         noise, best = told, after
         states.append(state)
-        left.remove(state.suspect)
+        left.remove(state.candidate)
     plain = calm
     for state in states:
         # On average, too, they may do something.
-        plain = state.suspect.act(plain, state.values)
-    return replace(trial.with_noise_of(made), filter=noise, plain=plain), tuple(states)
+        plain = state.candidate.act(plain, state.values)
+    return replace(problem.with_noise_of(made), filter=noise, plain=plain), tuple(states)
 
 
-def _seen(suspect: Suspect, values: Floats, widths: Floats, step_s: float) -> bool:
+def _seen(candidate: Candidate, values: Floats, widths: Floats, step_s: float) -> bool:
     """Tell whether a disturbance is known: how fast it is, how strong on one axis at least, and its moment if it has one.
 
     A position's error in a narrow band looks like a force along it, but turns nothing; what is faster than the filter's steps
     was not seen by it; and waves slower than any sea are none.
     """
-    band = np.array([parameter.unit == "Hz" for parameter in suspect.parameters])
-    possible = all(one.low <= value <= one.high for one, value in zip(suspect.parameters, values.tolist(), strict=True))
+    band = np.array([parameter.unit == "Hz" for parameter in candidate.parameters])
+    possible = all(
+        one.low <= value <= one.high for one, value in zip(candidate.parameters, values.tolist(), strict=True)
+    )
     if not possible or (values[band] * step_s > FASTEST).any():
         return False
-    strength = _strengths(suspect)
-    turning = np.array([parameter.unit == "N·m" for parameter in suspect.parameters])
+    strength = _strengths(candidate)
+    turning = np.array([parameter.unit == "N·m" for parameter in candidate.parameters])
     return bool((widths[~strength | turning] < VAGUE).all() and (widths[strength] < VAGUE).any())
 
 
-def _strengths(suspect: Suspect) -> NDArray[np.bool_]:
-    return np.array([parameter.name.endswith("std") for parameter in suspect.parameters])
+def _strengths(candidate: Candidate) -> NDArray[np.bool_]:
+    return np.array([parameter.name.endswith("std") for parameter in candidate.parameters])
 
 
-def _glance(steps: Windows, gaps: Floats, noise: Filter, processes: tuple[Process, ...], picture: Picture) -> float:
-    return likelihood(Filter(noise.channels, (*noise.processes, *processes), picture), steps, gaps)
+def _glance(steps: Windows, gaps: Floats, noise: NoiseModel, processes: tuple[Process, ...], picture: Picture) -> float:
+    return likelihood(NoiseModel(noise.channels, (*noise.processes, *processes), picture), steps, gaps)
 
 
-def _starts(suspect: Suspect) -> list[Floats]:
+def _starts(candidate: Candidate) -> list[Floats]:
     """Return parameters to begin with: strengths, and frequencies where there is one, about the usual ones."""
-    usual = _sizes(suspect)
-    strength = _strengths(suspect)
-    band = np.array([parameter.unit == "Hz" for parameter in suspect.parameters])
+    usual = _sizes(candidate)
+    strength = _strengths(candidate)
+    band = np.array([parameter.unit == "Hz" for parameter in candidate.parameters])
     bands = BANDS if band.any() else (1.0,)
     return [usual * np.where(strength, a, np.where(band, b, 1.0)) for a in STRENGTHS for b in bands]
 
 
-def _sizes(suspect: Suspect) -> Floats:
-    return np.array([parameter.size for parameter in suspect.parameters])
+def _sizes(candidate: Candidate) -> Floats:
+    return np.array([parameter.size for parameter in candidate.parameters])

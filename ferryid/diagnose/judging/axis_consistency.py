@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ferryid.diagnose.inference.estimation import WIDER, Fit, Trial, imagined
-from ferryid.diagnose.judging.sparse_regression import known_of
+from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.judging.sparse_regression import nuisance_columns
 from ferryid.vessel.profile import Floats
 
 SHARE = 0.6
@@ -23,7 +23,7 @@ ACTS = 0.1
 
 
 @dataclass(frozen=True)
-class Tie:
+class AxisConsistency:
     """What is there of an effect on each axis, less one, with standard errors, shape (c,), and on which axes it acts."""
 
     beyond: Floats
@@ -31,37 +31,37 @@ class Tie:
     acts: Floats
 
     @property
-    def torn(self) -> bool:
+    def inconsistent(self) -> bool:
         """Whether most of it is missing on an axis where it acts."""
         missing = -self.beyond
         return bool(np.any((self.acts > ACTS) & (missing > SHARE) & (missing - SURE * self.errors > 0.0)))
 
 
-def tie_of(trial: Trial, kept: Fit, index: int) -> Tie:
+def check_axis_consistency(problem: EstimationProblem, kept: Fit, index: int) -> AxisConsistency:
     """Return how an effect's axes hang together.
 
     Parameters
     ----------
-    trial
+    problem
         With the noise that the fit leaves.
     kept
         Hull and effects.
     index
         Which effect.
     """
-    seen, runs = trial.windows, trial.windows.runs
-    neutral = np.array([one.neutral for one in kept.suspects[index].parameters])
+    seen, runs = problem.windows, problem.windows.runs
+    neutral = np.array([one.neutral for one in kept.candidates[index].parameters])
     idle = replace(kept, values=(*kept.values[:index], neutral, *kept.values[index + 1 :]))
-    here = seen.gap(imagined(trial.plain, kept))
-    does = here - seen.gap(imagined(trial.plain, idle))
+    here = seen.gap(fitted_force_model(problem.plain, kept))
+    does = here - seen.gap(fitted_force_model(problem.plain, idle))
     c = does.shape[1]
-    known, centre = known_of(trial, kept, but=index)
-    columns = trial.noise.white(does[:, :, None] * np.eye(c), runs)
+    known, centre = nuisance_columns(problem, kept, but=index)
+    columns = problem.noise.white(does[:, :, None] * np.eye(c), runs)
     work = np.sum(columns**2, axis=0)
-    A = np.concatenate([trial.noise.white(known, runs), columns], axis=1)
+    A = np.concatenate([problem.noise.white(known, runs), columns], axis=1)
     # Hull and parameters are believed to lie about their usual values, the shares about one whole.
     bend = A.T @ A + np.eye(A.shape[1])
-    slope = A.T @ trial.noise.white(here, runs) + np.concatenate([centre, np.zeros(c)])
+    slope = A.T @ problem.noise.white(here, runs) + np.concatenate([centre, np.zeros(c)])
     covariance = np.linalg.inv(bend)
     errors = WIDER * np.sqrt(np.diag(covariance))[-c:]
-    return Tie(-(covariance @ slope)[-c:], errors, work / max(float(work.sum()), 1e-12))
+    return AxisConsistency(-(covariance @ slope)[-c:], errors, work / max(float(work.sum()), 1e-12))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial, without
-from ferryid.diagnose.inference.search import pruned, void
-from ferryid.diagnose.judging.axis_consistency import tie_of
-from ferryid.diagnose.judging.held_out import Evidence, evidence
-from ferryid.diagnose.judging.rivals import Standing, standing_of
-from ferryid.diagnose.judging.unexplained import impostors
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, without
+from ferryid.diagnose.inference.search import is_negligible, prune
+from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
+from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
+from ferryid.diagnose.judging.rivals import RivalComparison, compare_rivals
+from ferryid.diagnose.judging.unexplained import find_displaced
 from ferryid.effects.wording import listed
 
 SWAPS = 6
@@ -24,7 +24,7 @@ LAW = "an empirical law of the motion explains more in that place, and leaves no
 
 
 @dataclass(frozen=True)
-class Judged:
+class Elimination:
     """What is left of a selection.
 
     Attributes
@@ -34,37 +34,39 @@ class Judged:
     proof
         Held-out evidence; None where nothing is left, or the log is too short to hold anything out.
     standings
-        Of every suspect among its rivals.
+        Of every candidate among its rivals.
     told
         What was dropped, and why.
     """
 
     fit: Fit
-    proof: Evidence | None
-    standings: tuple[Standing, ...]
+    proof: HeldOutEvidence | None
+    standings: tuple[RivalComparison, ...]
     told: tuple[str, ...]
 
 
-def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Callable[[str], None]) -> Judged:
+def eliminate_backward(
+    problem: EstimationProblem, found: Fit, library: Sequence[Candidate], progress: Callable[[str], None]
+) -> Elimination:
     """Drop what does not stand, one after the other, as the others are to be judged without it.
 
     Parameters
     ----------
-    trial
+    problem
         With the noise that the selection leaves.
     found
         The selection.
     library
-        Every suspect, for rivals.
+        Every candidate, for rivals.
     progress
         Called with the name of each stage.
     """
     fallen_by_reason: dict[str, list[str]] = {}
     tried = {found.keys}
     kept, swaps = found, 0
-    while kept.suspects:
+    while kept.candidates:
         progress("weighing rivals")
-        standings = tuple(standing_of(trial, kept, i, library) for i in range(len(kept.suspects)))
+        standings = tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
         better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
         better = [one for one in better if one.fit.keys not in tried]
         if better and swaps < SWAPS:
@@ -72,18 +74,18 @@ def judged(trial: Trial, found: Fit, library: Sequence[Suspect], progress: Calla
             best = max(better, key=lambda one: one.gain)
             tried.add(best.fit.keys)
             swaps += 1
-            kept = pruned(trial, best.fit)
+            kept = prune(problem, best.fit)
             continue
         progress("judging on held-out stretches")
-        proof = evidence(trial, kept)
-        fallen, why = _fallen(trial, kept, proof)
+        proof = held_out_evidence(problem, kept)
+        fallen, why = _fallen(problem, kept, proof)
         if fallen is None:
-            return Judged(kept, proof, standings, _told(fallen_by_reason))
+            return Elimination(kept, proof, standings, _told(fallen_by_reason))
         if why:
-            fallen_by_reason.setdefault(why, []).append(kept.suspects[fallen].title)
-        kept = pruned(trial, without(trial, kept, fallen))
+            fallen_by_reason.setdefault(why, []).append(kept.candidates[fallen].title)
+        kept = prune(problem, without(problem, kept, fallen))
         tried.add(kept.keys)
-    return Judged(kept, None, (), _told(fallen_by_reason))
+    return Elimination(kept, None, (), _told(fallen_by_reason))
 
 
 def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
@@ -95,20 +97,20 @@ def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _fallen(trial: Trial, kept: Fit, proof: Evidence | None) -> tuple[int | None, str]:
-    """Return the suspect that stands least, and why it falls, if that is worth telling; None where all stand."""
+def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None) -> tuple[int | None, str]:
+    """Return the candidate that stands least, and why it falls, if that is worth telling; None where all stand."""
     if proof is not None:
         fallen = [i for i, one in enumerate(proof.proofs) if not one.holds]
         if fallen:
             worst = min(fallen, key=lambda i: proof.proofs[i].beaten)
             return worst, PLACEBO
     # Beside what was found later, it may be hardly anything: nothing to tell, and no sign of another cause.
-    idle = [i for i in range(len(kept.suspects)) if void(trial, kept, i)]
+    idle = [i for i in range(len(kept.candidates)) if is_negligible(problem, kept, i)]
     if idle:
         return idle[0], ""
-    torn = [i for i in range(len(kept.suspects)) if tie_of(trial, kept, i).torn]
-    if torn:
-        return torn[0], TORN
+    inconsistent = [i for i in range(len(kept.candidates)) if check_axis_consistency(problem, kept, i).inconsistent]
+    if inconsistent:
+        return inconsistent[0], TORN
     # Physics without a name here may look a little like an effect.
-    imitated = impostors(trial, kept)
+    imitated = find_displaced(problem, kept)
     return (imitated[0], LAW) if imitated else (None, "")

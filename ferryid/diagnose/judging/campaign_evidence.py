@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.inference.autoregression import ORDER, Noise
-from ferryid.diagnose.inference.campaign_hull import Member, fit_together, left_over
-from ferryid.diagnose.inference.estimation import Suspect
+from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
+from ferryid.diagnose.inference.campaign_hull import Member, fit_campaign_hull, residual_gaps
+from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.folds import DRAWS, FOLDS, folds_of, subset
 from ferryid.effects.picture import Picture
 from ferryid.errors import FerryIdError
@@ -57,7 +57,7 @@ def held_out_gains(
     none
         The logs without effects.
     spread, induced_size
-        As in `ferryid.diagnose.inference.campaign_hull.fit_together`.
+        As in `ferryid.diagnose.inference.campaign_hull.fit_campaign_hull`.
 
     Raises
     ------
@@ -68,16 +68,16 @@ def held_out_gains(
     if not cut:
         raise FerryIdError("the logs: each is too short to hold stretches out. Fix: give logs of some minutes")
     kept = [i for i, _ in cut]
-    weigh = fit_together([next(iter(variants.values()))[i] for i in kept], spread, induced_size).noise
+    weigh = fit_campaign_hull([next(iter(variants.values()))[i] for i in kept], spread, induced_size).noise
 
     def left(members: Sequence[Member]) -> list[Floats]:
         squares = [np.zeros(len(members[i].windows.starts)) for i in kept]
         for k in range(FOLDS):
             training = [replace(members[i], windows=folds.training[k]) for i, folds in cut]
-            made = fit_together(training, spread, induced_size)
+            made = fit_campaign_hull(training, spread, induced_size)
             for place, (i, folds) in enumerate(cut):
                 own = folds.fold == k
-                gaps = left_over(replace(members[i], windows=subset(members[i].windows, own)), made, place)
+                gaps = residual_gaps(replace(members[i], windows=subset(members[i].windows, own)), made, place)
                 squares[place][own] = _white_squares(gaps, weigh, folds.block[own])
         return squares
 
@@ -96,7 +96,7 @@ def held_out_gains(
     return gains
 
 
-def _white_squares(gaps: Floats, noise: Noise, block: NDArray[np.int64]) -> Floats:
+def _white_squares(gaps: Floats, noise: AutoregressiveNoise, block: NDArray[np.int64]) -> Floats:
     """Return the whitened square of every window; those that only start a block's autoregression count nothing."""
     squares = np.zeros(len(gaps))
     for k in np.unique(block):
@@ -108,16 +108,16 @@ def _white_squares(gaps: Floats, noise: Noise, block: NDArray[np.int64]) -> Floa
     return squares
 
 
-def on_heading(suspect: Suspect, psi: Floats) -> Suspect:
+def turn_heading(candidate: Candidate, psi: Floats) -> Candidate:
     """Return an effect that pushes as if the vessel had had another heading, shape (n,)."""
 
     def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
         scene = picture.scene
         other = replace(scene, eta=np.column_stack([scene.eta[:, :2], psi]))
-        pushed = suspect.effect.apply(replace(picture, scene=other), p, instance)
+        pushed = candidate.effect.apply(replace(picture, scene=other), p, instance)
         return replace(picture, external=pushed.external)
 
-    return replace(suspect, effect=replace(suspect.effect, apply=apply))
+    return replace(candidate, effect=replace(candidate.effect, apply=apply))
 
 
 def placebos(members: Sequence[Member]) -> dict[str, tuple[Member, ...]]:
@@ -131,4 +131,4 @@ def placebos(members: Sequence[Member]) -> dict[str, tuple[Member, ...]]:
 
 
 def _moved(member: Member, psi: Floats) -> Member:
-    return replace(member, suspects=tuple(on_heading(suspect, psi) for suspect in member.suspects))
+    return replace(member, candidates=tuple(turn_heading(candidate, psi) for candidate in member.candidates))

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.candidate_terms import Term, terms_of
-from ferryid.diagnose.inference.estimation import WIDER, Fit, Trial, fit
+from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fit
 from ferryid.diagnose.inference.folds import Folds
 from ferryid.diagnose.inference.search import VOID
-from ferryid.diagnose.judging.held_out import held_out, improvement
-from ferryid.diagnose.judging.sparse_regression import GAIN, MOST_TERMS, Law, lines_of, suspect_of
+from ferryid.diagnose.judging.held_out import compare_held_out, held_out
+from ferryid.diagnose.judging.sparse_regression import GAIN, MOST_TERMS, Law, law_candidate, linearise_terms
 from ferryid.effects.effect import HELD
 from ferryid.vessel.profile import Floats
 
@@ -31,7 +31,7 @@ REFITS = 2
 
 
 @dataclass(frozen=True)
-class Said:
+class LogInformation:
     """What one log says of the coefficients of terms, its hull and effects partialled out.
 
     Attributes
@@ -68,11 +68,11 @@ class Said:
         """Return one of `moves`; zero where the log cannot have the term."""
         return next((float(move) for one, move in zip(self.terms, self.moves, strict=True) if one.key == term.key), 0.0)
 
-    def beside(self, terms: Sequence[Term], values: Floats) -> Said:
+    def beside(self, terms: Sequence[Term], values: Floats) -> LogInformation:
         """Return what the log says beside a law that acts."""
         place = {term.key: value for term, value in zip(terms, values.tolist(), strict=True)}
-        acting = np.array([place.get(term.key, 0.0) for term in self.terms])
-        return replace(self, slope=self.slope - self.normal @ acting)
+        active_intervals = np.array([place.get(term.key, 0.0) for term in self.terms])
+        return replace(self, slope=self.slope - self.normal @ active_intervals)
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class VesselLaw:
     gains, expected
         Log-likelihood that the law gains in each log with the coefficients of the others, and would if it were true.
     moves
-        What each term adds to the acceleration in the log where it adds most, as in `Said`, shape (q,).
+        What each term adds to the acceleration in the log where it adds most, as in `LogInformation`, shape (q,).
     """
 
     terms: tuple[Term, ...]
@@ -122,10 +122,10 @@ class VesselLaw:
 
 
 @dataclass(frozen=True)
-class Heard:
+class CampaignLaws:
     """What the logs of a vessel, of which one is at `place`, say of its laws."""
 
-    said: tuple[Said, ...]
+    said: tuple[LogInformation, ...]
     place: int
     law: VesselLaw | None
 
@@ -134,15 +134,15 @@ class Heard:
         """How many logs can show the vessel's law."""
         return 0 if self.law is None else int(self.law.able.sum())
 
-    def common(self, trial: Trial, kept: Fit, folds: Folds) -> Law | None:
+    def common(self, problem: EstimationProblem, kept: Fit, folds: Folds) -> Law | None:
         """Return the vessel's law as it acts in the log, with the coefficients of the others; None where it does not show."""
         if self.law is None or not self.law.able[self.place]:
             return None
-        made = _with(trial, kept, self.law.terms, self.law.elsewhere[self.place])
-        seen = trial.with_noise_of(made)
-        before = held_out(seen, folds, kept.suspects, kept.values)
-        after = held_out(seen, folds, made.suspects, made.values)
-        better = improvement(seen, folds, before, after)
+        made = _with(problem, kept, self.law.terms, self.law.elsewhere[self.place])
+        seen = problem.with_noise_of(made)
+        before = held_out(seen, folds, kept.candidates, kept.values)
+        after = held_out(seen, folds, made.candidates, made.values)
+        better = compare_held_out(seen, folds, before, after)
         return Law(self.law.terms, made, seen, better, self.law.total, 0.0, self.law.values, self.law.errors)
 
     def of_others(self, law: Law) -> tuple[int, int, int]:
@@ -154,7 +154,7 @@ class Heard:
         return len(others), len(gains), sum(gain > 0.0 for gain in gains)
 
 
-def heard(logs: Mapping[str, tuple[Trial, Fit]]) -> dict[str, Heard]:
+def find_campaign_laws(logs: Mapping[str, tuple[EstimationProblem, Fit]]) -> dict[str, CampaignLaws]:
     """Return what each log is told by all.
 
     Parameters
@@ -163,33 +163,33 @@ def heard(logs: Mapping[str, tuple[Trial, Fit]]) -> dict[str, Heard]:
         Of one vessel, by path: each with what was found of it, hull and effects, and the noise that these leave.
     """
     best: VesselLaw | None = None
-    said = tuple(said_by(trial, kept) for trial, kept in logs.values())
+    said = tuple(log_information(problem, kept) for problem, kept in logs.values())
     while best is None or len(best.terms) < MOST_TERMS:
-        law = law_of_all(said, best)
+        law = select_campaign_law(said, best)
         if law is None:
             break
         for _ in range(REFITS):
-            again = tuple(said_by(trial, kept, law) for trial, kept in logs.values())
+            again = tuple(log_information(problem, kept, law) for problem, kept in logs.values())
             law = _fitted(again, law.terms)
         if not law.holds:
             break
         best, said = law, again
-    return {path: Heard(said, place, best) for place, path in enumerate(logs)}
+    return {path: CampaignLaws(said, place, best) for place, path in enumerate(logs)}
 
 
-def said_by(trial: Trial, kept: Fit, law: VesselLaw | None = None) -> Said:
+def log_information(problem: EstimationProblem, kept: Fit, law: VesselLaw | None = None) -> LogInformation:
     """Return what a log says of all terms that its scene offers, beside a fit.
 
     The slopes are those where there is no law. If one is known, all derivatives are taken where it acts, and the hull does not
     have to stand in for it.
     """
     if law is not None:
-        kept = _with(trial, kept, law.terms, law.values)
-        trial = trial.with_noise_of(kept)
-    terms = terms_of(trial.plain.scene)
-    lines = lines_of(trial, kept, terms)
-    pushes, seen = lines.terms * lines.sizes, trial.windows
-    left, known, columns = (trial.noise.white(one, seen.runs) for one in (lines.gaps, lines.known, pushes))
+        kept = _with(problem, kept, law.terms, law.values)
+        problem = problem.with_noise_of(kept)
+    terms = terms_of(problem.plain.scene)
+    lines = linearise_terms(problem, kept, terms)
+    pushes, seen = lines.terms * lines.sizes, problem.windows
+    left, known, columns = (problem.noise.white(one, seen.runs) for one in (lines.gaps, lines.known, pushes))
     measured = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
     moves = np.max(np.sqrt(np.mean(pushes**2, axis=0)) / np.maximum(measured, 1e-12)[:, None], axis=0)
     # Hull and effects are believed to lie about their usual values, the terms may have any.
@@ -197,11 +197,11 @@ def said_by(trial: Trial, kept: Fit, law: VesselLaw | None = None) -> Said:
     A = np.vstack([known, np.eye(p)])
     B = np.column_stack([np.concatenate([left, lines.centre]), np.vstack([columns, np.zeros((p, len(terms)))])])
     rest = B - A @ np.linalg.lstsq(A, B, rcond=None)[0]
-    said = Said(terms, rest[:, 1:].T @ rest[:, 1:], -rest[:, 1:].T @ rest[:, 0], moves)
+    said = LogInformation(terms, rest[:, 1:].T @ rest[:, 1:], -rest[:, 1:].T @ rest[:, 0], moves)
     return said if law is None else said.beside(law.terms, -law.values)
 
 
-def law_of_all(said: Sequence[Said], known: VesselLaw | None = None) -> VesselLaw | None:
+def select_campaign_law(said: Sequence[LogInformation], known: VesselLaw | None = None) -> VesselLaw | None:
     """Return the law with the one more term that gains most in the logs that it is not fitted to; None where none holds."""
     if len(said) < 2:
         return None
@@ -213,17 +213,17 @@ def law_of_all(said: Sequence[Said], known: VesselLaw | None = None) -> VesselLa
     return best if best is not None and best.total >= least else None
 
 
-def _with(trial: Trial, kept: Fit, terms: Sequence[Term], values: Floats) -> Fit:
+def _with(problem: EstimationProblem, kept: Fit, terms: Sequence[Term], values: Floats) -> Fit:
     """Return a fit beside a law whose coefficients are held."""
-    law = suspect_of(trial, kept, terms)
+    law = law_candidate(problem, kept, terms)
     held = tuple(
         replace(one, size=HELD, neutral=value, low=-np.inf, high=np.inf)
         for one, value in zip(law.parameters, values.tolist(), strict=True)
     )
-    return fit(trial, [*kept.suspects, replace(law, parameters=held)], [*kept.values, values])
+    return fit(problem, [*kept.candidates, replace(law, parameters=held)], [*kept.values, values])
 
 
-def _fitted(said: Sequence[Said], terms: tuple[Term, ...]) -> VesselLaw:
+def _fitted(said: Sequence[LogInformation], terms: tuple[Term, ...]) -> VesselLaw:
     """Return a law with the coefficients that all logs speak for."""
     parts = [one.of(terms) for one in said]
     normal, slope = (np.stack(one) for one in zip(*parts, strict=True))

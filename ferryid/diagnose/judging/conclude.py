@@ -10,18 +10,25 @@ import numpy as np
 
 from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.data.estimate import AXES, Estimate
-from ferryid.diagnose.inference.estimation import Fit, Trial, imagined
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
-from ferryid.diagnose.judging.confidence_rules import Claim, Key, LogFigures, apply_rules, lasting, log_notes
-from ferryid.diagnose.judging.detection_power import advice, powers, says_untested, tells, unexcited
-from ferryid.diagnose.judging.diagnosis import Diagnosis, Moved
+from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
+from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes
+from ferryid.diagnose.judging.detection_power import (
+    detection_powers,
+    is_testable,
+    recording_advice,
+    unexcited_axes,
+    untested_notes,
+)
+from ferryid.diagnose.judging.diagnosis import Diagnosis, HullChange
 from ferryid.diagnose.judging.free_runs import FreeRuns
-from ferryid.diagnose.judging.held_out import Evidence, Improvement
-from ferryid.diagnose.judging.hidden_signal import withheld as withheld_beside
+from ferryid.diagnose.judging.held_out import HeldOutEvidence, Improvement
+from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
 from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
 from ferryid.diagnose.judging.locate import locate
-from ferryid.diagnose.judging.posterior import learnt
+from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.vessel.profile import Floats
@@ -81,23 +88,23 @@ def _too_short(log: AveragedLog, baseline: Baseline, campaign: tuple[frozenset[K
 def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosis:
     selected, stands = log.selected, log.stands
     estimated = selected.estimated
-    screened, trial, kept = estimated.averaged.screened, selected.search.trial, stands.fit
+    screened, problem, kept = estimated.averaged.screened, selected.search.problem, stands.fit
     scene, survey = screened.scene, screened.measured.survey
     figures = replace(log.figures, campaign=campaign)
     findings, rule_notes = apply_rules(log.claims, figures)
-    chances, still = powers(trial, kept, selected.steady), unexcited(trial)
-    before, after = _scores(trial, log.base, kept, stands.proof)
+    chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
+    before, after = _scores(problem, log.base, kept, stands.proof)
     ratio = {axis: Estimate(unit="-", **one) for axis, one in after.get("ratio", {}).items()}
-    left = {axis: share for axis, share in _left_shares(trial, after["mse"]).items() if axis not in still}
-    remainder = Remainder(tells(chances, still), bool(stands.told), ratio, left)
+    left = {axis: share for axis, share in _left_shares(problem, after["mse"]).items() if axis not in still}
+    remainder = Remainder(is_testable(chances, still), bool(stands.told), ratio, left)
     notes = (
         *survey_notes(screened),
         *estimated.expectation.notes,
         *stands.told,
         *rule_notes,
         *log_notes(figures),
-        *says_untested(selected.search.untested),
-        *advice(chances, still),
+        *untested_notes(selected.search.untested),
+        *recording_advice(chances, still),
     )
     updates = estimated.baseline.updates_model
     return Diagnosis(
@@ -108,13 +115,13 @@ def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosi
         before,
         after,
         notes,
-        evidence=_leftover(trial, log.base, kept),
-        located=locate(trial, log.base, kept, scene) if kept.suspects else log.unknown.left,
-        withheld=withheld_beside(survey.hidden, scene, findings),
+        evidence=_leftover(problem, log.base, kept),
+        located=locate(problem, log.base, kept, scene) if kept.candidates else log.unknown.left,
+        withheld=compare_hidden_signals(survey.hidden, scene, findings),
         against=estimated.expectation.comparison,
-        moved=_moved(trial, kept) if kept.suspects else None,
+        moved=_moved(problem, kept) if kept.candidates else None,
         duration_s=_duration_s(screened),
-        learnt=learnt(trial, kept, selected.search.states, findings, survey) if updates else None,
+        posterior=posterior_of(problem, kept, selected.search.states, findings, survey) if updates else None,
         remainder=remainder,
     )
 
@@ -130,10 +137,12 @@ def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
     )
 
 
-def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple[dict[str, Any], dict[str, Any]]:
-    window_s = _window_s(trial.windows.weight, trial.windows.scene.step_s)
+def _scores(
+    problem: EstimationProblem, base: Fit, kept: Fit, proof: HeldOutEvidence | None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    window_s = _window_s(problem.windows.weight, problem.windows.scene.step_s)
     if proof is None:
-        errors = force_errors(trial.windows, imagined(trial.plain, base), trial.plain)
+        errors = force_errors(problem.windows, fitted_force_model(problem.plain, base), problem.plain)
         mse = dict(zip(AXES, np.mean(errors**2, axis=0).tolist(), strict=True))
         return {"mse": mse, "rows": len(errors), "window_s": window_s}, {"mse": mse}
     whole: Improvement = proof.whole
@@ -154,26 +163,26 @@ def _scores(trial: Trial, base: Fit, kept: Fit, proof: Evidence | None) -> tuple
     return before, after
 
 
-def _left_shares(trial: Trial, mse: Mapping[str, float]) -> dict[str, float]:
+def _left_shares(problem: EstimationProblem, mse: Mapping[str, float]) -> dict[str, float]:
     """Return the squared force error that is left over the squared force that moves the vessel, by axis.
 
     That is the thrust's or the inertia's, whichever is larger: a vessel that holds its place in a wind hardly accelerates.
     """
-    seen = trial.windows
-    inertia = seen.measured[:, 3:] @ mass_of(trial.plain.hull).T
+    seen = problem.windows
+    inertia = seen.measured[:, 3:] @ mass_of(problem.plain.hull).T
     thrust = seen.mean(seen.scene.parts.sum(axis=1))
     moves = np.maximum(np.mean(inertia**2, axis=0), np.mean(thrust**2, axis=0))
     return {axis: mse[axis] / float(size) for axis, size in zip(AXES, moves, strict=True) if size > 0.0}
 
 
-def _moved(trial: Trial, kept: Fit) -> Moved | None:
+def _moved(problem: EstimationProblem, kept: Fit) -> HullChange | None:
     """Return the hull's coefficient that the refit moved farthest; None where none could move."""
-    free = trial.hull_spread > 0.0
+    free = problem.hull_spread > 0.0
     if not free.any():
         return None
-    away = np.divide(kept.hull - trial.plain.hull, trial.hull_spread, out=np.zeros_like(kept.hull), where=free)
+    away = np.divide(kept.hull - problem.plain.hull, problem.hull_spread, out=np.zeros_like(kept.hull), where=free)
     k = int(np.argmax(np.abs(away)))
-    return Moved(COEFFICIENTS[k], UNITS[k], float(trial.plain.hull[k]), float(kept.hull[k]), float(away[k]))
+    return HullChange(COEFFICIENTS[k], UNITS[k], float(problem.plain.hull[k]), float(kept.hull[k]), float(away[k]))
 
 
 def _window_s(weight: Floats, step_s: float) -> float:
@@ -192,14 +201,14 @@ def _free_run(runs: FreeRuns, errors: Floats) -> dict[str, Any]:
     return {"horizons_s": runs.horizons_s.tolist(), **columns, "starts": runs.starts, "note": ""}
 
 
-def _leftover(trial: Trial, base: Fit, kept: Fit) -> dict[str, Any]:
-    seen = trial.windows
+def _leftover(problem: EstimationProblem, base: Fit, kept: Fit) -> dict[str, Any]:
+    seen = problem.windows
     psi = seen.mean(seen.scene.psi[:, None])[:, 0]
     speed = seen.mean(np.hypot(seen.scene.nu[:, 0], seen.scene.nu[:, 1])[:, None])[:, 0]
     return {
         "t": seen.middle_s,
-        "before": force_errors(seen, imagined(trial.plain, base), trial.plain),
-        "after": force_errors(seen, imagined(trial.plain, kept), trial.plain),
+        "before": force_errors(seen, fitted_force_model(problem.plain, base), problem.plain),
+        "after": force_errors(seen, fitted_force_model(problem.plain, kept), problem.plain),
         "heading": np.degrees(np.mod(psi, 2.0 * np.pi)),
         "speed": speed,
     }

@@ -12,7 +12,14 @@ from math import erf, sqrt
 
 import numpy as np
 
-from ferryid.diagnose.inference.estimation import NUDGE, Fit, Suspect, Trial, effect_slopes, imagined
+from ferryid.diagnose.inference.estimation import (
+    NUDGE,
+    Candidate,
+    EstimationProblem,
+    Fit,
+    effect_slopes,
+    fitted_force_model,
+)
 from ferryid.diagnose.inference.search import ODDS
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
 from ferryid.effects import effects
@@ -40,15 +47,15 @@ HULL = "hull_parameters"
 
 
 @dataclass(frozen=True)
-class Power:
-    """The chance, 0 to 1, that a suspect of usual size would have been found in a log."""
+class DetectionPower:
+    """The chance, 0 to 1, that a candidate of usual size would have been found in a log."""
 
-    suspect: Suspect
+    candidate: Candidate
     chance: float
 
 
-def powers(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> tuple[Power, ...]:
-    """Return the chance of finding each suspect, beside what was found.
+def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Candidate]) -> tuple[DetectionPower, ...]:
+    """Return the chance of finding each candidate, beside what was found.
 
     With d the change of the whitened prediction errors that the effect makes at its usual size, less what hull and findings
     can imitate, and S the information on its parameters, the logarithm of the evidence is normal about ``½ d'd - ½ z'z - ½ log
@@ -57,34 +64,34 @@ def powers(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> tuple[Power, 
 
     Parameters
     ----------
-    trial, kept
+    problem, kept
         The log, and what was found in it.
     library
-        The suspects; those that were found are left out.
+        The candidates; those that were found are left out.
     """
-    picture = imagined(trial.plain, kept)
-    before = trial.white(picture)
-    nuisance = np.column_stack([trial.by_hull, effect_slopes(trial, kept)])
+    picture = fitted_force_model(problem.plain, kept)
+    before = problem.white(picture)
+    nuisance = np.column_stack([problem.by_hull, effect_slopes(problem, kept)])
     inner = nuisance.T @ nuisance + np.eye(nuisance.shape[1])
 
     def apart(columns: Floats) -> Floats:
         return np.asarray(columns - nuisance @ np.linalg.solve(inner, nuisance.T @ columns))
 
-    taken = {one.key for one in kept.suspects}
+    taken = {one.key for one in kept.candidates}
     made = []
-    for suspect in library:
-        if suspect.key in taken or suspect.effect.id == HULL:
+    for candidate in library:
+        if candidate.key in taken or candidate.effect.id == HULL:
             continue
-        size = np.array([one.size for one in suspect.parameters])
+        size = np.array([one.size for one in candidate.parameters])
         chance = 1.0
-        for usual in _usual(suspect):
-            there = trial.white(suspect.act(picture, usual))
+        for usual in _usual(candidate):
+            there = problem.white(candidate.act(picture, usual))
             change = apart(there - before)
             if not change.any():
                 # Of what comes and goes by chance a picture holds no force: it is found in the noise, and not here.
                 break
             columns = [
-                (trial.white(suspect.act(picture, usual + NUDGE * step)) - there) / NUDGE for step in np.diag(size)
+                (problem.white(candidate.act(picture, usual + NUDGE * step)) - there) / NUDGE for step in np.diag(size)
             ]
             information = np.column_stack(columns).T @ apart(np.column_stack(columns))
             strength = float(change @ change)
@@ -92,22 +99,22 @@ def powers(trial: Trial, kept: Fit, library: Sequence[Suspect]) -> tuple[Power, 
             evidence = 0.5 * (strength - len(size) - occam)
             chance = min(chance, 0.5 * (1.0 + erf((evidence - ODDS) / sqrt(2.0 * max(strength, 1.0)))))
         else:
-            made.append(Power(suspect, chance))
+            made.append(DetectionPower(candidate, chance))
     return tuple(made)
 
 
-def _usual(suspect: Suspect) -> list[Floats]:
+def _usual(candidate: Candidate) -> list[Floats]:
     """Return parameters of usual size: all larger than neutral, and every other one smaller where that is possible."""
-    neutral = np.array([one.neutral for one in suspect.parameters])
-    size = np.array([one.size for one in suspect.parameters])
-    low, high = (np.array([getattr(one, end) for one in suspect.parameters]) for end in ("low", "high"))
+    neutral = np.array([one.neutral for one in candidate.parameters])
+    size = np.array([one.size for one in candidate.parameters])
+    low, high = (np.array([getattr(one, end) for one in candidate.parameters]) for end in ("low", "high"))
     signs = [np.ones(len(size)), np.where(np.arange(len(size)) % 2 == 0, -1.0, 1.0)]
     return [np.clip(neutral + sign * size, low, high) for sign in signs]
 
 
-def unexcited(trial: Trial) -> tuple[str, ...]:
+def unexcited_axes(problem: EstimationProblem) -> tuple[str, ...]:
     """Return the axes of whose hull coefficients the log tells next to nothing."""
-    information = trial.by_hull.T @ trial.by_hull
+    information = problem.by_hull.T @ problem.by_hull
     found = []
     for axis, places in AXES.items():
         most = float(np.linalg.eigvalsh(information[np.ix_(places, places)])[-1])
@@ -116,12 +123,12 @@ def unexcited(trial: Trial) -> tuple[str, ...]:
     return tuple(found)
 
 
-def tells(every: Sequence[Power], axes: Sequence[str]) -> bool:
+def is_testable(every: Sequence[DetectionPower], axes: Sequence[str]) -> bool:
     """Tell whether a log in which nothing was found can be said to match: more than half of the effects would have shown."""
     return 2 * sum(one.chance >= SEEN for one in every) > len(every) and len(axes) < len(AXES)
 
 
-def advice(every: Sequence[Power], axes: Sequence[str]) -> list[str]:
+def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> list[str]:
     """Return what the log could not show, and what to record next, in sentences; each effect and manoeuvre once."""
     told = []
     if axes:
@@ -133,8 +140,8 @@ def advice(every: Sequence[Power], axes: Sequence[str]) -> list[str]:
     by_manoeuvre: dict[str, dict[str, list[str]]] = {}
     for one in every:
         if one.chance < SEEN:
-            known = by_manoeuvre.setdefault(SHOWS.get(one.suspect.effect.id, OTHERWISE), {})
-            known.setdefault(one.suspect.effect.title.lower(), []).extend(filter(None, [one.suspect.instance]))
+            known = by_manoeuvre.setdefault(SHOWS.get(one.candidate.effect.id, OTHERWISE), {})
+            known.setdefault(one.candidate.effect.title.lower(), []).extend(filter(None, [one.candidate.instance]))
     if by_manoeuvre:
         parts = [
             f"for {listed([titled(title, ', '.join(of)) for title, of in names.items()])}, record {manoeuvre}"
@@ -144,7 +151,7 @@ def advice(every: Sequence[Power], axes: Sequence[str]) -> list[str]:
     return told
 
 
-def says_untested(untested: Mapping[str, str]) -> list[str]:
+def untested_notes(untested: Mapping[str, str]) -> list[str]:
     """Return a sentence for every reason why effects, by id, could not be tested."""
     by_reason: dict[str, list[str]] = {}
     for effect, reason in untested.items():

@@ -9,7 +9,7 @@ from typing import Any
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.locate import Location, plain_location
-from ferryid.diagnose.judging.posterior import Learnt
+from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.verdict import Remainder
 from ferryid.vessel.profile import Floats
 
@@ -17,7 +17,7 @@ SCHEMA = "ferryid.diagnosis/1"
 
 
 @dataclass(frozen=True)
-class Moved:
+class HullChange:
     """The coefficient of the hull that a refit moved farthest.
 
     Attributes
@@ -87,8 +87,8 @@ class Diagnosis:
         Signals that were hidden from the diagnosis.
     against
         The simulation that a recording was compared with, as
-        `ferryid.diagnose.inference.simulation_baseline.plain_against` gives it, or empty.
-    learnt
+        `ferryid.diagnose.inference.simulation_baseline.simulation_as_json` gives it, or empty.
+    posterior
         What a model can learn from it; None where it found no force left out, was held against a simulation, or shares
         the hull of other logs.
     located
@@ -112,9 +112,9 @@ class Diagnosis:
     evidence: Mapping[str, Floats] = field(default_factory=dict)
     withheld: tuple[Withheld, ...] = ()
     against: Mapping[str, Any] = field(default_factory=dict)
-    learnt: Learnt | None = None
+    posterior: Posterior | None = None
     located: Location | None = None
-    moved: Moved | None = None
+    moved: HullChange | None = None
     duration_s: float | None = None
     remainder: Remainder = field(default_factory=Remainder)
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.inference.estimation import Fit, Trial, imagined
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import fine_windows, spectrum_of
-from ferryid.diagnose.inference.stochastic_disturbance import WORTH, State
+from ferryid.diagnose.inference.stochastic_disturbance import WORTH, DisturbanceState
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.diagnose.judging.confidence_rules import Claim, Figures
+from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects.effect import Process
 from ferryid.effects.picture import Scene
@@ -27,12 +27,14 @@ PASSED = 1e-2
 """Share of the power that windows must let through for a frequency to be shown."""
 
 
-def disturbance_claims(trial: Trial, made: Fit, states: Sequence[State], scene: Scene) -> list[Claim]:
+def disturbance_claims(
+    problem: EstimationProblem, made: Fit, states: Sequence[DisturbanceState], scene: Scene
+) -> list[Claim]:
     """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over.
 
     Parameters
     ----------
-    trial
+    problem
         With the disturbances in its filter.
     made
         What else was found.
@@ -41,9 +43,9 @@ def disturbance_claims(trial: Trial, made: Fit, states: Sequence[State], scene: 
     scene
         The log's scene at its full rate.
     """
-    short = fine_windows(trial, scene)
-    frequency, power = spectrum_of(short, force_errors(short, imagined(trial.plain, made), trial.plain))
-    return [_claim(trial, state, short, frequency, power) for state in states]
+    short = fine_windows(problem, scene)
+    frequency, power = spectrum_of(short, force_errors(short, fitted_force_model(problem.plain, made), problem.plain))
+    return [_claim(problem, state, short, frequency, power) for state in states]
 
 
 def density(process: Process, frequency_hz: Floats) -> Floats:
@@ -82,13 +84,15 @@ def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[
     }
 
 
-def _claim(trial: Trial, state: State, short: Windows, frequency: Floats, spectrum: Floats) -> Claim:
-    scene = trial.windows.scene
-    suspect = state.suspect
-    assert suspect.effect.unsteady is not None
+def _claim(
+    problem: EstimationProblem, state: DisturbanceState, short: Windows, frequency: Floats, spectrum: Floats
+) -> Claim:
+    scene = problem.windows.scene
+    candidate = state.candidate
+    assert candidate.effect.unsteady is not None
     parameters = {name: one for name, one in state.estimates.items() if name in state.known}
-    picture = trial.filter.picture or trial.plain
-    pushes = suspect.effect.unsteady(picture)(state.values)
+    picture = problem.filter.picture or problem.plain
+    pushes = candidate.effect.unsteady(picture)(state.values)
     pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in pushes]
     # Newtons and newton metres compare as what they do to the vessel.
     arm = np.array([1.0, 1.0, np.sqrt(picture.hull[0] / picture.hull[4])])
@@ -96,7 +100,7 @@ def _claim(trial: Trial, state: State, short: Windows, frequency: Floats, spectr
     values = {name: one.value for name, one in parameters.items()}
     shown = _columns(short, frequency, spectrum, pushes, int(np.argmax(power)))
     finding = Finding(
-        effect=suspect.effect.id,
+        effect=candidate.effect.id,
         instance=None,
         probability=1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0))),
         parameters=parameters,
@@ -109,7 +113,7 @@ def _claim(trial: Trial, state: State, short: Windows, frequency: Floats, spectr
         rivals=(),
         unresolved_with=(),
         separating_manoeuvre=None,
-        says=suspect.effect.says(values, None),
+        says=candidate.effect.says(values, None),
         **shown,
     )
     power_in_velocities = _power_in_velocities(shown["evidence"]) if shown else inf

@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 
 from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.inference.estimation import Suspect, Trial
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem
 from ferryid.diagnose.judging.locate import Location
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
 
 
-def columns_of(
-    trial: Trial, place: Location, regressor: tuple[str, Floats] | None, *, alone: bool = False
+def figure_columns(
+    problem: EstimationProblem, place: Location, regressor: tuple[str, Floats] | None, *, alone: bool = False
 ) -> dict[str, Any]:
     """Return `evidence` and `labels` of a finding.
 
     Parameters
     ----------
-    trial
+    problem
         The log.
     place
         Where the errors without the finding differ from those with it.
@@ -39,7 +39,7 @@ def columns_of(
     labels = {"residual": f"{AXES[axis]} {kind} left over [{unit}]"}
     if regressor is not None:
         label, values = regressor
-        columns["regressor"] = _in_windows(trial, label, values)
+        columns["regressor"] = _in_windows(problem, label, values)
         labels["regressor"] = label
     return {"evidence": columns, "labels": labels}
 
@@ -53,15 +53,17 @@ def best_axis(place: Location) -> int:
     return int(np.argmax(added / np.mean(place.after**2, axis=0) if added.any() else place.shares))
 
 
-def regressor_of(suspect: Suspect, picture: Picture, values: Floats, place: Location) -> tuple[str, Floats] | None:
+def figure_regressor(
+    candidate: Candidate, picture: Picture, values: Floats, place: Location
+) -> tuple[str, Floats] | None:
     """Return label and values of the quantity that gives an effect away, where the effect names one."""
-    name = suspect.effect.regressor
-    return None if name is None else name(picture, values, suspect.instance, AXES[best_axis(place)])
+    name = candidate.effect.regressor
+    return None if name is None else name(picture, values, candidate.instance, AXES[best_axis(place)])
 
 
-def _in_windows(trial: Trial, label: str, values: Floats) -> Floats:
+def _in_windows(problem: EstimationProblem, label: str, values: Floats) -> Floats:
     """Return a quantity in every window: its mean, as forces are shown, but of an angle the one in the middle."""
-    seen = trial.windows
+    seen = problem.windows
     if label.endswith("[deg]"):
         return np.asarray(values[seen.starts + len(seen.weight) // 2])
     return seen.mean(values[:, None])[:, 0]

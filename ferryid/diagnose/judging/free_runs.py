@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.inference.estimation import Fit, Trial, imagined
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.folds import FOLDS, Folds, by_block, draws
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.picture import Picture, Scene, acceleration
@@ -42,7 +42,7 @@ class FreeRuns:
     starts: int
 
 
-def free_runs(trial: Trial, folds: Folds, before: Sequence[Fit], after: Sequence[Fit]) -> FreeRuns:
+def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], after: Sequence[Fit]) -> FreeRuns:
     """Integrate the pictures of two hypotheses from many starts in held-out blocks and compare them with the log.
 
     From its start a run knows the forces that the picture holds to act along the measured path, and integrates hull, load and
@@ -50,12 +50,12 @@ def free_runs(trial: Trial, folds: Folds, before: Sequence[Fit], after: Sequence
 
     Parameters
     ----------
-    trial, folds
+    problem, folds
         The log.
     before, after
         Fits for every fold.
     """
-    windows, scene = trial.windows, trial.windows.scene
+    windows, scene = problem.windows, problem.windows.scene
     width_s = len(windows.weight) * scene.step_s
     horizons = width_s * np.array([0.5, 1.0, 2.0, 4.0])
     stride = max(1, round(width_s / 40.0 / scene.step_s))
@@ -68,7 +68,7 @@ def free_runs(trial: Trial, folds: Folds, before: Sequence[Fit], after: Sequence
         if own.size == 0:
             continue
         for which, fits in enumerate((before, after)):
-            path = _run(imagined(trial.plain, fits[k]), starts[own], stride, int(steps[-1]))
+            path = _run(fitted_force_model(problem.plain, fits[k]), starts[own], stride, int(steps[-1]))
             for h, count in enumerate(steps):
                 rows = starts[own] + stride * int(count)
                 inside = rows <= last[own]

@@ -20,7 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER
-from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial, fit, imagined, near
+from ferryid.diagnose.inference.estimation import (
+    Candidate,
+    EstimationProblem,
+    Fit,
+    fit,
+    fitted_force_model,
+    starting_point,
+)
 from ferryid.diagnose.inference.folds import Folds, by_block, draws, folds_of, subset
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.weak_form import Windows
@@ -94,11 +101,11 @@ class Improvement:
 
 @dataclass(frozen=True)
 class Proof:
-    """Held-out evidence for one suspect, beside all the others that were found.
+    """Held-out evidence for one candidate, beside all the others that were found.
 
     Attributes
     ----------
-    suspect
+    candidate
         What is judged.
     improvement
         By adding it to the others.
@@ -115,7 +122,7 @@ class Proof:
         By adding it to the others.
     """
 
-    suspect: Suspect
+    candidate: Candidate
     improvement: Improvement
     placebos: Mapping[str, float]
     beaten: float
@@ -124,8 +131,8 @@ class Proof:
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """All held-out evidence for a hypothesis: as a whole, for each of its suspects, and in free runs."""
+class HeldOutEvidence:
+    """All held-out evidence for a hypothesis: as a whole, for each of its candidates, and in free runs."""
 
     folds: Folds
     whole: Improvement
@@ -133,34 +140,34 @@ class Evidence:
     free_runs: FreeRuns
 
 
-def evidence(trial: Trial, found: Fit) -> Evidence | None:
+def held_out_evidence(problem: EstimationProblem, found: Fit) -> HeldOutEvidence | None:
     """Return the held-out evidence for what was found; None for a log too short to hold anything out.
 
     Parameters
     ----------
-    trial
+    problem
         With the noise that the hypothesis leaves.
     found
         The hypothesis, fitted to the whole log.
     """
-    folds = folds_of(trial.windows)
+    folds = folds_of(problem.windows)
     if folds is None:
         return None
-    base = held_out(trial, folds, ())
-    full = held_out(trial, folds, found.suspects, found.values, found)
-    proofs = tuple(_proof(trial, folds, found, full, base, index) for index in range(len(found.suspects)))
-    return Evidence(
+    base = held_out(problem, folds, ())
+    full = held_out(problem, folds, found.candidates, found.values, found)
+    proofs = tuple(_proof(problem, folds, found, full, base, index) for index in range(len(found.candidates)))
+    return HeldOutEvidence(
         folds,
-        improvement(trial, folds, base, full),
+        compare_held_out(problem, folds, base, full),
         proofs,
-        free_runs(trial, folds, base.fits, full.fits),
+        free_runs(problem, folds, base.fits, full.fits),
     )
 
 
 def held_out(
-    trial: Trial,
+    problem: EstimationProblem,
     folds: Folds,
-    suspects: Sequence[Suspect],
+    candidates: Sequence[Candidate],
     start: Sequence[Floats] | None = None,
     beside: Fit | None = None,
 ) -> HeldOut:
@@ -168,41 +175,45 @@ def held_out(
 
     Parameters
     ----------
-    trial
+    problem
         Its noise weighs the windows, in all folds.
     folds
         From `folds_of`.
-    suspects, start
+    candidates, start
         As in `ferryid.diagnose.inference.estimation.fit`.
     beside
         A fit whose hull is not far from theirs, where the fits begin; the profile's hull where None.
     """
-    own_start = tuple(one.start for one in suspects) if start is None else tuple(start)
+    own_start = tuple(one.start for one in candidates) if start is None else tuple(start)
 
     def made_of(training: Windows) -> Fit:
-        part = _part(trial, training)
-        begin = None if beside is None else near(part, replace(beside, suspects=tuple(suspects), values=own_start))
-        return fit(part, suspects, own_start, begin=begin)
+        part = _part(problem, training)
+        begin = (
+            None
+            if beside is None
+            else starting_point(part, replace(beside, candidates=tuple(candidates), values=own_start))
+        )
+        return fit(part, candidates, own_start, begin=begin)
 
-    gaps = np.empty((len(trial.windows.starts), int(trial.windows.channels.sum())))
-    errors = np.empty((len(trial.windows.starts), 3))
+    gaps = np.empty((len(problem.windows.starts), int(problem.windows.channels.sum())))
+    errors = np.empty((len(problem.windows.starts), 3))
     fits = over(made_of, folds.training)
     for k, made in enumerate(fits):
         own = folds.fold == k
-        judged, picture = subset(trial.windows, own), imagined(trial.plain, made)
+        judged, picture = subset(problem.windows, own), fitted_force_model(problem.plain, made)
         gaps[own] = judged.gap(picture)
-        errors[own] = force_errors(judged, picture, trial.plain)
+        errors[own] = force_errors(judged, picture, problem.plain)
     return HeldOut(gaps, errors, tuple(fits))
 
 
-def improvement(trial: Trial, folds: Folds, before: HeldOut, after: HeldOut) -> Improvement:
+def compare_held_out(problem: EstimationProblem, folds: Folds, before: HeldOut, after: HeldOut) -> Improvement:
     """Return how much better the second of two hypotheses predicts."""
     picks = draws(folds.block)
     sums = [by_block(one.errors**2, folds.block) for one in (before, after)]
     removed = 1.0 - sums[1].sum(axis=0) / sums[0].sum(axis=0)
     drawn = 1.0 - (picks @ sums[1]) / (picks @ sums[0])
     low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
-    gains = _gains(trial, folds, before.gaps, after.gaps)
+    gains = _gains(problem, folds, before.gaps, after.gaps)
     score_low, score_high = np.quantile(picks @ gains, [0.025, 0.975])
     return Improvement(
         before.errors,
@@ -218,48 +229,48 @@ def improvement(trial: Trial, folds: Folds, before: HeldOut, after: HeldOut) -> 
     )
 
 
-def placebos(trial: Trial, suspect: Suspect, values: Floats) -> dict[str, Suspect]:
-    """Return what should explain as much as a suspect if only its shape counted and not when or where it acted.
+def placebos(problem: EstimationProblem, candidate: Candidate, values: Floats) -> dict[str, Candidate]:
+    """Return what should explain as much as a candidate if only its shape counted and not when or where it acted.
 
     Its force late by shares of the log, and its force on a vessel that turned the other way (heading mirrored), if it depends
-    on the heading at all. Each has the parameters of the suspect, to be fitted like it; but what is fitted beside an effect and
-    never told, by how much its formula is off, stays as it was found: a placebo is the same force, elsewhere.
+    on the heading at all. Each has the parameters of the candidate, to be fitted like it; but what is fitted beside an effect
+    and never reported, by how much its formula is off, stays as it was found: a placebo is the same force, elsewhere.
     """
-    untold = suspect.effect.untold(trial.plain.scene, values)
+    untold = candidate.effect.untold(problem.plain.scene, values)
     parameters = tuple(
         replace(one, size=HELD, neutral=value, start=value) if one.name in untold else one
-        for one, value in zip(suspect.parameters, values.tolist(), strict=True)
+        for one, value in zip(candidate.parameters, values.tolist(), strict=True)
     )
-    suspect = replace(suspect, parameters=parameters)
-    seconds = float(trial.windows.scene.t[-1] - trial.windows.scene.t[0])
-    made = {f"{share * seconds:.0f} s late": _shifted(suspect, share) for share in SHIFTS}
-    mirrored = _mirrored(suspect)
-    true = suspect.act(trial.plain, values)
-    wrong = mirrored.act(trial.plain, values)
-    size = np.linalg.norm(as_measured(true) - as_measured(trial.plain))
+    candidate = replace(candidate, parameters=parameters)
+    seconds = float(problem.windows.scene.t[-1] - problem.windows.scene.t[0])
+    made = {f"{share * seconds:.0f} s late": _shifted(candidate, share) for share in SHIFTS}
+    mirrored = _mirrored(candidate)
+    true = candidate.act(problem.plain, values)
+    wrong = mirrored.act(problem.plain, values)
+    size = np.linalg.norm(as_measured(true) - as_measured(problem.plain))
     # On a heading near north or south the mirrored force is the same: it would test nothing.
     if np.linalg.norm(as_measured(true) - as_measured(wrong)) > SAME * size:
         made[HEADING] = mirrored
     return made
 
 
-def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut, index: int) -> Proof:
-    suspect, values = found.suspects[index], found.values[index]
-    others = [k for k in range(len(found.suspects)) if k != index]
-    rest = [found.suspects[k] for k in others]
+def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, base: HeldOut, index: int) -> Proof:
+    candidate, values = found.candidates[index], found.values[index]
+    others = [k for k in range(len(found.candidates)) if k != index]
+    rest = [found.candidates[k] for k in others]
     start = [found.values[k] for k in others]
-    without = held_out(trial, folds, rest, start, found) if rest else base
-    made = improvement(trial, folds, without, full)
-    in_its_place = placebos(trial, suspect, values)
+    without = held_out(problem, folds, rest, start, found) if rest else base
+    made = compare_held_out(problem, folds, without, full)
+    in_its_place = placebos(problem, candidate, values)
 
-    def gains_of_placebos(weighed: Trial, bare: HeldOut, beside: Fit | None = None) -> dict[str, Floats]:
+    def gains_of_placebos(weighed: EstimationProblem, bare: HeldOut, beside: Fit | None = None) -> dict[str, Floats]:
         judged = {
             name: held_out(weighed, folds, [*rest, placebo], [*start, placebo.start], beside)
             for name, placebo in in_its_place.items()
         }
         return {name: _gains(weighed, folds, bare.gaps, one.gaps) for name, one in judged.items()}
 
-    gains, by_name = _gains(trial, folds, without.gaps, full.gaps), gains_of_placebos(trial, without, found)
+    gains, by_name = _gains(problem, folds, without.gaps, full.gaps), gains_of_placebos(problem, without, found)
     picks = draws(folds.block)
     beaten = _beaten(picks, gains, by_name)
     scores = {name: float(one.sum()) for name, one in by_name.items()}
@@ -267,17 +278,17 @@ def _proof(trial: Trial, folds: Folds, found: Fit, full: HeldOut, base: HeldOut,
     # What acts seldom shows in a block or two, which half of the draws leave out.
     seldom = made.score > PLAIN and made.score > PLAIN + max(scores.values())
     holds = (holds or seldom) and not _matched(made.score, scores)
-    if not holds and _hull_strains(trial, found, rest, start):
-        rigid = replace(trial, hull_spread=np.zeros_like(trial.hull_spread))
+    if not holds and _hull_strains(problem, found, rest, start):
+        rigid = replace(problem, hull_spread=np.zeros_like(problem.hull_spread))
         stiff = held_out(rigid, folds, rest, start)
-        without, made = stiff, improvement(trial, folds, stiff, full)
+        without, made = stiff, compare_held_out(problem, folds, stiff, full)
         # The same force late, or on a mirrored heading, has to be worse there too.
-        own = held_out(rigid, folds, found.suspects, found.values)
-        gains, by_name = _gains(trial, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
+        own = held_out(rigid, folds, found.candidates, found.values)
+        gains, by_name = _gains(problem, folds, stiff.gaps, own.gaps), gains_of_placebos(rigid, stiff)
         beaten = _beaten(picks, gains, by_name)
         scores = {name: float(one.sum()) for name, one in by_name.items()}
         holds = made.score_low > 0.0 and beaten > 0.0 and not _matched(made.score, scores)
-    return Proof(suspect, made, scores, beaten, holds, free_runs(trial, folds, without.fits, full.fits))
+    return Proof(candidate, made, scores, beaten, holds, free_runs(problem, folds, without.fits, full.fits))
 
 
 def _matched(score: float, placebos: Mapping[str, float]) -> bool:
@@ -293,54 +304,55 @@ def _beaten(picks: Floats, gains: Floats, by_name: Mapping[str, Floats]) -> floa
     return min(float(np.quantile(picks @ (gains - rival), 0.025)) for rival in rivals)
 
 
-def _hull_strains(trial: Trial, found: Fit, rest: Sequence[Suspect], start: Sequence[Floats]) -> bool:
-    """Tell whether the hull can stand in for a suspect only by being what nobody believes that it is.
+def _hull_strains(problem: EstimationProblem, found: Fit, rest: Sequence[Candidate], start: Sequence[Floats]) -> bool:
+    """Tell whether the hull can stand in for a candidate only by being what nobody believes that it is.
 
     A hull refitted to a fouled log explains it as well as fouling does, held-out stretches included; what speaks against it
-    is that all its coefficients are then off together. Such a suspect is judged against the hull as it is in the model.
+    is that all its coefficients are then off together. Such a candidate is judged against the hull as it is in the model.
     """
-    without = fit(trial, rest, start)
-    free = trial.hull_spread > 0.0
+    without = fit(problem, rest, start)
+    free = problem.hull_spread > 0.0
     strains = [
-        float(np.sum(((one.hull - trial.plain.hull)[free] / trial.hull_spread[free]) ** 2)) for one in (without, found)
+        float(np.sum(((one.hull - problem.plain.hull)[free] / problem.hull_spread[free]) ** 2))
+        for one in (without, found)
     ]
     return without.evidence < found.evidence - PLAIN and strains[0] > strains[1] + 2.0 * PLAIN
 
 
-def _part(trial: Trial, windows: Windows) -> Trial:
-    return trial.part(windows)
+def _part(problem: EstimationProblem, windows: Windows) -> EstimationProblem:
+    return problem.part(windows)
 
 
-def _gains(trial: Trial, folds: Folds, before: Floats, after: Floats) -> Floats:
+def _gains(problem: EstimationProblem, folds: Folds, before: Floats, after: Floats) -> Floats:
     """Return the gain in log-likelihood of every block, shape (blocks,)."""
-    runs, c = trial.windows.runs, before.shape[1]
+    runs, c = problem.windows.runs, before.shape[1]
     kept = np.concatenate([np.arange(a + ORDER, b) for a, b in runs if b - a > ORDER])
-    left = [np.sum(trial.noise.white(gaps, runs).reshape(-1, c) ** 2, axis=1) for gaps in (before, after)]
+    left = [np.sum(problem.noise.white(gaps, runs).reshape(-1, c) ** 2, axis=1) for gaps in (before, after)]
     gained = np.zeros(len(folds.block))
     gained[kept] = 0.5 * (left[0] - left[1])
     return by_block(gained[:, None], folds.block)[:, 0]
 
 
-def _shifted(suspect: Suspect, share: float) -> Suspect:
+def _shifted(candidate: Candidate, share: float) -> Candidate:
     def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
-        force = _force_of(suspect, picture, p)
+        force = _force_of(candidate, picture, p)
         late = np.roll(force, round(share * len(force)), axis=0)
         return replace(picture, external=picture.external + late)
 
-    return replace(suspect, effect=replace(suspect.effect, apply=apply), onset_s=0.0, offset_s=inf)
+    return replace(candidate, effect=replace(candidate.effect, apply=apply), onset_s=0.0, offset_s=inf)
 
 
-def _mirrored(suspect: Suspect) -> Suspect:
+def _mirrored(candidate: Candidate) -> Candidate:
     def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
         scene = picture.scene
         eta = np.column_stack([scene.eta[:, :2], -scene.psi])
-        force = _force_of(suspect, replace(picture, scene=replace(scene, eta=eta)), p)
+        force = _force_of(candidate, replace(picture, scene=replace(scene, eta=eta)), p)
         return replace(picture, external=picture.external + force)
 
-    return replace(suspect, effect=replace(suspect.effect, apply=apply), onset_s=0.0, offset_s=inf)
+    return replace(candidate, effect=replace(candidate.effect, apply=apply), onset_s=0.0, offset_s=inf)
 
 
-def _force_of(suspect: Suspect, picture: Picture, p: Floats) -> Floats:
+def _force_of(candidate: Candidate, picture: Picture, p: Floats) -> Floats:
     """Return what an effect changes, as a force [N, N, N·m], shape (n, 3)."""
-    more = as_measured(suspect.act(picture, p)) - as_measured(picture)
+    more = as_measured(candidate.act(picture, p)) - as_measured(picture)
     return np.asarray(more @ mass_of(picture.hull).T)

@@ -15,7 +15,9 @@ from ferryid.effects.picture import Scene
 from ferryid.vessel.profile import Floats
 
 
-def withheld(hidden: Mapping[str, Floats], scene: Scene, findings: Sequence[Finding]) -> tuple[Withheld, ...]:
+def compare_hidden_signals(
+    hidden: Mapping[str, Floats], scene: Scene, findings: Sequence[Finding]
+) -> tuple[Withheld, ...]:
     """Return every hidden signal beside the finding of the same name.
 
     Parameters

@@ -9,14 +9,14 @@ from ferryid.diagnose.checks import SensorFinding
 from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import Fit, fit
 from ferryid.diagnose.inference.stages import SelectedLog
-from ferryid.diagnose.judging.backward_elimination import Judged, judged
-from ferryid.diagnose.judging.campaign_laws import Heard, heard
-from ferryid.diagnose.judging.confidence_rules import Claim, Figures, LogFigures
+from ferryid.diagnose.judging.backward_elimination import Elimination, eliminate_backward
+from ferryid.diagnose.judging.campaign_laws import CampaignLaws, find_campaign_laws
+from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
 from ferryid.diagnose.judging.disturbance_findings import disturbance_claims
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
-from ferryid.diagnose.judging.signal_to_noise import noise_shares
-from ferryid.diagnose.judging.unexplained import Unknown, unknown_of
+from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
+from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
 
 
 @dataclass(frozen=True)
@@ -41,39 +41,43 @@ class JudgedLog:
 
     selected: SelectedLog
     base: Fit
-    stands: Judged
-    unknown: Unknown
+    stands: Elimination
+    unknown: Unexplained
     claims: tuple[Claim, ...]
     figures: LogFigures
 
 
 def judge(logs: Sequence[SelectedLog], progress: Callable[[str], None]) -> tuple[JudgedLog, ...]:
     """Judge the selections of the logs of a campaign: one by one, and by laws that hold in all of them."""
-    stand = [judged(log.search.trial, log.search.fit, log.steady, progress) for log in logs]
-    laws: Mapping[str, Heard] = {}
+    stand = [eliminate_backward(log.search.problem, log.search.fit, log.steady, progress) for log in logs]
+    laws: Mapping[str, CampaignLaws] = {}
     if any(log.estimated.baseline.joint for log in logs):
         progress("looking for laws that hold in all logs")
-        laws = heard({log.path: (log.search.trial, one.fit) for log, one in zip(logs, stand, strict=True)})
+        laws = find_campaign_laws(
+            {log.path: (log.search.problem, one.fit) for log, one in zip(logs, stand, strict=True)}
+        )
     return tuple(_judged(log, one, laws.get(log.path), progress) for log, one in zip(logs, stand, strict=True))
 
 
-def _judged(log: SelectedLog, stands: Judged, laws: Heard | None, progress: Callable[[str], None]) -> JudgedLog:
-    trial, states, scene = log.search.trial, log.search.states, log.estimated.averaged.screened.scene
-    base = fit(trial, ())
+def _judged(
+    log: SelectedLog, stands: Elimination, laws: CampaignLaws | None, progress: Callable[[str], None]
+) -> JudgedLog:
+    problem, states, scene = log.search.problem, log.search.states, log.estimated.averaged.screened.scene
+    base = fit(problem, ())
     progress("looking for what has no name")
-    unknown = unknown_of(trial, stands.fit, scene, laws)
+    unknown = find_unexplained(problem, stands.fit, scene, laws)
     progress("locating")
     claims = (
         *sensor_claims(log.estimated.averaged.screened.sensors),
-        *force_claims(trial, stands, scene),
-        *disturbance_claims(trial, stands.fit, states, scene),
+        *force_claims(problem, stands, scene),
+        *disturbance_claims(problem, stands.fit, states, scene),
         *unknown.claims,
     )
     baseline = log.estimated.baseline
     figures = LogFigures(
         hull_known=baseline.hull_known,
         joint=baseline.joint,
-        velocity_noise=noise_shares(trial),
+        velocity_noise=velocity_noise_shares(problem),
         unsteady=unknown.unsteady or bool(states),
         baseline_sensors=baseline.sensors,
     )

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.inference.autoregression import ORDER, noise_of
-from ferryid.diagnose.inference.change_points import acting
-from ferryid.diagnose.inference.estimation import Fit, Trial, imagined
+from ferryid.diagnose.inference.autoregression import ORDER, fit_autoregression
+from ferryid.diagnose.inference.change_points import active_intervals
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import Band, bands_of
 from ferryid.diagnose.judging.error_profiles import TELLS, Profiled, in_words, profiles_of
@@ -41,7 +41,7 @@ class Location:
         When it acts [s], pairs of first and last.
     onset_s, offset_s
         When errors rise and fall, None where they are large from the start, or to the end. What began before the vessel did
-        anything that shows it, such as a payload before it accelerates, rises later; a suspect's own onset is found sharper.
+        anything that shows it, such as a payload before it accelerates, rises later; a candidate's own onset is found sharper.
     profiles
         The strongest first.
     bands
@@ -63,33 +63,35 @@ class Location:
     regime: str
 
 
-def locate(trial: Trial, before: Fit, after: Fit, scene: Scene | None = None) -> Location:
+def locate(problem: EstimationProblem, before: Fit, after: Fit, scene: Scene | None = None) -> Location:
     """Return where and when the errors of one hypothesis exceed those of a better one.
 
     Parameters
     ----------
-    trial
+    problem
         The log.
     before, after
         Fits without and with what was found; the same one where nothing was.
     scene
         The log's scene at its full rate, for frequencies above those of the trial's windows; the trial's own where None.
     """
-    pictures = [imagined(trial.plain, made) for made in (before, after)]
-    first, second = (force_errors(trial.windows, picture, trial.plain) for picture in pictures)
-    kept, (white, calm) = whitened((first, second), trial.windows.runs)
+    pictures = [fitted_force_model(problem.plain, made) for made in (before, after)]
+    first, second = (force_errors(problem.windows, picture, problem.plain) for picture in pictures)
+    kept, (white, calm) = whitened((first, second), problem.windows.runs)
     unexplained = before is after
     power_before, power_after = np.mean(white**2, axis=0), np.mean(calm**2, axis=0)
     excess = np.maximum(power_before / power_after - 1.0, 0.0)
-    profiles = profiles_of(trial.windows, kept, white, calm, first)
+    profiles = profiles_of(problem.windows, kept, white, calm, first)
     # Without a better hypothesis an axis stands out by how uneven its errors are.
     uneven = profiles[0].by_axis if unexplained and profiles and profiles[0].statistic >= TELLS else np.zeros(3)
     shares = _shared(np.maximum(uneven, 0.0) if unexplained else excess)
     axes = shares if shares.any() else np.full(3, 1.0 / 3.0)
     strength = (white**2 if unexplained else white**2 - calm**2) @ axes
-    middle, seconds = trial.windows.middle_s, trial.windows.scene.t
-    reach = 0.5 * len(trial.windows.weight) * trial.windows.scene.step_s
-    intervals = acting(middle[kept], strength, reach, (float(seconds[0]), float(seconds[-1])), steady=unexplained)
+    middle, seconds = problem.windows.middle_s, problem.windows.scene.t
+    reach = 0.5 * len(problem.windows.weight) * problem.windows.scene.step_s
+    intervals = active_intervals(
+        middle[kept], strength, reach, (float(seconds[0]), float(seconds[-1])), steady=unexplained
+    )
     onset = None if not intervals or intervals[0][0] <= middle[0] else intervals[0][0]
     offset = None if not intervals or intervals[-1][1] >= middle[-1] else intervals[-1][1]
     return Location(
@@ -102,7 +104,7 @@ def locate(trial: Trial, before: Fit, after: Fit, scene: Scene | None = None) ->
         onset,
         offset,
         profiles,
-        bands_of(trial, pictures, scene),
+        bands_of(problem, pictures, scene),
         in_words(profiles, axes),
     )
 
@@ -151,7 +153,7 @@ def whitened(errors: tuple[Floats, Floats], runs: tuple[tuple[int, int], ...]) -
     Both pass through the autoregression of the second, axis by axis; the first `ORDER` windows of a series only start it.
     """
     kept = np.concatenate([np.arange(a + ORDER, b) for a, b in runs if b - a > ORDER])
-    noise = noise_of(errors[1], runs)
+    noise = fit_autoregression(errors[1], runs)
     left = []
     for values in errors:
         parts = []

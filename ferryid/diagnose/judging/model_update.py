@@ -13,7 +13,7 @@ import numpy as np
 
 from ferryid import __version__
 from ferryid.diagnose.judging.diagnosis import Diagnosis
-from ferryid.diagnose.judging.posterior import Learnt
+from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.files import alone
@@ -29,7 +29,7 @@ APART = 0.25
 """Logs contradict each other about a parameter where its intervals are apart, by more than this share of its usual size."""
 
 
-def keep(
+def store_updated_model(
     diagnoses: Sequence[Diagnosis], profile: Profile, model: Model | None, out: Path, *, name: str = ""
 ) -> tuple[Diagnosis, ...]:
     """Store the model that diagnoses lead to, and return them with its path; as they are where nothing was left out.
@@ -52,26 +52,26 @@ def keep(
     FerryIdError
         For a name that a model cannot have, and a folder that cannot be written.
     """
-    made, notes = remodelled(diagnoses, profile, model, checked_name(name or (model.name if model else profile.name)))
+    made, notes = update_model(diagnoses, profile, model, checked_name(name or (model.name if model else profile.name)))
     if made is None:
         return tuple(diagnoses)
     with alone(out / "models"):
         path = str(save(made, out).path)
     return tuple(
-        replace(one, model=path, notes=(*one.notes, *one.learnt.notes, *notes)) if one.learnt else one
+        replace(one, model=path, notes=(*one.notes, *one.posterior.notes, *notes)) if one.posterior else one
         for one in diagnoses
     )
 
 
-def remodelled(
+def update_model(
     diagnoses: Sequence[Diagnosis], profile: Profile, model: Model | None, name: str
 ) -> tuple[Model | None, tuple[str, ...]]:
     """Return the model that diagnoses lead to, None where they found nothing, and what a reader must know of it."""
-    logs = [one.learnt for one in diagnoses if one.learnt is not None]
+    logs = [one.posterior for one in diagnoses if one.posterior is not None]
     if not logs:
         return None, ()
     vessel, notes = _properties(logs, profile)
-    verdict, scores = _scores([one for one in diagnoses if one.learnt is not None], logs)
+    verdict, scores = _scores([one for one in diagnoses if one.posterior is not None], logs)
     start = blank(profile, name) if model is None else replace(model, name=name)
     hull, covariance = _hull(logs)
     if model is not None and model.vessel_effects:
@@ -97,7 +97,7 @@ def remodelled(
     return made, notes
 
 
-def _hull(logs: Sequence[Learnt]) -> tuple[Floats, Floats]:
+def _hull(logs: Sequence[Posterior]) -> tuple[Floats, Floats]:
     """Return the hull that all logs together speak for, and its covariance; what was believed before counts once.
 
     The posterior of each log is a Gaussian; what the log adds to what was believed before is the difference of their
@@ -128,7 +128,7 @@ def _quantities(hull: Floats, covariance: Floats) -> dict[str, Quantity]:
     }
 
 
-def _properties(logs: Sequence[Learnt], profile: Profile) -> tuple[tuple[StoredEffect, ...], tuple[str, ...]]:
+def _properties(logs: Sequence[Posterior], profile: Profile) -> tuple[tuple[StoredEffect, ...], tuple[str, ...]]:
     """Return the vessel's properties that the logs agree on, and what is to be told of them."""
     by_key: dict[tuple[str, str | None], list[StoredEffect]] = {}
     for log in logs:
@@ -211,7 +211,7 @@ def _on_top(one: StoredEffect, more: StoredEffect, profile: Profile) -> StoredEf
     return replace(one, parameters=parameters, sources=(*one.sources, *more.sources))
 
 
-def _added(before: Sequence[Conditions], logs: Sequence[Learnt]) -> tuple[Conditions, ...]:
+def _added(before: Sequence[Conditions], logs: Sequence[Posterior]) -> tuple[Conditions, ...]:
     """Return the conditions of all logs; what was found in a log that had conditions already comes after these."""
     known = {one.sha256: one for one in before}
     for log in logs:
@@ -222,7 +222,7 @@ def _added(before: Sequence[Conditions], logs: Sequence[Learnt]) -> tuple[Condit
     return tuple(known.values())
 
 
-def _trained(start: Model, logs: Sequence[Learnt]) -> tuple[Mapping[str, Any], ...]:
+def _trained(start: Model, logs: Sequence[Posterior]) -> tuple[Mapping[str, Any], ...]:
     known = {str(log["sha256"]): log for log in start.training}
     for one in logs:
         known.setdefault(str(one.training["sha256"]), one.training)
@@ -233,7 +233,7 @@ def _spanned(several: Sequence[Mapping[str, tuple[float, float]]]) -> dict[str, 
     return {name: (min(one[name][0] for one in several), max(one[name][1] for one in several)) for name in several[0]}
 
 
-def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Learnt]) -> tuple[Verdict, dict[str, Any]]:
+def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[Verdict, dict[str, Any]]:
     """Return held-out force errors without and with the findings, pooled over logs, as a model file has its scores."""
     weights = np.array([float(one.before.get("rows", 0)) for one in diagnoses])
     weights = weights / weights.sum() if weights.sum() > 0.0 else np.full(len(diagnoses), 1.0 / len(diagnoses))

@@ -6,7 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import exp
 
-from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial, fit, near, settled, without
+from ferryid.diagnose.inference.estimation import (
+    Candidate,
+    EstimationProblem,
+    Fit,
+    choose_parameters,
+    fit,
+    starting_point,
+    without,
+)
 from ferryid.diagnose.inference.onset_estimation import brief
 from ferryid.diagnose.inference.search import FAR, ODDS
 from ferryid.diagnose.parallel import over
@@ -16,12 +24,12 @@ NEAREST = 4
 
 
 @dataclass(frozen=True)
-class StandIn:
-    """Another suspect in the place of one that was found.
+class RivalFit:
+    """Another candidate in the place of one that was found.
 
     Attributes
     ----------
-    suspect
+    candidate
         What it is.
     fit
         Of it beside the others that were found.
@@ -29,52 +37,54 @@ class StandIn:
         Its evidence over that of what was found.
     """
 
-    suspect: Suspect
+    candidate: Candidate
     fit: Fit
     gain: float
 
 
 @dataclass(frozen=True)
-class Standing:
-    """How one of several suspects stands beside the others.
+class RivalComparison:
+    """How one of several candidates stands beside the others.
 
     Attributes
     ----------
     rivals
         The best first.
     probability
-        Of the suspect, over its rivals and none of them.
+        Of the candidate, over its rivals and none of them.
     """
 
-    rivals: tuple[StandIn, ...]
+    rivals: tuple[RivalFit, ...]
     probability: float
 
 
-def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect]) -> Standing:
-    """Return how a suspect stands against every other of the library in its place, in its span.
+def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate]) -> RivalComparison:
+    """Return how a candidate stands against every other of the library in its place, in its span.
 
     One that is too brief to be judged is weighed against none at all only: it is no name, whatever else could stand there.
     """
-    suspect = kept.suspects[index]
-    bare = without(trial, kept, index)
+    candidate = kept.candidates[index]
+    bare = without(problem, kept, index)
     none = exp(min(bare.evidence - kept.evidence + ODDS, 50.0))
-    if brief(trial, suspect):
-        return Standing((), 1.0 / (1.0 + none))
-    begin = near(trial, bare)
-    taken = {one.key for one in kept.suspects}
+    if brief(problem, candidate):
+        return RivalComparison((), 1.0 / (1.0 + none))
+    begin = starting_point(problem, bare)
+    taken = {one.key for one in kept.candidates}
 
-    def instead(other: Suspect) -> StandIn:
-        timed = replace(other, onset_s=suspect.onset_s, offset_s=suspect.offset_s) if other.effect.onset else other
-        stand_in = settled(trial, bare, timed)
+    def instead(other: Candidate) -> RivalFit:
+        refit_spans = (
+            replace(other, onset_s=candidate.onset_s, offset_s=candidate.offset_s) if other.effect.onset else other
+        )
+        stand_in = choose_parameters(problem, bare, refit_spans)
         start = [*bare.values, stand_in.start]
         made = fit(
-            trial, [*bare.suspects, stand_in], start, steps=FAR, begin=None if stand_in.effect.bends_hull else begin
+            problem, [*bare.candidates, stand_in], start, steps=FAR, begin=None if stand_in.effect.bends_hull else begin
         )
-        return StandIn(stand_in, made, made.evidence - kept.evidence)
+        return RivalFit(stand_in, made, made.evidence - kept.evidence)
 
-    def settled_in(one: StandIn) -> StandIn:
-        made = fit(trial, one.fit.suspects, one.fit.values, begin=near(trial, one.fit))
-        return StandIn(one.suspect, made, made.evidence - kept.evidence)
+    def settled_in(one: RivalFit) -> RivalFit:
+        made = fit(problem, one.fit.candidates, one.fit.values, begin=starting_point(problem, one.fit))
+        return RivalFit(one.candidate, made, made.evidence - kept.evidence)
 
     rivals = over(instead, [other for other in library if other.key not in taken])
     rivals.sort(key=lambda one: -one.gain)
@@ -82,4 +92,4 @@ def standing_of(trial: Trial, kept: Fit, index: int, library: Sequence[Suspect])
     rivals[:NEAREST] = over(settled_in, rivals[:NEAREST])
     rivals.sort(key=lambda one: -one.gain)
     against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
-    return Standing(tuple(rivals), 1.0 / (1.0 + against))
+    return RivalComparison(tuple(rivals), 1.0 / (1.0 + against))

@@ -12,9 +12,9 @@ from math import sqrt
 
 import numpy as np
 
-from ferryid.diagnose.data.complementary_filter import placed
+from ferryid.diagnose.data.complementary_filter import velocity_from_pose
 from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.inference.estimation import Trial
+from ferryid.diagnose.inference.estimation import EstimationProblem
 from ferryid.effects.picture import acceleration
 from ferryid.signals.smooth import odd_rows, steady_mean
 
@@ -22,21 +22,21 @@ MEAN_S = 2.0
 """Time over which a slope of positions is about as noisy as the velocity in use."""
 
 
-def noise_shares(trial: Trial) -> dict[str, float]:
+def velocity_noise_shares(problem: EstimationProblem) -> dict[str, float]:
     """Return how large the velocity's noise is, times damping, against what moves the vessel, on axes with thrust.
 
     Nothing is known of it without positions.
 
     The noise is that between two velocities: the one in use, and the slope of positions. It is shared between them evenly.
     """
-    seen, plain = trial.windows, trial.plain
+    seen, plain = problem.windows, problem.plain
     scene = seen.scene
     rows = odd_rows(MEAN_S, 1.0 / scene.step_s)
     if not seen.channels[0] or len(scene.t) < rows:
         return {}
     # Motion that is faster than the mean is left out of both.
     own = steady_mean(scene.nu, rows)
-    other = steady_mean(np.nan_to_num(placed(scene.eta, 1.0 / scene.step_s)), rows)
+    other = steady_mean(np.nan_to_num(velocity_from_pose(scene.eta, 1.0 / scene.step_s)), rows)
     here, there = (acceleration(replace(plain, scene=replace(scene, nu=nu))) for nu in (own, other))
     idle = acceleration(replace(plain, parts=np.zeros_like(plain.parts)))
     noise = np.std(seen.mean(here - there), axis=0) / sqrt(2.0)

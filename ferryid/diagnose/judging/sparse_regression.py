@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.diagnose.inference.autoregression import ORDER, Noise, noise_of
+from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise, fit_autoregression
 from ferryid.diagnose.inference.candidate_terms import Term, terms_of
-from ferryid.diagnose.inference.estimation import WIDER, Fit, Suspect, Trial, fit, imagined
+from ferryid.diagnose.inference.estimation import WIDER, Candidate, EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds
 from ferryid.diagnose.inference.search import VOID
-from ferryid.diagnose.judging.held_out import Improvement, held_out, improvement
+from ferryid.diagnose.judging.held_out import Improvement, compare_held_out, held_out
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
@@ -57,8 +57,8 @@ class Law:
     terms
         In the order of their selection.
     fit
-        Hull, effects, and the law as the last suspect; its values are the terms' coefficients.
-    trial
+        Hull, effects, and the law as the last candidate; its values are the terms' coefficients.
+    problem
         With the noise that the fit leaves.
     held_out
         What the law improves on held-out windows.
@@ -70,7 +70,7 @@ class Law:
 
     terms: tuple[Term, ...]
     fit: Fit
-    trial: Trial
+    problem: EstimationProblem
     held_out: Improvement
     gain: float
     chance: float
@@ -79,7 +79,7 @@ class Law:
 
 
 @dataclass(frozen=True)
-class Lines:
+class LinearTerms:
     """The gaps and their derivatives about a fit.
 
     Attributes
@@ -101,12 +101,12 @@ class Lines:
     sizes: Floats
 
 
-def law_of(trial: Trial, kept: Fit, folds: Folds, unlike: Floats | None = None) -> Law | None:
+def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floats | None = None) -> Law | None:
     """Return a law for what a fit leaves; None where none holds.
 
     Parameters
     ----------
-    trial
+    problem
         With the noise that the fit leaves.
     kept
         The fit: hull and effects.
@@ -116,14 +116,14 @@ def law_of(trial: Trial, kept: Fit, folds: Folds, unlike: Floats | None = None) 
         What an effect moves the gaps by, shape (J, c): no term that says the same, as a share of a thruster's force says what a
         weak thruster does. Any will do where None.
     """
-    terms = list(terms_of(trial.plain.scene))
+    terms = list(terms_of(problem.plain.scene))
     if unlike is not None:
-        terms = _unlike(trial, kept, terms, unlike)
+        terms = _unlike(problem, kept, terms, unlike)
     chosen: list[Term] = []
-    made, seen = kept, trial
+    made, seen = kept, problem
     gains: list[tuple[float, float]] = []
     while len(chosen) < MOST_TERMS:
-        lines = lines_of(seen, made, terms)
+        lines = linearise_terms(seen, made, terms)
         best, real, chance = _best(seen, seen.noise, lines, folds)
         if real < GAIN or real <= chance:
             best, real, chance = _best(seen, _noise_of_the_rest(seen, lines), lines, folds, plain=True)
@@ -136,7 +136,7 @@ def law_of(trial: Trial, kept: Fit, folds: Folds, unlike: Floats | None = None) 
     if not chosen:
         return None
     made = _fitted(seen, kept, chosen)
-    errors = made.errors(len(kept.suspects))
+    errors = made.errors(len(kept.candidates))
     sure = [abs(value) > SURE * error for value, error in zip(made.values[-1], errors, strict=True)]
     if not any(sure):
         return None
@@ -145,27 +145,27 @@ def law_of(trial: Trial, kept: Fit, folds: Folds, unlike: Floats | None = None) 
         made = _fitted(seen, kept, chosen)
     if _void(seen, made):
         return None
-    before = held_out(seen, folds, kept.suspects, kept.values)
-    after = held_out(seen, folds, made.suspects, made.values)
-    better = improvement(seen, folds, before, after)
+    before = held_out(seen, folds, kept.candidates, kept.values)
+    after = held_out(seen, folds, made.candidates, made.values)
+    better = compare_held_out(seen, folds, before, after)
     if better.score_low <= 0.0:
         return None
-    return Law(tuple(chosen), made, seen, better, *gains[0], made.values[-1], WIDER * made.errors(len(kept.suspects)))
+    return Law(tuple(chosen), made, seen, better, *gains[0], made.values[-1], WIDER * made.errors(len(kept.candidates)))
 
 
-def _unlike(trial: Trial, kept: Fit, terms: Sequence[Term], moved: Floats) -> list[Term]:
-    pushes = lines_of(trial, kept, terms).terms
+def _unlike(problem: EstimationProblem, kept: Fit, terms: Sequence[Term], moved: Floats) -> list[Term]:
+    pushes = linearise_terms(problem, kept, terms).terms
     size = np.sqrt(np.sum(moved**2) * np.sum(pushes**2, axis=(0, 1)))
     alike = np.abs(np.einsum("jc,jck->k", moved, pushes)) / np.maximum(size, 1e-12)
     return [term for term, one in zip(terms, alike.tolist(), strict=True) if one < ALIKE]
 
 
-def suspect_of(trial: Trial, kept: Fit, terms: Sequence[Term]) -> Suspect:
+def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) -> Candidate:
     """Return a law as something that hypotheses can hold: one parameter a term.
 
     A coefficient's usual size gives a force as large as the thrusters' is in the root mean square, on the axis of the term.
     """
-    picture = imagined(trial.plain, kept)
+    picture = fitted_force_model(problem.plain, kept)
     thrust = np.sqrt(np.mean(picture.parts.sum(axis=1) ** 2, axis=0))
     parameters = []
     for term in terms:
@@ -189,36 +189,38 @@ def suspect_of(trial: Trial, kept: Fit, terms: Sequence[Term]) -> Suspect:
         lambda values, instance: "",
         lambda values, instance: {},
     )
-    return Suspect(effect, None, made)
+    return Candidate(effect, None, made)
 
 
-def _fitted(trial: Trial, kept: Fit, terms: Sequence[Term]) -> Fit:
-    law = suspect_of(trial, kept, terms)
-    return fit(trial, [*kept.suspects, law], [*kept.values, np.zeros(len(terms))])
+def _fitted(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) -> Fit:
+    law = law_candidate(problem, kept, terms)
+    return fit(problem, [*kept.candidates, law], [*kept.values, np.zeros(len(terms))])
 
 
-def _void(trial: Trial, made: Fit) -> bool:
+def _void(problem: EstimationProblem, made: Fit) -> bool:
     """Tell whether the law moves the vessel too little to matter to anybody."""
-    seen = trial.windows
-    without = replace(made, suspects=made.suspects[:-1], values=made.values[:-1])
-    moved = seen.gap(imagined(trial.plain, made)) - seen.gap(imagined(trial.plain, without))
+    seen = problem.windows
+    without = replace(made, candidates=made.candidates[:-1], values=made.values[:-1])
+    moved = seen.gap(fitted_force_model(problem.plain, made)) - seen.gap(fitted_force_model(problem.plain, without))
     size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
     return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
 
 
-def _best(trial: Trial, noise: Noise, lines: Lines, folds: Folds, *, plain: bool = False) -> tuple[int, float, float]:
+def _best(
+    problem: EstimationProblem, noise: AutoregressiveNoise, lines: LinearTerms, folds: Folds, *, plain: bool = False
+) -> tuple[int, float, float]:
     """Return which term gains most beside a fit, how much, and how much the best gains on placebos.
 
     Placebos made of a force that stands plainly above the noise are forces as well, and shifted a constant one is itself: there
     half of those with other signs are beaten, and no others are held against it.
     """
-    runs = trial.windows.runs
+    runs = problem.windows.runs
     left, known, columns = (noise.white(one, runs) for one in (lines.gaps, lines.known, lines.terms))
     rows = np.concatenate([np.arange(a + ORDER, b) for a, b in runs if b - a > ORDER])
     c = lines.gaps.shape[1]
     parts = []
     for k, training in enumerate(folds.training):
-        inside = np.isin(trial.windows.starts, training.starts)
+        inside = np.isin(problem.windows.starts, training.starts)
         # A whitened window needs the ones before it.
         whole = np.all([inside[rows - lag] for lag in range(ORDER + 1)], axis=0)
         parts.append((np.repeat(whole, c), np.repeat(folds.fold[rows] == k, c)))
@@ -231,54 +233,56 @@ def _best(trial: Trial, noise: Noise, lines: Lines, folds: Folds, *, plain: bool
     return best, float(most[0]), chance
 
 
-def lines_of(trial: Trial, made: Fit, terms: Sequence[Term]) -> Lines:
+def linearise_terms(problem: EstimationProblem, made: Fit, terms: Sequence[Term]) -> LinearTerms:
     """Return a fit's gaps and what they change by with hull, effects and the coefficients of terms."""
-    seen = trial.windows
-    picture = imagined(trial.plain, made)
+    seen = problem.windows
+    picture = fitted_force_model(problem.plain, made)
     base = seen.gap(picture)
-    known, centre = known_of(trial, made)
+    known, centre = nuisance_columns(problem, made)
     pushes = np.stack(
         [seen.gap(replace(picture, external=picture.external + term.force(picture))) - base for term in terms], axis=-1
     )
     sizes = np.maximum(np.sqrt(np.mean(pushes**2, axis=(0, 1))), 1e-12)
-    return Lines(base, known, centre, pushes / sizes, sizes)
+    return LinearTerms(base, known, centre, pushes / sizes, sizes)
 
 
-def known_of(trial: Trial, made: Fit, *, but: int = -1) -> tuple[Floats, Floats]:
-    """Return a fit's `Lines.known` and `Lines.centre`, without the parameters of the suspect number `but`."""
-    seen = trial.windows
-    base = seen.gap(imagined(trial.plain, made))
+def nuisance_columns(problem: EstimationProblem, made: Fit, *, but: int = -1) -> tuple[Floats, Floats]:
+    """Return a fit's `LinearTerms.known` and `LinearTerms.centre`, without the parameters of the candidate number `but`."""
+    seen = problem.windows
+    base = seen.gap(fitted_force_model(problem.plain, made))
     known, centre = [], []
-    for k, spread in enumerate(trial.hull_spread):
+    for k, spread in enumerate(problem.hull_spread):
         hull = made.hull.copy()
         hull[k] += 0.1 * spread
-        known.append((seen.gap(imagined(trial.plain, replace(made, hull=hull))) - base) / 0.1)
-        centre.append((made.hull[k] - trial.plain.hull[k]) / spread if spread > 0.0 else 0.0)
-    for i, suspect in enumerate(made.suspects):
-        for j, parameter in enumerate(suspect.parameters if i != but else ()):
+        known.append((seen.gap(fitted_force_model(problem.plain, replace(made, hull=hull))) - base) / 0.1)
+        centre.append((made.hull[k] - problem.plain.hull[k]) / spread if spread > 0.0 else 0.0)
+    for i, candidate in enumerate(made.candidates):
+        for j, parameter in enumerate(candidate.parameters if i != but else ()):
             step = -0.01 if made.values[i][j] + 0.01 * parameter.size > parameter.high else 0.01
             values = [one.copy() for one in made.values]
             values[i][j] += step * parameter.size
-            known.append((seen.gap(imagined(trial.plain, replace(made, values=tuple(values)))) - base) / step)
+            known.append(
+                (seen.gap(fitted_force_model(problem.plain, replace(made, values=tuple(values)))) - base) / step
+            )
             centre.append((float(made.values[i][j]) - parameter.neutral) / parameter.size)
     return np.stack(known, axis=-1), np.array(centre)
 
 
-def _noise_of_the_rest(trial: Trial, lines: Lines) -> Noise:
+def _noise_of_the_rest(problem: EstimationProblem, lines: LinearTerms) -> AutoregressiveNoise:
     """Return the noise that all terms together leave.
 
     A force that is there most of the time is in the errors' autoregression as well, which then takes it for noise. What
     remains with so many terms is a little less than the noise, for placebos as well.
     """
-    runs = trial.windows.runs
+    runs = problem.windows.runs
     every = np.concatenate([lines.known, lines.terms], axis=-1)
     prior = np.diag(np.concatenate([np.ones(len(lines.centre)), np.full(lines.terms.shape[-1], 1e-3)]))
     target = np.concatenate([lines.centre, np.zeros(lines.terms.shape[-1])])
-    noise = trial.noise
+    noise = problem.noise
     for _ in range(2):
         A = np.vstack([noise.white(every, runs), prior])
         y = np.concatenate([noise.white(lines.gaps, runs), target])
-        noise = noise_of(lines.gaps - every @ np.linalg.lstsq(A, y, rcond=None)[0], runs)
+        noise = fit_autoregression(lines.gaps - every @ np.linalg.lstsq(A, y, rcond=None)[0], runs)
     return noise
 
 

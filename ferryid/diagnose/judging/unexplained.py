@@ -14,18 +14,18 @@ import numpy as np
 
 from ferryid.diagnose.data.estimate import AXES, Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
-from ferryid.diagnose.inference.estimation import Fit, Trial, fit, imagined
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds, folds_of
 from ferryid.diagnose.inference.onset_estimation import brief
 from ferryid.diagnose.inference.search import ODDS
 from ferryid.diagnose.inference.spectra import BURST_HZ, Band, Burst, bursts_of
-from ferryid.diagnose.judging.campaign_laws import Heard
-from ferryid.diagnose.judging.confidence_rules import Claim, Figures, OtherLogs
+from ferryid.diagnose.judging.campaign_laws import CampaignLaws
+from ferryid.diagnose.judging.claims import Claim, Figures, OtherLogs
 from ferryid.diagnose.judging.error_profiles import TELLS
-from ferryid.diagnose.judging.figure_data import columns_of
+from ferryid.diagnose.judging.figure_data import figure_columns
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
 from ferryid.diagnose.judging.locate import Location, locate
-from ferryid.diagnose.judging.sparse_regression import Law, law_of
+from ferryid.diagnose.judging.sparse_regression import Law, select_law
 from ferryid.effects.picture import Picture, Scene
 from ferryid.vessel.profile import Floats
 
@@ -40,7 +40,7 @@ BURSTS = 5.0
 
 
 @dataclass(frozen=True)
-class Unknown:
+class Unexplained:
     """What is left beside all that has a name.
 
     Attributes
@@ -58,91 +58,91 @@ class Unknown:
     unsteady: bool
 
 
-def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None) -> Unknown:
+def find_unexplained(
+    problem: EstimationProblem, kept: Fit, scene: Scene, laws: CampaignLaws | None = None
+) -> Unexplained:
     """Return what is left of a log beside what was named.
 
     Parameters
     ----------
-    trial
+    problem
         With the noise that the named effects leave.
     kept
         Hull and named effects.
     scene
         The log's scene at its full rate.
-    heard
+    laws
         What the vessel's other logs say; None where there are none.
     """
     claims = []
-    folds = folds_of(trial.windows)
-    after, seen = kept, trial
-    if folds is not None and heard is not None and (common := heard.common(trial, kept, folds)) is not None:
-        shared = _lawful(common, after, scene, f"that holds in all {heard.able} logs that can show it")
+    folds = folds_of(problem.windows)
+    after, seen = kept, problem
+    if folds is not None and laws is not None and (common := laws.common(problem, kept, folds)) is not None:
+        shared = _lawful(common, after, scene, f"that holds in all {laws.able} logs that can show it")
         claims.append(Claim(shared, Figures("law")))
-        after, seen = common.fit, common.trial
-    if folds is not None and (law := law_of(seen, after, folds)) is not None:
+        after, seen = common.fit, common.problem
+    if folds is not None and (law := select_law(seen, after, folds)) is not None:
         own = _lawful(law, after, scene, "that was seen in this log only")
-        claims.append(
-            Claim(own, Figures("law", other_logs=None if heard is None else OtherLogs(*heard.of_others(law))))
-        )
-        after, seen = law.fit, law.trial
+        claims.append(Claim(own, Figures("law", other_logs=None if laws is None else OtherLogs(*laws.of_others(law)))))
+        after, seen = law.fit, law.problem
     left = locate(seen, after, after, scene)
     # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
-    known = bool(trial.filter.processes)
+    known = bool(problem.filter.processes)
     uneven = bool(left.profiles) and left.profiles[0].statistic >= TELLS
-    burst = bursts_of(seen, imagined(seen.plain, after), scene)
+    burst = bursts_of(seen, fitted_force_model(seen.plain, after), scene)
     if burst is not None and burst.deviations >= BURSTS:
         uneven = True
         if not known:
             claims.append(Claim(_in_bursts(burst), Figures("bursts")))
     elif uneven and not known:
         claims.append(Claim(_unsteady(seen, left), Figures("unsteady")))
-    return Unknown(tuple(claims), left, uneven)
+    return Unexplained(tuple(claims), left, uneven)
 
 
-def impostors(trial: Trial, kept: Fit) -> tuple[int, ...]:
+def find_displaced(problem: EstimationProblem, kept: Fit) -> tuple[int, ...]:
     """Return which of the named effects a law of fewer means makes idle.
 
     Physics outside the library may look a little like an effect. If a law that is fitted in the effect's place explains more
     than the effect, and leaves it nothing to explain, then the effect was named by mistake. A law that says the same as the
     effect in other words is no such law, nor is one that explains more by no more than the effect's formula may be off.
     """
-    folds = folds_of(trial.windows)
+    folds = folds_of(problem.windows)
     if folds is None:
         return ()
-    every = (i for i, one in enumerate(kept.suspects) if not brief(trial, one))
-    return tuple(i for i in every if _displaced(trial, kept, i, folds))
+    every = (i for i, one in enumerate(kept.candidates) if not brief(problem, one))
+    return tuple(i for i in every if _displaced(problem, kept, i, folds))
 
 
-def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
-    others = [k for k in range(len(kept.suspects)) if k != index]
-    rest, start = [kept.suspects[k] for k in others], [kept.values[k] for k in others]
-    without = fit(trial, rest, start)
-    named = trial.windows.gap(imagined(trial.plain, kept))
-    bare = replace(kept, suspects=tuple(rest), values=tuple(start))
-    moved = named - trial.windows.gap(imagined(trial.plain, bare))
-    law = law_of(trial.with_noise_of(without), without, folds, unlike=moved)
+def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) -> bool:
+    others = [k for k in range(len(kept.candidates)) if k != index]
+    rest, start = [kept.candidates[k] for k in others], [kept.values[k] for k in others]
+    without = fit(problem, rest, start)
+    named = problem.windows.gap(fitted_force_model(problem.plain, kept))
+    bare = replace(kept, candidates=tuple(rest), values=tuple(start))
+    moved = named - problem.windows.gap(fitted_force_model(problem.plain, bare))
+    law = select_law(problem.with_noise_of(without), without, folds, unlike=moved)
     if law is None:
         return False
-    told, coefficients = law.fit.suspects[-1], law.fit.values[-1]
-    suspect, values = kept.suspects[index], kept.values[index]
-    both = fit(trial, [*rest, told, suspect], [*start, coefficients, suspect.start])
-    fair = trial.with_noise_of(both)
+    told, coefficients = law.fit.candidates[-1], law.fit.values[-1]
+    candidate, values = kept.candidates[index], kept.values[index]
+    both = fit(problem, [*rest, told, candidate], [*start, coefficients, candidate.start])
+    fair = problem.with_noise_of(both)
     with_neither = fit(fair, rest, start).evidence
     with_law = fit(fair, [*rest, told], [*start, coefficients]).evidence
-    with_effect = fit(fair, [*rest, suspect], [*start, values]).evidence
-    with_both = fit(fair, [*rest, told, suspect], both.values).evidence
-    better = with_law - with_effect > max(ODDS, suspect.effect.form * (with_law - with_neither))
+    with_effect = fit(fair, [*rest, candidate], [*start, values]).evidence
+    with_both = fit(fair, [*rest, told, candidate], both.values).evidence
+    better = with_law - with_effect > max(ODDS, candidate.effect.form * (with_law - with_neither))
     return better and with_both - with_law < ODDS
 
 
 def _lawful(law: Law, kept: Fit, scene: Scene, whose: str) -> Finding:
-    trial = law.trial
+    problem = law.problem
     # The hull stays as it is with the law: refitted without, it would bend to it on axes where it does not act.
-    before = replace(law.fit, suspects=law.fit.suspects[:-1], values=law.fit.values[:-1])
-    place = locate(trial, before, law.fit, scene)
-    picture = imagined(trial.plain, before)
+    before = replace(law.fit, candidates=law.fit.candidates[:-1], values=law.fit.values[:-1])
+    place = locate(problem, before, law.fit, scene)
+    picture = fitted_force_model(problem.plain, before)
     terms = [
-        _told(term, picture, trial, float(value), float(error))
+        _told(term, picture, problem, float(value), float(error))
         for term, value, error in zip(law.terms, law.values, law.errors, strict=True)
     ]
     first = law.terms[0]
@@ -156,7 +156,7 @@ def _lawful(law: Law, kept: Fit, scene: Scene, whose: str) -> Finding:
         probability=1.0 - exp(-min(law.gain - max(law.chance, 0.0), 700.0)),
         parameters={},
         axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
-        intervals=((float(trial.windows.scene.t[0]), float(trial.windows.scene.t[-1])),),
+        intervals=((float(problem.windows.scene.t[0]), float(problem.windows.scene.t[-1])),),
         onset_s=None,
         regime=place.regime,
         improvement=dict(zip(AXES, law.held_out.removed.tolist(), strict=True)),
@@ -167,13 +167,13 @@ def _lawful(law: Law, kept: Fit, scene: Scene, whose: str) -> Finding:
         says=f"A force acts that has no name here, but a law {whose}: {told}.",
         band_hz=_band(place.bands, place.shares, [band.before - band.after for band in place.bands]),
         law=tuple(terms),
-        **columns_of(trial, place, regressor),
+        **figure_columns(problem, place, regressor),
     )
 
 
-def _told(term: Term, picture: Picture, trial: Trial, value: float, error: float) -> LawTerm:
+def _told(term: Term, picture: Picture, problem: EstimationProblem, value: float, error: float) -> LawTerm:
     """Return a term as people read it: its force where its quantity is as large as it usually gets."""
-    quantity = term.value(picture)[trial.windows.scene.usable]
+    quantity = term.value(picture)[problem.windows.scene.usable]
     at = 1.0 if term.name == "1" else float(f"{np.quantile(np.abs(quantity), USUAL):.1g}")
     low, high = value - 1.96 * error, value + 1.96 * error
     share = not term.force_unit
@@ -232,7 +232,7 @@ def _no_chance(deviations: float, looked_at: int) -> float:
     return max(0.0, 1.0 - looked_at * 0.5 * exp(-0.5 * deviations * deviations))
 
 
-def _unsteady(trial: Trial, left: Location) -> Finding:
+def _unsteady(problem: EstimationProblem, left: Location) -> Finding:
     band = _band(left.bands, left.shares, [one.before for one in left.bands])
     spans = [f"{first:.0f}-{last:.0f} s" for first, last in left.intervals[:SPANS]]
     whole = len(left.intervals) == 1 and left.onset_s is None and left.offset_s is None
@@ -258,16 +258,16 @@ def _unsteady(trial: Trial, left: Location) -> Finding:
         separating_manoeuvre=None,
         says=f"Something unsteady moves the vessel, most in {axis}{fast}{when}{where}; no law of its motion explains it.",
         band_hz=band,
-        **columns_of(trial, left, None, alone=True),
+        **figure_columns(problem, left, None, alone=True),
     )
 
 
-def _band(bands: Sequence[Band], shares: Floats, powers: Sequence[Floats]) -> tuple[float, float] | None:
+def _band(bands: Sequence[Band], shares: Floats, detection_powers: Sequence[Floats]) -> tuple[float, float] | None:
     """Return the fewest neighbouring bands that hold most of the power, each axis in its own unit."""
     if not bands:
         return None
-    total = np.maximum(np.sum(np.maximum(powers, 0.0), axis=0), 1e-12)
-    level = np.array([float(np.maximum(power, 0.0) / total @ shares) for power in powers])
+    total = np.maximum(np.sum(np.maximum(detection_powers, 0.0), axis=0), 1e-12)
+    level = np.array([float(np.maximum(power, 0.0) / total @ shares) for power in detection_powers])
     for count in range(1, len(bands) + 1):
         sums = [float(level[k : k + count].sum()) for k in range(len(bands) - count + 1)]
         best = int(np.argmax(sums))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import SensorFinding, checks, examine
-from ferryid.diagnose.data.complementary_filter import steadied
+from ferryid.diagnose.data.complementary_filter import complementary_filter
 from ferryid.effects.picture import Scene
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored
@@ -236,7 +236,7 @@ def test_the_velocity_in_products_is_made_anew_of_what_was_corrected(error: str)
     else:
         eta[2000:4000, :2] = eta[2000, :2]
     wrong = replace(right, eta=eta)
-    steady, made = (steadied(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
+    steady, made = (complementary_filter(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
     findings, corrected = examine(replace(wrong, nu=made))
     assert [one.effect for one in findings] == ["heading_bias" if error == "heading" else "held_samples"]
     rows = corrected.usable
@@ -248,7 +248,7 @@ def test_the_velocity_in_products_is_made_anew_of_what_was_corrected(error: str)
 def test_the_velocity_in_products_has_the_scale_that_was_found(along: float, turning: float) -> None:
     right = quiet(2)
     wrong = scaled(right, along, along, turning)
-    steady, made = (steadied(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
+    steady, made = (complementary_filter(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
     findings, corrected = examine(replace(wrong, nu=made))
     assert [one.effect for one in findings] == ["velocity_scale" if along != 1.0 else "yaw_rate_scale"]
     rows = corrected.usable

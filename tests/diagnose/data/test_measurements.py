@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.measurements import scene_of, window_lengths
-from ferryid.diagnose.inference.prior import broad_spread, plain_picture
+from ferryid.diagnose.data.measurements import read_measurements, window_lengths
+from ferryid.diagnose.inference.prior import default_hull_spread, prior_force_model
 from ferryid.effects.picture import COEFFICIENTS, Scene, acceleration
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import basis
@@ -27,7 +27,7 @@ FERRY = load_profile("milliampere")
 @pytest.fixture(scope="module")
 def short() -> Scene:
     """The scene of the short fixture, nothing smoothed."""
-    return scene_of(SHORT, FERRY, None, window_s=0.0)[0]
+    return read_measurements(SHORT, FERRY, None, window_s=0.0)[0]
 
 
 def model_of(
@@ -70,13 +70,13 @@ def test_each_thruster_pushes_along_its_angle_and_turns_by_its_lever(short: Scen
 
 
 def test_the_thrusters_together_are_the_applied_force() -> None:
-    scene, survey = scene_of(SHORT, FERRY, None, window_s=0.0)
+    scene, survey = read_measurements(SHORT, FERRY, None, window_s=0.0)
     rows = survey.motion.valid & scene.usable
     np.testing.assert_allclose(scene.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
 
 
 def test_the_velocity_is_kept_as_measured_beside_the_calmer_one() -> None:
-    scene, survey = scene_of(SHORT, FERRY, None)
+    scene, survey = read_measurements(SHORT, FERRY, None)
     np.testing.assert_array_equal(scene.nu_raw[scene.usable], survey.motion.raw_nu[scene.usable])
     assert np.isfinite(scene.nu).all()
     rough, calm = (np.abs(np.diff(values, axis=0)).mean(axis=0) for values in (scene.nu_raw, scene.nu))
@@ -84,9 +84,9 @@ def test_the_velocity_is_kept_as_measured_beside_the_calmer_one() -> None:
 
 
 def test_a_withheld_wind_is_hidden_and_kept() -> None:
-    seen, _ = scene_of(SHORT, FERRY, None, window_s=0.0)
+    seen, _ = read_measurements(SHORT, FERRY, None, window_s=0.0)
     assert seen.wind is not None
-    blind, survey = scene_of(SHORT, FERRY, None, window_s=0.0, withhold=("wind",))
+    blind, survey = read_measurements(SHORT, FERRY, None, window_s=0.0, withhold=("wind",))
     assert blind.wind is None
     assert survey.motion.wind is None
     np.testing.assert_array_equal(survey.hidden["wind"][: len(seen.t)][seen.usable], seen.wind[seen.usable])
@@ -95,23 +95,23 @@ def test_a_withheld_wind_is_hidden_and_kept() -> None:
 @pytest.mark.parametrize(("what", "told"), [("wimd", 'Did you mean "wind"?'), ("heading", "choose one of")])
 def test_what_cannot_be_withheld_is_refused(what: str, told: str) -> None:
     with pytest.raises(FerryIdError, match="--withhold") as caught:
-        scene_of(SHORT, FERRY, None, withhold=(what,))
+        read_measurements(SHORT, FERRY, None, withhold=(what,))
     assert told in str(caught.value)
 
 
 def test_what_the_log_does_not_have_cannot_be_withheld(shared_data: Callable[[str], Path]) -> None:
     log = shared_data("kvlcc2/HSVA_CPMC_KVLCC2_Z_10_05.dat")
     with pytest.raises(FerryIdError, match="wind cannot be withheld"):
-        scene_of(str(log), load_profile("kvlcc2-model"), None, withhold=("wind",))
+        read_measurements(str(log), load_profile("kvlcc2-model"), None, withhold=("wind",))
 
 
 def test_a_vessel_without_actuators_is_refused() -> None:
     with pytest.raises(FerryIdError, match="no actuator in the profile"):
-        scene_of(SHORT, replace(FERRY, actuators=()), None)
+        read_measurements(SHORT, replace(FERRY, actuators=()), None)
 
 
 def test_the_plain_picture_moves_as_the_hull_in_the_measured_wind(short: Scene) -> None:
-    picture, spread = plain_picture(replace(short, current=None, payload=None), FERRY)
+    picture, spread = prior_force_model(replace(short, current=None, payload=None), FERRY)
     assert FERRY.wind is not None
     assert short.wind is not None
     tau = short.parts.sum(axis=1) + wind_force(FERRY.wind, short.wind, short.psi, short.nu)
@@ -120,7 +120,7 @@ def test_the_plain_picture_moves_as_the_hull_in_the_measured_wind(short: Scene) 
 
 
 def test_without_wind_the_air_is_still(short: Scene) -> None:
-    picture, _ = plain_picture(replace(short, wind=None, current=None, payload=None), FERRY)
+    picture, _ = prior_force_model(replace(short, wind=None, current=None, payload=None), FERRY)
     assert FERRY.wind is not None
     # Still air meets a vessel from ahead.
     assert np.all(picture.external[short.nu[:, 0] > 0.1, 0] < 0.0)
@@ -133,7 +133,7 @@ def test_a_model_becomes_a_picture_of_the_same_force(short: Scene, weather: bool
 
     scene = replace(short, payload=None, current=None, wind=short.wind if weather else None)
     model = model_of("decoupled", around)
-    picture, spread = plain_picture(scene, FERRY, model)
+    picture, spread = prior_force_model(scene, FERRY, model)
     nu_dot = acceleration(picture)
     needed = estimator(model)(nu_dot, scene.nu, scene.psi, scene.wind, None)
     np.testing.assert_allclose(needed, scene.parts.sum(axis=1), atol=1e-6)
@@ -148,13 +148,13 @@ def test_a_model_becomes_a_picture_of_the_same_force(short: Scene, weather: bool
 
 def test_a_model_that_couples_surge_inertia_is_refused(short: Scene) -> None:
     with pytest.raises(FerryIdError, match="--structure decoupled"):
-        plain_picture(short, FERRY, model_of("coupled", np.ones))
+        prior_force_model(short, FERRY, model_of("coupled", np.ones))
 
 
 def test_a_model_of_another_vessel_is_refused(short: Scene) -> None:
     other = model_of("decoupled", np.zeros, load_profile("revolt").text)
     with pytest.raises(FerryIdError, match="says nothing about"):
-        plain_picture(short, FERRY, other)
+        prior_force_model(short, FERRY, other)
 
 
 def test_windows_follow_froude() -> None:
@@ -165,7 +165,7 @@ def test_windows_follow_froude() -> None:
 
 @pytest.mark.parametrize("vessel", ["milliampere-2025", "esso-osaka", "gunnerus", "kvlcc2-model", "vtec-usv"])
 def test_a_hull_without_a_model_may_have_any_damping(short: Scene, vessel: str) -> None:
-    spread = broad_spread(short, load_profile(vessel))
+    spread = default_hull_spread(short, load_profile(vessel))
     assert spread.shape == (len(COEFFICIENTS),)
     assert np.all(np.isfinite(spread) & (spread > 0.0))
 
@@ -175,16 +175,16 @@ def test_a_tanker_may_lift_as_tankers_do_and_a_known_hull_as_it_is_known(short: 
     tanker = load_profile("kvlcc2-model")
     L, T = tanker.hull.length_m, tanker.hull.draught_m
     plate = 0.5 * 1000.0 * L * T
-    spread = dict(zip(COEFFICIENTS, broad_spread(short, tanker), strict=True))
+    spread = dict(zip(COEFFICIENTS, default_hull_spread(short, tanker), strict=True))
     usual = {"Y_uv": 0.4 * plate, "Y_ur": 0.08 * plate * L, "N_uv": 0.13 * plate * L, "N_ur": 0.05 * plate * L**2}
     for name, value in usual.items():
         assert 0.3 * value < spread[name] < 5.0 * value, name
-    assert plain_picture(short, FERRY)[1][-4:].tolist() == [0.0, 0.0, 0.0, 0.0]
+    assert prior_force_model(short, FERRY)[1][-4:].tolist() == [0.0, 0.0, 0.0, 0.0]
 
 
 def test_broad_beliefs_hold_what_was_measured_of_a_ferry(short: Scene) -> None:
     # Table 4.1 was identified on the real vessel: nothing of it may lie far outside what its size alone lets one believe.
-    spread = broad_spread(short, FERRY)
+    spread = default_hull_spread(short, FERRY)
     known = np.array([0.0, *([0.0] * 4), *(FERRY.hull.D.get(name, 0.0) for name in COEFFICIENTS[5:])])
     rigid = np.array([FERRY.hull.mass_kg, FERRY.hull.mass_kg, 0.0, 0.0, FERRY.hull.inertia_z])
     known[:5] = np.array([2389.657, 2533.911, 62.386, 28.141, 5068.91]) - rigid
@@ -194,7 +194,7 @@ def test_broad_beliefs_hold_what_was_measured_of_a_ferry(short: Scene) -> None:
 def test_a_tanker_with_propeller_and_rudder_has_a_scene(shared_data: Callable[[str], Path]) -> None:
     log = shared_data("esso_osaka/random/random_06-Aug-2020_16_24_25_1.csv")
     profile = load_profile("esso-osaka")
-    scene, survey = scene_of(str(log), profile, None, withhold=("wind",), window_s=0.0)
+    scene, survey = read_measurements(str(log), profile, None, withhold=("wind",), window_s=0.0)
     rows = survey.motion.valid & scene.usable
     np.testing.assert_allclose(scene.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
     assert np.isnan(scene.angles).all()

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.measurements import window_lengths
-from ferryid.diagnose.inference.campaign import Together, together
-from ferryid.diagnose.inference.campaign_hull import INDUCED, Member, SharedHull, fit_together
-from ferryid.diagnose.inference.estimation import Suspect, fit, trial_of
+from ferryid.diagnose.inference.campaign import Campaign, fit_campaign
+from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, Member, fit_campaign_hull
+from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
@@ -27,7 +27,7 @@ from tests.diagnose.judging.test_held_out import sailed
 FERRY = load_profile("milliampere")
 WIND = effects()["wind"]
 # Without factors on its load, so that logs add up in straight lines.
-SUSPECT = Suspect(WIND, None, WIND.parameters_of(FERRY)[:2])
+SUSPECT = Candidate(WIND, None, WIND.parameters_of(FERRY)[:2])
 WINDS = ((-2.0, 1.5), (1.5, 2.5), (2.5, -1.0))
 SPREAD = 0.3 * np.abs(hull_of(FERRY))
 NONE_INDUCED = np.zeros(len(INDUCED))
@@ -60,8 +60,8 @@ def members(factor: float = 1.0) -> tuple[Member, ...]:
 
 
 @cache
-def fitted() -> SharedHull:
-    return fit_together(members(), SPREAD, NONE_INDUCED)
+def fitted() -> CampaignHull:
+    return fit_campaign_hull(members(), SPREAD, NONE_INDUCED)
 
 
 def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
@@ -81,7 +81,7 @@ def test_the_common_hull_is_nearer_the_true_one_than_it_was_thought() -> None:
 
 
 def test_a_log_has_no_part_in_what_the_others_say() -> None:
-    alone = fit_together(members()[:2], SPREAD, NONE_INDUCED)
+    alone = fit_campaign_hull(members()[:2], SPREAD, NONE_INDUCED)
     mean, covariance = fitted().belief(without=2)
     expected, own = alone.belief()
     error = np.sqrt(np.diag(own))[: len(SPREAD)]
@@ -94,22 +94,22 @@ def test_a_log_has_no_part_in_what_the_others_say() -> None:
 
 def test_logs_of_one_hull_agree_and_of_another_do_not() -> None:
     assert fitted().disagreement < 1.6
-    assert fit_together(members(1.4), SPREAD, NONE_INDUCED).disagreement > 2.0 * fitted().disagreement
+    assert fit_campaign_hull(members(1.4), SPREAD, NONE_INDUCED).disagreement > 2.0 * fitted().disagreement
 
 
 def test_the_hull_as_a_suspect_has_the_same_mean_and_covariance() -> None:
     hull = fitted()
-    suspect = hull.suspect(without=0)
+    candidate = hull.candidate(without=0)
     mean, covariance = hull.belief(without=0)
     plain = members()[0].plain
 
     def moved(k: int) -> np.ndarray:
-        p = np.zeros(len(suspect.parameters))
+        p = np.zeros(len(candidate.parameters))
         p[k] = 1.0
-        return suspect.act(plain, p).hull - mean[: len(SPREAD)]
+        return candidate.act(plain, p).hull - mean[: len(SPREAD)]
 
-    assert suspect.act(plain, np.zeros(len(suspect.parameters))).hull == pytest.approx(mean[: len(SPREAD)])
-    columns = np.column_stack([moved(k) for k in range(len(suspect.parameters))])
+    assert candidate.act(plain, np.zeros(len(candidate.parameters))).hull == pytest.approx(mean[: len(SPREAD)])
+    columns = np.column_stack([moved(k) for k in range(len(candidate.parameters))])
     size = np.sqrt(np.diag(covariance))[: len(SPREAD)]
     scale = np.where(size > 0.0, size, 1.0)
     assert columns @ columns.T / np.outer(scale, scale) == pytest.approx(
@@ -121,12 +121,12 @@ def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
     hull = fitted()
     first = members()[0]
     plain, spread = hull.picture(first.plain, without=0)
-    made = fit(trial_of(first.windows, plain, spread), [SUSPECT])
+    made = fit(estimation_problem(first.windows, plain, spread), [SUSPECT])
     assert made.values[0] == pytest.approx(WINDS[0], abs=0.35)
 
 
 def test_winds_hold_on_held_out_stretches_and_placebos_do_not() -> None:
-    bare = [replace(member, suspects=()) for member in members()]
+    bare = [replace(member, candidates=()) for member in members()]
     gains = held_out_gains({"found": members(), **placebos(members())}, bare, SPREAD, NONE_INDUCED)
     found = gains["found"]
     assert found.interval()[0] > 0.0
@@ -136,7 +136,7 @@ def test_winds_hold_on_held_out_stretches_and_placebos_do_not() -> None:
 
 def test_a_common_hull_needs_two_logs() -> None:
     with pytest.raises(FerryIdError, match="needs two logs"):
-        together([], FERRY, lambda stage: None)
+        fit_campaign([], FERRY, lambda stage: None)
 
 
 def test_a_common_hull_and_another_model_exclude_each_other() -> None:
@@ -148,8 +148,8 @@ def test_a_common_hull_and_another_model_exclude_each_other() -> None:
     ("variances", "told"), [(9.0, "3.0 times as much as the noise"), (0.8, "by no more than the noise")]
 )
 def test_how_far_logs_disagree_is_told_as_people_think_of_it(variances: float, told: str) -> None:
-    hull = cast(SharedHull, SimpleNamespace(disagreement=variances))
-    says = Together(members(), hull, {"a": 0}).says("a")
+    hull = cast(CampaignHull, SimpleNamespace(disagreement=variances))
+    says = Campaign(members(), hull, {"a": 0}).says("a")
     assert says.startswith("The hull is that of 2 other logs of the vessel")
     assert told in says
     assert "variance" not in says

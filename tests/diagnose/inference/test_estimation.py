@@ -8,10 +8,10 @@ import numpy as np
 from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
-from ferryid.diagnose.inference.autoregression import ORDER, Noise, noise_of
-from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial, fit
+from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise, fit_autoregression
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit
 from ferryid.diagnose.inference.kalman import DIFFUSE
-from ferryid.diagnose.inference.noise_model import Filter, stride_s
+from ferryid.diagnose.inference.noise_model import NoiseModel, stride_s
 from ferryid.diagnose.inference.weak_form import steps_of, windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
@@ -27,7 +27,7 @@ def push(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, external=picture.external + np.array([p[0], 0.0, 0.0]))
 
 
-PUSH = Suspect(
+PUSH = Candidate(
     Effect("push", "Push", lambda profile: (), push, lambda v, i: "", lambda v, i: {}),
     None,
     (Parameter("force", "N", 50.0, -1e4, 1e4),),
@@ -50,7 +50,7 @@ def covariance(row: Floats, n: int, h: float) -> Floats:
     return np.asarray(D @ (error + moved @ toeplitz(pushed**2 * np.exp(-lag / pushed_s)) @ moved.T) @ D.T)
 
 
-def trial(true_force: float, seed: int = 0) -> Trial:
+def problem(true_force: float, seed: int = 0) -> EstimationProblem:
     """A vessel held at rest, pushed by a force that its noisy position is said to show, with the noise of `NOISE`."""
     t = np.arange(0.0, 300.0, 0.2)
     zero = np.zeros((len(t), 3))
@@ -71,14 +71,14 @@ def trial(true_force: float, seed: int = 0) -> Trial:
         position[: often * (n + 2) : often, j] = path
     moved = replace(seen, scene=replace(seen.scene, eta=position))
     plain = Picture(seen.scene, hull_of(FERRY), seen.scene.parts, seen.scene.angles, np.zeros((len(seen.scene.t), 3)))
-    white = Noise(np.zeros((3, ORDER)), np.eye(3))
+    white = AutoregressiveNoise(np.zeros((3, ORDER)), np.eye(3))
     # Next to no freedom of the hull, so that the case stays the linear one of the formula.
-    return Trial(moved, plain, white, np.full(len(plain.hull), 1e-9), Filter(NOISE))
+    return EstimationProblem(moved, plain, white, np.full(len(plain.hull), 1e-9), NoiseModel(NOISE))
 
 
 def test_a_linear_hypothesis_has_the_mean_spread_and_evidence_of_the_formula() -> None:
     size, mass = 50.0, FERRY.hull.M[0, 0]
-    case = trial(60.0)
+    case = problem(60.0)
     found, nothing = fit(case, [PUSH]), fit(case, [])
     # Two positions stand for an unknown start; the gaps that sum up to them tell nothing.
     y = case.steps.measured[DIFFUSE:, 0] * mass
@@ -98,11 +98,11 @@ def test_a_linear_hypothesis_has_the_mean_spread_and_evidence_of_the_formula() -
 
 
 def test_evidence_weighs_filters_against_each_other() -> None:
-    case = trial(0.0)
+    case = problem(0.0)
     y, h = case.steps.measured[DIFFUSE:, :3], stride_s(case.steps)
     told, known = [], []
     for share in (1.0, 1.3, 0.6):
-        told.append(fit(replace(case, filter=Filter(share * NOISE)), []).evidence)
+        told.append(fit(replace(case, filter=NoiseModel(share * NOISE)), []).evidence)
         one = multivariate_normal(np.zeros(len(y)), covariance(share * NOISE[0], len(y), h))
         known.append(sum(one.logpdf(y[:, j]) for j in range(3)))
     # A start of which next to nothing is known is not quite one of which nothing is.
@@ -110,7 +110,7 @@ def test_evidence_weighs_filters_against_each_other() -> None:
 
 
 def test_slopes_by_the_hull_are_those_of_whitened_gaps() -> None:
-    case = trial(60.0)
+    case = problem(60.0)
     n = len(case.plain.scene.t)
     moving = np.random.default_rng(1).normal(size=(n, 3)) * [1.0, 0.5, 0.2]
     steps = replace(case.steps, scene=replace(case.plain.scene, nu=moving))
@@ -129,7 +129,7 @@ def test_slopes_by_the_hull_are_those_of_whitened_gaps() -> None:
 
 def test_limits_are_kept() -> None:
     narrow = replace(PUSH, parameters=(Parameter("force", "N", 50.0, -5.0, 5.0),))
-    assert fit(trial(60.0), [narrow]).values[0] == 5.0
+    assert fit(problem(60.0), [narrow]).values[0] == 5.0
 
 
 def test_a_limit_does_not_keep_the_others_from_their_best() -> None:
@@ -141,21 +141,21 @@ def test_a_limit_does_not_keep_the_others_from_their_best() -> None:
 
     both = (Parameter("force", "N", 500.0, -1e4, 1e4), Parameter("more", "N", 500.0, 0.0, 1e4))
 
-    case = trial(60.0)
+    case = problem(60.0)
     drifting = replace(
         case.plain, external=case.plain.external + np.array([60.0, 0.0, 0.0]) * (case.plain.scene.t > 150.0)[:, None]
     )
     case = replace(case, plain=drifting)
     effect = replace(PUSH.effect, apply=shove)
-    limited = fit(case, [Suspect(effect, None, both)])
-    alone = fit(case, [Suspect(effect, None, (both[0], replace(both[1], size=1e-7)))])
+    limited = fit(case, [Candidate(effect, None, both)])
+    alone = fit(case, [Candidate(effect, None, (both[0], replace(both[1], size=1e-7)))])
     assert limited.values[0][1] == 0.0
     np.testing.assert_allclose(limited.values[0][0], alone.values[0][0], rtol=1e-3)
 
 
 def test_an_onset_leaves_what_was_before_it_alone() -> None:
     late = replace(PUSH, onset_s=150.0)
-    case = trial(0.0)
+    case = problem(0.0)
     after = late.act(case.plain, np.array([30.0]))
     rows = case.plain.scene.t >= 150.0
     assert (after.external[~rows, 0] == 0.0).all()
@@ -170,7 +170,7 @@ def test_noise_is_white_once_its_own_autoregression_is_taken_off() -> None:
     for k in range(2, n):
         series[k] = 0.9 * series[k - 1] - 0.3 * series[k - 2] + kicks[k]
     runs = ((0, n // 2), (n // 2, n))
-    learnt = noise_of(series, runs)
+    learnt = fit_autoregression(series, runs)
     np.testing.assert_allclose(learnt.coefficients[:, :2], [[0.9, -0.3]] * 3, atol=0.06)
     white = learnt.white(series, runs).reshape(-1, 3)
     np.testing.assert_allclose(white.T @ white / len(white), np.eye(3), atol=0.02)
@@ -184,8 +184,10 @@ def test_noise_is_white_once_its_own_autoregression_is_taken_off() -> None:
 def told(name: str, values: list[float], variance: float = 0.0) -> Floats:
     """Return the errors that are told of an effect whose posterior has this variance in every parameter."""
     effect = effects()[name]
-    suspect = Suspect(effect, effect.instances(FERRY)[0], effect.parameters_of(FERRY)[: len(values)])
-    return Fit((suspect,), (np.array(values),), variance * np.eye(len(values)), hull_of(FERRY), 0.0).told_errors(0)
+    candidate = Candidate(effect, effect.instances(FERRY)[0], effect.parameters_of(FERRY)[: len(values)])
+    return Fit((candidate,), (np.array(values),), variance * np.eye(len(values)), hull_of(FERRY), 0.0).reported_errors(
+        0
+    )
 
 
 def test_a_formula_is_believed_to_a_tenth_of_what_it_changes() -> None:

@@ -10,18 +10,18 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import toeplitz
 from scipy.stats import chi2, multivariate_normal
 
-from ferryid.diagnose.inference.autoregression import ORDER, Noise
-from ferryid.diagnose.inference.estimation import Suspect, Trial, fit
+from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit
 from ferryid.diagnose.inference.kalman import DIFFUSE, costs_alone, errors, errors_alone, gains
 from ferryid.diagnose.inference.noise_model import (
     EXCERPT,
     PIECES,
-    Filter,
+    NoiseModel,
     _widths,
     excerpt,
-    learn,
+    fit_noise,
     likelihood,
-    sieve_of,
+    make_whitening_filter,
     stride_s,
 )
 from ferryid.diagnose.inference.weak_form import Windows, steps_of, windows
@@ -172,7 +172,9 @@ def test_shared_disturbances_have_the_likelihood_of_their_dense_covariance(place
             for i in range(3):
                 for j in range(3):
                     C[:, i, :, j] += G @ (felt[:, i, None] * R * felt[:, j]) @ G.T
-        return likelihood(Filter(channels, processes, plain), steps, gaps), dense(y, C.reshape(3 * n, 3 * n), integrals)
+        return likelihood(NoiseModel(channels, processes, plain), steps, gaps), dense(
+            y, C.reshape(3 * n, 3 * n), integrals
+        )
 
     tried = [
         (TRUE, (Process(force, 1.0, 5.0), Process(steady, 2.0, 4.0, 0.3))),
@@ -208,7 +210,7 @@ def noisy() -> tuple[Windows, Floats]:
 
 def test_matching_noise_is_whitened(noisy: tuple[Windows, Floats]) -> None:
     steps, gaps = noisy
-    white = sieve_of(Filter(TRUE), steps).white(gaps).reshape(gaps.shape)
+    white = make_whitening_filter(NoiseModel(TRUE), steps).white(gaps).reshape(gaps.shape)
     assert (white[:DIFFUSE] == 0.0).all()
     left = white[DIFFUSE:]
     n = len(left)
@@ -216,17 +218,17 @@ def test_matching_noise_is_whitened(noisy: tuple[Windows, Floats]) -> None:
     for lag in range(1, 21):
         assert np.abs(np.mean(left[lag:] * left[:-lag], axis=0)).max() < 4.0 / np.sqrt(n)
     assert np.abs(np.corrcoef(left.T)[np.triu_indices(3, 1)]).max() < 4.0 / np.sqrt(n)
-    columns = sieve_of(Filter(TRUE), steps).white(np.stack([gaps, -2.0 * gaps], axis=2))
+    columns = make_whitening_filter(NoiseModel(TRUE), steps).white(np.stack([gaps, -2.0 * gaps], axis=2))
     np.testing.assert_allclose(columns, white.reshape(-1, 1) * [1.0, -2.0], rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("wrong", [None, 3.0, -3.0], ids=["no start", "start too large", "start too small"])
 def test_noise_is_learnt(noisy: tuple[Windows, Floats], wrong: float | None) -> None:
     steps, gaps = noisy
-    near = None if wrong is None else Filter(TRUE * np.exp(wrong * np.array([1.0, -1.0, 0.3, 1.0, -0.5])))
-    learnt = learn(steps, gaps, near)
+    near = None if wrong is None else NoiseModel(TRUE * np.exp(wrong * np.array([1.0, -1.0, 0.3, 1.0, -0.5])))
+    learnt = fit_noise(steps, gaps, near)
     # The likelihood cannot be less than at the truth, and is more by half a chi square of as many degrees as parameters.
-    more = 2.0 * (likelihood(learnt, steps, gaps) - likelihood(Filter(TRUE), steps, gaps))
+    more = 2.0 * (likelihood(learnt, steps, gaps) - likelihood(NoiseModel(TRUE), steps, gaps))
     assert -0.1 < more < chi2(10).ppf(0.999)
     np.testing.assert_allclose(learnt.channels[0], learnt.channels[1])
     # White and coloured error, and the disturbance's strength; of how long it lasts 80 time constants tell less.
@@ -242,19 +244,19 @@ def test_a_break_of_a_run_starts_the_filter_anew() -> None:
     gaps = np.random.default_rng(5).standard_normal((len(steps.starts), 3))
     steps = replace(steps, measured=np.tile(gaps, 2))
     shared = Process(np.broadcast_to([0.0, 20.0, -30.0], (len(plain.scene.t), 3)), 2.0, 4.0, 0.3)
-    for noise in (Filter(TRUE), Filter(TRUE, (shared,), plain)):
-        together = sieve_of(noise, steps).white(gaps).reshape(-1, 3)
+    for noise in (NoiseModel(TRUE), NoiseModel(TRUE, (shared,), plain)):
+        together = make_whitening_filter(noise, steps).white(gaps).reshape(-1, 3)
         changed = gaps.copy()
         end = steps.runs[0][1]
         changed[:end] += 5.0
-        again = sieve_of(noise, steps).white(changed).reshape(-1, 3)
+        again = make_whitening_filter(noise, steps).white(changed).reshape(-1, 3)
         np.testing.assert_array_equal(again[end:], together[end:])
         assert (together[end : end + DIFFUSE] == 0.0).all()
         # The second run by itself, on the same scale, is what it is beside the first.
         mirrored = replace(
             steps, starts=steps.starts[end:], runs=((0, len(gaps) - end),), measured=steps.measured[end:]
         )
-        alone = sieve_of(noise, mirrored).white(gaps[end:]).reshape(-1, 3)
+        alone = make_whitening_filter(noise, mirrored).white(gaps[end:]).reshape(-1, 3)
         np.testing.assert_allclose(alone, together[end:], rtol=1e-3, atol=1e-3)
 
 
@@ -328,7 +330,7 @@ def test_an_excerpt_is_filtered_as_its_runs_are() -> None:
     gaps = np.random.default_rng(7).standard_normal((len(steps.starts), 3))
     steps = replace(steps, measured=np.tile(gaps, 2))
     part = excerpt(steps)
-    left = sieve_of(Filter(TRUE), part).white(part.measured[:, :3]).reshape(-1, 3)
+    left = make_whitening_filter(NoiseModel(TRUE), part).white(part.measured[:, :3]).reshape(-1, 3)
     for first, end in part.runs:
         a = int(np.searchsorted(steps.starts, part.starts[first]))
         alone = replace(
@@ -339,7 +341,7 @@ def test_an_excerpt_is_filtered_as_its_runs_are() -> None:
         )
         np.testing.assert_allclose(
             left[first:end],
-            sieve_of(Filter(TRUE), alone).white(gaps[a : a + end - first]).reshape(-1, 3),
+            make_whitening_filter(NoiseModel(TRUE), alone).white(gaps[a : a + end - first]).reshape(-1, 3),
             rtol=1e-3,
             atol=1e-3,
         )
@@ -419,7 +421,7 @@ def late(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, parts=parts)
 
 
-LATE = Suspect(
+LATE = Candidate(
     Effect("late", "Late", lambda profile: (), late, lambda v, i: "", lambda v, i: {}),
     None,
     (Parameter("factor", "1", 1.0, 0.0, 5.0, 1.0), Parameter("delay", "s", 1.0, -2.0, 2.0)),
@@ -429,7 +431,7 @@ LATE = Suspect(
 KNOWN = np.array([[0.004, 0.005, 0.6, 0.02, 4.0], [0.004, 0.005, 0.6, 0.02, 4.0], [1e-6, 1e-7, 1.0, 1e-9, 1.0]])
 
 
-def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[Trial, Picture]]:
+def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[EstimationProblem, Picture]]:
     """Return a trial for every seed, with the noise that there is, and its picture without effects."""
     hull = np.zeros(len(COEFFICIENTS))
     hull[[0, 1, 4]] = MASS
@@ -443,8 +445,8 @@ def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[Trial, Picture]
         cut = windows(scene, 8.0, 2.0)
         plain = Picture(cut.scene, hull, cut.scene.parts, cut.scene.angles, zero[: len(cut.scene.t)])
         held = np.where(np.arange(len(COEFFICIENTS)) == 0, 1e-9, 0.0)
-        blank = Noise(np.zeros((3, ORDER)), np.eye(3))
-        made.append((Trial(cut, plain, blank, held, Filter(KNOWN)), plain))
+        blank = AutoregressiveNoise(np.zeros((3, ORDER)), np.eye(3))
+        made.append((EstimationProblem(cut, plain, blank, held, NoiseModel(KNOWN)), plain))
     return made
 
 
@@ -452,12 +454,12 @@ def test_a_closed_loop_does_not_bias_what_prediction_errors_estimate() -> None:
     # The controller answers as often as the filter looks: every 0.4 s, the steps of windows of 8 s.
     t, seen, force = looped(0.4)
     told, spread, naive = [], [], []
-    for k, (trial, _) in enumerate(trials(seen, force, t)):
-        made = fit(trial, [LATE], [np.array([0.7, 0.4])])
+    for k, (problem, _) in enumerate(trials(seen, force, t)):
+        made = fit(problem, [LATE], [np.array([0.7, 0.4])])
         told.append(made.values[0])
         spread.append(made.errors(0))
         # Least squares on the very same steps, with the force and its rate as regressors.
-        steps = trial.steps
+        steps = problem.steps
         felt = [steps.mean(one).ravel() / MASS for one in (force[:, k], np.gradient(force[:, k], STEP_S, axis=0))]
         factor, slope = np.linalg.lstsq(np.column_stack(felt), steps.measured[:, :2].ravel())[0]
         naive.append([factor, -slope / factor])
@@ -472,12 +474,12 @@ def test_a_closed_loop_does_not_bias_what_prediction_errors_estimate() -> None:
 
 def test_a_fit_and_its_noise_learnt_in_turn_come_to_the_truth() -> None:
     t, seen, force = looped(0.4)
-    for trial, plain in trials(seen, force, t)[:1]:
+    for problem, plain in trials(seen, force, t)[:1]:
         wrong = late(plain, np.array([0.7, 0.4]), None)
-        trial = replace(trial, filter=learn(trial.steps, trial.steps.gap(wrong)))
+        problem = replace(problem, filter=fit_noise(problem.steps, problem.steps.gap(wrong)))
         for _ in range(25):
-            made = fit(trial, [LATE])
-            trial = trial.with_noise_of(made)
+            made = fit(problem, [LATE])
+            problem = problem.with_noise_of(made)
         # What is not known of the noise is no part of the errors, so that these are somewhat small.
         assert (np.abs(made.values[0] - [1.0, 0.0]) < 5.0 * made.errors(0)).all()
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from ferryid.diagnose.inference.estimation import WIDER, Suspect, fit
+from ferryid.diagnose.inference.estimation import WIDER, Candidate, fit
 from ferryid.diagnose.inference.profile_likelihood import intervals
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.picture import Picture
 from ferryid.vessel.profile import Floats
-from tests.diagnose.inference.test_estimation import PUSH, trial
+from tests.diagnose.inference.test_estimation import PUSH, problem
 
 
 def both(picture: Picture, p: Floats, instance: str | None) -> Picture:
@@ -21,7 +21,7 @@ def both(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, external=picture.external + np.array([p[0] * p[1], 0.0, 0.0]))
 
 
-FACTORS = Suspect(
+FACTORS = Candidate(
     Effect("both", "Both", lambda profile: (), both, lambda v, i: "", lambda v, i: {}, ridge="a"),
     None,
     (Parameter("a", "-", 1.0, 0.0, 20.0, neutral=1.0), Parameter("b", "N", 50.0, -1e4, 1e4, start=20.0)),
@@ -29,7 +29,7 @@ FACTORS = Suspect(
 
 
 def test_the_ridge_of_a_product_has_the_intervals_of_its_posterior() -> None:
-    case = trial(90.0)
+    case = problem(90.0)
     # What the log says of the product alone, which is nearly all that a push of unknown size is.
     vague = replace(PUSH, parameters=(Parameter("force", "N", 1e4, -1e5, 1e5),))
     told = fit(case, [vague])
@@ -42,7 +42,7 @@ def test_the_ridge_of_a_product_has_the_intervals_of_its_posterior() -> None:
     kept = fit(case, [FACTORS])
     found = intervals(case, kept, 0)
     assert found["a"] == pytest.approx((low, high), rel=0.08)
-    linear = kept.values[0][0] + 1.96 * kept.told_errors(0)[0] * np.array([-1.0, 1.0])
+    linear = kept.values[0][0] + 1.96 * kept.reported_errors(0)[0] * np.array([-1.0, 1.0])
     assert abs(linear[0] - low) > 0.3 * low, "a case in which the curvature at the top misleads"
     # Given a, b is normal; drawn at random.
     rng = np.random.default_rng(0)

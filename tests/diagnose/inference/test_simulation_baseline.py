@@ -9,13 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.measurements import scene_of, window_lengths
-from ferryid.diagnose.data.path_comparison import Paths, paths
+from ferryid.diagnose.data.measurements import read_measurements, window_lengths
+from ferryid.diagnose.data.path_comparison import PathComparison, compare_paths
 from ferryid.diagnose.inference import simulation_baseline as against
-from ferryid.diagnose.inference.estimation import trial_of
-from ferryid.diagnose.inference.prior import plain_picture
+from ferryid.diagnose.inference.estimation import estimation_problem
+from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import Search, search
-from ferryid.diagnose.inference.simulation_baseline import Simulated, base_picture, differing, learn
+from ferryid.diagnose.inference.simulation_baseline import (
+    Simulation,
+    differing_candidates,
+    learn_simulation,
+    simulated_force_model,
+)
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects.picture import Scene, acceleration
@@ -62,14 +67,14 @@ def windy(folder: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def simulated(windy: str) -> Simulated:
-    return learn(windy, FERRY, None, progress=quietly)
+def simulated(windy: str) -> Simulation:
+    return learn_simulation(windy, FERRY, None, progress=quietly)
 
 
-def found(simulated: Simulated, log: str) -> Search:
-    seen = windows(scene_of(log, FERRY, None)[0], *window_lengths(FERRY))
-    plain, spread = base_picture(simulated, seen.scene)
-    return search(trial_of(seen, plain, spread), quietly, known=differing(simulated, seen.scene))
+def found(simulated: Simulation, log: str) -> Search:
+    seen = windows(read_measurements(log, FERRY, None)[0], *window_lengths(FERRY))
+    plain, spread = simulated_force_model(simulated, seen.scene)
+    return search(estimation_problem(seen, plain, spread), quietly, known=differing_candidates(simulated, seen.scene))
 
 
 def test_only_the_fault_is_found_where_both_have_the_wind(folder: Path, windy: str) -> None:
@@ -88,22 +93,22 @@ def test_only_the_fault_is_found_where_both_have_the_wind(folder: Path, windy: s
     assert result.against["says"] in result.notes
 
 
-def test_what_the_simulation_learnt_is_what_was_simulated(simulated: Simulated) -> None:
+def test_what_the_simulation_learnt_is_what_was_simulated(simulated: Simulation) -> None:
     (blown,) = simulated.conditions
-    assert blown.suspect.effect.id == "wind"
+    assert blown.candidate.effect.id == "wind"
     np.testing.assert_allclose(blown.values[:2], [2.0, 0.0], atol=0.1)
 
 
-def test_the_same_trial_with_other_noise_differs_in_nothing(folder: Path, simulated: Simulated) -> None:
+def test_the_same_trial_with_other_noise_differs_in_nothing(folder: Path, simulated: Simulation) -> None:
     result = found(simulated, sailed(folder, "again", wind(2.0), 11))
-    assert result.fit.suspects == ()
+    assert result.fit.candidates == ()
     assert result.rounds[0].none > 0.9
 
 
 @pytest.mark.parametrize("north", [3.1, 0.0])
-def test_a_wind_that_differs_is_told_with_both_values(folder: Path, simulated: Simulated, north: float) -> None:
+def test_a_wind_that_differs_is_told_with_both_values(folder: Path, simulated: Simulation, north: float) -> None:
     result = found(simulated, sailed(folder, f"wind-{north}", wind(north), 3))
-    (one,) = result.fit.suspects
+    (one,) = result.fit.candidates
     assert one.effect.id == "wind"
     np.testing.assert_allclose(result.fit.values[0][:2], [north, 0.0], atol=0.1)
     says = one.effect.says({"north": north, "east": 0.0}, None)
@@ -112,47 +117,47 @@ def test_a_wind_that_differs_is_told_with_both_values(folder: Path, simulated: S
 
 
 def test_a_simulated_hull_of_seven_tenths_hides_no_fault(folder: Path) -> None:
-    light = learn(sailed(folder, "light", wind(2.0), 5, hull=0.7), FERRY, None, progress=quietly)
+    light = learn_simulation(sailed(folder, "light", wind(2.0), 5, hull=0.7), FERRY, None, progress=quietly)
     assert light.hull[0] == pytest.approx(0.7 * FERRY.hull.M[0, 0], rel=0.1)
     result = found(light, sailed(folder, "heavy", wind(2.0) + FAULT, 6))
-    names = {one.key: values for one, values in zip(result.fit.suspects, result.fit.values, strict=True)}
+    names = {one.key: values for one, values in zip(result.fit.candidates, result.fit.values, strict=True)}
     assert names["thruster_gain", "thruster1"][0] == pytest.approx(0.8, abs=0.03)
     # The hulls do differ; nothing else does.
     assert set(names) <= {("thruster_gain", "thruster1"), ("hull_parameters", None), ("fouling", None)}
 
 
-def test_an_effect_that_both_have_is_taken_out_and_put_in_exactly(simulated: Simulated) -> None:
+def test_an_effect_that_both_have_is_taken_out_and_put_in_exactly(simulated: Simulation) -> None:
     scene = windows(simulated.scene, 8.0, 2.0).scene
-    picture, _ = base_picture(simulated, scene)
-    (one,) = [one for one in differing(simulated, scene) if one.effect.id == "wind"]
+    picture, _ = simulated_force_model(simulated, scene)
+    (one,) = [one for one in differing_candidates(simulated, scene) if one.effect.id == "wind"]
     neutral = np.array([parameter.neutral for parameter in one.parameters])
     np.testing.assert_allclose(acceleration(one.act(picture, neutral)), acceleration(picture), atol=1e-12)
-    still = replace(plain_picture(scene, FERRY)[0], hull=simulated.hull)
+    still = replace(prior_force_model(scene, FERRY)[0], hull=simulated.hull)
     np.testing.assert_allclose(acceleration(one.act(picture, np.zeros(2))), acceleration(still), atol=1e-12)
 
 
-def test_a_clock_that_started_later_is_found_from_the_path(simulated: Simulated) -> None:
+def test_a_clock_that_started_later_is_found_from_the_path(simulated: Simulation) -> None:
     scene = simulated.scene
-    compared = paths(replace(scene, t=scene.t - 12.0), scene)
-    assert isinstance(compared, Paths)
+    compared = compare_paths(replace(scene, t=scene.t - 12.0), scene)
+    assert isinstance(compared, PathComparison)
     assert compared.shift_s == pytest.approx(12.0, abs=0.5)
     assert np.sqrt(np.mean(compared.position_m**2)) < 0.05
 
 
-def test_paths_of_another_manoeuvre_are_not_compared(simulated: Simulated) -> None:
+def test_paths_of_another_manoeuvre_are_not_compared(simulated: Simulation) -> None:
     def moved(eta: np.ndarray) -> Scene:
         return replace(simulated.scene, eta=eta)
 
     eta = simulated.scene.eta
-    assert "apart" in str(paths(moved(eta[:, [1, 0, 2]] * [-3.0, 3.0, 1.0]), simulated.scene))
-    assert "no positions" in str(paths(moved(np.full_like(eta, np.nan)), simulated.scene))
+    assert "apart" in str(compare_paths(moved(eta[:, [1, 0, 2]] * [-3.0, 3.0, 1.0]), simulated.scene))
+    assert "no positions" in str(compare_paths(moved(np.full_like(eta, np.nan)), simulated.scene))
     half = replace(simulated.scene, usable=simulated.scene.usable & (simulated.scene.t < 200.0))
-    assert "lasts" in str(paths(half, simulated.scene))
+    assert "lasts" in str(compare_paths(half, simulated.scene))
 
 
 def test_a_simulation_too_short_to_learn_from_is_refused() -> None:
     with pytest.raises(FerryIdError, match="simulate and record the whole trial"):
-        learn(str(FIXTURES / "short.mcap"), FERRY, None, progress=quietly)
+        learn_simulation(str(FIXTURES / "short.mcap"), FERRY, None, progress=quietly)
 
 
 def test_a_simulation_of_another_vessel_is_refused(folder: Path) -> None:
@@ -160,7 +165,7 @@ def test_a_simulation_of_another_vessel_is_refused(folder: Path) -> None:
     other = replace(FERRY, actuators=tuple(replace(one, position_m=(0.3, 1.5)) for one in FERRY.actuators))
     log = sailed(folder, "hasty", "", 7, dwell_s=20)
     with pytest.raises(FerryIdError, match="needs a simulation of milliampere"):
-        learn(log, other, None, progress=quietly)
+        learn_simulation(log, other, None, progress=quietly)
 
 
 def test_model_and_simulation_exclude_each_other(windy: str) -> None:
@@ -175,4 +180,4 @@ def test_a_load_that_a_simulation_records_for_a_part_of_it_is_aboard_for_that_pa
     scene = Scene(FERRY, t, zero, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), usable, payload=load)
     (one,) = against._measured(scene)
     assert one.values == pytest.approx([300.0, 0.5])
-    assert (one.suspect.onset_s, one.suspect.offset_s) == (30.0, 79.0)
+    assert (one.candidate.onset_s, one.candidate.offset_s) == (30.0, 79.0)

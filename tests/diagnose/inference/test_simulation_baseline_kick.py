@@ -7,8 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Suspect
-from ferryid.diagnose.inference.simulation_baseline import Condition, Simulated, base_picture, differing
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.simulation_baseline import (
+    Condition,
+    Simulation,
+    differing_candidates,
+    simulated_force_model,
+)
 from ferryid.effects import effects
 from ferryid.effects.picture import Scene, hull_of
 from ferryid.vessel import load_profile
@@ -23,13 +28,15 @@ def test_only_the_difference_to_the_simulations_load_comes_aboard() -> None:
         angles=np.zeros((n, k)), usable=np.ones(n, dtype=bool),
     )  # fmt: skip
     payload = effects()["payload"]
-    own = Suspect(payload, None, payload.parameters_of(ferry))
+    own = Candidate(payload, None, payload.parameters_of(ferry))
     hull = hull_of(ferry)
-    simulated = Simulated(
+    simulated = Simulation(
         "s", scene, hull, 0.1 * np.abs(hull), (Condition(own, np.array([300.0, 0.0]), np.zeros(2)),), ()
     )
-    base, _ = base_picture(simulated, scene)
-    late = replace(next(one for one in differing(simulated, scene) if one.effect.id == "payload"), onset_s=100.0)
+    base, _ = simulated_force_model(simulated, scene)
+    late = replace(
+        next(one for one in differing_candidates(simulated, scene) if one.effect.id == "payload"), onset_s=100.0
+    )
     for mass, taken in ((300.0, 0.0), (400.0, -100.0)):
         more = late.act(base, np.array([mass, 0.0])).external - base.external
         assert more.sum(axis=0)[0] * scene.step_s == pytest.approx(taken)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.measurements import scene_of, window_lengths
-from ferryid.diagnose.inference.estimation import Suspect, trial_of
-from ferryid.diagnose.inference.prior import plain_picture
-from ferryid.diagnose.inference.search import Search, search, suspects_of
-from ferryid.diagnose.inference.stochastic_disturbance import State, _seen
+from ferryid.diagnose.data.measurements import read_measurements, window_lengths
+from ferryid.diagnose.inference.estimation import Candidate, estimation_problem
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.search import Search, list_candidates, search
+from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, _seen
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.confidence_rules import absent_in_velocities
 from ferryid.diagnose.judging.disturbance_findings import _power_in_velocities, density, disturbance_claims
@@ -39,22 +39,22 @@ IMITATORS = ("wind", "gusts", "waves", "time_delay", "thruster_lag")
 def found_in(environment: str, seed: int, folder: Path) -> Search:
     log = folder / "trial.mcap"
     write_log(simulate(parse_scenario(BASE + environment, "unsteady"), seed), log)
-    scene, _ = scene_of(str(log), FERRY, None)
+    scene, _ = read_measurements(str(log), FERRY, None)
     seen = windows(scene, *window_lengths(FERRY))
-    plain, spread = plain_picture(seen.scene, FERRY)
-    suspects, _ = suspects_of(seen.scene)
-    known = [one for one in suspects if one.effect.id in IMITATORS]
+    plain, spread = prior_force_model(seen.scene, FERRY)
+    candidates, _ = list_candidates(seen.scene)
+    known = [one for one in candidates if one.effect.id in IMITATORS]
     assert {one.effect.id for one in known} == set(IMITATORS)
-    return search(trial_of(seen, plain, spread), lambda stage: None, known=known)
+    return search(estimation_problem(seen, plain, spread), lambda stage: None, known=known)
 
 
-def values_of(state: State) -> dict[str, float]:
-    return dict(zip([one.name for one in state.suspect.parameters], state.values.tolist(), strict=True))
+def values_of(state: DisturbanceState) -> dict[str, float]:
+    return dict(zip([one.name for one in state.candidate.parameters], state.values.tolist(), strict=True))
 
 
 def spectrum_in(result: Search) -> Mapping[str, Floats]:
     """Return the figure of the only disturbance."""
-    (claim,) = disturbance_claims(result.trial, result.fit, result.states, result.trial.windows.scene)
+    (claim,) = disturbance_claims(result.problem, result.fit, result.states, result.problem.windows.scene)
     finding = claim.finding
     assert (np.diff(finding.evidence["frequency"]) > 0.0).all()
     return finding.evidence
@@ -75,9 +75,9 @@ def test_the_spectrum_of_a_disturbance_is_the_transform_of_its_covariance(freque
 def test_gusts_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     gusts = f"environment = {{ wind = {{ {WIND}, gust_std_mps = {TRUE_GUST}, gust_time_s = 8.0 }} }}\n"
     result = found_in(gusts, seed, tmp_path)
-    assert [one.suspect.effect.id for one in result.states] == ["gusts"]
+    assert [one.candidate.effect.id for one in result.states] == ["gusts"]
     assert abs(values_of(result.states[0])["std"] / TRUE_GUST - 1.0) < 0.25
-    assert [one.effect.id for one in result.fit.suspects] == ["wind"]
+    assert [one.effect.id for one in result.fit.candidates] == ["wind"]
     evidence = spectrum_in(result)
     slow = evidence["frequency"] < 0.1
     assert 0.5 < float(np.median(evidence["before"][slow] / evidence["explained"][slow])) < 3.0
@@ -88,9 +88,9 @@ def test_gusts_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
 def test_waves_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     waves = "waves = { significant_height_m = 0.12, peak_period_s = 2.4, direction_deg = 225.0 }"
     result = found_in(f"environment = {{ {waves} }}\n", seed, tmp_path)
-    assert [one.suspect.effect.id for one in result.states] == ["waves"]
+    assert [one.candidate.effect.id for one in result.states] == ["waves"]
     assert abs(values_of(result.states[0])["peak_frequency"] / TRUE_HZ - 1.0) < 0.3
-    assert not {one.effect.id for one in result.fit.suspects} & {"time_delay", "thruster_lag"}
+    assert not {one.effect.id for one in result.fit.candidates} & {"time_delay", "thruster_lag"}
     evidence = spectrum_in(result)
     for name in ("before", "explained"):
         assert abs(evidence["frequency"][np.argmax(evidence[name])] / TRUE_HZ - 1.0) < 0.3
@@ -102,7 +102,7 @@ def test_waves_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
 def test_where_nothing_comes_and_goes_there_are_no_states(wind: str, seed: int, tmp_path: Path) -> None:
     result = found_in(wind, seed, tmp_path)
     assert result.states == ()
-    assert [one.effect.id for one in result.fit.suspects] == (["wind"] if wind else [])
+    assert [one.effect.id for one in result.fit.candidates] == (["wind"] if wind else [])
 
 
 @pytest.mark.parametrize(("share", "unseen"), [(1.0, False), (30.0, False), (0.5, False), (0.05, True)])
@@ -125,7 +125,7 @@ def test_a_peak_that_the_navigation_shifts_a_little_is_seen(at_hz: float, unseen
 
 def test_waves_slower_than_any_sea_are_none() -> None:
     ferry = load_profile("milliampere")
-    waves = Suspect(effects()["waves"], None, effects()["waves"].parameters_of(ferry))
+    waves = Candidate(effects()["waves"], None, effects()["waves"].parameters_of(ferry))
     values, widths = np.array([0.45, 60.0, 100.0, 6.0]), np.full(4, 0.1)
     assert _seen(waves, values, widths, 0.4)
     assert not _seen(waves, np.array([0.044, *values[1:]]), widths, 0.4)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ferryid.diagnose.data.complementary_filter import steadied
+from ferryid.diagnose.data.complementary_filter import complementary_filter
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects.picture import Picture, Scene, hull_of
 from ferryid.simulate.plant.hull import hydrodynamics, required_force
@@ -111,7 +111,7 @@ def test_slow_errors_of_the_velocity_are_taken_from_the_position_and_fast_motion
     scene, _ = sailed()
     slow = 0.05 * np.sin(2.0 * np.pi * scene.t / 40.0)[:, None] * np.ones(3)
     wrong = scene.nu + slow
-    better = steadied(wrong, wrong, scene.eta, RATE_HZ)
+    better = complementary_filter(wrong, wrong, scene.eta, RATE_HZ)
     inner = slice(100, -100)
     assert np.abs(better - scene.nu)[inner].max() < 0.15 * np.abs(slow).max()
-    assert np.abs(steadied(scene.nu, scene.nu, scene.eta, RATE_HZ) - scene.nu)[inner].max() < 1e-3
+    assert np.abs(complementary_filter(scene.nu, scene.nu, scene.eta, RATE_HZ) - scene.nu)[inner].max() < 1e-3

@@ -8,16 +8,12 @@ from math import inf, nextafter
 import pytest
 
 from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.claims import Claim, Figures, Kind, LogFigures, OtherLogs
 from ferryid.diagnose.judging.confidence_rules import (
     RULES,
     STRONG,
-    Claim,
     ConfidenceRule,
     Context,
-    Figures,
-    Kind,
-    LogFigures,
-    OtherLogs,
     about_nothing_sure,
     absent_in_other_logs,
     absent_in_velocities,

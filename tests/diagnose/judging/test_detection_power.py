@@ -10,9 +10,17 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Fit, Suspect, Trial
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit
 from ferryid.diagnose.inference.search import ODDS
-from ferryid.diagnose.judging.detection_power import AXES, Power, advice, powers, says_untested, tells, unexcited
+from ferryid.diagnose.judging.detection_power import (
+    AXES,
+    DetectionPower,
+    detection_powers,
+    is_testable,
+    recording_advice,
+    unexcited_axes,
+    untested_notes,
+)
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, hull_of
@@ -27,7 +35,7 @@ def push(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, external=picture.external + np.array([p[0], 0.0, 0.0]))
 
 
-PUSH = Suspect(
+PUSH = Candidate(
     Effect("push", "Push", lambda profile: (), push, lambda v, i: "", lambda v, i: {}),
     None,
     (Parameter("force", "N", 10.0, -1e4, 1e4),),
@@ -35,7 +43,7 @@ PUSH = Suspect(
 NOTHING = Fit((), (), np.empty((0, 0)), hull_of(FERRY), 0.0)
 
 
-def linear(strength: float, hull: Floats | None = None) -> Trial:
+def linear(strength: float, hull: Floats | None = None) -> EstimationProblem:
     """A trial whose prediction errors are the push, every newton of it worth `strength` in units of the noise."""
     zero = np.zeros((ROWS, 3))
     scene = Scene(
@@ -44,13 +52,13 @@ def linear(strength: float, hull: Floats | None = None) -> Trial:
     plain = Picture(scene, hull_of(FERRY), scene.parts, scene.angles, zero)
     by_hull = np.zeros((ROWS, len(COEFFICIENTS))) if hull is None else hull
     return cast(
-        Trial,
+        EstimationProblem,
         SimpleNamespace(plain=plain, by_hull=by_hull, white=lambda picture: strength * picture.external[:, 0]),
     )
 
 
-def chance(trial: Trial) -> float:
-    (one,) = powers(trial, NOTHING, [PUSH])
+def chance(problem: EstimationProblem) -> float:
+    (one,) = detection_powers(problem, NOTHING, [PUSH])
     return one.chance
 
 
@@ -81,16 +89,16 @@ def test_what_the_hull_can_imitate_is_not_seen() -> None:
 
 def test_what_was_found_and_what_is_only_noise_have_no_chance_to_tell() -> None:
     still = replace(PUSH, effect=replace(PUSH.effect, apply=lambda picture, p, instance: picture))
-    assert powers(linear(0.2), NOTHING, [still]) == ()
+    assert detection_powers(linear(0.2), NOTHING, [still]) == ()
     found = Fit((PUSH,), (np.array([5.0]),), np.eye(1), hull_of(FERRY), 0.0)
-    assert powers(linear(0.2), found, [PUSH]) == ()
+    assert detection_powers(linear(0.2), found, [PUSH]) == ()
 
 
 @pytest.mark.parametrize("axis", list(AXES))
 def test_an_axis_that_moves_is_told_from_those_that_do_not(axis: str) -> None:
     hull = np.zeros((ROWS, len(COEFFICIENTS)))
     hull[:, AXES[axis][0]] = 1.0
-    assert unexcited(linear(1.0, hull)) == tuple(name for name in AXES if name != axis)
+    assert unexcited_axes(linear(1.0, hull)) == tuple(name for name in AXES if name != axis)
 
 
 def test_every_coefficient_belongs_to_one_axis() -> None:
@@ -99,38 +107,41 @@ def test_every_coefficient_belongs_to_one_axis() -> None:
     assert all(COEFFICIENTS[place][0] == "N" or COEFFICIENTS[place] in ("m32", "m33") for place in AXES["yaw"])
 
 
-def suspect(name: str, instance: str | None = None) -> Suspect:
-    return Suspect(effects()[name], instance, effects()[name].parameters_of(FERRY))
+def candidate(name: str, instance: str | None = None) -> Candidate:
+    return Candidate(effects()[name], instance, effects()[name].parameters_of(FERRY))
 
 
 def test_a_log_that_could_show_less_than_half_is_not_testable() -> None:
-    seen, blind = Power(suspect("wind"), 0.9), Power(suspect("payload"), 0.1)
-    assert tells([seen, seen, blind], ())
-    assert not tells([seen, blind, blind], ())
-    assert not tells([seen, seen, blind], tuple(AXES))
+    seen, blind = DetectionPower(candidate("wind"), 0.9), DetectionPower(candidate("payload"), 0.1)
+    assert is_testable([seen, seen, blind], ())
+    assert not is_testable([seen, blind, blind], ())
+    assert not is_testable([seen, seen, blind], tuple(AXES))
 
 
 def test_advice_names_axis_effect_and_manoeuvre() -> None:
-    blind: list[Any] = [Power(suspect("wind"), 0.1), Power(suspect("thruster_gain", "thruster1"), 0.2)]
-    told = " ".join(advice([*blind, Power(suspect("current"), 0.99)], ("sway",)))
+    blind: list[Any] = [
+        DetectionPower(candidate("wind"), 0.1),
+        DetectionPower(candidate("thruster_gain", "thruster1"), 0.2),
+    ]
+    told = " ".join(recording_advice([*blind, DetectionPower(candidate("current"), 0.99)], ("sway",)))
     assert "hardly moved in sway" in told
     assert "moves sideways" in told
     assert "thruster force (thruster1)" in told
     assert "turn on the spot" in told
     assert "current" not in told
-    assert advice([Power(suspect("current"), 0.99)], ()) == []
+    assert recording_advice([DetectionPower(candidate("current"), 0.99)], ()) == []
 
 
 def test_advice_names_each_effect_and_manoeuvre_once() -> None:
-    ends: list[Any] = [Power(suspect("azimuth_offset", f"thruster{k}"), 0.1) for k in (1, 2)]
-    (told,) = advice([*ends, Power(suspect("fouling"), 0.2)], ())
+    ends: list[Any] = [DetectionPower(candidate("azimuth_offset", f"thruster{k}"), 0.1) for k in (1, 2)]
+    (told,) = recording_advice([*ends, DetectionPower(candidate("fouling"), 0.2)], ())
     assert told.count("for azimuth offset (thruster1, thruster2), record each thruster alone") == 1
     assert told.count("azimuth offset") == told.count("fouling") == 1
 
 
 def test_what_was_not_tested_is_told_by_title_and_once_for_a_reason() -> None:
     untested = {"wind": "there are no wind areas", "gusts": "there are no wind areas", "thruster_gain": "nothing turns"}
-    assert says_untested(untested) == [
+    assert untested_notes(untested) == [
         "Not tested: steady wind and gusts, since there are no wind areas.",
         "Not tested: thruster force, since nothing turns.",
     ]

@@ -9,26 +9,27 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.inference.estimation import Trial, fit
-from ferryid.diagnose.judging.backward_elimination import Judged
-from ferryid.diagnose.judging.confidence_rules import Context, LogFigures, apply_rules, improves_no_claimed_axis
+from ferryid.diagnose.inference.estimation import EstimationProblem, fit
+from ferryid.diagnose.judging.backward_elimination import Elimination
+from ferryid.diagnose.judging.claims import LogFigures
+from ferryid.diagnose.judging.confidence_rules import Context, apply_rules, improves_no_claimed_axis
 from ferryid.diagnose.judging.finding import HINT, Finding
 from ferryid.diagnose.judging.findings import force_claims
-from ferryid.diagnose.judging.held_out import evidence
-from ferryid.diagnose.judging.rivals import Standing
+from ferryid.diagnose.judging.held_out import held_out_evidence
+from ferryid.diagnose.judging.rivals import RivalComparison
 from ferryid.effects import effects
-from tests.diagnose.judging.test_held_out import WIND, sailed, suspect, trial_on
+from tests.diagnose.judging.test_held_out import WIND, candidate, sailed, trial_on
 
 
 @pytest.fixture(scope="module")
-def windy() -> tuple[Trial, Judged]:
-    trial = trial_on(sailed(480.0, WIND))
-    found = fit(trial, [suspect("wind")])
-    trial = trial.with_noise_of(found)
-    return trial, Judged(found, evidence(trial, found), (Standing((), 0.999),), ())
+def windy() -> tuple[EstimationProblem, Elimination]:
+    problem = trial_on(sailed(480.0, WIND))
+    found = fit(problem, [candidate("wind")])
+    problem = problem.with_noise_of(found)
+    return problem, Elimination(found, held_out_evidence(problem, found), (RivalComparison((), 0.999),), ())
 
 
-def with_lows(stands: Judged, forces: list[float], runs: list[float], score: float = 20.0) -> Judged:
+def with_lows(stands: Elimination, forces: list[float], runs: list[float], score: float = 20.0) -> Elimination:
     """Return the same with another score and lower ends: of force by axis, and of position, heading, speed and yaw rate."""
     assert stands.proof is not None
     (proof,) = stands.proof.proofs
@@ -41,20 +42,20 @@ def with_lows(stands: Judged, forces: list[float], runs: list[float], score: flo
     return replace(stands, proof=replace(stands.proof, proofs=(other,)))
 
 
-def judged_by_rules(trial: Trial, stands: Judged) -> tuple[Finding, tuple[str, ...]]:
-    (finding,), notes = apply_rules(force_claims(trial, stands, trial.windows.scene), LogFigures())
+def judged_by_rules(problem: EstimationProblem, stands: Elimination) -> tuple[Finding, tuple[str, ...]]:
+    (finding,), notes = apply_rules(force_claims(problem, stands, problem.windows.scene), LogFigures())
     return finding, notes
 
 
-def test_a_wind_that_blew_is_told_for_sure(windy: tuple[Trial, Judged]) -> None:
+def test_a_wind_that_blew_is_told_for_sure(windy: tuple[EstimationProblem, Elimination]) -> None:
     finding, notes = judged_by_rules(*windy)
     assert finding.sure
     assert notes == ()
 
 
-def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[Trial, Judged]) -> None:
-    trial, stands = windy
-    finding, (note,) = judged_by_rules(trial, with_lows(stands, [-0.1] * 3, [np.nan, -0.1, -0.1, -0.1]))
+def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    finding, (note,) = judged_by_rules(problem, with_lows(stands, [-0.1] * 3, [np.nan, -0.1, -0.1, -0.1]))
     assert finding.probability == HINT
     assert note == (
         "Steady wind is a hint: on the axes that it claims, neither the held-out squared force error nor the free run "
@@ -62,21 +63,21 @@ def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[T
     )
 
 
-def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[Trial, Judged]) -> None:
-    trial, stands = windy
-    (blown,) = stands.fit.suspects
+def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    (blown,) = stands.fit.candidates
     brief = replace(blown, effect=replace(blown.effect, once=lambda scene, p: True))
-    finding, (note,) = judged_by_rules(trial, replace(stands, fit=replace(stands.fit, suspects=(brief,))))
+    finding, (note,) = judged_by_rules(problem, replace(stands, fit=replace(stands.fit, candidates=(brief,))))
     assert finding.probability == HINT
     assert "the vessel was in that place once" in note
 
 
-def test_what_acts_for_less_than_two_blocks_is_a_hint(windy: tuple[Trial, Judged]) -> None:
-    trial, stands = windy
-    (blown,) = stands.fit.suspects
+def test_what_acts_for_less_than_two_blocks_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    (blown,) = stands.fit.candidates
     for offset_s, sure in ((150.0, False), (300.0, True)):
         brief = replace(blown, onset_s=100.0, offset_s=offset_s)
-        finding, notes = judged_by_rules(trial, replace(stands, fit=replace(stands.fit, suspects=(brief,))))
+        finding, notes = judged_by_rules(problem, replace(stands, fit=replace(stands.fit, candidates=(brief,))))
         assert finding.sure == sure
         assert any("held-out data judge nothing below 80 s" in note for note in notes) != sure
 
@@ -86,30 +87,32 @@ def test_what_acts_for_less_than_two_blocks_is_a_hint(windy: tuple[Trial, Judged
     [(100.0, 300.0, 4.0, False), (100.0, 300.0, 1.0, True), (100.0, inf, 4.0, True), (0.0, inf, 4.0, True)],
 )
 def test_what_comes_and_goes_by_little_is_a_hint(
-    windy: tuple[Trial, Judged], onset_s: float, offset_s: float, passing: float, sure: bool
+    windy: tuple[EstimationProblem, Elimination], onset_s: float, offset_s: float, passing: float, sure: bool
 ) -> None:
     """A wind of 2.5 m/s northwards, where 4 m/s or 1 m/s are little."""
-    trial, stands = windy
-    (blown,) = stands.fit.suspects
-    suspect = replace(
+    problem, stands = windy
+    (blown,) = stands.fit.candidates
+    candidate = replace(
         blown, effect=replace(blown.effect, passing=passing, onset=True), onset_s=onset_s, offset_s=offset_s
     )
-    made = replace(stands.fit, suspects=(suspect,), values=(np.array([2.5, 0.0, 1.0, 1.0, 1.0]),))
-    finding, notes = judged_by_rules(trial, replace(stands, fit=made))
+    made = replace(stands.fit, candidates=(candidate,), values=(np.array([2.5, 0.0, 1.0, 1.0, 1.0]),))
+    finding, notes = judged_by_rules(problem, replace(stands, fit=made))
     assert finding.sure == sure
     assert any("by less than hull and formulas may be off" in note for note in notes) != sure
 
 
 @pytest.mark.parametrize(("grown", "sure"), [(1.2, False), (1.05, True)])
-def test_what_makes_an_axis_worse_is_a_hint(windy: tuple[Trial, Judged], grown: float, sure: bool) -> None:
+def test_what_makes_an_axis_worse_is_a_hint(
+    windy: tuple[EstimationProblem, Elimination], grown: float, sure: bool
+) -> None:
     """By 44 and by 10 % of the squared error in yaw, whatever it improves elsewhere."""
-    trial, stands = windy
+    problem, stands = windy
     assert stands.proof is not None
     (proof,) = stands.proof.proofs
     after = proof.improvement.after.copy()
     after[:, 2] = grown * proof.improvement.before[:, 2]
     other = replace(proof, improvement=replace(proof.improvement, after=after))
-    finding, notes = judged_by_rules(trial, replace(stands, proof=replace(stands.proof, proofs=(other,))))
+    finding, notes = judged_by_rules(problem, replace(stands, proof=replace(stands.proof, proofs=(other,))))
     assert finding.sure == sure
     assert notes == (
         () if sure else ("Steady wind is a hint: it makes the held-out squared force error in yaw 44 % larger.",)
@@ -129,19 +132,23 @@ def test_what_makes_an_axis_worse_is_a_hint(windy: tuple[Trial, Judged], grown: 
     ],
 )
 def test_only_an_axis_that_is_claimed_shows_a_finding(
-    windy: tuple[Trial, Judged], shares: list[float], forces: list[float], runs: list[float], shows: bool
+    windy: tuple[EstimationProblem, Elimination],
+    shares: list[float],
+    forces: list[float],
+    runs: list[float],
+    shows: bool,
 ) -> None:
-    trial, stands = windy
-    (claim,) = force_claims(trial, with_lows(stands, forces, runs), trial.windows.scene)
+    problem, stands = windy
+    (claim,) = force_claims(problem, with_lows(stands, forces, runs), problem.windows.scene)
     finding = replace(claim.finding, axes=dict(zip(AXES, shares, strict=True)))
     judged, _ = improves_no_claimed_axis(finding, Context(claim.figures))
     assert judged is not None
     assert judged.sure is shows
 
 
-def test_a_strong_likelihood_needs_no_more(windy: tuple[Trial, Judged]) -> None:
-    trial, stands = windy
-    (claim,) = force_claims(trial, with_lows(stands, [-0.1] * 3, [-0.1] * 4, score=45.0), trial.windows.scene)
+def test_a_strong_likelihood_needs_no_more(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    (claim,) = force_claims(problem, with_lows(stands, [-0.1] * 3, [-0.1] * 4, score=45.0), problem.windows.scene)
     assert improves_no_claimed_axis(claim.finding, Context(claim.figures)) == (claim.finding, "")
 
 

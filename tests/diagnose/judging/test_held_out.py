@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ferryid.diagnose.inference.estimation import HULL_SPREAD, Suspect, Trial, fit, trial_of
+from ferryid.diagnose.inference.estimation import HULL_SPREAD, Candidate, EstimationProblem, estimation_problem, fit
 from ferryid.diagnose.inference.folds import FOLDS, folds_of, subset
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.free_runs import free_runs
-from ferryid.diagnose.judging.held_out import HEADING, evidence, held_out, placebos
+from ferryid.diagnose.judging.held_out import HEADING, held_out, held_out_evidence, placebos
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD
 from ferryid.effects.picture import Picture, Scene, hull_of
@@ -59,31 +59,31 @@ def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005) -> Scene:
     return Scene(FERRY, t, eta, nu, path[:, 3:], parts, np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
 
 
-def trial_on(scene: Scene) -> Trial:
+def trial_on(scene: Scene) -> EstimationProblem:
     cut = windows(scene, 8.0, 2.0)
     seen = cut.scene
     still = wind_force(FERRY.wind, np.zeros((len(seen.t), 2)), seen.psi, seen.nu) if FERRY.wind else np.zeros(3)
     plain = Picture(seen, hull_of(FERRY), seen.parts, seen.angles, still)
-    return trial_of(cut, plain, HULL_SPREAD * np.abs(plain.hull))
+    return estimation_problem(cut, plain, HULL_SPREAD * np.abs(plain.hull))
 
 
-def suspect(name: str, instance: str | None = None) -> Suspect:
+def candidate(name: str, instance: str | None = None) -> Candidate:
     effect = effects()[name]
-    return Suspect(effect, instance, effect.parameters_of(FERRY))
+    return Candidate(effect, instance, effect.parameters_of(FERRY))
 
 
 @pytest.fixture(scope="module")
-def windy() -> Trial:
-    trial = trial_on(sailed(480.0, WIND))
-    return trial.with_noise_of(fit(trial, [suspect("wind")]))
+def windy() -> EstimationProblem:
+    problem = trial_on(sailed(480.0, WIND))
+    return problem.with_noise_of(fit(problem, [candidate("wind")]))
 
 
 @pytest.fixture(scope="module")
-def calm() -> Trial:
+def calm() -> EstimationProblem:
     return trial_on(sailed(480.0, np.zeros(2)))
 
 
-def test_what_is_left_over_is_model_minus_measured(windy: Trial) -> None:
+def test_what_is_left_over_is_model_minus_measured(windy: EstimationProblem) -> None:
     """A wind that the model does not know pushes the vessel; what is left over is that push with its sign turned round."""
     seen, plain = windy.windows, windy.plain
     assert FERRY.wind is not None
@@ -95,7 +95,7 @@ def test_what_is_left_over_is_model_minus_measured(windy: Trial) -> None:
         assert slope == pytest.approx(-1.0, abs=0.2), axis
 
 
-def test_training_and_held_out_windows_share_no_row(windy: Trial) -> None:
+def test_training_and_held_out_windows_share_no_row(windy: EstimationProblem) -> None:
     folds = folds_of(windy.windows)
     assert folds is not None
     width = len(windy.windows.weight)
@@ -109,7 +109,7 @@ def test_training_and_held_out_windows_share_no_row(windy: Trial) -> None:
     assert set(folds.fold.tolist()) == set(range(FOLDS))
 
 
-def test_no_series_of_training_windows_reaches_over_a_held_out_block(windy: Trial) -> None:
+def test_no_series_of_training_windows_reaches_over_a_held_out_block(windy: EstimationProblem) -> None:
     folds = folds_of(windy.windows)
     assert folds is not None
     stride = int(np.diff(windy.windows.starts).min())
@@ -120,15 +120,15 @@ def test_no_series_of_training_windows_reaches_over_a_held_out_block(windy: Tria
             assert np.all(np.diff(training.starts[first:end]) == stride)
 
 
-def test_a_log_too_short_to_hold_anything_out_has_no_evidence(windy: Trial) -> None:
+def test_a_log_too_short_to_hold_anything_out_has_no_evidence(windy: EstimationProblem) -> None:
     few = subset(windy.windows, np.arange(len(windy.windows.starts)) < 20)
     assert folds_of(few) is None
     assert folds_of(subset(windy.windows, np.zeros(len(windy.windows.starts), dtype=bool))) is None
-    found = fit(windy, [suspect("wind")])
-    assert evidence(replace(windy, windows=few), found) is None
+    found = fit(windy, [candidate("wind")])
+    assert held_out_evidence(replace(windy, windows=few), found) is None
 
 
-def test_a_force_that_was_left_out_is_the_force_error(calm: Trial) -> None:
+def test_a_force_that_was_left_out_is_the_force_error(calm: EstimationProblem) -> None:
     push = np.array([20.0, -30.0, 40.0])
     pushed = replace(calm.plain, external=calm.plain.external + push)
     more = force_errors(calm.windows, pushed, calm.plain) - force_errors(calm.windows, calm.plain, calm.plain)
@@ -136,10 +136,10 @@ def test_a_force_that_was_left_out_is_the_force_error(calm: Trial) -> None:
     np.testing.assert_allclose(mass_of(hull_of(FERRY)), FERRY.hull.M)
 
 
-def test_a_block_is_judged_by_fits_that_have_not_seen_it(windy: Trial) -> None:
+def test_a_block_is_judged_by_fits_that_have_not_seen_it(windy: EstimationProblem) -> None:
     folds = folds_of(windy.windows)
     assert folds is not None
-    judged = held_out(windy, folds, [suspect("wind")])
+    judged = held_out(windy, folds, [candidate("wind")])
     # Whatever is done to a block's own measurements moves its errors by just that, and nothing through the fit.
     own = folds.fold == 0
     measured = windy.windows.measured.copy()
@@ -147,13 +147,13 @@ def test_a_block_is_judged_by_fits_that_have_not_seen_it(windy: Trial) -> None:
     changed = replace(windy, windows=replace(windy.windows, measured=measured))
     again = folds_of(changed.windows)
     assert again is not None
-    other = held_out(changed, again, [suspect("wind")])
+    other = held_out(changed, again, [candidate("wind")])
     np.testing.assert_allclose(other.gaps[own], judged.gaps[own] - 0.5, atol=1e-9)
 
 
-def test_a_wind_that_blew_holds_and_beats_every_placebo(windy: Trial) -> None:
-    found = fit(windy, [suspect("wind")])
-    told = evidence(windy, found)
+def test_a_wind_that_blew_holds_and_beats_every_placebo(windy: EstimationProblem) -> None:
+    found = fit(windy, [candidate("wind")])
+    told = held_out_evidence(windy, found)
     assert told is not None
     (proof,) = told.proofs
     assert proof.holds
@@ -165,52 +165,52 @@ def test_a_wind_that_blew_holds_and_beats_every_placebo(windy: Trial) -> None:
     assert np.all(whole.removed <= whole.high)
     np.testing.assert_allclose(whole.removed, 1.0 - whole.mse_after / whole.mse_before)
     # The fits of the folds find the wind as well as the whole does.
-    for values in [one.values[0] for one in held_out(windy, told.folds, found.suspects).fits]:
+    for values in [one.values[0] for one in held_out(windy, told.folds, found.candidates).fits]:
         np.testing.assert_allclose(values[:2], WIND, atol=0.15)
 
 
-def test_what_did_not_happen_does_not_hold(calm: Trial) -> None:
+def test_what_did_not_happen_does_not_hold(calm: EstimationProblem) -> None:
     for name in ("wind", "current", "payload", "mooring"):
-        told = evidence(calm, fit(calm, [suspect(name)]))
+        told = held_out_evidence(calm, fit(calm, [candidate(name)]))
         assert told is not None
         assert not told.proofs[0].holds, name
 
 
-def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: Trial) -> None:
+def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: EstimationProblem) -> None:
     found = np.array([*WIND, 1.1, 0.9, 0.6])
-    for placebo in placebos(windy, suspect("wind"), found).values():
+    for placebo in placebos(windy, candidate("wind"), found).values():
         free = [one.name for one in placebo.parameters if one.size > HELD]
         assert free == ["north", "east"]
         np.testing.assert_array_equal(placebo.start[2:], found[2:])
 
 
-def test_a_constant_push_is_matched_by_its_placebo(calm: Trial) -> None:
+def test_a_constant_push_is_matched_by_its_placebo(calm: EstimationProblem) -> None:
     # The held-out errors shrink, but the same force late shrinks them as much: it tells nothing of when it acts.
-    base = suspect("wind").effect
+    base = candidate("wind").effect
 
     def apply(picture: Picture, p: np.ndarray, instance: str | None) -> Picture:
         return replace(picture, external=picture.external + np.array([p[0], p[1], 0.0]))
 
     pushed = replace(calm, plain=replace(calm.plain, external=calm.plain.external + np.array([40.0, -40.0, 0.0])))
-    push = Suspect(
+    push = Candidate(
         replace(base, id="push", apply=apply),
         None,
         tuple(replace(parameter, size=50.0, low=-500.0, high=500.0) for parameter in base.parameters_of(FERRY)),
     )
     found = fit(pushed, [push])
-    told = evidence(pushed.with_noise_of(found), found)
+    told = held_out_evidence(pushed.with_noise_of(found), found)
     assert told is not None
     assert told.proofs[0].improvement.score_low > 0.0
     assert told.proofs[0].beaten <= 1e-6
     assert not told.proofs[0].holds
 
 
-def test_only_what_depends_on_the_heading_has_a_mirrored_placebo(windy: Trial) -> None:
-    assert HEADING in placebos(windy, suspect("wind"), np.array([*WIND, 1.0, 1.0, 1.0]))
-    assert HEADING not in placebos(windy, suspect("payload"), np.array([300.0, 0.5]))
+def test_only_what_depends_on_the_heading_has_a_mirrored_placebo(windy: EstimationProblem) -> None:
+    assert HEADING in placebos(windy, candidate("wind"), np.array([*WIND, 1.0, 1.0, 1.0]))
+    assert HEADING not in placebos(windy, candidate("payload"), np.array([300.0, 0.5]))
 
 
-def test_free_runs_of_the_true_picture_stay_with_the_vessel(windy: Trial) -> None:
+def test_free_runs_of_the_true_picture_stay_with_the_vessel(windy: EstimationProblem) -> None:
     folds = folds_of(windy.windows)
     assert folds is not None
     seen = windy.windows.scene
@@ -223,7 +223,7 @@ def test_free_runs_of_the_true_picture_stay_with_the_vessel(windy: Trial) -> Non
     np.testing.assert_array_less(runs.after[:, 0], 0.03)
     np.testing.assert_array_less(runs.after[:, 2], 0.01)
     np.testing.assert_allclose(runs.removed, 0.0)
-    better = free_runs(windy, folds, held_out(windy, folds, ()).fits, held_out(windy, folds, [suspect("wind")]).fits)
+    better = free_runs(windy, folds, held_out(windy, folds, ()).fits, held_out(windy, folds, [candidate("wind")]).fits)
     assert np.all(better.removed[1:, 0] > 0.5)
     assert np.all(better.low[1:, 0] > 0.0)
     assert np.all(np.diff(better.before[:, 0]) > 0.0)

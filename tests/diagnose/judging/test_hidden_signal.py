@@ -7,7 +7,7 @@ import pytest
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import Finding
-from ferryid.diagnose.judging.hidden_signal import withheld
+from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
 from ferryid.effects.picture import Scene
 from ferryid.vessel import load_profile
 
@@ -36,7 +36,9 @@ def found(**parameters: Estimate) -> Finding:
 
 def test_a_load_is_compared_while_it_was_aboard() -> None:
     mass = Estimate(290.0, 280.0, 300.0, "kg")
-    (one,) = withheld({"payload": load(20, 60)}, scene(), [found(mass=mass, x=Estimate(0.4, 0.3, 0.5, "m"))])
+    (one,) = compare_hidden_signals(
+        {"payload": load(20, 60)}, scene(), [found(mass=mass, x=Estimate(0.4, 0.3, 0.5, "m"))]
+    )
     assert one.measured == {"mass": 300.0, "x": 0.5, "onset": 20.0, "offset": 59.0}
     assert set(one.found) == {"mass", "x"}
     assert "Measured while it was aboard: mass 300 kg, x 0.5 m, onset 20 s, offset 59 s" in one.says
@@ -44,7 +46,7 @@ def test_a_load_is_compared_while_it_was_aboard() -> None:
 
 
 def test_a_load_that_stays_has_no_ends_and_one_that_was_not_found_is_told() -> None:
-    (one,) = withheld({"payload": load(0, N)}, scene(), [])
+    (one,) = compare_hidden_signals({"payload": load(0, N)}, scene(), [])
     assert set(one.measured) == {"mass", "x"}
     assert one.says.endswith("nothing of it was found.")
 
@@ -52,11 +54,11 @@ def test_a_load_that_stays_has_no_ends_and_one_that_was_not_found_is_told() -> N
 def test_a_wind_is_compared_on_average_of_what_was_measured() -> None:
     blown = np.full((N, 2), [2.0, -1.0])
     blown[:50] = np.nan
-    (one,) = withheld({"wind": blown}, scene(), [])
+    (one,) = compare_hidden_signals({"wind": blown}, scene(), [])
     assert one.measured == {"north": pytest.approx(2.0), "east": pytest.approx(-1.0)}
     assert "on average: north 2 m/s, east -1 m/s" in one.says
 
 
 def test_an_empty_deck_is_no_load() -> None:
-    (one,) = withheld({"payload": load(0, 0)}, scene(), [])
+    (one,) = compare_hidden_signals({"payload": load(0, 0)}, scene(), [])
     assert one.measured == {"mass": 0.0, "x": 0.0}

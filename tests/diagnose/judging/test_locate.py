@@ -7,8 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.change_points import MOST_BREAKS, _breaks, acting
-from ferryid.diagnose.inference.estimation import HULL_SPREAD, Fit, Suspect, Trial, fit, trial_of
+from ferryid.diagnose.inference.change_points import MOST_BREAKS, _breaks, active_intervals
+from ferryid.diagnose.inference.estimation import (
+    HULL_SPREAD,
+    Candidate,
+    EstimationProblem,
+    Fit,
+    estimation_problem,
+    fit,
+)
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.error_profiles import FEWEST, in_words, profile_of
 from ferryid.diagnose.judging.locate import locate, whitened
@@ -21,7 +28,7 @@ FERRY = load_profile("milliampere")
 SECONDS, STEP_S = 600.0, 0.2
 
 
-def trial_on(push: Floats | None = None) -> Trial:
+def trial_on(push: Floats | None = None) -> EstimationProblem:
     """A turning vessel whose thrusters give what its hull needs less a push that nobody measured, with noise."""
     rng = np.random.default_rng(5)
     t = np.arange(0.0, SECONDS, STEP_S)
@@ -44,24 +51,24 @@ def trial_on(push: Floats | None = None) -> Trial:
     scene = replace(seen, parts=parts)
     cut = windows(scene, 8.0, 2.0)
     plain = Picture(cut.scene, hull_of(FERRY), cut.scene.parts, cut.scene.angles, np.zeros((len(cut.scene.t), 3)))
-    return trial_of(cut, plain, HULL_SPREAD * np.abs(plain.hull))
+    return estimation_problem(cut, plain, HULL_SPREAD * np.abs(plain.hull))
 
 
-def pushed(shape: Floats) -> Suspect:
+def pushed(shape: Floats) -> Candidate:
     """An effect that is any push: `shape` times its only parameter."""
 
     def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
         return replace(picture, external=picture.external + p[0] * shape)
 
     effect = replace(effects()["wind"], id="push", apply=apply)
-    return Suspect(effect, None, (Parameter("size", "", 1.0, -10.0, 10.0),))
+    return Candidate(effect, None, (Parameter("size", "", 1.0, -10.0, 10.0),))
 
 
-def told_of(shape: Floats) -> tuple[Trial, Fit]:
-    trial = trial_on(shape)
-    found = fit(trial, [pushed(shape)])
-    trial = trial.with_noise_of(found)
-    return trial, fit(trial, [pushed(shape)])
+def told_of(shape: Floats) -> tuple[EstimationProblem, Fit]:
+    problem = trial_on(shape)
+    found = fit(problem, [pushed(shape)])
+    problem = problem.with_noise_of(found)
+    return problem, fit(problem, [pushed(shape)])
 
 
 T = np.arange(0.0, SECONDS, STEP_S)
@@ -71,8 +78,8 @@ PSI = 2.0 * np.pi / 100.0 * T
 def test_a_push_in_sway_shows_in_sway() -> None:
     shape = np.zeros((len(T), 3))
     shape[:, 1] = 60.0 * np.sin(T / 6.0)
-    trial, found = told_of(shape)
-    where = locate(trial, fit(trial, ()), found)
+    problem, found = told_of(shape)
+    where = locate(problem, fit(problem, ()), found)
     assert where.shares.sum() == pytest.approx(1.0)
     assert where.shares[1] > 0.9
     assert where.intervals == ((0.0, pytest.approx(SECONDS, abs=1.0)),)
@@ -84,8 +91,8 @@ def test_a_push_for_a_time_begins_and_ends() -> None:
     shape = np.zeros((len(T), 3))
     acts = (T >= 200.0) & (T < 420.0)
     shape[acts, 2] = 150.0 * np.sin(T[acts] / 5.0)
-    trial, found = told_of(shape)
-    where = locate(trial, fit(trial, ()), found)
+    problem, found = told_of(shape)
+    where = locate(problem, fit(problem, ()), found)
     assert len(where.intervals) == 1
     assert where.onset_s == pytest.approx(200.0, abs=10.0)
     assert where.offset_s == pytest.approx(420.0, abs=10.0)
@@ -96,8 +103,8 @@ def test_a_push_at_some_headings_is_told_by_the_heading() -> None:
     shape = np.zeros((len(T), 3))
     inside = (heading >= 90.0) & (heading < 150.0)
     shape[inside, 1] = 80.0
-    trial, found = told_of(shape)
-    where = locate(trial, fit(trial, ()), found)
+    problem, found = told_of(shape)
+    where = locate(problem, fit(problem, ()), found)
     assert where.profiles[0].name == "heading"
     assert where.profiles[0].statistic > 4.0
     edges = [float(word) for word in where.regime.replace("headings", "").split() if word.isdigit()]
@@ -113,8 +120,8 @@ def test_a_push_at_some_headings_is_told_by_the_heading() -> None:
 def test_a_fast_push_lies_in_its_frequency_band() -> None:
     shape = np.zeros((len(T), 3))
     shape[:, 0] = 80.0 * np.sin(2.0 * np.pi * 0.15 * T)
-    trial, found = told_of(shape)
-    where = locate(trial, fit(trial, ()), found)
+    problem, found = told_of(shape)
+    where = locate(problem, fit(problem, ()), found)
     gained = {(band.low_hz, band.high_hz): band.before[0] - band.after[0] for band in where.bands}
     assert max(gained, key=lambda key: gained[key]) == (0.1, 0.2)
     # Half the square of the amplitude, less what a window of 1.6 s takes of 0.15 Hz.
@@ -122,9 +129,9 @@ def test_a_fast_push_lies_in_its_frequency_band() -> None:
 
 
 def test_without_a_mismatch_nothing_stands_out() -> None:
-    trial = trial_on()
-    alone = fit(trial, ())
-    where = locate(trial, alone, alone)
+    problem = trial_on()
+    alone = fit(problem, ())
+    where = locate(problem, alone, alone)
     assert where.shares.tolist() == [0.0, 0.0, 0.0]
     assert where.excess.tolist() == [0.0, 0.0, 0.0]
     assert where.regime == "all along"
@@ -136,9 +143,9 @@ def test_errors_that_grow_are_found_without_any_explanation() -> None:
     shape = np.zeros((len(T), 3))
     late = T > 400.0
     shape[late, 2] = 60.0 * np.random.default_rng(9).standard_normal(int(late.sum())).cumsum() / 20.0
-    trial = trial_on(shape)
-    alone = fit(trial, ())
-    where = locate(trial, alone, alone)
+    problem = trial_on(shape)
+    alone = fit(problem, ())
+    where = locate(problem, alone, alone)
     assert where.onset_s == pytest.approx(400.0, abs=25.0)
 
 
@@ -148,11 +155,11 @@ def test_white_noise_has_no_change_and_a_step_has_one() -> None:
     for seed in range(200):
         noise = np.random.default_rng(seed).standard_normal(300)
         false += len(_breaks(np.abs(noise), 0, 300, MOST_BREAKS)) > 0
-        false += acting(times, noise**2, 4.0, (0.0, 300.0), steady=True) != ((0.0, 300.0),)
+        false += active_intervals(times, noise**2, 4.0, (0.0, 300.0), steady=True) != ((0.0, 300.0),)
     assert false <= 8
     step = np.random.default_rng(1).standard_normal(300) ** 2 * np.where(times < 120.0, 0.05, 4.0)
     for steady in (False, True):
-        ((start, end),) = acting(times, step, 4.0, (0.0, 300.0), steady=steady)
+        ((start, end),) = active_intervals(times, step, 4.0, (0.0, 300.0), steady=steady)
         assert start == pytest.approx(120.0, abs=5.0)
         assert end == 300.0
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.data.measurements import Survey, scene_of, window_lengths
-from ferryid.diagnose.inference.estimation import Suspect, Trial, fit, trial_of
-from ferryid.diagnose.inference.prior import plain_picture
-from ferryid.diagnose.inference.stochastic_disturbance import State
+from ferryid.diagnose.data.measurements import Survey, read_measurements, window_lengths
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem, fit
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.finding import Finding
-from ferryid.diagnose.judging.model_update import keep, remodelled
-from ferryid.diagnose.judging.posterior import Learnt, learnt
+from ferryid.diagnose.judging.model_update import store_updated_model, update_model
+from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.effects.picture import acceleration
@@ -64,17 +64,17 @@ def sailed(folder: Path, name: str, path: str, seed: int, more: str) -> str:
     return str(log)
 
 
-def trial_on(log: str, model: Model | None = None) -> tuple[Trial, Survey]:
-    scene, survey = scene_of(log, FERRY, None)
+def trial_on(log: str, model: Model | None = None) -> tuple[EstimationProblem, Survey]:
+    scene, survey = read_measurements(log, FERRY, None)
     seen = windows(scene, *window_lengths(FERRY))
-    plain, spread = plain_picture(seen.scene, FERRY, model, survey.recording.sha256)
-    return trial_of(seen, plain, spread), survey
+    plain, spread = prior_force_model(seen.scene, FERRY, model, survey.recording.sha256)
+    return estimation_problem(seen, plain, spread), survey
 
 
-def finding(suspect: Suspect, probability: float) -> Finding:
+def finding(candidate: Candidate, probability: float) -> Finding:
     return Finding(
-        suspect.effect.id,
-        suspect.instance,
+        candidate.effect.id,
+        candidate.instance,
         probability,
         {},
         {},
@@ -97,30 +97,30 @@ def taught(
     told_s: float | None = None,
     offset_s: float = inf,
     doubtful: str = "",
-) -> tuple[Learnt, Trial]:
+) -> tuple[Posterior, EstimationProblem]:
     """Fit effects to a log whose presence is known, so that nothing here depends on a search."""
-    trial, survey = trial_on(log)
-    suspects = [
-        Suspect(
+    problem, survey = trial_on(log)
+    candidates = [
+        Candidate(
             effects()[name], effects()[name].instances(FERRY)[-1], effects()[name].parameters_of(FERRY),
             onset_s if effects()[name].onset else 0.0, offset_s if effects()[name].onset else inf,
         )
         for name in names
     ]  # fmt: skip
-    kept = fit(trial, suspects)
-    trial = trial.with_noise_of(kept)
-    kept = fit(trial, suspects, kept.values)
-    findings = [replace(finding(one, 0.3 if one.effect.id == doubtful else 0.99), onset_s=told_s) for one in suspects]
-    found = learnt(trial, kept, (), findings, survey)
+    kept = fit(problem, candidates)
+    problem = problem.with_noise_of(kept)
+    kept = fit(problem, candidates, kept.values)
+    findings = [replace(finding(one, 0.3 if one.effect.id == doubtful else 0.99), onset_s=told_s) for one in candidates]
+    found = posterior_of(problem, kept, (), findings, survey)
     assert found is not None
-    return found, trial
+    return found, problem
 
 
-def told(*several: Learnt) -> list[Diagnosis]:
+def told(*several: Posterior) -> list[Diagnosis]:
     after = {"mse": dict.fromkeys(AXES, 50.0)}
     return [
         Diagnosis(
-            str(one.training["name"]), "milliampere", "explained", (), {"mse": MSE, "rows": 10}, after, learnt=one
+            str(one.training["name"]), "milliampere", "explained", (), {"mse": MSE, "rows": 10}, after, posterior=one
         )
         for one in several
     ]
@@ -148,7 +148,7 @@ def fouled(folder: Path) -> str:
 def model(fouled: str, folder: Path) -> Model:
     """The model that a log of a fouled ferry in a wind leads to."""
     found, _ = taught(fouled, "fouling", "wind")
-    done = keep(told(found), FERRY, None, folder / "out")
+    done = store_updated_model(told(found), FERRY, None, folder / "out")
     assert done[0].model is not None
     return load_file(Path(done[0].model))
 
@@ -201,7 +201,7 @@ def test_a_fault_that_began_in_one_log_lasts_in_the_next(folder: Path) -> None:
     first = sailed(folder, "fault", TWELVE, 4, f"{BROKEN}from_s = 300\n")
     second = sailed(folder, "after", BRISK, 5, BROKEN)
     found, _ = taught(first, "thruster_gain", onset_s=300.0, told_s=300.5)
-    made, _ = remodelled(told(found), FERRY, None, "ferry")
+    made, _ = update_model(told(found), FERRY, None, "ferry")
     assert made is not None
     assert made.vessel_effects[0].values["factor"] == pytest.approx(0.6, abs=0.03)
     assert made.vessel_effects[0].sources[0].onset_s == 300.5, "the onset that was told"
@@ -213,40 +213,44 @@ def test_a_fault_that_began_in_one_log_lasts_in_the_next(folder: Path) -> None:
 
 def test_a_fault_that_passed_in_one_log_is_not_in_the_next(folder: Path) -> None:
     log = sailed(folder, "passed", TWELVE, 4, f"{BROKEN}from_s = 300\nuntil_s = 500\n")
-    found, trial = taught(log, "thruster_gain", onset_s=300.0, offset_s=500.0)
+    found, problem = taught(log, "thruster_gain", onset_s=300.0, offset_s=500.0)
     assert found.vessel == ()
     (stored,) = found.conditions
     assert (stored.effect, stored.offset_in(str(found.training["sha256"]))) == ("thruster_gain", 500.0)
-    made, _ = remodelled(told(found), FERRY, None, "ferry")
+    made, _ = update_model(told(found), FERRY, None, "ferry")
     assert made is not None
     assert not made.accepted, "nothing of it holds for the vessel"
-    here, there = (plain_picture(trial.plain.scene, FERRY, made, sha)[0] for sha in (found.training["sha256"], "other"))
-    t = trial.plain.scene.t
+    here, there = (
+        prior_force_model(problem.plain.scene, FERRY, made, sha)[0] for sha in (found.training["sha256"], "other")
+    )
+    t = problem.plain.scene.t
     weak = np.any(here.parts != there.parts, axis=(1, 2))
     assert weak.any()
     assert ((t[weak] >= 300.0) & (t[weak] < 500.0)).all()
 
 
 def test_the_model_moves_as_the_picture_that_was_fitted(model: Model, fouled: str) -> None:
-    trial, survey = trial_on(fouled)
-    suspects = [Suspect(effects()[name], None, effects()[name].parameters_of(FERRY)) for name in ("fouling", "wind")]
-    picture = replace(trial.plain, hull=np.array([one.value for one in model.hull.values()]))
-    for suspect, stored in zip(suspects, (*model.vessel_effects, *model.conditions[0].effects), strict=True):
-        picture = suspect.act(picture, np.array(list(stored.values.values())))
-    again, _ = plain_picture(trial.plain.scene, FERRY, model, survey.recording.sha256)
+    problem, survey = trial_on(fouled)
+    candidates = [
+        Candidate(effects()[name], None, effects()[name].parameters_of(FERRY)) for name in ("fouling", "wind")
+    ]
+    picture = replace(problem.plain, hull=np.array([one.value for one in model.hull.values()]))
+    for candidate, stored in zip(candidates, (*model.vessel_effects, *model.conditions[0].effects), strict=True):
+        picture = candidate.act(picture, np.array(list(stored.values.values())))
+    again, _ = prior_force_model(problem.plain.scene, FERRY, model, survey.recording.sha256)
     np.testing.assert_allclose(acceleration(again), acceleration(picture), rtol=1e-9, atol=1e-12)
-    elsewhere, _ = plain_picture(trial.plain.scene, FERRY, model, "of another log")
+    elsewhere, _ = prior_force_model(problem.plain.scene, FERRY, model, "of another log")
     assert np.abs(acceleration(elsewhere) - acceleration(picture)).max() > 1e-3
 
 
 def test_a_diagnosis_of_a_diagnosed_model_changes_what_it_adds_alone(model: Model, folder: Path) -> None:
     log = sailed(folder, "worse", TWELVE, 6, FOULED.replace("1.8", "2.7"))
-    trial, survey = trial_on(log, model)
-    suspect = Suspect(effects()["fouling"], None, effects()["fouling"].parameters_of(FERRY))
-    kept = fit(trial, [suspect])
-    found = learnt(trial, kept, (), [finding(suspect, 0.99)], survey)
+    problem, survey = trial_on(log, model)
+    candidate = Candidate(effects()["fouling"], None, effects()["fouling"].parameters_of(FERRY))
+    kept = fit(problem, [candidate])
+    found = posterior_of(problem, kept, (), [finding(candidate, 0.99)], survey)
     assert found is not None
-    made, _ = remodelled(told(found), FERRY, model, "milliampere")
+    made, _ = update_model(told(found), FERRY, model, "milliampere")
     assert made is not None
     (growth,) = made.vessel_effects
     assert len(growth.sources) == 2
@@ -261,7 +265,7 @@ def test_logs_that_agree_are_weighed_and_those_that_do_not_are_told(folder: Path
     other = sailed(folder, "again", BRISK, 11, FOULED)
     one, _ = taught(fouled, "fouling", "wind")
     two, _ = taught(other, "fouling")
-    made, notes = remodelled(told(one, two), FERRY, None, "ferry")
+    made, notes = update_model(told(one, two), FERRY, None, "ferry")
     assert made is not None
     assert notes == ()
     (growth,) = made.vessel_effects
@@ -276,18 +280,18 @@ def test_logs_that_agree_are_weighed_and_those_that_do_not_are_told(folder: Path
     width = made.hull["m11"].high - made.hull["m11"].low
     assert width < 2 * 1.96 * min(np.sqrt(part.covariance[k, k]) for part in (one, two))
 
-    def moved(part: Learnt, value: float) -> Learnt:
+    def moved(part: Posterior, value: float) -> Posterior:
         quantity = replace(part.vessel[0].parameters["surge"], value=value, low=value - 0.05, high=value + 0.05)
         stored = replace(part.vessel[0], parameters={**part.vessel[0].parameters, "surge": quantity})
         return replace(part, vessel=(stored,))
 
-    made, notes = remodelled(told(moved(one, 1.8), moved(two, 1.0)), FERRY, None, "ferry")
+    made, notes = update_model(told(moved(one, 1.8), moved(two, 1.0)), FERRY, None, "ferry")
     assert made is not None
     assert made.vessel_effects == ()
     assert not made.accepted
     assert "contradict each other about surge (1.8 against 1 -)" in notes[0]
     # Logs that differ by more than they admit leave a wider interval than either of them.
-    made, notes = remodelled(told(moved(one, 1.8), moved(two, 1.72)), FERRY, None, "ferry")
+    made, notes = update_model(told(moved(one, 1.8), moved(two, 1.72)), FERRY, None, "ferry")
     assert made is not None
     wide = made.vessel_effects[0].parameters["surge"]
     assert wide.high - wide.low > 0.1 / np.sqrt(2.0) * 1.2
@@ -298,12 +302,12 @@ def test_what_is_doubtful_or_nothing_makes_no_model(fouled: str, folder: Path) -
     assert found.vessel == ()
     assert [one.effect for one in found.conditions] == ["wind"]
     assert found.notes == ("Fouling is too doubtful to enter a model.",)
-    made, _ = remodelled(told(found), FERRY, None, "ferry")
+    made, _ = update_model(told(found), FERRY, None, "ferry")
     assert made is not None
     assert not made.accepted
     nothing = Diagnosis("calm", "milliampere", "matched", (), {"mse": MSE}, {"mse": MSE})
-    assert remodelled([nothing], FERRY, None, "ferry") == (None, ())
-    assert keep([nothing], FERRY, None, folder / "none") == (nothing,)
+    assert update_model([nothing], FERRY, None, "ferry") == (None, ())
+    assert store_updated_model([nothing], FERRY, None, folder / "none") == (nothing,)
     assert not (folder / "none").exists()
 
 
@@ -315,14 +319,14 @@ CHANCE = {
 """Parameters of disturbances, and the standard deviations of their logarithms."""
 
 
-def gusty(log: str, **probabilities: float) -> Learnt:
+def gusty(log: str, **probabilities: float) -> Posterior:
     """Return what a log teaches in which a wind was found, and these disturbances with their probabilities."""
-    trial, survey = trial_on(log)
-    wind = Suspect(effects()["wind"], None, effects()["wind"].parameters_of(FERRY))
-    chance = {name: Suspect(effects()[name], None, effects()[name].parameters_of(FERRY)) for name in probabilities}
-    states = [State(suspect, *CHANCE[name], gain=40.0) for name, suspect in chance.items()]
+    problem, survey = trial_on(log)
+    wind = Candidate(effects()["wind"], None, effects()["wind"].parameters_of(FERRY))
+    chance = {name: Candidate(effects()[name], None, effects()[name].parameters_of(FERRY)) for name in probabilities}
+    states = [DisturbanceState(candidate, *CHANCE[name], gain=40.0) for name, candidate in chance.items()]
     findings = [finding(wind, 0.99), *(finding(chance[name], value) for name, value in probabilities.items())]
-    found = learnt(trial, fit(trial, [wind]), states, findings, survey)
+    found = posterior_of(problem, fit(problem, [wind]), states, findings, survey)
     assert found is not None
     return found
 
@@ -351,7 +355,7 @@ def test_what_came_and_went_by_chance_is_a_condition_of_its_log(fouled: str) -> 
 
 
 def test_stored_gusts_load_the_vessel_as_many_winds_drawn_at_random_do(fouled: str, folder: Path) -> None:
-    (kept,) = keep(told(gusty(fouled, gusts=0.97)), FERRY, None, folder / "out", name="gusty")
+    (kept,) = store_updated_model(told(gusty(fouled, gusts=0.97)), FERRY, None, folder / "out", name="gusty")
     assert kept.model is not None
     stored = load_file(Path(kept.model))
     (known,) = stored.conditions
@@ -361,7 +365,7 @@ def test_stored_gusts_load_the_vessel_as_many_winds_drawn_at_random_do(fouled: s
     def load(of: Model, sha256: str = known.sha256) -> np.ndarray:
         """Return the external force beyond that in still air."""
         still = replace(of, conditions=())
-        return np.subtract(*(plain_picture(scene, FERRY, one, sha256)[0].external[rows] for one in (of, still)))
+        return np.subtract(*(prior_force_model(scene, FERRY, one, sha256)[0].external[rows] for one in (of, still)))
 
     assert {one.effect for one in known.effects} == {"wind", "gusts"}
     wind = next(one for one in known.effects if one.effect == "wind")
@@ -387,17 +391,17 @@ def test_stored_gusts_load_the_vessel_as_many_winds_drawn_at_random_do(fouled: s
 
 
 def test_a_wrong_hull_model_becomes_the_hull(fouled: str) -> None:
-    trial, survey = trial_on(fouled)
+    problem, survey = trial_on(fouled)
     effect = effects()["hull_parameters"]
-    suspect = Suspect(effect, None, effect.parameters_of(FERRY))
-    names = [parameter.name for parameter in suspect.parameters]
+    candidate = Candidate(effect, None, effect.parameters_of(FERRY))
+    names = [parameter.name for parameter in candidate.parameters]
     factors = np.where(np.array(names) == "m11", 1.5, 1.0)
     # Without a step the factors stay as they are given, and the hull is the profile's.
-    kept = fit(trial, [suspect], [factors], steps=0)
-    found = learnt(trial, kept, (), [finding(suspect, 0.99)], survey)
+    kept = fit(problem, [candidate], [factors], steps=0)
+    found = posterior_of(problem, kept, (), [finding(candidate, 0.99)], survey)
     assert found is not None
     assert (found.vessel, found.conditions) == ((), ())
-    made, _ = remodelled(told(found), FERRY, None, "ferry")
+    made, _ = update_model(told(found), FERRY, None, "ferry")
     assert made is not None
     assert made.hull["m11"].value == pytest.approx(1.5 * FERRY.hull.M[0, 0])
     assert made.hull["m22"].value == pytest.approx(FERRY.hull.M[1, 1])
@@ -429,15 +433,15 @@ def test_nothing_is_left_to_find_in_a_log_of_the_model(model: Model, folder: Pat
     write_log(simulate(replace(sailing.scenario, sensors=quick, duration_s=720.0), 21, vessel=sailing.vessel), log)
     (with_model,) = diagnose([str(log)], FERRY, None, DiagnosisSettings(model=model), progress=quiet)
     assert with_model.verdict == "matched"
-    assert with_model.learnt is None
+    assert with_model.posterior is None
     entry = judged(model, str(log), folder / "out")["logs"][0]
     assert entry["per_axis"]["surge"] < 0.9
 
 
 def test_sides_of_a_shallow_place_that_a_log_does_not_tell_have_no_interval(folder: Path) -> None:
     log = sailed(folder, "shallow", TWELVE, 6, "[environment.shallow]\nnorth_m = [7.5, 60.0]\ndamping_factor = 2.0\n")
-    found, trial = taught(log, "shallow_water")
+    found, problem = taught(log, "shallow_water")
     (stored,) = found.conditions
-    untold = effects()["shallow_water"].untold(trial.plain.scene, np.array(list(stored.values.values())))
+    untold = effects()["shallow_water"].untold(problem.plain.scene, np.array(list(stored.values.values())))
     assert untold
     assert {name for name, one in stored.parameters.items() if not np.isfinite(one.low)} == untold

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.confidence_rules import LogFigures, drowned_axes, log_notes, noise_drowns_an_axis
-from ferryid.diagnose.judging.signal_to_noise import noise_shares
+from ferryid.diagnose.judging.claims import LogFigures
+from ferryid.diagnose.judging.confidence_rules import drowned_axes, log_notes, noise_drowns_an_axis
+from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene
 from tests.diagnose.trials import FERRY
 
@@ -34,24 +35,26 @@ def still(*, noise_mps: float = NOISE_MPS, damping: float = DAMPING, mass: float
 
 
 def test_noise_times_damping_is_held_against_the_thrust() -> None:
-    trial = still()
+    problem = still()
     # Independent errors of rows, averaged over 2 s, average out in a window by the root of the sum of squared weights; of two
     # equally noisy velocities each has half of the variance between them, and here one has all of it.
-    share = np.sqrt(np.sum(np.convolve(trial.windows.weight * 0.2, np.full(11, 1.0 / 11.0)) ** 2))
-    assert noise_shares(trial)["sway"] == pytest.approx(NOISE_MPS * DAMPING * share / np.sqrt(2.0) / THRUST_N, rel=0.05)
-    assert list(noise_shares(trial)) == ["sway"], "nothing pushes along or turns"
-    assert drowned_axes(LogFigures(velocity_noise=noise_shares(trial)), DROWNED) == {}
+    share = np.sqrt(np.sum(np.convolve(problem.windows.weight * 0.2, np.full(11, 1.0 / 11.0)) ** 2))
+    assert velocity_noise_shares(problem)["sway"] == pytest.approx(
+        NOISE_MPS * DAMPING * share / np.sqrt(2.0) / THRUST_N, rel=0.05
+    )
+    assert list(velocity_noise_shares(problem)) == ["sway"], "nothing pushes along or turns"
+    assert drowned_axes(LogFigures(velocity_noise=velocity_noise_shares(problem)), DROWNED) == {}
 
 
 def test_mass_plays_no_part_and_noise_and_damping_do() -> None:
-    once = noise_shares(still())["sway"]
-    assert noise_shares(still(mass=3.0 * MASS))["sway"] == pytest.approx(once)
-    assert noise_shares(still(noise_mps=3.0 * NOISE_MPS))["sway"] == pytest.approx(3.0 * once, rel=1e-3)
-    assert noise_shares(still(damping=3.0 * DAMPING))["sway"] == pytest.approx(3.0 * once, rel=1e-3)
+    once = velocity_noise_shares(still())["sway"]
+    assert velocity_noise_shares(still(mass=3.0 * MASS))["sway"] == pytest.approx(once)
+    assert velocity_noise_shares(still(noise_mps=3.0 * NOISE_MPS))["sway"] == pytest.approx(3.0 * once, rel=1e-3)
+    assert velocity_noise_shares(still(damping=3.0 * DAMPING))["sway"] == pytest.approx(3.0 * once, rel=1e-3)
 
 
 def test_an_axis_that_noise_drowns_is_told() -> None:
-    figures = LogFigures(velocity_noise=noise_shares(still(noise_mps=20.0 * NOISE_MPS)))
+    figures = LogFigures(velocity_noise=velocity_noise_shares(still(noise_mps=20.0 * NOISE_MPS)))
     drowned = drowned_axes(figures, DROWNED)
     assert list(drowned) == ["sway"]
     (note,) = log_notes(figures)
@@ -59,4 +62,4 @@ def test_an_axis_that_noise_drowns_is_told() -> None:
 
 
 def test_without_positions_nothing_is_known_of_the_noise() -> None:
-    assert noise_shares(still(placed=False)) == {}
+    assert velocity_noise_shares(still(placed=False)) == {}

@@ -9,14 +9,21 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.candidate_terms import terms_of
-from ferryid.diagnose.inference.estimation import Suspect, Trial, fit, imagined, trial_of
+from ferryid.diagnose.inference.estimation import (
+    Candidate,
+    EstimationProblem,
+    estimation_problem,
+    fit,
+    fitted_force_model,
+)
 from ferryid.diagnose.inference.folds import folds_of
-from ferryid.diagnose.inference.prior import plain_picture
+from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.spectra import bursts_of
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.confidence_rules import Context, Figures, LogFigures, unexplained_shares
-from ferryid.diagnose.judging.sparse_regression import GAIN, law_of
-from ferryid.diagnose.judging.unexplained import BURSTS, impostors, unknown_of
+from ferryid.diagnose.judging.claims import Figures, LogFigures
+from ferryid.diagnose.judging.confidence_rules import Context, unexplained_shares
+from ferryid.diagnose.judging.sparse_regression import GAIN, select_law
+from ferryid.diagnose.judging.unexplained import BURSTS, find_displaced, find_unexplained
 from ferryid.effects import effects
 from ferryid.effects.picture import Picture, Scene, acceleration, hull_of
 from ferryid.vessel import load_profile
@@ -55,13 +62,13 @@ def sailed(seed: int) -> Scene:
     return replace(scene, parts=parts, angles=angles, eta=measured, nu_raw=noisy)
 
 
-def trial_with(force: Floats, seed: int = 0) -> Trial:
+def trial_with(force: Floats, seed: int = 0) -> EstimationProblem:
     """Return a trial whose picture lacks a force [N, N, N·m] that acted, shape (n, 3)."""
     cut = windows(sailed(seed), 8.0, 2.0)
-    plain, spread = plain_picture(cut.scene, FERRY)
+    plain, spread = prior_force_model(cut.scene, FERRY)
     every = round(len(T) / len(cut.scene.t))
     thin = force[: len(cut.scene.t) * every].reshape(-1, every, 3).mean(axis=1)
-    return trial_of(cut, replace(plain, external=plain.external - thin), spread)
+    return estimation_problem(cut, replace(plain, external=plain.external - thin), spread)
 
 
 def pushes(surge: Floats | float = 0.0, sway: Floats | float = 0.0, yaw: Floats | float = 0.0) -> Floats:
@@ -81,15 +88,15 @@ def nu() -> Floats:
     ],
 )
 def test_a_law_comes_back(force: Floats, on: str, name: str, size: float) -> None:
-    trial = trial_with(force)
-    law = law_of(trial, fit(trial, ()), folds_of(trial.windows))
+    problem = trial_with(force)
+    law = select_law(problem, fit(problem, ()), folds_of(problem.windows))
     assert law is not None
     assert [(term.on, term.name) for term in law.terms] == [(on, name)]
     error = law.fit.errors(0)[0]
     assert law.fit.values[-1][0] == pytest.approx(size, abs=max(3.0 * error, 0.05 * abs(size)))
     assert law.gain > max(GAIN, law.chance)
     assert law.held_out.score_low > 0.0
-    made = unknown_of(trial, fit(trial, ()), sailed(0))
+    made = find_unexplained(problem, fit(problem, ()), sailed(0))
     told = made.claims[0].finding
     # What it holds of the error is what it removes, where it does.
     left = unexplained_shares(Context(Figures("force"), LogFigures(), made.claims))
@@ -105,20 +112,20 @@ def test_a_law_comes_back(force: Floats, on: str, name: str, size: float) -> Non
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_and_a_hull_that_is_off_have_no_law(seed: int) -> None:
     cut = windows(sailed(seed), 8.0, 2.0)
-    plain, spread = plain_picture(cut.scene, FERRY)
+    plain, spread = prior_force_model(cut.scene, FERRY)
     off = np.random.default_rng(seed).choice([0.92, 1.08], len(plain.hull))
-    trial = trial_of(cut, replace(plain, hull=plain.hull * off), spread)
-    made = unknown_of(trial, fit(trial, ()), sailed(seed))
+    problem = estimation_problem(cut, replace(plain, hull=plain.hull * off), spread)
+    made = find_unexplained(problem, fit(problem, ()), sailed(seed))
     assert made.claims == ()
     assert not made.unsteady
 
 
 def test_bursts_are_told_by_band_and_time() -> None:
     burst = np.exp(-(((T - 200.0) / 15.0) ** 2)) + np.exp(-(((T - 500.0) / 15.0) ** 2))
-    trial = trial_with(pushes(sway=120.0 * burst * np.sin(2.0 * np.pi * 0.28 * T)))
+    problem = trial_with(pushes(sway=120.0 * burst * np.sin(2.0 * np.pi * 0.28 * T)))
     # The windows are blind to it: it turns too fast for them.
-    alone = fit(trial, ())
-    made = unknown_of(trial, alone, sailed(0))
+    alone = fit(problem, ())
+    made = find_unexplained(problem, alone, sailed(0))
     assert made.unsteady
     (claim,) = made.claims
     told = claim.finding
@@ -133,8 +140,8 @@ def test_bursts_are_told_by_band_and_time() -> None:
 def test_even_noise_has_no_bursts() -> None:
     strongest = []
     for seed in range(4):
-        trial = trial_with(pushes(), seed)
-        burst = bursts_of(trial, imagined(trial.plain, fit(trial, ())), sailed(seed))
+        problem = trial_with(pushes(), seed)
+        burst = bursts_of(problem, fitted_force_model(problem.plain, fit(problem, ())), sailed(seed))
         assert burst is not None
         strongest.append(burst.deviations)
     assert max(strongest) < BURSTS
@@ -142,41 +149,41 @@ def test_even_noise_has_no_bursts() -> None:
 
 def test_a_wind_is_told_right_whose_moment_the_profile_has_too_large() -> None:
     wind = effects()["wind"]
-    breeze = Suspect(wind, None, wind.parameters_of(FERRY))
+    breeze = Candidate(wind, None, wind.parameters_of(FERRY))
     calm = trial_with(pushes())
     blown = breeze.act(calm.plain, np.array([-5.0, 3.0, 1.0, 1.0, 0.5]))
     lacking = replace(calm.plain, external=calm.plain.external - (blown.external - calm.plain.external))
-    trial = trial_of(calm.windows, lacking, calm.hull_spread)
-    assert fit(trial, [breeze]).values[0] == pytest.approx([-5.0, 3.0, 1.0, 1.0, 0.5], abs=0.25)
+    problem = estimation_problem(calm.windows, lacking, calm.hull_spread)
+    assert fit(problem, [breeze]).values[0] == pytest.approx([-5.0, 3.0, 1.0, 1.0, 0.5], abs=0.25)
     # By the moment alone, which is measured best, it would blow less.
-    stiff = fit(trial, [replace(breeze, parameters=breeze.parameters[:2])])
+    stiff = fit(problem, [replace(breeze, parameters=breeze.parameters[:2])])
     assert np.hypot(*stiff.values[0]) < 0.9 * np.hypot(5.0, 3.0)
 
 
 def test_an_effect_that_a_law_makes_idle_is_an_impostor_and_a_true_one_is_not() -> None:
     gain = effects()["thruster_gain"]
-    suspect = Suspect(gain, "thruster1", gain.parameters_of(FERRY))
-    trial = trial_with(pushes(surge=-20.0, sway=10.0))
-    kept = fit(trial, [suspect])
-    assert impostors(trial, kept) == (0,)
+    candidate = Candidate(gain, "thruster1", gain.parameters_of(FERRY))
+    problem = trial_with(pushes(surge=-20.0, sway=10.0))
+    kept = fit(problem, [candidate])
+    assert find_displaced(problem, kept) == (0,)
     # Where the law explains more by no more than the effect's formula may be off, it displaces nothing.
-    vague = replace(suspect, effect=replace(gain, form=1.0))
-    assert impostors(trial, replace(kept, suspects=(vague,))) == ()
+    vague = replace(candidate, effect=replace(gain, form=1.0))
+    assert find_displaced(problem, replace(kept, candidates=(vague,))) == ()
     wind = effects()["wind"]
-    breeze = Suspect(wind, None, wind.parameters_of(FERRY))
+    breeze = Candidate(wind, None, wind.parameters_of(FERRY))
     calm = trial_with(pushes())
     blown = breeze.act(calm.plain, np.array([-3.0, 2.0]))
     lacking = replace(calm.plain, external=calm.plain.external - (blown.external - calm.plain.external))
-    trial = trial_of(calm.windows, lacking, calm.hull_spread)
-    kept = fit(trial, [breeze])
+    problem = estimation_problem(calm.windows, lacking, calm.hull_spread)
+    kept = fit(problem, [breeze])
     assert kept.values[0][:2] == pytest.approx([-3.0, 2.0], abs=0.3)
-    trial = trial.with_noise_of(kept)
-    assert impostors(trial, fit(trial, [breeze], kept.values)) == ()
+    problem = problem.with_noise_of(kept)
+    assert find_displaced(problem, fit(problem, [breeze], kept.values)) == ()
 
 
 def test_terms_are_forces_of_the_picture() -> None:
-    trial = trial_with(pushes())
-    picture = trial.plain
+    problem = trial_with(pushes())
+    picture = problem.plain
     scene = picture.scene
     by_name = {(term.on, term.name): term for term in terms_of(scene)}
     assert len(by_name) == len(terms_of(scene))
