@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.effects.effect import Residual
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 USUAL = 0.12
@@ -15,7 +15,7 @@ USUAL = 0.12
 TINY = 0.01
 
 
-def by_hull(picture: Picture, believed: Floats, residual: Residual, places: list[int]) -> tuple[Floats, Floats]:
+def by_hull(picture: ForceModel, believed: Floats, residual: Residual, places: list[int]) -> tuple[Floats, Floats]:
     """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
 
     The line is drawn at the picture's hull, which is the fitted one, as acceleration is far from linear in mass.

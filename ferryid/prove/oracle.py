@@ -27,7 +27,7 @@ from ferryid.diagnose.inference import EstimationProblem as Trial
 from ferryid.diagnose.inference import estimation_problem as trial_of
 from ferryid.diagnose.inference import prior_force_model as plain_picture
 from ferryid.effects import effects
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements as Scene
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.prove.calibration import FALSE_SHARE
 from ferryid.prove.case import Truth

@@ -24,7 +24,7 @@ from ferryid.diagnose.inference import fitted_force_model as imagined
 from ferryid.diagnose.inference import is_negligible as void
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD, Processes
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel as Picture
 from ferryid.vessel.profile import Floats
 
 ROUNDS = 2

@@ -18,7 +18,7 @@ from ferryid.diagnose.checks.kinematics import ANGLE, NEUTRAL, SCALE, Kinematics
 from ferryid.diagnose.checks.lever_arm import least_m
 from ferryid.diagnose.checks.yaw_rate_scale import compared
 from ferryid.diagnose.checks.yaw_rate_scale import corrected as rescaled
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements as Scene
 from ferryid.vessel.frames import to_world
 
 CHANCE = 0.02

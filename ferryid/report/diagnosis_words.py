@@ -9,7 +9,7 @@ from typing import Any
 
 from ferryid.diagnose import AXES, CHANGED, NEAR, UNKNOWN, Diagnosis, Estimate, Finding, error_ratio, worse_axes
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, timed, titled
 
 EVERYWHERE = "all along"

@@ -11,7 +11,7 @@ import ferryid.diagnose.inference.search as search_module
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.search import list_candidates, search
 from ferryid.diagnose.judging.held_out import HEADING, held_out_evidence
-from ferryid.effects.picture import COEFFICIENTS, Scene
+from ferryid.effects.force_model import COEFFICIENTS, Measurements
 from tests.diagnose.trials import FERRY, OFF, sailed, trial_on
 
 BASE = """
@@ -32,13 +32,13 @@ def gain(problem: EstimationProblem, made: Fit) -> float:
 
 
 @pytest.fixture(scope="module")
-def raw(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+def raw(tmp_path_factory: pytest.TempPathFactory) -> Measurements:
     """A closed-loop trial with coloured navigation noise, in which nothing acts but a hull that is ten per cent off."""
     return sailed(tmp_path_factory.mktemp("clean"), "clean", BASE, 3)
 
 
 @pytest.fixture(scope="module")
-def clean(raw: Scene) -> EstimationProblem:
+def clean(raw: Measurements) -> EstimationProblem:
     """The same, ready for hypotheses."""
     return trial_on(raw)
 
@@ -51,7 +51,7 @@ def inflow(tmp_path_factory: pytest.TempPathFactory) -> EstimationProblem:
     )
 
 
-def test_trap_1_noise_in_the_acceleration_is_not_less_mass(clean: EstimationProblem, raw: Scene) -> None:
+def test_trap_1_noise_in_the_acceleration_is_not_less_mass(clean: EstimationProblem, raw: Measurements) -> None:
     # The trap: force on the differentiated velocity by least squares.
     u_dot = np.gradient(raw.nu_raw[:, 0], raw.step_s)
     u, v, r = raw.nu.T

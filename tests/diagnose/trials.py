@@ -12,7 +12,7 @@ from ferryid.diagnose.inference.estimation import EstimationProblem, estimation_
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
@@ -32,7 +32,7 @@ OFF = {
 """What the true hull is off the profile's."""
 
 
-def sailed(folder: Path, name: str, scenario: str, seed: int) -> Scene:
+def sailed(folder: Path, name: str, scenario: str, seed: int) -> Measurements:
     """Simulate a scenario, TOML without a true hull, and return the scene that its log shows."""
     log = folder / f"{name}.mcap"
     write_log(simulate(replace(parse_scenario(scenario, name), true_hull=OFF), seed), log)
@@ -51,7 +51,7 @@ def averaged(paths: Sequence[str], vessel: Profile, withhold: Sequence[str] = ()
     ]
 
 
-def trial_on(scene: Scene) -> EstimationProblem:
+def trial_on(scene: Measurements) -> EstimationProblem:
     """Return a scene ready for hypotheses."""
     seen = windows(scene, *window_lengths(FERRY))
     return estimation_problem(seen, *prior_force_model(seen.scene, FERRY))

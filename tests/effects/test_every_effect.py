@@ -16,7 +16,7 @@ from ferryid.diagnose.inference.prior import prior_force_model as plain_picture
 from ferryid.diagnose.inference.search import Search, search
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 

@@ -18,7 +18,7 @@ from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_evidence import Gains, held_out_gains, placebos, turn_heading
 from ferryid.effects.effect import Parameter
-from ferryid.effects.picture import COEFFICIENTS, Picture
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.signals.smooth import moving_mean
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
@@ -191,7 +191,7 @@ def changing(member: Member) -> tuple[Candidate, Floats]:
     for parameter in mean:
         parameters += [parameter, *(Parameter(f"{parameter.name} {k}", "-", 1.0, -9.0, 9.0) for k in range(len(nodes)))]
 
-    def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         scene = picture.scene
         air = series @ p.reshape(2, -1).T
         still = wind_force(AREAS, np.zeros_like(air), scene.psi, scene.nu)

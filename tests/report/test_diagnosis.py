@@ -27,7 +27,7 @@ from ferryid.diagnose.judging.finding import Finding, LawTerm, Rival
 from ferryid.diagnose.judging.locate import Location
 from ferryid.diagnose.judging.verdict import VERDICTS
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.report.diagnosis_figures import _profile, binned, in_regime

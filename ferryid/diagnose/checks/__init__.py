@@ -18,7 +18,7 @@ import numpy as np
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.contradiction import opposed
 from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.smooth import odd_rows, steady_mean
@@ -37,7 +37,7 @@ def checks() -> tuple[Check, ...]:
     return tuple(sorted(found, key=lambda check: (check.place, check.id)))
 
 
-def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
+def examine(scene: Measurements) -> tuple[tuple[SensorFinding, ...], Measurements]:
     """Return what is wrong with the sensors of a scene, and the scene without it.
 
     Raises
@@ -67,7 +67,7 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
     return tuple(findings), scene
 
 
-def refilter_velocity(scene: Scene) -> Scene:
+def refilter_velocity(scene: Measurements) -> Measurements:
     """Return a scene whose velocity that enters products is made anew, of what is corrected now."""
     rate = 1.0 / scene.step_s
     eta = np.where(scene.usable[:, None], scene.eta, np.nan)

@@ -23,7 +23,7 @@ from scipy.signal import savgol_filter
 
 from ferryid.diagnose.checks.regression import Solution, step
 from ferryid.diagnose.checks.spans import Spans, spans
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_body, to_world
 from ferryid.vessel.profile import Floats
 
@@ -129,7 +129,7 @@ class _Data:
 class _Same:
     """A scene that equals itself only, as several checks ask for the kinematics of the same one."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Measurements) -> None:
         self.scene = scene
 
     def __eq__(self, other: object) -> bool:
@@ -139,7 +139,7 @@ class _Same:
         return id(self.scene)
 
 
-def kinematics(scene: Scene, told: tuple[int, ...] = ()) -> Kinematics | None:
+def kinematics(scene: Measurements, told: tuple[int, ...] = ()) -> Kinematics | None:
     """Compare positions and velocities; None where the scene has too little of them.
 
     Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ferryid.diagnose.checks import SensorFinding, examine
 from ferryid.diagnose.data.measurements import MeasuredLog
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class ScreenedLog:
     """
 
     measured: MeasuredLog
-    scene: Scene
+    scene: Measurements
     sensors: tuple[SensorFinding, ...]
 
 

@@ -15,7 +15,7 @@ from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import OUTLIER
 from ferryid.diagnose.checks.regression import MEMORY, Solution, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 LEAST = 0.02
@@ -59,7 +59,7 @@ class Rates:
         return min(abs(one), abs(other)) if one * other > 0.0 else 0.0
 
 
-def compared(scene: Scene) -> Rates | None:
+def compared(scene: Measurements) -> Rates | None:
     """Compare the rates of heading and gyro; None where the scene has too little of them.
 
     A bias and a delay of the gyro are solved for along with the factor. Noise of the heading makes the factor of a regression
@@ -86,13 +86,13 @@ def compared(scene: Scene) -> Rates | None:
     return Rates(solved, float(other.values[0]), problem.middle_s, rate, measured)
 
 
-def corrected(scene: Scene, factor: float) -> Scene:
+def corrected(scene: Measurements, factor: float) -> Measurements:
     """Return a scene whose yaw rate is divided by a factor."""
     scale = np.array([1.0, 1.0, factor])
     return replace(scene, nu_raw=scene.nu_raw / scale, nu=scene.nu / scale)
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return the factor of the yaw rate, measured over true."""
     rates = compared(scene)
     if rates is None or rates.off < LEAST or not rates.solution.certain(0, 1.0):

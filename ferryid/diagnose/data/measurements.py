@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.pictured import bridged, pushes
 from ferryid.signals.align import align
@@ -76,7 +76,7 @@ class MeasuredLog:
     """A log as it was measured: the first stage of a diagnosis."""
 
     path: str
-    scene: Scene
+    scene: Measurements
     survey: Survey
 
 
@@ -108,7 +108,7 @@ def read_measurements(
     window_s: float = MEAN_S,
     verify: bool = False,
     progress: Callable[[str], None] = quiet,
-) -> tuple[Scene, Survey]:
+) -> tuple[Measurements, Survey]:
     """Return the scene that a log shows, and what else is known of the log.
 
     Positions, heading and `nu_raw` are as measured; `nu`, wind and current pass through a moving mean, as they enter
@@ -202,7 +202,7 @@ def _without(track: Track, withhold: Sequence[str]) -> tuple[Track, dict[str, Fl
     return replace(track, columns=columns), hidden
 
 
-def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) -> Scene:
+def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) -> Measurements:
     rows = odd_rows(window_s, track.rate_hz)
     usable = measured.usable & np.isfinite(measured.eta[:, 2])
     if not usable.any():
@@ -223,7 +223,7 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
     )
     parts, angles = pushes(profile, track.columns, through_water, usable)
     nu_raw = bridged(measured.nu, usable)
-    return Scene(
+    return Measurements(
         profile=profile,
         t=measured.t,
         eta=eta,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import wrap
 from ferryid.vessel.profile import Floats
 
@@ -39,7 +39,7 @@ class PathComparison:
     speed_mps: Floats
 
 
-def compare_paths(simulated: Scene, recorded: Scene) -> PathComparison | str:
+def compare_paths(simulated: Measurements, recorded: Measurements) -> PathComparison | str:
     """Compare the paths of a simulation and a recording of one manoeuvre.
 
     The simulation's clock may have started up to `MOST_SHIFT_S` earlier or later.
@@ -77,7 +77,7 @@ def compare_paths(simulated: Scene, recorded: Scene) -> PathComparison | str:
     return PathComparison(shift, t, np.hypot(away[:, 0], away[:, 1]), wrap(away[:, 2]), away[:, 3])
 
 
-def _sampled(scene: Scene, t: Floats) -> Floats:
+def _sampled(scene: Measurements, t: Floats) -> Floats:
     """Return north, east, heading and speed at some times, NaN outside of what was measured, shape (n, 4)."""
     columns = np.column_stack([scene.eta, np.hypot(scene.nu[:, 0], scene.nu[:, 1])])
     known = scene.usable

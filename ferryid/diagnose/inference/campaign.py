@@ -16,7 +16,7 @@ from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Floats, Profile
 
@@ -34,7 +34,7 @@ class Campaign:
     hull: CampaignHull
     place: Mapping[str, int]
 
-    def picture(self, path: str, plain: Picture) -> tuple[Picture, Floats]:
+    def picture(self, path: str, plain: ForceModel) -> tuple[ForceModel, Floats]:
         """Return a log's picture with the hull that the other logs speak for, as `CampaignHull.picture` does."""
         return self.hull.picture(plain, self.place.get(path))
 

@@ -6,8 +6,8 @@ wind, current and payload are not. So the hull is fitted to all logs at once, ea
 steps; the normal matrix of each log, its own effects partialled out, is what this log knows of the hull. Their sum without one
 log is what the others know, which makes a belief for diagnosing that log that it had no part in.
 
-Beside the coefficients of `ferryid.effects.picture` the hull has the drag of drift and turning here: surge forces with v r and
-v v, which a hull that lifts pays for it.
+Beside the coefficients of `ferryid.effects.force_model` the hull has the drag of drift and turning here: surge forces with
+v r and v v, which a hull that lifts pays for it.
 
 References
 ----------
@@ -28,7 +28,7 @@ from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_a
 from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.picture import COEFFICIENTS, Picture
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.vessel.profile import Floats
 
 INDUCED = ("X_vr", "X_vv")
@@ -45,7 +45,7 @@ class Member:
     """One log of a vessel: its windows, its picture without effects, and the effects that are its own."""
 
     windows: Windows
-    plain: Picture
+    plain: ForceModel
     candidates: tuple[Candidate, ...] = ()
 
 
@@ -119,7 +119,7 @@ class CampaignHull:
         known = np.eye(len(A)) + (A - np.eye(len(A))) / max(1.0, self.disagreement)
         return z, np.asarray(np.linalg.inv(known))
 
-    def picture(self, plain: Picture, without: int | None = None) -> tuple[Picture, Floats]:
+    def picture(self, plain: ForceModel, without: int | None = None) -> tuple[ForceModel, Floats]:
         """Return a log's picture with the hull that is believed in, and the standard deviations of `COEFFICIENTS`.
 
         The induced drag is an external force at the measured motion. Standard deviations alone say less than the covariance
@@ -139,7 +139,7 @@ class CampaignHull:
         mean, root = self.before + self.spread * z, self.spread[:, None] * np.linalg.cholesky(covariance)
         h = len(COEFFICIENTS)
 
-        def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+        def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
             now = mean + root @ p
             return induced(replace(picture, hull=now[:h]), now[h:])
 
@@ -152,7 +152,7 @@ def _says(values: Values, instance: str | None) -> str:
     return "The hull is that of the vessel's other logs."
 
 
-def induced(picture: Picture, coefficients: Floats) -> Picture:
+def induced(picture: ForceModel, coefficients: Floats) -> ForceModel:
     """Return the picture with induced drag in it, from coefficients in the order of `INDUCED`; in still water."""
     _, v, r = picture.scene.nu.T
     X_vr, X_vv = coefficients

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.effects.picture import Picture, Scene, body_current
+from ferryid.effects.force_model import ForceModel, Measurements, body_current
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Floats
 
-Quantity = Callable[[Picture], Floats]
+Quantity = Callable[[ForceModel], Floats]
 AXES = ("surge", "sway", "yaw")
 FORCE = ("N", "N", "N·m")
 
@@ -39,7 +39,7 @@ class Term:
     unit: str
     force_unit: str
     value: Quantity
-    force: Callable[[Picture], Floats]
+    force: Callable[[ForceModel], Floats]
 
     @property
     def key(self) -> tuple[str, str]:
@@ -59,7 +59,7 @@ class Term:
         )
 
 
-def terms_of(scene: Scene) -> tuple[Term, ...]:
+def terms_of(scene: Measurements) -> tuple[Term, ...]:
     """Return all terms that a scene offers.
 
     On every axis: a constant, polynomials and moduli of the velocity through the water up to the third order, and harmonics of
@@ -80,7 +80,7 @@ def terms_of(scene: Scene) -> tuple[Term, ...]:
     return tuple(made)
 
 
-def through_water(picture: Picture) -> tuple[Floats, Floats, Floats]:
+def through_water(picture: ForceModel) -> tuple[Floats, Floats, Floats]:
     """Return the velocity through the water [m/s, m/s, rad/s], shape (n,) each."""
     u_c, v_c = body_current(picture)
     u, v, r = picture.scene.nu.T
@@ -110,7 +110,7 @@ def _motions() -> list[tuple[str, str, Quantity]]:
     return made
 
 
-def _one(picture: Picture) -> Floats:
+def _one(picture: ForceModel) -> Floats:
     return np.ones(len(picture.scene.t))
 
 
@@ -119,7 +119,7 @@ def _velocity(i: int, function: Callable[[Floats], Floats]) -> Quantity:
 
 
 def _product(i: int, j: int, modulus: int | None) -> Quantity:
-    def quantity(picture: Picture) -> Floats:
+    def quantity(picture: ForceModel) -> Floats:
         nu = through_water(picture)
         first, second = (np.abs(nu[k]) if k == modulus else nu[k] for k in (i, j))
         return np.asarray(first * second)
@@ -132,7 +132,7 @@ def _harmonic(times: int, function: Callable[[Floats], Floats]) -> Quantity:
 
 
 def _place(along: int) -> Quantity:
-    def quantity(picture: Picture) -> Floats:
+    def quantity(picture: ForceModel) -> Floats:
         place = picture.scene.eta[:, along]
         return np.asarray(place - place[picture.scene.usable].mean())
 
@@ -140,7 +140,7 @@ def _place(along: int) -> Quantity:
 
 
 def _on_axis(axis: int, name: str, unit: str, quantity: Quantity) -> Term:
-    def force(picture: Picture) -> Floats:
+    def force(picture: ForceModel) -> Floats:
         values = np.zeros((len(picture.scene.t), 3))
         values[:, axis] = quantity(picture)
         return values
@@ -149,7 +149,7 @@ def _on_axis(axis: int, name: str, unit: str, quantity: Quantity) -> Term:
 
 
 def _of_world(name: str, unit: str, along: int, quantity: Quantity) -> Term:
-    def force(picture: Picture) -> Floats:
+    def force(picture: ForceModel) -> Floats:
         push = [np.zeros(len(picture.scene.t)), np.zeros(len(picture.scene.t))]
         push[along] = quantity(picture)
         X, Y = to_body(push[0], push[1], picture.scene.psi)
@@ -159,23 +159,23 @@ def _of_world(name: str, unit: str, along: int, quantity: Quantity) -> Term:
 
 
 def _of_thruster(k: int, name: str) -> list[Term]:
-    def size(picture: Picture) -> Floats:
+    def size(picture: ForceModel) -> Floats:
         return np.asarray(np.hypot(picture.parts[:, k, 0], picture.parts[:, k, 1]))
 
-    def speed(picture: Picture) -> Floats:
+    def speed(picture: ForceModel) -> Floats:
         u, v, _ = through_water(picture)
         return np.asarray(np.hypot(u, v))
 
-    def inflow(picture: Picture) -> Floats:
+    def inflow(picture: ForceModel) -> Floats:
         u, v, r = through_water(picture)
         x, y = picture.scene.profile.actuators[k].position_m
         X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
         return np.asarray((X * (u - r * y) + Y * (v + r * x)) / np.maximum(size(picture), 1e-9))
 
-    def along(quantity: Quantity) -> Callable[[Picture], Floats]:
+    def along(quantity: Quantity) -> Callable[[ForceModel], Floats]:
         return lambda picture: picture.parts[:, k] * quantity(picture)[:, None]
 
-    def across(picture: Picture) -> Floats:
+    def across(picture: ForceModel) -> Floats:
         x, y = picture.scene.profile.actuators[k].position_m
         X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
         return np.column_stack([-Y, X, x * X + y * Y])

@@ -19,7 +19,7 @@ from ferryid.diagnose.inference.noise_model import (
 )
 from ferryid.diagnose.inference.weak_form import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import titled
 from ferryid.vessel.profile import Floats
 
@@ -80,7 +80,7 @@ class Candidate:
         """Parameters with which a search begins."""
         return np.array([one.neutral if one.start is None else one.start for one in self.parameters])
 
-    def act(self, picture: Picture, p: Floats) -> Picture:
+    def act(self, picture: ForceModel, p: Floats) -> ForceModel:
         """Return the picture with the effect in it."""
         return self.effect.act(picture, p, self.instance, self.onset_s, self.offset_s)
 
@@ -152,7 +152,7 @@ class EstimationProblem:
     """
 
     windows: Windows
-    plain: Picture
+    plain: ForceModel
     noise: AutoregressiveNoise
     hull_spread: Floats
     filter: NoiseModel
@@ -177,7 +177,7 @@ class EstimationProblem:
         """`hull_slopes` of the plain picture."""
         return self.hull_slopes(self.plain)
 
-    def hull_slopes(self, picture: Picture) -> Floats:
+    def hull_slopes(self, picture: ForceModel) -> Floats:
         """Return derivatives of the prediction errors by the hull's coefficients, in their spreads, shape (w, 26).
 
         Coefficients that cannot move have none.
@@ -189,7 +189,7 @@ class EstimationProblem:
             every[:, free] = self.whitening_filter.white(self.steps.hull_changes(picture, free, moves) / MOVED)
         return every
 
-    def white(self, picture: Picture) -> Floats:
+    def white(self, picture: ForceModel) -> Floats:
         """Return the whitened prediction errors of a picture, flat."""
         return self.whitening_filter.white(self.steps.gap(picture))
 
@@ -253,7 +253,7 @@ def fit(
     # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
     bends = any(candidate.effect.bends_hull for candidate in candidates)
 
-    def picture_of(z: Floats) -> Picture:
+    def picture_of(z: Floats) -> ForceModel:
         picture = replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])
         return apply_candidates(picture, candidates, np.split(neutral + size * z[h:], cuts)) if every else picture
 
@@ -357,19 +357,19 @@ def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candid
     return replace(candidate, parameters=made.parameters, doubt=made.doubt)
 
 
-def fitted_force_model(plain: Picture, made: Fit) -> Picture:
+def fitted_force_model(plain: ForceModel, made: Fit) -> ForceModel:
     """Return the picture that a fit has of the log."""
     return apply_candidates(replace(plain, hull=made.hull), made.candidates, made.values)
 
 
-def apply_candidates(picture: Picture, candidates: Sequence[Candidate], values: Sequence[Floats]) -> Picture:
+def apply_candidates(picture: ForceModel, candidates: Sequence[Candidate], values: Sequence[Floats]) -> ForceModel:
     """Return the picture with some candidates in it, each in its turn."""
     for candidate, p in sorted(zip(candidates, values, strict=True), key=lambda one: one[0].effect.turn):
         picture = candidate.act(picture, p)
     return picture
 
 
-def estimation_problem(windows: Windows, plain: Picture, hull_spread: Floats) -> EstimationProblem:
+def estimation_problem(windows: Windows, plain: ForceModel, hull_spread: Floats) -> EstimationProblem:
     """Return the trial with the noise that is left when the hull alone is refitted.
 
     What an effect leaves in the gaps is in that noise too, until a hypothesis that holds takes it out: see

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 
-def force_errors(windows: Windows, picture: Picture, plain: Picture) -> Floats:
+def force_errors(windows: Windows, picture: ForceModel, plain: ForceModel) -> Floats:
     """Return a picture's force less the one that the velocities show [N, N, N·m], in every window, shape (J, 3)."""
     velocities = replace(windows, channels=np.repeat([False, True], 3))
     return np.asarray(velocities.gap(picture) @ mass_of(plain.hull).T)

@@ -20,7 +20,7 @@ from ferryid.diagnose.inference.kalman import DIFFUSE, costs_alone, errors, erro
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import Process
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 GROUPS = (0, 0, 1)
@@ -54,7 +54,7 @@ class NoiseModel:
 
     channels: Floats
     processes: tuple[Process, ...] = ()
-    picture: Picture | None = None
+    picture: ForceModel | None = None
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ def fit_noise_with(
     alone: NoiseModel,
     made: Callable[[Floats], tuple[Process, ...]],
     start: Floats,
-    picture: Picture,
+    picture: ForceModel,
     worth: float = -np.inf,
 ) -> tuple[NoiseModel, Floats, Floats, float]:
     """Return the noise that gaps have if disturbances push beside each channel's own noise.

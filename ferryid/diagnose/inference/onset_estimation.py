@@ -23,7 +23,7 @@ from ferryid.diagnose.inference.estimation import (
 )
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.noise_model import stride_s
-from ferryid.effects.picture import Picture, as_measured
+from ferryid.effects.force_model import ForceModel, as_measured
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
@@ -60,7 +60,7 @@ class Linearisation:
         Of their cross-products and the prior, shape (k, k).
     """
 
-    picture: Picture
+    picture: ForceModel
     left: Floats
     slopes: Floats
     inverse: Floats

@@ -9,7 +9,7 @@ import numpy as np
 
 from ferryid.diagnose.data.measurements import BLOCK_COEFFICIENT, WATER_DENSITY, WINDOW_LENGTH_M, dimensions
 from ferryid.diagnose.inference.estimation import HULL_SPREAD
-from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.identify.pictured import Pictured, bare_picture
@@ -17,8 +17,8 @@ from ferryid.vessel.profile import Floats, Profile
 
 
 def prior_force_model(
-    scene: Scene, profile: Profile, model: Model | None = None, sha256: str = ""
-) -> tuple[Picture, Floats]:
+    scene: Measurements, profile: Profile, model: Model | None = None, sha256: str = ""
+) -> tuple[ForceModel, Floats]:
     """Return the picture before any candidate, and how far each of its hull's coefficients is believed to be off.
 
     The air is still where no wind was measured, and the water too. A model is imagined as `Pictured` has it, with its vessel's
@@ -37,7 +37,7 @@ def prior_force_model(
 
     Returns
     -------
-    Picture
+    ForceModel
         Without candidates.
     ndarray
         Standard deviations, shape (26,), in the units of the coefficients: `HULL_SPREAD` of each where a hull model is
@@ -55,7 +55,7 @@ def prior_force_model(
     return replace(bare, external=scene.air_load, ambient=lambda now: now.air_load), spread
 
 
-def default_hull_spread(scene: Scene, profile: Profile) -> Floats:
+def default_hull_spread(scene: Measurements, profile: Profile) -> Floats:
     """Return how large the hull's coefficients may be for a vessel of this size and speed, shape (26,).
 
     Added mass of a half-immersed cylinder of the hull's draught, cross-flow drag with a coefficient of 1 along the hull, lift
@@ -110,7 +110,7 @@ def default_hull_spread(scene: Scene, profile: Profile) -> Floats:
     return np.array([every[name] for name in COEFFICIENTS])
 
 
-def _modelled(scene: Scene, profile: Profile, model: Model, sha256: str) -> tuple[Picture, Floats]:
+def _modelled(scene: Measurements, profile: Profile, model: Model, sha256: str) -> tuple[ForceModel, Floats]:
     known = Pictured(model)
     if known.force.profile.name != profile.name:
         raise FerryIdError(

@@ -33,7 +33,7 @@ from ferryid.diagnose.inference.onset_estimation import (
 from ferryid.diagnose.inference.stochastic_disturbance import WORTH, DisturbanceState, fit_disturbances
 from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 ODDS = 8.0
@@ -95,7 +95,7 @@ class Search:
     states: tuple[DisturbanceState, ...] = ()
 
 
-def list_candidates(scene: Scene) -> tuple[list[Candidate], dict[str, str]]:
+def list_candidates(scene: Measurements) -> tuple[list[Candidate], dict[str, str]]:
     """Return every effect that the scene can show, and why it cannot show the others."""
     candidates, untested = [], {}
     for effect in effects().values():

@@ -28,7 +28,7 @@ from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Values
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Floats, Profile
 
@@ -71,7 +71,7 @@ class Simulation:
     """
 
     log: str
-    scene: Scene
+    scene: Measurements
     hull: Floats
     spread: Floats
     conditions: tuple[Condition, ...]
@@ -138,7 +138,7 @@ def learn_simulation(
     )
 
 
-def _in_hull(candidate: Candidate, values: Floats, plain: Picture) -> bool:
+def _in_hull(candidate: Candidate, values: Floats, plain: ForceModel) -> bool:
     after = candidate.act(plain, values)
     same = all(
         getattr(after, field.name) is getattr(plain, field.name) for field in fields(plain) if field.name != "hull"
@@ -150,7 +150,7 @@ def _size(measured: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
-def _measured(scene: Scene) -> tuple[Condition, ...]:
+def _measured(scene: Measurements) -> tuple[Condition, ...]:
     """Return the conditions that a simulation records, by their means, for a recording that lacks their sensors.
 
     Of a payload it is the mean while it was aboard.
@@ -169,7 +169,9 @@ def _measured(scene: Scene) -> tuple[Condition, ...]:
     return tuple(found)
 
 
-def simulated_force_model(simulated: Simulation, scene: Scene, shift_s: float = 0.0) -> tuple[Picture, Floats]:
+def simulated_force_model(
+    simulated: Simulation, scene: Measurements, shift_s: float = 0.0
+) -> tuple[ForceModel, Floats]:
     """Return the simulation's picture of what a recording shows, and how far its hull's coefficients may be off.
 
     What the recording measured itself (wind, current, payload) is the recording's.
@@ -190,7 +192,7 @@ def simulated_force_model(simulated: Simulation, scene: Scene, shift_s: float = 
     return picture, simulated.spread
 
 
-def _carried(simulated: Simulation, scene: Scene, shift_s: float) -> list[Condition]:
+def _carried(simulated: Simulation, scene: Measurements, shift_s: float) -> list[Condition]:
     return [
         replace(one, candidate=_later(one.candidate, shift_s))
         for one in simulated.conditions
@@ -204,7 +206,7 @@ def _later(candidate: Candidate, shift_s: float) -> Candidate:
     return candidate
 
 
-def differing_candidates(simulated: Simulation, scene: Scene, shift_s: float = 0.0) -> list[Candidate]:
+def differing_candidates(simulated: Simulation, scene: Measurements, shift_s: float = 0.0) -> list[Candidate]:
     """Return every candidate of a recording, those that the simulation has already as differences to it."""
     plain, _ = prior_force_model(scene, scene.profile)
     bare = replace(plain, hull=simulated.hull)
@@ -214,7 +216,7 @@ def differing_candidates(simulated: Simulation, scene: Scene, shift_s: float = 0
     return [_relative(one, carried, known[one.key], bare) if one.key in known else one for one in candidates]
 
 
-def difference_notes(simulated: Simulation, scene: Scene) -> list[str]:
+def difference_notes(simulated: Simulation, scene: Measurements) -> list[str]:
     """Return the errors of the simulation's sensors, and conditions that differ by what was measured, in sentences."""
     told = [f"The simulation's log: {one.says}" for one in simulated.sensors]
     return told + [
@@ -225,7 +227,7 @@ def difference_notes(simulated: Simulation, scene: Scene) -> list[str]:
     ]
 
 
-def _described(one: Condition, scene: Scene) -> str:
+def _described(one: Condition, scene: Measurements) -> str:
     untold = one.candidate.effect.untold(scene, one.values)
     return ", ".join(
         f"{parameter.name} {_told(value, parameter.unit)}"
@@ -234,18 +236,18 @@ def _described(one: Condition, scene: Scene) -> str:
     )
 
 
-def _relative(candidate: Candidate, carried: Sequence[Condition], index: int, bare: Picture) -> Candidate:
+def _relative(candidate: Candidate, carried: Sequence[Condition], index: int, bare: ForceModel) -> Candidate:
     """Return an effect that takes the simulation's values for neutral, and changes a picture from these to its own."""
     own = carried[index]
     neutral = dict(zip((one.name for one in candidate.parameters), own.values.tolist(), strict=True))
 
-    def pictured(hull: Floats, p: Floats) -> Picture:
+    def pictured(hull: Floats, p: Floats) -> ForceModel:
         picture = replace(bare, hull=hull)
         for k, one in enumerate(carried):
             picture = one.candidate.act(picture, p if k == index else one.values)
         return picture
 
-    def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         return _changed(picture, pictured(picture.hull, own.values), pictured(picture.hull, p))
 
     def says(values: Values, instance: str | None) -> str:
@@ -258,7 +260,7 @@ def _relative(candidate: Candidate, carried: Sequence[Condition], index: int, ba
         ]
         return f"{name} differs: {'; '.join(parts)}."
 
-    def kick(picture: Picture, p: Floats) -> Floats:
+    def kick(picture: ForceModel, p: Floats) -> Floats:
         # What the simulation has aboard already gives none.
         assert candidate.effect.kick is not None
         return candidate.effect.kick(picture, p) - candidate.effect.kick(picture, own.values)
@@ -274,7 +276,7 @@ def _told(value: float, unit: str) -> str:
     return f"{value:.2f}" + ("" if unit == "-" else f" {unit}")
 
 
-def _changed(picture: Picture, old: Picture, new: Picture) -> Picture:
+def _changed(picture: ForceModel, old: ForceModel, new: ForceModel) -> ForceModel:
     """Return a picture changed as `old` becomes `new`: hull and factors by the ratio, all else by the difference."""
     scene = picture.scene
     if new.scene is not old.scene:

@@ -12,7 +12,7 @@ from scipy.special import polygamma
 from ferryid.diagnose.inference.estimation import EstimationProblem
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.weak_form import Windows, windows
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.vessel.profile import Floats
 
 FINE = 8
@@ -64,7 +64,9 @@ class Burst:
     force: Floats
 
 
-def bands_of(problem: EstimationProblem, pictures: Sequence[Picture], scene: Scene | None) -> tuple[Band, ...]:
+def bands_of(
+    problem: EstimationProblem, pictures: Sequence[ForceModel], scene: Measurements | None
+) -> tuple[Band, ...]:
     """Return the power of the force errors in frequency bands, by windows short enough to let them through.
 
     The weight of a window of length T passes frequencies up to about 1/T; the power of each is that of the filtered error.
@@ -83,13 +85,13 @@ def bands_of(problem: EstimationProblem, pictures: Sequence[Picture], scene: Sce
     return tuple(bands)
 
 
-def fine_windows(problem: EstimationProblem, scene: Scene) -> Windows:
+def fine_windows(problem: EstimationProblem, scene: Measurements) -> Windows:
     """Return windows of the scene that are short enough to show what is fast."""
     step_s = problem.windows.scene.step_s
     return windows(scene, max(len(problem.windows.weight) * step_s / FINE, 8.0 * step_s), step_s)
 
 
-def bursts_of(problem: EstimationProblem, picture: Picture, scene: Scene) -> Burst | None:
+def bursts_of(problem: EstimationProblem, picture: ForceModel, scene: Measurements) -> Burst | None:
     """Return the most telling band in which the power of the force error comes and goes; None where there are no bands.
 
     The power of blocks is compared with an even one, as that of noise would be: of a band of width B, a block of length T holds

@@ -12,7 +12,7 @@ from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem
 from ferryid.diagnose.inference.search import Search, search
 from ferryid.diagnose.inference.weak_form import Windows, windows
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 FEWEST_WINDOWS = 60
@@ -55,7 +55,7 @@ class Expectation:
         Of a simulation: it and its path against the recording's, as plain values; empty else.
     """
 
-    picture: Picture
+    picture: ForceModel
     hull_spread: Floats
     library: tuple[Candidate, ...]
     notes: tuple[str, ...] = ()

@@ -14,7 +14,7 @@ from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, 
 from ferryid.diagnose.inference.noise_model import NoiseModel, fit_noise, fit_noise_with, likelihood, stride_s
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Process
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 WORTH = 12.0
@@ -61,7 +61,7 @@ def fit_disturbances(
     problem: EstimationProblem,
     made: Fit,
     candidates: Sequence[Candidate],
-    calm: Picture,
+    calm: ForceModel,
     least: float = WORTH,
     *,
     near: Sequence[DisturbanceState] = (),
@@ -146,7 +146,9 @@ def _strengths(candidate: Candidate) -> NDArray[np.bool_]:
     return np.array([parameter.name.endswith("std") for parameter in candidate.parameters])
 
 
-def _glance(steps: Windows, gaps: Floats, noise: NoiseModel, processes: tuple[Process, ...], picture: Picture) -> float:
+def _glance(
+    steps: Windows, gaps: Floats, noise: NoiseModel, processes: tuple[Process, ...], picture: ForceModel
+) -> float:
     return likelihood(NoiseModel(noise.channels, (*noise.processes, *processes), picture), steps, gaps)
 
 

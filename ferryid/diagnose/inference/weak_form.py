@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
 from ferryid.effects.balance import Places, to_ground
-from ferryid.effects.picture import Picture, Scene, as_measured, hull_changes
+from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes
 from ferryid.vessel.profile import Floats
 
 CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
@@ -48,7 +48,7 @@ class Windows:
         Which of them are used: those of position and heading, or the others where there is no position, shape (6,).
     """
 
-    scene: Scene
+    scene: Measurements
     starts: NDArray[np.int64]
     runs: tuple[tuple[int, int], ...]
     weight: Floats
@@ -64,7 +64,7 @@ class Windows:
         """Return ``∫ w f dt`` in every window, shape (J,) or (J, c), of values with n rows."""
         return _means(values, self.weight, self.starts, self.scene.step_s)
 
-    def gap(self, picture: Picture) -> Floats:
+    def gap(self, picture: ForceModel) -> Floats:
         """Return the picture's acceleration less the measured one in every window, shape (J, channels)."""
         rates = as_measured(picture)
         if self.channels[0]:
@@ -79,10 +79,10 @@ class Windows:
         to_ground(turned, *self.scene.pointing)
         return turned[:, :, 0]
 
-    def hull_changes(self, picture: Picture, places: Places, moves: Floats) -> Floats:
+    def hull_changes(self, picture: ForceModel, places: Places, moves: Floats) -> Floats:
         """Return by how much `gap` changes if coefficients of the hull move one by one, shape (J, channels, q).
 
-        `places` and `moves` as in `ferryid.effects.picture.hull_changes`.
+        `places` and `moves` as in `ferryid.effects.force_model.hull_changes`.
         """
         changes = hull_changes(picture, places, moves)
         if self.channels[0]:
@@ -97,7 +97,7 @@ FORCES_HZ = 5.0
 """Rate at which forces are averaged over windows; they change slowly against it, and hypotheses cost a quarter."""
 
 
-def windows(scene: Scene, length_s: float, stride_s: float) -> Windows:
+def windows(scene: Measurements, length_s: float, stride_s: float) -> Windows:
     """Return windows of `length_s` every `stride_s` seconds, as many as lie wholly in measured data.
 
     The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full
@@ -190,7 +190,7 @@ def weighed(values: Floats, weight: Floats, starts: Places) -> Floats:
     return out
 
 
-def _thinned(scene: Scene, every: int) -> Scene:
+def _thinned(scene: Measurements, every: int) -> Measurements:
     """Return the scene with every so many rows replaced by their mean; a row is usable where all of them are."""
     if every == 1:
         return scene

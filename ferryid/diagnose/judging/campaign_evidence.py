@@ -18,7 +18,7 @@ from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.campaign_hull import Member, fit_campaign_hull, residual_gaps
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.folds import DRAWS, FOLDS, folds_of, subset
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Floats
 
@@ -111,7 +111,7 @@ def _white_squares(gaps: Floats, noise: AutoregressiveNoise, block: NDArray[np.i
 def turn_heading(candidate: Candidate, psi: Floats) -> Candidate:
     """Return an effect that pushes as if the vessel had had another heading, shape (n,)."""
 
-    def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         scene = picture.scene
         other = replace(scene, eta=np.column_stack([scene.eta[:, :2], psi]))
         pushed = candidate.effect.apply(replace(picture, scene=other), p, instance)

@@ -30,7 +30,7 @@ from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
-from ferryid.effects.picture import COEFFICIENTS, UNITS
+from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.vessel.profile import Floats
 
 

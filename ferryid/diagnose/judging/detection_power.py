@@ -23,7 +23,7 @@ from ferryid.diagnose.inference.estimation import (
 from ferryid.diagnose.inference.search import ODDS
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, titled
 from ferryid.vessel.profile import Floats
 

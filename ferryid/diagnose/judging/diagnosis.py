@@ -23,7 +23,7 @@ class HullChange:
     Attributes
     ----------
     coefficient, unit
-        Of `ferryid.effects.picture.COEFFICIENTS`.
+        Of `ferryid.effects.force_model.COEFFICIENTS`.
     before, value
         What was believed of it, and what came out.
     deviations

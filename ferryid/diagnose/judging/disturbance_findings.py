@@ -17,7 +17,7 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects.effect import Process
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 ABOUT_PEAK = 0.1
@@ -28,7 +28,7 @@ PASSED = 1e-2
 
 
 def disturbance_claims(
-    problem: EstimationProblem, made: Fit, states: Sequence[DisturbanceState], scene: Scene
+    problem: EstimationProblem, made: Fit, states: Sequence[DisturbanceState], scene: Measurements
 ) -> list[Claim]:
     """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over.
 

@@ -9,7 +9,7 @@ import numpy as np
 from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem
 from ferryid.diagnose.judging.locate import Location
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 
@@ -54,7 +54,7 @@ def best_axis(place: Location) -> int:
 
 
 def figure_regressor(
-    candidate: Candidate, picture: Picture, values: Floats, place: Location
+    candidate: Candidate, picture: ForceModel, values: Floats, place: Location
 ) -> tuple[str, Floats] | None:
     """Return label and values of the quantity that gives an effect away, where the effect names one."""
     name = candidate.effect.regressor

@@ -29,7 +29,7 @@ from ferryid.diagnose.judging.figure_data import figure_columns, figure_regresso
 from ferryid.diagnose.judging.finding import NEAR, Finding, Rival
 from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 TIME_DROP = 50.0
@@ -41,7 +41,7 @@ TIME_NEAR, TIME_FINE_S = 10.0, 0.2
 SHOWN_RIVALS = 3
 
 
-def force_claims(problem: EstimationProblem, stands: Elimination, scene: Scene) -> list[Claim]:
+def force_claims(problem: EstimationProblem, stands: Elimination, scene: Measurements) -> list[Claim]:
     """Return the findings of forces with their figures, that which removes most of the error first.
 
     Parameters
@@ -61,7 +61,7 @@ def force_claims(problem: EstimationProblem, stands: Elimination, scene: Scene) 
 
 
 def _force_claim(
-    problem: EstimationProblem, stands: Elimination, scene: Scene, i: int, removed: Mapping[str, float]
+    problem: EstimationProblem, stands: Elimination, scene: Measurements, i: int, removed: Mapping[str, float]
 ) -> Claim:
     kept, standing = stands.fit, stands.standings[i]
     candidate, values = kept.candidates[i], kept.values[i]

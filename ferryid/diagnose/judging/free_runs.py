@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.folds import FOLDS, Folds, by_block, draws
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.effects.picture import Picture, Scene, acceleration
+from ferryid.effects.force_model import ForceModel, Measurements, acceleration
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
@@ -93,7 +93,7 @@ def _starts(windows: Windows, folds: Folds, shortest: int) -> tuple[Ints, Ints, 
     return np.array(starts, dtype=np.int64), np.array(last, dtype=np.int64), np.array(block, dtype=np.int64)
 
 
-def _run(picture: Picture, starts: Ints, stride: int, steps: int) -> Floats:
+def _run(picture: ForceModel, starts: Ints, stride: int, steps: int) -> Floats:
     """Return states of all runs, shape (steps + 1, starts, 6)."""
     scene = picture.scene
     end, dt = len(scene.t) - 1, stride * scene.step_s
@@ -112,10 +112,10 @@ def _run(picture: Picture, starts: Ints, stride: int, steps: int) -> Floats:
     return path
 
 
-def _rates(picture: Picture, rows: Ints, state: Floats) -> Floats:
+def _rates(picture: ForceModel, rows: Ints, state: Floats) -> Floats:
     """Return the derivative of states, shape (s, 6), with the forces of some rows."""
     nu, psi = state[:, 3:], state[:, 2]
-    now: Scene = replace(picture.scene, t=picture.scene.t[rows], eta=state[:, :3], nu=nu, nu_raw=nu)
+    now: Measurements = replace(picture.scene, t=picture.scene.t[rows], eta=state[:, :3], nu=nu, nu_raw=nu)
     at = replace(
         picture,
         scene=now,
@@ -130,7 +130,7 @@ def _rates(picture: Picture, rows: Ints, state: Floats) -> Floats:
     return np.hstack([velocity, acceleration(at)])
 
 
-def _error(scene: Scene, rows: Ints, state: Floats) -> Floats:
+def _error(scene: Measurements, rows: Ints, state: Floats) -> Floats:
     """Return errors of position, heading, speed and yaw rate, shape (s, 4)."""
     away = state[:, :2] - scene.eta[rows, :2]
     turned = np.abs(state[:, 2] - scene.psi[rows])

@@ -34,7 +34,7 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.free_runs import FreeRuns, free_runs
 from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import HELD
-from ferryid.effects.picture import Picture, as_measured
+from ferryid.effects.force_model import ForceModel, as_measured
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
@@ -334,7 +334,7 @@ def _gains(problem: EstimationProblem, folds: Folds, before: Floats, after: Floa
 
 
 def _shifted(candidate: Candidate, share: float) -> Candidate:
-    def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         force = _force_of(candidate, picture, p)
         late = np.roll(force, round(share * len(force)), axis=0)
         return replace(picture, external=picture.external + late)
@@ -343,7 +343,7 @@ def _shifted(candidate: Candidate, share: float) -> Candidate:
 
 
 def _mirrored(candidate: Candidate) -> Candidate:
-    def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         scene = picture.scene
         eta = np.column_stack([scene.eta[:, :2], -scene.psi])
         force = _force_of(candidate, replace(picture, scene=replace(scene, eta=eta)), p)
@@ -352,7 +352,7 @@ def _mirrored(candidate: Candidate) -> Candidate:
     return replace(candidate, effect=replace(candidate.effect, apply=apply), onset_s=0.0, offset_s=inf)
 
 
-def _force_of(candidate: Candidate, picture: Picture, p: Floats) -> Floats:
+def _force_of(candidate: Candidate, picture: ForceModel, p: Floats) -> Floats:
     """Return what an effect changes, as a force [N, N, N·m], shape (n, 3)."""
     more = as_measured(candidate.act(picture, p)) - as_measured(picture)
     return np.asarray(more @ mass_of(picture.hull).T)

@@ -11,12 +11,12 @@ from ferryid.diagnose.data.payload import aboard
 from ferryid.diagnose.judging.diagnosis import Withheld
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects import effects
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 
 def compare_hidden_signals(
-    hidden: Mapping[str, Floats], scene: Scene, findings: Sequence[Finding]
+    hidden: Mapping[str, Floats], scene: Measurements, findings: Sequence[Finding]
 ) -> tuple[Withheld, ...]:
     """Return every hidden signal beside the finding of the same name.
 
@@ -32,7 +32,7 @@ def compare_hidden_signals(
     return tuple(_beside(signal, values, scene, findings) for signal, values in hidden.items())
 
 
-def _beside(signal: str, values: Floats, scene: Scene, findings: Sequence[Finding]) -> Withheld:
+def _beside(signal: str, values: Floats, scene: Measurements, findings: Sequence[Finding]) -> Withheld:
     # A signal has the name of the effect that it measures.
     finding = next((one for one in findings if one.effect == signal), None)
     t = scene.t[: len(values)]

@@ -19,7 +19,7 @@ from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import Band, bands_of
 from ferryid.diagnose.judging.error_profiles import TELLS, Profiled, in_words, profiles_of
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
@@ -63,7 +63,7 @@ class Location:
     regime: str
 
 
-def locate(problem: EstimationProblem, before: Fit, after: Fit, scene: Scene | None = None) -> Location:
+def locate(problem: EstimationProblem, before: Fit, after: Fit, scene: Measurements | None = None) -> Location:
     """Return where and when the errors of one hypothesis exceed those of a better one.
 
     Parameters

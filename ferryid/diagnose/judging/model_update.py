@@ -15,7 +15,7 @@ from ferryid import __version__
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS, UNITS
+from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.files import alone
 from ferryid.identify.accept import accept
 from ferryid.identify.model import AXES, Model, blank

@@ -13,7 +13,7 @@ from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, effect_slopes, fit
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
 from ferryid.diagnose.judging.finding import Finding
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.identify.excitation import ranges
 from ferryid.identify.stored_effect import Quantity, Source, StoredEffect
 from ferryid.vessel.profile import Floats

@@ -15,7 +15,7 @@ import numpy as np
 from ferryid.diagnose.data.complementary_filter import velocity_from_pose
 from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import EstimationProblem
-from ferryid.effects.picture import acceleration
+from ferryid.effects.force_model import acceleration
 from ferryid.signals.smooth import odd_rows, steady_mean
 
 MEAN_S = 2.0

@@ -25,7 +25,7 @@ from ferryid.diagnose.inference.folds import Folds
 from ferryid.diagnose.inference.search import VOID
 from ferryid.diagnose.judging.held_out import Improvement, compare_held_out, held_out
 from ferryid.effects.effect import Effect, Parameter
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 Flags = NDArray[np.bool_]
@@ -175,7 +175,7 @@ def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) 
         parameters.append(Parameter(term.name, term.coefficient_unit, usual, -WIDE * usual, WIDE * usual))
     made = tuple(parameters)
 
-    def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         external = picture.external.copy()
         for coefficient, term in zip(p.tolist(), terms, strict=True):
             external += coefficient * term.force(picture)

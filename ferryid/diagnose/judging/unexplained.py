@@ -26,7 +26,7 @@ from ferryid.diagnose.judging.figure_data import figure_columns
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
 from ferryid.diagnose.judging.locate import Location, locate
 from ferryid.diagnose.judging.sparse_regression import Law, select_law
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.vessel.profile import Floats
 
 USUAL = 0.9
@@ -59,7 +59,7 @@ class Unexplained:
 
 
 def find_unexplained(
-    problem: EstimationProblem, kept: Fit, scene: Scene, laws: CampaignLaws | None = None
+    problem: EstimationProblem, kept: Fit, scene: Measurements, laws: CampaignLaws | None = None
 ) -> Unexplained:
     """Return what is left of a log beside what was named.
 
@@ -135,7 +135,7 @@ def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) 
     return better and with_both - with_law < ODDS
 
 
-def _lawful(law: Law, kept: Fit, scene: Scene, whose: str) -> Finding:
+def _lawful(law: Law, kept: Fit, scene: Measurements, whose: str) -> Finding:
     problem = law.problem
     # The hull stays as it is with the law: refitted without, it would bend to it on axes where it does not act.
     before = replace(law.fit, candidates=law.fit.candidates[:-1], values=law.fit.values[:-1])
@@ -171,7 +171,7 @@ def _lawful(law: Law, kept: Fit, scene: Scene, whose: str) -> Finding:
     )
 
 
-def _told(term: Term, picture: Picture, problem: EstimationProblem, value: float, error: float) -> LawTerm:
+def _told(term: Term, picture: ForceModel, problem: EstimationProblem, value: float, error: float) -> LawTerm:
     """Return a term as people read it: its force where its quantity is as large as it usually gets."""
     quantity = term.value(picture)[problem.windows.scene.usable]
     at = 1.0 if term.name == "1" else float(f"{np.quantile(np.abs(quantity), USUAL):.1g}")

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Picture, as_measured, required_force
+from ferryid.effects.force_model import ForceModel as Picture
+from ferryid.effects.force_model import as_measured, required_force
 from ferryid.identify.model import blank
 from ferryid.identify.pictured import Pictured
 from ferryid.identify.predict import Prediction, force_with, held_in, imagine, smoothed_scene

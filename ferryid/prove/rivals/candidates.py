@@ -13,7 +13,8 @@ from functools import partial
 import numpy as np
 
 from ferryid.effects import Effect, effects
-from ferryid.effects.picture import COEFFICIENTS, Picture, between
+from ferryid.effects.force_model import COEFFICIENTS, between
+from ferryid.effects.force_model import ForceModel as Picture
 from ferryid.prove.rivals.base import Base
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Floats

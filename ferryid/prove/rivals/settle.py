@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel as Picture
 from ferryid.prove.rivals.base import Base
 from ferryid.vessel.profile import Floats
 

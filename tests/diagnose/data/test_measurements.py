@@ -11,7 +11,7 @@ import pytest
 
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.prior import default_hull_spread, prior_force_model
-from ferryid.effects.picture import COEFFICIENTS, Scene, acceleration
+from ferryid.effects.force_model import COEFFICIENTS, Measurements, acceleration
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import basis
 from ferryid.identify.estimate import estimator
@@ -25,7 +25,7 @@ FERRY = load_profile("milliampere")
 
 
 @pytest.fixture(scope="module")
-def short() -> Scene:
+def short() -> Measurements:
     """The scene of the short fixture, nothing smoothed."""
     return read_measurements(SHORT, FERRY, None, window_s=0.0)[0]
 
@@ -60,7 +60,7 @@ def model_of(
     )
 
 
-def test_each_thruster_pushes_along_its_angle_and_turns_by_its_lever(short: Scene) -> None:
+def test_each_thruster_pushes_along_its_angle_and_turns_by_its_lever(short: Measurements) -> None:
     assert short.parts.shape == (len(short.t), 2, 3)
     for k, lever_m in enumerate((1.8, -1.8)):
         surge, sway, moment = short.parts[:, k].T
@@ -110,7 +110,7 @@ def test_a_vessel_without_actuators_is_refused() -> None:
         read_measurements(SHORT, replace(FERRY, actuators=()), None)
 
 
-def test_the_plain_picture_moves_as_the_hull_in_the_measured_wind(short: Scene) -> None:
+def test_the_plain_picture_moves_as_the_hull_in_the_measured_wind(short: Measurements) -> None:
     picture, spread = prior_force_model(replace(short, current=None, payload=None), FERRY)
     assert FERRY.wind is not None
     assert short.wind is not None
@@ -119,7 +119,7 @@ def test_the_plain_picture_moves_as_the_hull_in_the_measured_wind(short: Scene) 
     np.testing.assert_allclose(spread, 0.12 * np.abs(picture.hull))
 
 
-def test_without_wind_the_air_is_still(short: Scene) -> None:
+def test_without_wind_the_air_is_still(short: Measurements) -> None:
     picture, _ = prior_force_model(replace(short, wind=None, current=None, payload=None), FERRY)
     assert FERRY.wind is not None
     # Still air meets a vessel from ahead.
@@ -127,7 +127,7 @@ def test_without_wind_the_air_is_still(short: Scene) -> None:
 
 
 @pytest.mark.parametrize("weather", [False, True])
-def test_a_model_becomes_a_picture_of_the_same_force(short: Scene, weather: bool) -> None:
+def test_a_model_becomes_a_picture_of_the_same_force(short: Measurements, weather: bool) -> None:
     def around(shape: tuple[int, int]) -> np.ndarray:
         return 30.0 * np.random.default_rng(1).standard_normal(shape)
 
@@ -146,12 +146,12 @@ def test_a_model_becomes_a_picture_of_the_same_force(short: Scene, weather: bool
     assert spread[place] == pytest.approx(np.hypot(0.12 * fitted["X_|u|u"], np.sqrt(2.0)))
 
 
-def test_a_model_that_couples_surge_inertia_is_refused(short: Scene) -> None:
+def test_a_model_that_couples_surge_inertia_is_refused(short: Measurements) -> None:
     with pytest.raises(FerryIdError, match="--structure decoupled"):
         prior_force_model(short, FERRY, model_of("coupled", np.ones))
 
 
-def test_a_model_of_another_vessel_is_refused(short: Scene) -> None:
+def test_a_model_of_another_vessel_is_refused(short: Measurements) -> None:
     other = model_of("decoupled", np.zeros, load_profile("revolt").text)
     with pytest.raises(FerryIdError, match="says nothing about"):
         prior_force_model(short, FERRY, other)
@@ -164,13 +164,13 @@ def test_windows_follow_froude() -> None:
 
 
 @pytest.mark.parametrize("vessel", ["milliampere-2025", "esso-osaka", "gunnerus", "kvlcc2-model", "vtec-usv"])
-def test_a_hull_without_a_model_may_have_any_damping(short: Scene, vessel: str) -> None:
+def test_a_hull_without_a_model_may_have_any_damping(short: Measurements, vessel: str) -> None:
     spread = default_hull_spread(short, load_profile(vessel))
     assert spread.shape == (len(COEFFICIENTS),)
     assert np.all(np.isfinite(spread) & (spread > 0.0))
 
 
-def test_a_tanker_may_lift_as_tankers_do_and_a_known_hull_as_it_is_known(short: Scene) -> None:
+def test_a_tanker_may_lift_as_tankers_do_and_a_known_hull_as_it_is_known(short: Measurements) -> None:
     # Kijima et al. (1990) with the KVLCC2's length, breadth, draught and block coefficient.
     tanker = load_profile("kvlcc2-model")
     L, T = tanker.hull.length_m, tanker.hull.draught_m
@@ -182,7 +182,7 @@ def test_a_tanker_may_lift_as_tankers_do_and_a_known_hull_as_it_is_known(short: 
     assert prior_force_model(short, FERRY)[1][-4:].tolist() == [0.0, 0.0, 0.0, 0.0]
 
 
-def test_broad_beliefs_hold_what_was_measured_of_a_ferry(short: Scene) -> None:
+def test_broad_beliefs_hold_what_was_measured_of_a_ferry(short: Measurements) -> None:
     # Table 4.1 was identified on the real vessel: nothing of it may lie far outside what its size alone lets one believe.
     spread = default_hull_spread(short, FERRY)
     known = np.array([0.0, *([0.0] * 4), *(FERRY.hull.D.get(name, 0.0) for name in COEFFICIENTS[5:])])

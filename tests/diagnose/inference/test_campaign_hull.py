@@ -18,7 +18,7 @@ from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
-from ferryid.effects.picture import Picture, hull_of
+from ferryid.effects.force_model import ForceModel, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
@@ -55,7 +55,7 @@ def members(factor: float = 1.0) -> tuple[Member, ...]:
         thin = seen.scene
         still = wind_force(FERRY.wind, np.zeros((len(thin.t), 2)), thin.psi, thin.nu)  # type: ignore[arg-type]
         wrong = hull_of(FERRY) * np.where(np.arange(len(SPREAD)) % 2, 1.15, 0.85)
-        made.append(Member(seen, Picture(thin, wrong, thin.parts, thin.angles, still), (SUSPECT,)))
+        made.append(Member(seen, ForceModel(thin, wrong, thin.parts, thin.angles, still), (SUSPECT,)))
     return tuple(made)
 
 

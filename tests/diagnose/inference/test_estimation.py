@@ -15,14 +15,14 @@ from ferryid.diagnose.inference.noise_model import NoiseModel, stride_s
 from ferryid.diagnose.inference.weak_form import steps_of, windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
-from ferryid.effects.picture import Picture, Scene, hull_of
+from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Floats
 
 FERRY = load_profile("milliampere")
 
 
-def push(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def push(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """A constant force ahead: exactly linear."""
     return replace(picture, external=picture.external + np.array([p[0], 0.0, 0.0]))
 
@@ -55,7 +55,7 @@ def problem(true_force: float, seed: int = 0) -> EstimationProblem:
     t = np.arange(0.0, 300.0, 0.2)
     zero = np.zeros((len(t), 3))
     parts, ahead = np.zeros((len(t), 2, 3)), np.zeros((len(t), 2))
-    scene = Scene(FERRY, t, zero, zero, zero, parts, ahead, np.ones(len(t), dtype=bool))
+    scene = Measurements(FERRY, t, zero, zero, zero, parts, ahead, np.ones(len(t), dtype=bool))
     seen = windows(scene, 8.0, 2.0)
     steps = steps_of(seen)
     n, h = len(steps.starts), stride_s(steps)
@@ -70,7 +70,9 @@ def problem(true_force: float, seed: int = 0) -> EstimationProblem:
         path = np.concatenate([np.zeros(2), np.cumsum(np.cumsum(gaps)) * h * h])
         position[: often * (n + 2) : often, j] = path
     moved = replace(seen, scene=replace(seen.scene, eta=position))
-    plain = Picture(seen.scene, hull_of(FERRY), seen.scene.parts, seen.scene.angles, np.zeros((len(seen.scene.t), 3)))
+    plain = ForceModel(
+        seen.scene, hull_of(FERRY), seen.scene.parts, seen.scene.angles, np.zeros((len(seen.scene.t), 3))
+    )
     white = AutoregressiveNoise(np.zeros((3, ORDER)), np.eye(3))
     # Next to no freedom of the hull, so that the case stays the linear one of the formula.
     return EstimationProblem(moved, plain, white, np.full(len(plain.hull), 1e-9), NoiseModel(NOISE))
@@ -133,7 +135,7 @@ def test_limits_are_kept() -> None:
 
 
 def test_a_limit_does_not_keep_the_others_from_their_best() -> None:
-    def shove(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def shove(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         more = np.zeros((len(picture.scene.t), 3))
         # The second is all but the first, so that a step that leaves its limit aside goes far off in both.
         more[:, 0] = p[0] + p[1] * (1.0 + 0.5 * (picture.scene.t > 150.0))

@@ -27,7 +27,7 @@ from ferryid.diagnose.inference.noise_model import (
 from ferryid.diagnose.inference.weak_form import Windows, steps_of, windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter, Process
-from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Floats
 
@@ -37,16 +37,16 @@ TRUE = np.array([[0.01, 0.02, 1.5, 0.01, 8.0], [0.01, 0.02, 1.5, 0.01, 8.0], [0.
 OTHER = np.array([[0.02, 0.01, 3.0, 0.02, 4.0], [0.005, 0.03, 0.8, 0.005, 20.0], [0.003, 0.002, 2.0, 0.002, 5.0]])
 
 
-def at_rest(seconds: float, placed: bool = True, usable: np.ndarray | None = None) -> tuple[Windows, Picture]:
+def at_rest(seconds: float, placed: bool = True, usable: np.ndarray | None = None) -> tuple[Windows, ForceModel]:
     """Return steps of a vessel that lies still, and its picture without any force."""
     t = np.arange(0.0, seconds, STEP_S)
     zero = np.zeros((len(t), 3))
     eta = zero if placed else np.column_stack([np.full((len(t), 2), np.nan), zero[:, 2]])
     every = np.ones(len(t), dtype=bool) if usable is None else usable
-    scene = Scene(FERRY, t, eta, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), every)
+    scene = Measurements(FERRY, t, eta, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), every)
     seen = windows(scene, 8.0, 2.0)
     thin = seen.scene
-    return steps_of(seen), Picture(thin, hull_of(FERRY), thin.parts, thin.angles, np.zeros((len(thin.t), 3)))
+    return steps_of(seen), ForceModel(thin, hull_of(FERRY), thin.parts, thin.angles, np.zeros((len(thin.t), 3)))
 
 
 def moved_by(n: int, integrals: int, h: float) -> Floats:
@@ -412,7 +412,7 @@ def looped(tick_s: float) -> tuple[Floats, Floats, Floats]:
     return STEP_S * np.arange(len(seen)), seen, force
 
 
-def late(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def late(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Scale the force of the first thruster, and let it be late."""
     t = picture.scene.t
     parts = picture.parts.copy()
@@ -431,7 +431,7 @@ LATE = Candidate(
 KNOWN = np.array([[0.004, 0.005, 0.6, 0.02, 4.0], [0.004, 0.005, 0.6, 0.02, 4.0], [1e-6, 1e-7, 1.0, 1e-9, 1.0]])
 
 
-def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[EstimationProblem, Picture]]:
+def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[EstimationProblem, ForceModel]]:
     """Return a trial for every seed, with the noise that there is, and its picture without effects."""
     hull = np.zeros(len(COEFFICIENTS))
     hull[[0, 1, 4]] = MASS
@@ -441,9 +441,9 @@ def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[EstimationProbl
         eta, parts = zero.copy(), np.zeros((len(t), 2, 3))
         eta[:, :2], parts[:, 0, :2] = seen[:, k], force[:, k]
         eta[:, 2] = 1e-6 * np.random.default_rng(k).standard_normal(len(t))
-        scene = Scene(FERRY, t, eta, zero, zero, parts, np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
+        scene = Measurements(FERRY, t, eta, zero, zero, parts, np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
         cut = windows(scene, 8.0, 2.0)
-        plain = Picture(cut.scene, hull, cut.scene.parts, cut.scene.angles, zero[: len(cut.scene.t)])
+        plain = ForceModel(cut.scene, hull, cut.scene.parts, cut.scene.angles, zero[: len(cut.scene.t)])
         held = np.where(np.arange(len(COEFFICIENTS)) == 0, 1e-9, 0.0)
         blank = AutoregressiveNoise(np.zeros((3, ORDER)), np.eye(3))
         made.append((EstimationProblem(cut, plain, blank, held, NoiseModel(KNOWN)), plain))
@@ -495,8 +495,8 @@ def test_the_thrusters_lag_is_that_of_its_equation(time_constant_s: float) -> No
         x, y = FERRY.actuators[k].position_m
         parts[:, k, 0], parts[:, k, 1] = along * np.cos(angles[:, k]), along * np.sin(angles[:, k])
         parts[:, k, 2] = x * parts[:, k, 1] - y * parts[:, k, 0]
-    scene = Scene(FERRY, t, zero, zero, zero, parts, angles, np.ones(len(t), dtype=bool))
-    plain = Picture(scene, hull_of(FERRY), parts, angles, zero)
+    scene = Measurements(FERRY, t, zero, zero, zero, parts, angles, np.ones(len(t), dtype=bool))
+    plain = ForceModel(scene, hull_of(FERRY), parts, angles, zero)
     after = effects()["thruster_lag"].apply(plain, np.array([time_constant_s]), None)
 
     def rate(now: float, force: np.ndarray) -> np.ndarray:

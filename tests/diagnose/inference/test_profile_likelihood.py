@@ -11,12 +11,12 @@ from scipy.stats import norm
 from ferryid.diagnose.inference.estimation import WIDER, Candidate, fit
 from ferryid.diagnose.inference.profile_likelihood import intervals
 from ferryid.effects.effect import Effect, Parameter
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 from tests.diagnose.inference.test_estimation import PUSH, problem
 
 
-def both(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def both(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """A constant force ahead, the product of two factors."""
     return replace(picture, external=picture.external + np.array([p[0] * p[1], 0.0, 0.0]))
 

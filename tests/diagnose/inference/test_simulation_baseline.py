@@ -23,7 +23,7 @@ from ferryid.diagnose.inference.simulation_baseline import (
 )
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
-from ferryid.effects.picture import Scene, acceleration
+from ferryid.effects.force_model import Measurements, acceleration
 from ferryid.errors import FerryIdError
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
@@ -145,7 +145,7 @@ def test_a_clock_that_started_later_is_found_from_the_path(simulated: Simulation
 
 
 def test_paths_of_another_manoeuvre_are_not_compared(simulated: Simulation) -> None:
-    def moved(eta: np.ndarray) -> Scene:
+    def moved(eta: np.ndarray) -> Measurements:
         return replace(simulated.scene, eta=eta)
 
     eta = simulated.scene.eta
@@ -177,7 +177,9 @@ def test_a_load_that_a_simulation_records_for_a_part_of_it_is_aboard_for_that_pa
     t = np.arange(0.0, 100.0)
     zero, usable = np.zeros((len(t), 3)), np.ones(len(t), dtype=bool)
     load = np.where(((t >= 30.0) & (t < 80.0))[:, None], [300.0, 0.5], 0.0)
-    scene = Scene(FERRY, t, zero, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), usable, payload=load)
+    scene = Measurements(
+        FERRY, t, zero, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), usable, payload=load
+    )
     (one,) = against._measured(scene)
     assert one.values == pytest.approx([300.0, 0.5])
     assert (one.candidate.onset_s, one.candidate.offset_s) == (30.0, 79.0)

@@ -15,7 +15,7 @@ from ferryid.diagnose.inference.simulation_baseline import (
     simulated_force_model,
 )
 from ferryid.effects import effects
-from ferryid.effects.picture import Scene, hull_of
+from ferryid.effects.force_model import Measurements, hull_of
 from ferryid.vessel import load_profile
 
 
@@ -23,7 +23,7 @@ def test_only_the_difference_to_the_simulations_load_comes_aboard() -> None:
     ferry = load_profile("milliampere")
     n, k = 1000, len(ferry.actuators)
     nu = np.tile([1.0, 0.0, 0.0], (n, 1))
-    scene = Scene(
+    scene = Measurements(
         profile=ferry, t=0.2 * np.arange(n), eta=np.zeros((n, 3)), nu_raw=nu, nu=nu, parts=np.zeros((n, k, 3)),
         angles=np.zeros((n, k)), usable=np.ones(n, dtype=bool),
     )  # fmt: skip

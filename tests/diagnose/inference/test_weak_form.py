@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from ferryid.diagnose.data.complementary_filter import complementary_filter
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.effects.picture import Picture, Scene, hull_of
+from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.simulate.plant.hull import hydrodynamics, required_force
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Floats
@@ -19,7 +19,7 @@ FERRY = load_profile("milliampere")
 RATE_HZ = 20.0
 
 
-def sailed(seconds: float = 60.0, current: tuple[float, float] = (0.0, 0.0)) -> tuple[Scene, Floats]:
+def sailed(seconds: float = 60.0, current: tuple[float, float] = (0.0, 0.0)) -> tuple[Measurements, Floats]:
     """Return a scene of a hull under smooth forces of two thrusters, its motion from SciPy, and these forces (n, 2, 3)."""
     p = hydrodynamics(FERRY.hull)
     M = FERRY.hull.M
@@ -41,11 +41,11 @@ def sailed(seconds: float = 60.0, current: tuple[float, float] = (0.0, 0.0)) -> 
     y = solve_ivp(rates, (0.0, seconds), np.zeros(6), t_eval=t, rtol=1e-10, atol=1e-12, method="DOP853").y.T
     parts = np.array([pushes(one) for one in t])
     angles = np.arctan2(parts[:, :, 1], parts[:, :, 0])
-    return Scene(FERRY, t, y[:, :3], y[:, 3:], y[:, 3:], parts, angles, np.ones(len(t), dtype=bool)), parts
+    return Measurements(FERRY, t, y[:, :3], y[:, 3:], y[:, 3:], parts, angles, np.ones(len(t), dtype=bool)), parts
 
 
-def still_air(scene: Scene) -> Picture:
-    return Picture(scene, hull_of(FERRY), scene.parts, scene.angles, np.zeros((len(scene.t), 3)))
+def still_air(scene: Measurements) -> ForceModel:
+    return ForceModel(scene, hull_of(FERRY), scene.parts, scene.angles, np.zeros((len(scene.t), 3)))
 
 
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
@@ -90,7 +90,7 @@ def test_windows_average_derivatives_of_polynomials_exactly() -> None:
     eta = np.column_stack([0.5 * 0.3 * t**2, 7.0 + 0.0 * t, 0.02 * t])
     nu = np.column_stack([0.1 * t, 0.2 * t - 3.0, 0.0 * t])
     blank = np.zeros((len(t), 2, 3))
-    scene = Scene(FERRY, t, eta, nu, nu, blank, blank[:, :, 0], np.ones(len(t), dtype=bool))
+    scene = Measurements(FERRY, t, eta, nu, nu, blank, blank[:, :, 0], np.ones(len(t), dtype=bool))
     measured = windows(scene, 8.0, 2.0).measured
     np.testing.assert_allclose(measured, np.broadcast_to([0.3, 0.0, 0.0, 0.1, 0.2, 0.0], measured.shape), atol=1e-9)
 

@@ -23,7 +23,7 @@ from ferryid.diagnose.judging.detection_power import (
 )
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
-from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Floats
 
@@ -31,7 +31,7 @@ FERRY = load_profile("milliampere")
 ROWS = 50
 
 
-def push(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def push(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     return replace(picture, external=picture.external + np.array([p[0], 0.0, 0.0]))
 
 
@@ -46,10 +46,10 @@ NOTHING = Fit((), (), np.empty((0, 0)), hull_of(FERRY), 0.0)
 def linear(strength: float, hull: Floats | None = None) -> EstimationProblem:
     """A trial whose prediction errors are the push, every newton of it worth `strength` in units of the noise."""
     zero = np.zeros((ROWS, 3))
-    scene = Scene(
+    scene = Measurements(
         FERRY, np.arange(ROWS) * 0.2, zero, zero, zero, np.zeros((ROWS, 2, 3)), zero, np.ones(ROWS, dtype=bool)
     )
-    plain = Picture(scene, hull_of(FERRY), scene.parts, scene.angles, zero)
+    plain = ForceModel(scene, hull_of(FERRY), scene.parts, scene.angles, zero)
     by_hull = np.zeros((ROWS, len(COEFFICIENTS))) if hull is None else hull
     return cast(
         EstimationProblem,

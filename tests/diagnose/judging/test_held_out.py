@@ -16,7 +16,7 @@ from ferryid.diagnose.judging.free_runs import free_runs
 from ferryid.diagnose.judging.held_out import HEADING, held_out, held_out_evidence, placebos
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD
-from ferryid.effects.picture import Picture, Scene, hull_of
+from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
@@ -25,7 +25,7 @@ FERRY = load_profile("milliampere")
 WIND = np.array([-2.0, 1.5])
 
 
-def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005) -> Scene:
+def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005) -> Measurements:
     """Integrate the ferry by scipy under a force of many periods, and measure it with white noise."""
 
     def tau(t: float) -> np.ndarray:
@@ -56,14 +56,14 @@ def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005) -> Scene:
     force = np.array([tau(one) for one in t])
     # Half of the force each from two thrusters: where it acts is of no interest here.
     parts = np.stack([0.5 * force, 0.5 * force], axis=1)
-    return Scene(FERRY, t, eta, nu, path[:, 3:], parts, np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
+    return Measurements(FERRY, t, eta, nu, path[:, 3:], parts, np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
 
 
-def trial_on(scene: Scene) -> EstimationProblem:
+def trial_on(scene: Measurements) -> EstimationProblem:
     cut = windows(scene, 8.0, 2.0)
     seen = cut.scene
     still = wind_force(FERRY.wind, np.zeros((len(seen.t), 2)), seen.psi, seen.nu) if FERRY.wind else np.zeros(3)
-    plain = Picture(seen, hull_of(FERRY), seen.parts, seen.angles, still)
+    plain = ForceModel(seen, hull_of(FERRY), seen.parts, seen.angles, still)
     return estimation_problem(cut, plain, HULL_SPREAD * np.abs(plain.hull))
 
 
@@ -188,7 +188,7 @@ def test_a_constant_push_is_matched_by_its_placebo(calm: EstimationProblem) -> N
     # The held-out errors shrink, but the same force late shrinks them as much: it tells nothing of when it acts.
     base = candidate("wind").effect
 
-    def apply(picture: Picture, p: np.ndarray, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: np.ndarray, instance: str | None) -> ForceModel:
         return replace(picture, external=picture.external + np.array([p[0], p[1], 0.0]))
 
     pushed = replace(calm, plain=replace(calm.plain, external=calm.plain.external + np.array([40.0, -40.0, 0.0])))

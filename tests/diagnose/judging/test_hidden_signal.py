@@ -8,18 +8,18 @@ import pytest
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel import load_profile
 
 FERRY = load_profile("milliampere")
 N = 100
 
 
-def scene() -> Scene:
+def scene() -> Measurements:
     """A hundred seconds at rest."""
     zero = np.zeros((N, 3))
     usable = np.ones(N, dtype=bool)
-    return Scene(FERRY, np.arange(float(N)), zero, zero, zero, np.zeros((N, 2, 3)), np.zeros((N, 2)), usable)
+    return Measurements(FERRY, np.arange(float(N)), zero, zero, zero, np.zeros((N, 2, 3)), np.zeros((N, 2)), usable)
 
 
 def load(first: int, end: int) -> np.ndarray:

@@ -20,7 +20,7 @@ from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.error_profiles import FEWEST, in_words, profile_of
 from ferryid.diagnose.judging.locate import locate, whitened
 from ferryid.effects import Parameter, effects
-from ferryid.effects.picture import Picture, Scene, acceleration, hull_of
+from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Floats
 
@@ -41,8 +41,10 @@ def trial_on(push: Floats | None = None) -> EstimationProblem:
     eta = np.column_stack([place, psi])
     noisy = nu + rng.standard_normal(nu.shape) * [0.01, 0.01, 0.002]
     eta = eta + rng.standard_normal(eta.shape) * [0.02, 0.02, 0.002]
-    seen = Scene(FERRY, t, eta, noisy, nu, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
-    bare = Picture(seen, hull_of(FERRY), seen.parts, seen.angles, np.zeros((len(t), 3)))
+    seen = Measurements(
+        FERRY, t, eta, noisy, nu, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), np.ones(len(t), dtype=bool)
+    )
+    bare = ForceModel(seen, hull_of(FERRY), seen.parts, seen.angles, np.zeros((len(t), 3)))
     accelerated = np.column_stack([np.cos(t / 23.0) / 23.0, 0.7 / 53.0 * np.cos(t / 53.0), np.zeros_like(t)])
     # Inverse dynamics with the picture's own equations: its force is what is left of the motion it gives without any.
     needed = (accelerated - acceleration(bare)) @ FERRY.hull.M.T
@@ -50,14 +52,14 @@ def trial_on(push: Floats | None = None) -> EstimationProblem:
     parts = np.stack([needed - gone, np.zeros_like(needed)], axis=1)
     scene = replace(seen, parts=parts)
     cut = windows(scene, 8.0, 2.0)
-    plain = Picture(cut.scene, hull_of(FERRY), cut.scene.parts, cut.scene.angles, np.zeros((len(cut.scene.t), 3)))
+    plain = ForceModel(cut.scene, hull_of(FERRY), cut.scene.parts, cut.scene.angles, np.zeros((len(cut.scene.t), 3)))
     return estimation_problem(cut, plain, HULL_SPREAD * np.abs(plain.hull))
 
 
 def pushed(shape: Floats) -> Candidate:
     """An effect that is any push: `shape` times its only parameter."""
 
-    def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         return replace(picture, external=picture.external + p[0] * shape)
 
     effect = replace(effects()["wind"], id="push", apply=apply)

@@ -22,7 +22,7 @@ from ferryid.diagnose.judging.model_update import store_updated_model, update_mo
 from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
-from ferryid.effects.picture import acceleration
+from ferryid.effects.force_model import acceleration
 from ferryid.identify.candidates import line_up
 from ferryid.identify.compare import compare
 from ferryid.identify.evaluate import evaluate, render_evaluation

@@ -25,7 +25,7 @@ from ferryid.diagnose.judging.confidence_rules import Context, unexplained_share
 from ferryid.diagnose.judging.sparse_regression import GAIN, select_law
 from ferryid.diagnose.judging.unexplained import BURSTS, find_displaced, find_unexplained
 from ferryid.effects import effects
-from ferryid.effects.picture import Picture, Scene, acceleration, hull_of
+from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Floats
 
@@ -35,7 +35,7 @@ T = np.arange(0.0, SECONDS, STEP_S)
 
 
 @cache
-def sailed(seed: int) -> Scene:
+def sailed(seed: int) -> Measurements:
     """Return a vessel that turns, goes ahead and astern and drifts, with the thrust that its hull needs for it, and noise."""
     rng = np.random.default_rng(seed)
     u = 0.5 * np.sin(T / 17.0) + 0.4 * np.sin(T / 41.0 + 1.0)
@@ -46,8 +46,8 @@ def sailed(seed: int) -> Scene:
     c, s = np.cos(psi), np.sin(psi)
     eta = np.column_stack([np.cumsum(c * u - s * v) * STEP_S, np.cumsum(s * u + c * v) * STEP_S, psi])
     still = np.zeros((len(T), 2, 3))
-    scene = Scene(FERRY, T, eta, nu, nu, still, np.zeros((len(T), 2)), np.ones(len(T), dtype=bool))
-    bare = Picture(scene, hull_of(FERRY), scene.parts, scene.angles, np.zeros((len(T), 3)))
+    scene = Measurements(FERRY, T, eta, nu, nu, still, np.zeros((len(T), 2)), np.ones(len(T), dtype=bool))
+    bare = ForceModel(scene, hull_of(FERRY), scene.parts, scene.angles, np.zeros((len(T), 3)))
     needed = (np.gradient(nu, STEP_S, axis=0) - acceleration(bare)) @ FERRY.hull.M.T
     # Two thrusters at bow and stern that share surge and sway, and turn the vessel between them.
     (x1, y1), (x2, y2) = (actuator.position_m for actuator in FERRY.actuators)

@@ -10,11 +10,11 @@ import pytest
 from ferryid.diagnose.inference.estimation import Candidate as Suspect
 from ferryid.diagnose.inference.estimation import apply_candidates as acted
 from ferryid.effects import effects
-from ferryid.effects.picture import (
+from ferryid.effects.force_model import (
     COEFFICIENTS,
     UNITS,
-    Picture,
-    Scene,
+    ForceModel,
+    Measurements,
     aboard,
     acceleration,
     as_measured,
@@ -33,9 +33,9 @@ RNG = np.random.default_rng(4)
 N = 40
 
 
-def picture(*, flow: bool, load: bool, damped: bool) -> Picture:
+def picture(*, flow: bool, load: bool, damped: bool) -> ForceModel:
     nu = RNG.normal(size=(N, 3)) * [1.0, 0.5, 0.2]
-    scene = Scene(
+    scene = Measurements(
         profile=FERRY,
         t=0.2 * np.arange(N),
         eta=RNG.normal(size=(N, 3)) * 3.0,
@@ -47,7 +47,7 @@ def picture(*, flow: bool, load: bool, damped: bool) -> Picture:
     )
     x = RNG.normal(size=N)
     mass = 100.0 + 50.0 * RNG.random(N)
-    return Picture(
+    return ForceModel(
         scene,
         hull_of(FERRY),
         scene.parts,
@@ -126,7 +126,7 @@ def test_the_unit_of_a_coefficient_follows_from_its_name(name: str) -> None:
 LIFTING = {"Y_uv": -300.0, "Y_ur": 200.0, "N_uv": -150.0, "N_ur": -80.0}
 
 
-def lifting(one: Picture, nu: tuple[float, float, float]) -> np.ndarray:
+def lifting(one: ForceModel, nu: tuple[float, float, float]) -> np.ndarray:
     """Return the force of lift [N, N, N·m] alone at a steady velocity: what a picture with lift needs less."""
     hull = one.hull.copy()
     for name, value in LIFTING.items():

@@ -1,6 +1,6 @@
-"""What moves a vessel, as one imagines it: a scene that was measured, and a picture of the forces in it.
+"""What was measured of a vessel, and a model of the forces that move it.
 
-An effect takes a picture and returns another, in which its own physics acts. Effects so combine in any number.
+An effect takes a force model and returns another, in which its own physics acts. Effects so combine in any number.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ YAW = ("N_v", "N_|v|v", "N_|r|v", "N_r", "N_|v|r", "N_|r|r", "N_rrr")
 LIFT = ("Y_uv", "Y_ur", "N_uv", "N_ur")
 """Circulatory lift of a hull that moves ahead, on sway and yaw."""
 COEFFICIENTS = (*MASS, *SURGE, *SWAY, *YAW, *LIFT)
-"""Order of the hull's coefficients in `Picture.hull`."""
+"""Order of the hull's coefficients in `ForceModel.hull`."""
 UNITS = (
     *("kg", "kg", "kg·m", "kg·m", "kg·m²"),
     *("kg/s", "kg/m", "kg·s/m²"),
@@ -38,7 +38,7 @@ _NO_FLOW, _NO_LOAD, _NO_FACTOR = np.empty((0, 2)), np.empty((0, 5)), np.empty(0)
 
 
 @dataclass(frozen=True)
-class Scene:
+class Measurements:
     """What was measured, n rows on a uniform grid, and the vessel that it was measured on.
 
     Attributes
@@ -111,8 +111,8 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A scene with the forces imagined in it.
+class ForceModel:
+    """Measurements with a model of the forces that act.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class Picture:
         What the navigation measures the motion of, ahead and to starboard of the body origin [m].
     """
 
-    scene: Scene
+    scene: Measurements
     hull: Floats
     parts: Floats
     angles: Floats
@@ -156,7 +156,7 @@ class Picture:
     air: Floats | None = None
     air_factors: Floats | None = None
     gust_std: float = 0.0
-    ambient: Callable[[Scene], Floats] | None = None
+    ambient: Callable[[Measurements], Floats] | None = None
     turned: float = 0.0
     antenna: tuple[float, float] = (0.0, 0.0)
 
@@ -173,7 +173,7 @@ def named(hull: Floats) -> Mapping[str, float]:
     return dict(zip(COEFFICIENTS, hull.tolist(), strict=True))
 
 
-def body_current(picture: Picture) -> tuple[Floats, Floats]:
+def body_current(picture: ForceModel) -> tuple[Floats, Floats]:
     """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n,) each."""
     flow, scene = picture.flow, picture.scene
     if flow is None:
@@ -184,7 +184,7 @@ def body_current(picture: Picture) -> tuple[Floats, Floats]:
     return cosine * north + sine * east, cosine * east - sine * north
 
 
-def acceleration(picture: Picture) -> Floats:
+def acceleration(picture: ForceModel) -> Floats:
     """Return the acceleration over ground that a picture gives at the measured velocities, shape (n, 3).
 
     ``M nu_dot = tau + external - C(nu_r) nu_r - D(nu_r) nu_r``, with ``[r v_c, -r u_c, 0]`` added for the water that the body
@@ -195,7 +195,7 @@ def acceleration(picture: Picture) -> Floats:
     return accelerations(np.ascontiguousarray(scene.nu), picture.hull, parts, *_forces(picture))
 
 
-def hull_changes(picture: Picture, places: Places, moves: Floats) -> Floats:
+def hull_changes(picture: ForceModel, places: Places, moves: Floats) -> Floats:
     """Return by how much `as_measured` changes if coefficients of the hull move one by one, shape (n, 3, q).
 
     Parameters
@@ -210,7 +210,7 @@ def hull_changes(picture: Picture, places: Places, moves: Floats) -> Floats:
     return _from_antenna(picture, changes)
 
 
-def corrected(picture: Picture, scene: Scene) -> Picture:
+def corrected(picture: ForceModel, scene: Measurements) -> ForceModel:
     """Return the picture of a scene whose measurements were corrected, with the ambient forces at what it then shows."""
     if picture.ambient is None:
         return replace(picture, scene=scene)
@@ -218,20 +218,20 @@ def corrected(picture: Picture, scene: Scene) -> Picture:
     return replace(picture, scene=scene, external=picture.external + more)
 
 
-def as_measured(picture: Picture) -> Floats:
+def as_measured(picture: ForceModel) -> Floats:
     """Return `acceleration` as the navigation would measure it: that of its antenna, along its own axes, shape (n, 3)."""
     rates = acceleration(picture)
     return _from_antenna(picture, rates[:, :, None])[:, :, 0]
 
 
-def _from_antenna(picture: Picture, rates: Floats) -> Floats:
+def _from_antenna(picture: ForceModel, rates: Floats) -> Floats:
     """Turn accelerations, shape (n, 3, q), into those that the navigation measures, in place."""
     if picture.antenna != (0.0, 0.0) or picture.turned != 0.0:
         from_antenna(rates, *picture.antenna, cos(picture.turned), sin(picture.turned))
     return rates
 
 
-def required_force(picture: Picture, nu_dot: Floats) -> Floats:
+def required_force(picture: ForceModel, nu_dot: Floats) -> Floats:
     """Return the force that the actuators need for an acceleration over ground [N, N, N·m], shape (n, 3).
 
     The inverse of `acceleration`: what `parts` add up to plays no part.
@@ -247,7 +247,7 @@ def required_force(picture: Picture, nu_dot: Floats) -> Floats:
     return required(np.ascontiguousarray(nu_dot), nu, picture.hull, *_forces(picture))
 
 
-def _forces(picture: Picture) -> tuple[Floats, Floats, Floats, Floats]:
+def _forces(picture: ForceModel) -> tuple[Floats, Floats, Floats, Floats]:
     """Return external forces, flow along the vessel's axes, load, and factor on damping, for `ferryid.effects.balance`."""
     n = len(picture.scene.t)
     flow = _NO_FLOW if picture.flow is None else np.column_stack(body_current(picture))
@@ -261,7 +261,7 @@ def _forces(picture: Picture) -> tuple[Floats, Floats, Floats, Floats]:
     return external, flow, load, factor
 
 
-def added_mass(picture: Picture) -> Floats:
+def added_mass(picture: ForceModel) -> Floats:
     """Return the part of a picture's mass matrix that is not the rigid body's, as a load, shape (5,)."""
     hull = picture.scene.profile.hull
     moment = hull.mass_kg * hull.x_g_m
@@ -274,8 +274,8 @@ def aboard(payload: Floats) -> Floats:
 
 
 def between(
-    before: Picture, after: Picture, onset_s: float, offset_s: float = inf, kick: Floats | None = None
-) -> Picture:
+    before: ForceModel, after: ForceModel, onset_s: float, offset_s: float = inf, kick: Floats | None = None
+) -> ForceModel:
     """Return the second picture from an onset until an offset [s], else the first; hull and scene are the second's.
 
     `kick` is a momentum by row, as of `ferryid.effects.effect.Effect`; that of the first row of the onset acts there.
