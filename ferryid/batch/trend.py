@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.batch.summary import found_in, parameters_of
-from ferryid.diagnose.result import HINT
+from ferryid.diagnose import HINT
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.vessel.profile import Profile

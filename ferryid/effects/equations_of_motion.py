@@ -1,7 +1,7 @@
 """The equations of motion in every row of a picture, compiled: one pass instead of some hundred over short-lived arrays.
 
-The coefficients of the hull are in the order of `ferryid.effects.picture.COEFFICIENTS`; what a picture has not got is an array
-without rows.
+The coefficients of the hull are in the order of `ferryid.effects.force_model.COEFFICIENTS`; what a force model has not
+got is an array without rows.
 """
 
 from __future__ import annotations

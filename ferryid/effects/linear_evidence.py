@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.effects.effect import Residual
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 HULL_STD = 0.12
@@ -15,7 +15,9 @@ HULL_STD = 0.12
 TINY = 0.01
 
 
-def hull_jacobian(picture: Picture, believed: Floats, residual: Residual, places: list[int]) -> tuple[Floats, Floats]:
+def hull_jacobian(
+    picture: ForceModel, believed: Floats, residual: Residual, places: list[int]
+) -> tuple[Floats, Floats]:
     """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
 
     The line is drawn at the picture's hull, which is the fitted one, as acceleration is far from linear in mass.
@@ -32,7 +34,7 @@ def hull_jacobian(picture: Picture, believed: Floats, residual: Residual, places
 
 
 def profiled_loss(J: Floats, residuals: Floats) -> Floats:
-    """Return the negative logarithm of the likelihood of each of some residuals, with the hull refitted to it.
+    """Return the negative logarithm of the likelihood of each of some residuals, with the hull profiled_loss to it.
 
     Parameters
     ----------
@@ -48,7 +50,7 @@ def profiled_loss(J: Floats, residuals: Floats) -> Floats:
 
 
 def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float) -> Floats:
-    """Return the evidence of each of some alternatives, with the hull's coefficients refitted beside it.
+    """Return the evidence of each of some alternatives, with the hull's coefficients profiled_loss beside it.
 
     Parameters
     ----------

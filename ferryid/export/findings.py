@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.result import HINT, SCHEMA
+from ferryid.diagnose import HINT, SCHEMA
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.errors import FerryIdError

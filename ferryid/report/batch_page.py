@@ -11,7 +11,7 @@ from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
 
-from ferryid.diagnose.result import HINT
+from ferryid.diagnose import HINT
 from ferryid.identify.result import AXES
 from ferryid.report import batch_figures
 from ferryid.report.diagnosis_words import title

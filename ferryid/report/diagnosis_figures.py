@@ -12,8 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ferryid.diagnose.profiles import Profiled
-from ferryid.diagnose.result import AXES, Diagnosis, Finding
+from ferryid.diagnose import AXES, Diagnosis, Finding, Profiled
 from ferryid.report.figures import (
     BASE,
     MEASURED,

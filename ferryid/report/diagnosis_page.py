@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.result import AXES, Diagnosis, Finding
+from ferryid.diagnose import AXES, Diagnosis, Finding, campaign_verdict
 from ferryid.identify.result import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
 from ferryid.report.figures import Floats
@@ -31,7 +31,7 @@ def render(
     left = [one.log for one in diagnoses[MAX_LOGS:]]
     page = template("diagnosis.html").render(
         title=title,
-        verdict=diagnosis_words.overall(diagnoses),
+        verdict=campaign_verdict([one.verdict for one in diagnoses]),
         headline=diagnosis_words.summary(diagnoses),
         several=several,
         logs=logs,

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ferryid.diagnose.result import Estimate
+from ferryid.diagnose import Estimate
 from ferryid.validation.case import Truth, parameter_vectors
 from ferryid.validation.json_record import Record
 from ferryid.validation.name_scores import Share, named_findings

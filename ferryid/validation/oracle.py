@@ -15,13 +15,19 @@ from math import inf
 
 from scipy.stats import chi2
 
-from ferryid.diagnose.checks import resteadied
-from ferryid.diagnose.diagnose import FEWEST_WINDOWS
-from ferryid.diagnose.hypothesis import Suspect, Trial, trial_of
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
-from ferryid.diagnose.weak import Windows, windows
+from ferryid.diagnose.checks import refilter_velocity
+from ferryid.diagnose.data import read_measurements, window_lengths
+from ferryid.diagnose.inference import (
+    FEWEST_WINDOWS,
+    Candidate,
+    EstimationProblem,
+    Windows,
+    estimation_problem,
+    prior_force_model,
+    windows,
+)
 from ferryid.effects import effects
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.validation.case import Truth
 from ferryid.validation.oracle_calibration import FALSE_SHARE
@@ -51,7 +57,9 @@ def oracle(log: str, profile: Profile, truths: Sequence[Truth]) -> OracleResult:
     """
     start = time.perf_counter()
     _check(profile, truths)
-    return replace(_estimates(_Log(scene_of(log, profile, None)[0]), truths), seconds=time.perf_counter() - start)
+    return replace(
+        _estimates(_Log(read_measurements(log, profile, None)[0]), truths), seconds=time.perf_counter() - start
+    )
 
 
 def oracle_of_each(log: str, profile: Profile, truths: Sequence[Truth]) -> OracleResult:
@@ -61,7 +69,7 @@ def oracle_of_each(log: str, profile: Profile, truths: Sequence[Truth]) -> Oracl
     """
     start = time.perf_counter()
     _check(profile, truths)
-    shared = _Log(scene_of(log, profile, None)[0])
+    shared = _Log(read_measurements(log, profile, None)[0])
     recovered = tuple(_estimates(shared, [one]).recovered[0] for one in truths)
     return OracleResult(0.0, recovered, time.perf_counter() - start)
 
@@ -83,17 +91,17 @@ def floor_of(free: int, tries: int = 1) -> float:
 class _Log:
     """A log in which several effects may be estimated."""
 
-    scene: Scene
+    scene: Measurements
 
     @cached_property
     def windows(self) -> Windows:
         return windows(self.scene, *window_lengths(self.scene.profile))
 
     @cached_property
-    def trial(self) -> Trial:
+    def trial(self) -> EstimationProblem:
         """The trial, with the noise that the hull alone leaves."""
-        plain, spread = plain_picture(self.windows.scene, self.scene.profile)
-        return trial_of(self.windows, plain, spread)
+        plain, spread = prior_force_model(self.windows.scene, self.scene.profile)
+        return estimation_problem(self.windows, plain, spread)
 
     @property
     def too_short(self) -> str:
@@ -102,7 +110,7 @@ class _Log:
         return f"only {found} stretches without a gap" if found < FEWEST_WINDOWS else ""
 
 
-def _sensor_oracles() -> dict[str, Callable[[Scene], SensorEstimate]]:
+def _sensor_oracles() -> dict[str, Callable[[Measurements], SensorEstimate]]:
     """Return the estimates from kinematics alone, by effect."""
     return {name: one.oracle for name, one in plant_effects().items() if one.oracle is not None}
 
@@ -148,7 +156,7 @@ def _estimates(log: _Log, truths: Sequence[Truth]) -> OracleResult:
         total += one.gain
         scene = one.correct(scene) if sure else scene
     if forces:
-        right = log if scene is log.scene else _Log(resteadied(scene))
+        right = log if scene is log.scene else _Log(refilter_velocity(scene))
         gain, recovered = _of_forces(right, forces)
         total += gain
         for made in recovered:
@@ -187,8 +195,8 @@ def _of_forces(log: _Log, truths: Sequence[Truth]) -> tuple[float, list[OracleEs
     return gain, made
 
 
-def _suspect(profile: Profile, truth: Truth) -> Suspect:
+def _suspect(profile: Profile, truth: Truth) -> Candidate:
     effect = effects()[truth.effect]
     onset_s = 0.0 if truth.onset_s is None else truth.onset_s
     offset_s = inf if truth.offset_s is None else truth.offset_s
-    return Suspect(effect, truth.instance, effect.parameters_of(profile), onset_s, offset_s)
+    return Candidate(effect, truth.instance, effect.parameters_of(profile), onset_s, offset_s)

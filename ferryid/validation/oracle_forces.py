@@ -12,15 +12,26 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ferryid.diagnose.filter import Filter, learn_with, likelihood
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined, settled
-from ferryid.diagnose.result import Estimate
-from ferryid.diagnose.ridge import intervals
-from ferryid.diagnose.search import void
-from ferryid.diagnose.unsteady import BANDS, STRENGTHS, State
+from ferryid.diagnose import Estimate
+from ferryid.diagnose.inference import (
+    BANDS,
+    STRENGTHS,
+    Candidate,
+    DisturbanceState,
+    EstimationProblem,
+    Fit,
+    NoiseModel,
+    choose_parameters,
+    fit,
+    fit_noise_with,
+    fitted_force_model,
+    intervals,
+    is_negligible,
+    likelihood,
+)
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD, Processes
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
 ROUNDS = 2
@@ -59,18 +70,18 @@ class ForceEstimate:
 class _Model:
     """A hypothesis: the trial with the noise that it leaves, what was fitted, and what comes and goes by chance."""
 
-    trial: Trial
+    trial: EstimationProblem
     fit: Fit
-    states: tuple[State, ...] = ()
+    states: tuple[DisturbanceState, ...] = ()
 
 
-def force_gains(trial: Trial, known: Sequence[Suspect]) -> tuple[float, tuple[ForceEstimate, ...]]:
+def force_gains(trial: EstimationProblem, known: Sequence[Candidate]) -> tuple[float, tuple[ForceEstimate, ...]]:
     """Return what effects gain together over the hull alone, and what each gains, added last.
 
     Parameters
     ----------
     trial
-        From `ferryid.diagnose.hypothesis.trial_of`.
+        From `ferryid.diagnose.inference.estimation_problem`.
     known
         Effects that are in the log.
     """
@@ -84,15 +95,15 @@ def force_gains(trial: Trial, known: Sequence[Suspect]) -> tuple[float, tuple[Fo
     return max(_likelihood(full, bare) - _likelihood(bare, full if not unsteady else None), 0.0), made
 
 
-def _mean_effects(trial: Trial, known: Sequence[Suspect]) -> list[Suspect]:
+def _mean_effects(trial: EstimationProblem, known: Sequence[Candidate]) -> list[Candidate]:
     """Return the means of unsteady effects that are not given: a gust is one of a wind, which is fitted with and without it."""
     there = {one.effect.id for one in known}
     missing = {one.effect.about for one in known} - there - {""}
     profile = trial.plain.scene.profile
-    return [Suspect(effects()[name], None, effects()[name].parameters_of(profile)) for name in sorted(missing)]
+    return [Candidate(effects()[name], None, effects()[name].parameters_of(profile)) for name in sorted(missing)]
 
 
-def _with_chosen_parameters(trial: Trial, suspects: Sequence[Suspect]) -> list[Suspect]:
+def _with_chosen_parameters(trial: EstimationProblem, suspects: Sequence[Candidate]) -> list[Candidate]:
     """Return suspects with the parameters that their effects choose, under the noise that these leave."""
     chosen = list(suspects)
     if all(one.effect.choose is None for one in chosen):
@@ -101,16 +112,16 @@ def _with_chosen_parameters(trial: Trial, suspects: Sequence[Suspect]) -> list[S
         for i, suspect in enumerate(chosen):
             if suspect.effect.choose is not None:
                 beside = _fitted(trial, [one for k, one in enumerate(chosen) if k != i])
-                chosen[i] = settled(trial, beside, suspect)
+                chosen[i] = choose_parameters(trial, beside, suspect)
         trial = trial.with_noise_of(_fitted(trial, chosen))
     return chosen
 
 
 def _modelled(
-    trial: Trial,
-    steady: Sequence[Suspect],
-    unsteady: Sequence[Suspect],
-    pushing: Picture | None = None,
+    trial: EstimationProblem,
+    steady: Sequence[Candidate],
+    unsteady: Sequence[Candidate],
+    pushing: ForceModel | None = None,
     near: _Model | None = None,
 ) -> _Model:
     """Return a hypothesis fitted under its own noise.
@@ -130,11 +141,11 @@ def _modelled(
     made = _fitted(trial, steady)
     trial = trial.with_noise_of(made)
     made = fit(trial, steady, made.values)
-    states: tuple[State, ...] = ()
+    states: tuple[DisturbanceState, ...] = ()
     if near is not None and unsteady:
         keys = {one.key for one in unsteady}
-        states = tuple(state for state in near.states if state.suspect.key in keys)
-        trial = replace(trial, filter=Filter(near.trial.filter.channels))
+        states = tuple(state for state in near.states if state.candidate.key in keys)
+        trial = replace(trial, filter=NoiseModel(near.trial.filter.channels))
     # As long as the fit still moves much, a glimpse is enough.
     for worth in (*(GLIMPSES * (np.inf,)), -np.inf) if unsteady else ():
         trial, states = _with_processes(trial, made, unsteady, calm, pushing, states, worth)
@@ -142,7 +153,7 @@ def _modelled(
     return _Model(trial, made, states)
 
 
-def _fitted(trial: Trial, suspects: Sequence[Suspect]) -> Fit:
+def _fitted(trial: EstimationProblem, suspects: Sequence[Candidate]) -> Fit:
     """Return the likeliest fit from several places to begin: each parameter in turn as far off as it is large."""
     own = [one.start for one in suspects]
     places = [own]
@@ -161,51 +172,51 @@ def _fitted(trial: Trial, suspects: Sequence[Suspect]) -> Fit:
 
 
 def _with_processes(
-    trial: Trial,
+    trial: EstimationProblem,
     made: Fit,
-    unsteady: Sequence[Suspect],
-    calm: Picture,
-    pushing: Picture | None,
-    near: Sequence[State],
+    unsteady: Sequence[Candidate],
+    calm: ForceModel,
+    pushing: ForceModel | None,
+    near: Sequence[DisturbanceState],
     worth: float,
-) -> tuple[Trial, tuple[State, ...]]:
+) -> tuple[EstimationProblem, tuple[DisturbanceState, ...]]:
     """Return the trial with unsteady effects in its filter that are likeliest beside a fit, and these.
 
     One after the other they are learnt together with each channel's own noise, the others as they are `near`; `worth` as in
-    `ferryid.diagnose.filter.learn_with`.
+    `ferryid.diagnose.inference.fit_noise_with`.
     """
-    picture = imagined(trial.plain, made)
+    picture = fitted_force_model(trial.plain, made)
     within = picture if pushing is None else pushing
     steps = trial.excerpt
     gaps = steps.gap(picture)
-    states = {state.suspect.key: state for state in near}
-    pushes = {suspect.key: _pushes(suspect, within) for suspect in (*unsteady, *(state.suspect for state in near))}
+    states = {state.candidate.key: state for state in near}
+    pushes = {suspect.key: _pushes(suspect, within) for suspect in (*unsteady, *(state.candidate for state in near))}
     noise = trial.filter
     for suspect in unsteady:
         others = tuple(one for key, state in states.items() if key != suspect.key for one in pushes[key](state.values))
         processes = pushes[suspect.key]
-        noise = Filter(noise.channels, others, within)
+        noise = NoiseModel(noise.channels, others, within)
 
-        def glance(p: Floats, noise: Filter = noise, processes: Processes = processes) -> float:
+        def glance(p: Floats, noise: NoiseModel = noise, processes: Processes = processes) -> float:
             every = (*noise.processes, *processes(p))
-            return likelihood(Filter(noise.channels, every, within), steps, gaps)
+            return likelihood(NoiseModel(noise.channels, every, within), steps, gaps)
 
         places = [states[suspect.key].values] if suspect.key in states else _places(suspect)
-        noise, values, widths, _ = learn_with(steps, gaps, noise, processes, max(places, key=glance), within, worth)
-        states[suspect.key] = State(suspect, values, widths, 0.0)
+        noise, values, widths, _ = fit_noise_with(steps, gaps, noise, processes, max(places, key=glance), within, worth)
+        states[suspect.key] = DisturbanceState(suspect, values, widths, 0.0)
     plain = calm
     for state in states.values():
         # On average, too, they may do something.
-        plain = state.suspect.act(plain, state.values)
+        plain = state.candidate.act(plain, state.values)
     return replace(trial, filter=noise, plain=plain), tuple(states.values())
 
 
-def _pushes(suspect: Suspect, picture: Picture) -> Processes:
+def _pushes(suspect: Candidate, picture: ForceModel) -> Processes:
     assert suspect.effect.unsteady is not None
     return suspect.effect.unsteady(picture)
 
 
-def _places(suspect: Suspect) -> list[Floats]:
+def _places(suspect: Candidate) -> list[Floats]:
     """Return parameters to begin with: strengths, and frequencies where there is one, about the usual ones."""
     usual = np.array([one.size for one in suspect.parameters])
     strength = np.array([one.name.endswith("std") for one in suspect.parameters])
@@ -217,24 +228,24 @@ def _places(suspect: Suspect) -> list[Floats]:
     ]
 
 
-def _estimate(trial: Trial, full: _Model, suspect: Suspect) -> ForceEstimate:
+def _estimate(trial: EstimationProblem, full: _Model, suspect: Candidate) -> ForceEstimate:
     """Return what one effect of a hypothesis gains, added last."""
-    others = [one for one in full.fit.suspects if one.key != suspect.key]
-    shaking = [state.suspect for state in full.states if state.suspect.key != suspect.key]
+    others = [one for one in full.fit.candidates if one.key != suspect.key]
+    shaking = [state.candidate for state in full.states if state.candidate.key != suspect.key]
     untold = suspect.effect.untold(trial.plain.scene, suspect.start)
     free = sum(one.size > HELD and one.name not in untold for one in suspect.parameters)
     # Without the wind that they are one of, gusts push as they did about it.
     blown = any(one.effect.about == suspect.effect.id for one in shaking)
-    rest = _modelled(trial, others, shaking, imagined(full.trial.plain, full.fit) if blown else None, full)
+    rest = _modelled(trial, others, shaking, fitted_force_model(full.trial.plain, full.fit) if blown else None, full)
     if suspect.effect.unsteady is not None:
         gain = _likelihood(full, rest) - _likelihood(rest)
-        parameters = next(state.estimates for state in full.states if state.suspect.key == suspect.key)
+        parameters = next(state.estimates for state in full.states if state.candidate.key == suspect.key)
         idle = False
     else:
         gain = _likelihood(full, rest) - _likelihood(rest, full)
-        index = [one.key for one in full.fit.suspects].index(suspect.key)
+        index = [one.key for one in full.fit.candidates].index(suspect.key)
         parameters = _estimates(full, index)
-        idle = void(full.trial, full.fit, index)
+        idle = is_negligible(full.trial, full.fit, index)
     return ForceEstimate(max(gain, 0.0), free, parameters, idle)
 
 
@@ -242,25 +253,25 @@ def _likelihood(model: _Model, other: _Model | None = None) -> float:
     """Return the logarithm of the likelihood of a hypothesis, under the noise of another one if that is likelier."""
     best = _log_likelihood(model.trial, model.fit)
     if other is not None:
-        again = fit(other.trial, model.fit.suspects, model.fit.values)
+        again = fit(other.trial, model.fit.candidates, model.fit.values)
         best = max(best, _log_likelihood(other.trial, again))
     return best
 
 
-def _log_likelihood(trial: Trial, made: Fit) -> float:
-    left, free = trial.white(imagined(trial.plain, made)), trial.hull_spread > 0.0
+def _log_likelihood(trial: EstimationProblem, made: Fit) -> float:
+    left, free = trial.white(fitted_force_model(trial.plain, made)), trial.hull_spread > 0.0
     away = (made.hull - trial.plain.hull)[free] / trial.hull_spread[free]
-    return -0.5 * float(left @ left + away @ away) - trial.sieve.log_scale
+    return -0.5 * float(left @ left + away @ away) - trial.whitening_filter.log_scale
 
 
 def _estimates(model: _Model, index: int) -> dict[str, Estimate]:
-    """Return the parameters of a steady effect with intervals as in a diagnosis, those that the log determines."""
-    suspect, values = model.fit.suspects[index], model.fit.values[index]
+    """Return the parameters of a steady effect with intervals as a diagnosis tells them, those that the log tells."""
+    suspect, values = model.fit.candidates[index], model.fit.values[index]
     followed = intervals(model.trial, model.fit, index) if suspect.effect.ridge and not suspect.times else {}
     untold = suspect.effect.untold(model.trial.plain.scene, values)
     found = {}
     for one, value, error in zip(
-        suspect.parameters, values.tolist(), model.fit.told_errors(index).tolist(), strict=True
+        suspect.parameters, values.tolist(), model.fit.reported_errors(index).tolist(), strict=True
     ):
         if one.size <= HELD or one.name in untold:
             continue

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from scipy.stats import norm
 from scipy.stats import t as student
 
+from ferryid.diagnose import Estimate
 from ferryid.diagnose.checks.kinematics import NEUTRAL, Kinematics
-from ferryid.diagnose.result import Estimate
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class SensorEstimate:
     gain: float
     free: int
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
-    correct: Callable[[Scene], Scene] = lambda scene: scene
+    correct: Callable[[Measurements], Measurements] = lambda scene: scene
     idle: bool = False
 
 

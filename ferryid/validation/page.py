@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.result import AXES
+from ferryid.diagnose import AXES
 from ferryid.report.html import template
 from ferryid.report.validation_figures import Answers, Detected, confusion_matrix, detection_curves, parameter_errors
 from ferryid.validation.case_sampling import KINDS, cells

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ferryid.diagnose.result import HINT, Estimate
+from ferryid.diagnose import HINT, Estimate
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.json_record import Record
 

@@ -9,7 +9,7 @@ from math import inf, isfinite, nan, prod
 import numpy as np
 from scipy.stats import binom
 
-from ferryid.diagnose.result import AXES
+from ferryid.diagnose import AXES
 from ferryid.validation.json_record import Record
 from ferryid.validation.name_scores import Share, names, wrong_names
 from ferryid.validation.records import DIAGNOSED, UNKNOWN, CaseResult, TransferScore

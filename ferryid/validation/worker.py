@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ferryid.diagnose.parallel import keep_to_one_thread
+from ferryid.diagnose import keep_to_one_thread
 from ferryid.errors import FerryIdError, UnwritableError, one_line
 from ferryid.validation.records import Diagnosis
 from ferryid.validation.source_hash import source_hash
@@ -45,17 +45,15 @@ def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
     UnwritableError
         Where the model could not be written.
     """
-    from ferryid.diagnose.diagnose import diagnose
-    from ferryid.diagnose.remodel import keep
-    from ferryid.diagnose.result import to_json
+    from ferryid.diagnose import to_json
     from ferryid.vessel import load_profile
 
     start = time.perf_counter()
     try:
         vessel = load_profile(profile)
-        found = diagnose([str(log)], vessel, None, progress=lambda stage: None)
+        (found,) = diagnose_and_store([str(log)], vessel, out, tables=None, progress=lambda stage: None)
         seconds = time.perf_counter() - start
-        made = to_json(keep(found, vessel, None, out)[0])
+        made = to_json(found)
     except UnwritableError:
         raise
     except FerryIdError as error:

@@ -83,7 +83,7 @@ def test_every_effect_and_check_is_described() -> None:
 
 
 def test_every_column_and_coefficient_is_in_the_nomenclature() -> None:
-    from ferryid.effects.picture import COEFFICIENTS
+    from ferryid.effects.force_model import COEFFICIENTS
     from ferryid.vessel.parse_signals import VESSEL_QUANTITIES
     from ferryid.vessel.signal_map import _SIMPLE
 

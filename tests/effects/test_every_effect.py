@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import trial_of
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
-from ferryid.diagnose.search import Search, search
-from ferryid.diagnose.weak import windows
+from ferryid.diagnose.data.measurements import read_measurements as scene_of
+from ferryid.diagnose.data.measurements import window_lengths
+from ferryid.diagnose.inference.estimation import estimation_problem as trial_of
+from ferryid.diagnose.inference.prior import prior_force_model as plain_picture
+from ferryid.diagnose.inference.search import Search, search
+from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 

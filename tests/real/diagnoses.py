@@ -13,9 +13,11 @@ import numpy as np
 import pandas as pd
 from rosbags.highlevel import AnyReader
 
-from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.result import Diagnosis, Estimate, Finding
-from ferryid.diagnose.scene import scene_of
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.measurements import read_measurements
+from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.report import diagnosis_figures
 from ferryid.report.diagnosis_words import numbers, probability
 from ferryid.vessel import load_profile
@@ -90,7 +92,13 @@ def told(
     vessel: str, logs: Sequence[str], judge: Judge, *, together: bool = False, withhold: Sequence[str] = ()
 ) -> tuple[str, tuple[Diagnosis, ...]]:
     """Diagnose logs; return a table of findings with what is to be said of each, and write the figures of forces."""
-    made = diagnose(logs, load_profile(vessel), None, shared=together, withhold=withhold, progress=lambda stage: None)
+    made = diagnose(
+        logs,
+        load_profile(vessel),
+        None,
+        DiagnosisSettings(together=together, withhold=tuple(withhold)),
+        progress=lambda stage: None,
+    )
     lines = ["| log | verdict | finding | probability | |", "|---|---|---|---|---|"]
     for one in made:
         rows = [(finding.says, probability(finding.probability), judge(one, finding)) for finding in one.findings] or [
@@ -144,7 +152,7 @@ def osaka() -> str:
         pictures.course(true, random.names, (3, 4, 5)), encoding="utf-8"
     )
     profile = load_profile("esso-osaka")
-    lags = [witnesses.velocity_lag(scene_of(path, profile, None)[0]) for path in esso.logs("random")]
+    lags = [witnesses.velocity_lag(read_measurements(path, profile, None)[0]) for path in esso.logs("random")]
     (FOLDER / "diagnosis-esso-osaka-lag.svg").write_text(pictures.lag(lags, random.names), encoding="utf-8")
     seconds = [one.seconds for one in lags]
     by_log = dict(zip(random.names, seconds, strict=True))
@@ -262,7 +270,7 @@ def milliampere() -> str:
     """Return the section on the ferry with four thrusters."""
     folder = DATA / MILLIAMPERE
     profile = load_profile("milliampere-2025")
-    scene = scene_of(str(folder), profile, None)[0]
+    scene = read_measurements(str(folder), profile, None)[0]
     lag, gain = witnesses.velocity_lag(scene), witnesses.slow_gain(scene)
     at, offsets, used = witnesses.antenna(folder), witnesses.encoder_offsets(folder), witnesses.sectors(scene)
     sectors = "; ".join(f"{name} {low:.0f} to {high:.0f}" for name, (low, high) in zip(scene.names, used, strict=True))
@@ -406,7 +414,7 @@ def pool() -> str:
     ]
     steps, shown = [], None
     for log in logs:
-        scene = scene_of(log, profile, None)[0]
+        scene = read_measurements(log, profile, None)[0]
         steps.append(witnesses.position_steps(_poses(log)))
         told_ = witnesses.idle(scene)
         if told_ is not None:

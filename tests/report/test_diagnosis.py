@@ -18,12 +18,16 @@ import numpy as np
 import pytest
 
 from ferryid import __version__
-from ferryid.diagnose.bands import Band
-from ferryid.diagnose.locate import Location
-from ferryid.diagnose.profiles import profile_of
-from ferryid.diagnose.result import AXES, VERDICTS, Diagnosis, Estimate, Finding, LawTerm, Moved, Rival, Withheld
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.inference.spectra import Band
+from ferryid.diagnose.judging.diagnosis import Diagnosis, Withheld
+from ferryid.diagnose.judging.diagnosis import HullChange as Moved
+from ferryid.diagnose.judging.error_profiles import profile_of
+from ferryid.diagnose.judging.finding import Finding, LawTerm, Rival
+from ferryid.diagnose.judging.locate import Location
+from ferryid.diagnose.judging.verdict import VERDICTS
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.report.diagnosis_figures import _profile, binned, in_regime
@@ -37,7 +41,6 @@ from ferryid.report.diagnosis_words import (
     free_run_rows,
     headline,
     numbers,
-    overall,
     ratio_of,
     rivals,
     said,
@@ -546,20 +549,6 @@ def test_several_logs_are_one_object_and_one_page(tmp_path: Path) -> None:
     assert outcome.json["after"]["mse"]["surge"] == pytest.approx(250.0)
     assert outcome.text.startswith("Of 3 logs, 1 matched, 1 explained and 1 not testable.")
     assert outcome.report.parent.name == "diagnosis-a-and-2-more-without-wind"
-
-
-@pytest.mark.parametrize(
-    ("verdicts", "one"),
-    [
-        (("matched", "matched"), "matched"),
-        (("matched", "explained"), "explained"),
-        (("explained", "unexplained"), "partly_explained"),
-        (("matched", "unexplained"), "unexplained"),
-        (("not_testable", "not_testable"), "not_testable"),
-    ],
-)
-def test_one_verdict_on_several_logs(verdicts: tuple[str, ...], one: str) -> None:
-    assert overall([diagnosis(verdict) for verdict in verdicts]) == one
 
 
 def test_bins_hold_the_mean_and_an_interval_that_knows_what_is_independent() -> None:

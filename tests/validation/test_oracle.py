@@ -9,7 +9,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import WIDER
+from ferryid.diagnose.inference.estimation import WIDER
 from ferryid.effects.effect import DEFINITION
 from ferryid.errors import FerryIdError
 from ferryid.simulate import parse_scenario, simulate, write_log

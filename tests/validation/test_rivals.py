@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import as_measured
+from ferryid.effects.force_model import as_measured
 from ferryid.errors import FerryIdError
 from ferryid.validation.rivals import RIVALS, sindy, stepwise
 from ferryid.validation.rivals.base import Base, base_of, prepared_log

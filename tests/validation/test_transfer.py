@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.remodel import keep
+from ferryid.diagnose.judging.model_update import store_updated_model
+from ferryid.diagnose.pipeline import diagnose
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model, blank
 from ferryid.identify.predict import Prediction
@@ -188,7 +188,9 @@ def test_a_model_of_another_log_is_refused(logs: tuple[str, str, Path]) -> None:
 def test_what_is_diagnosed_beats_base_model_and_stepwise_regression(logs: tuple[str, str, Path]) -> None:
     """From one end to the other, by way of the model's file; the only test here that diagnoses."""
     first, other, folder = logs
-    found = keep(diagnose([first], PROFILE, folder, progress=lambda stage: None), PROFILE, None, folder)[0]
+    found = store_updated_model(diagnose([first], PROFILE, folder, progress=lambda stage: None), PROFILE, None, folder)[
+        0
+    ]
     assert found.model is not None
     result = transfer_test(first, other, PROFILE, folder, diagnosed=found.model, rivals={"stepwise": stepwise.learn})
     diagnosed, rival = result.methods["diagnosed"], result.methods["stepwise"]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.result import Estimate
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.effects.force_model import Measurements
 from ferryid.identify.pictured import bridged
 from ferryid.vessel.profile import Floats
 
@@ -31,7 +31,7 @@ LEAST_SHARE, LEAST_S, LEAST_OF_LONG = 0.005, 2.0, 0.001
 """Holds that are neither this share of the log nor one as long as this, with the other share, do no harm."""
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return the share of the log in which some channel is held, and the longest time of it."""
     columns = np.column_stack([scene.eta, scene.nu_raw])
     held = np.column_stack([held_rows(column, scene.usable, scene.step_s) for column in columns.T])
@@ -46,7 +46,7 @@ def find(scene: Scene) -> SensorFinding | None:
     names = [name for name, column in zip(NAMES, held.T, strict=True) if column.any()]
     percent = 100.0 * share
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         # What was held is bridged: the jump at its end is no motion, and means reach over it.
         both = ((seen.eta, held[:, :3]), (seen.nu_raw, held[:, 3:]))
         eta, nu_raw = (bridged(np.where(gone, np.nan, now), seen.usable) for now, gone in both)

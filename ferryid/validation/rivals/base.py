@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Picture, as_measured, required_force
+from ferryid.effects.force_model import ForceModel, as_measured, required_force
 from ferryid.identify.model import blank
 from ferryid.identify.pictured import Pictured
 from ferryid.identify.predict import Prediction, force_with, held_in, imagine, smoothed_scene
@@ -40,7 +40,7 @@ class Base:
 
     prepared: Prepared
     prediction: Prediction
-    picture: Picture
+    picture: ForceModel
     known: Pictured
 
     @property
@@ -58,7 +58,7 @@ class Base:
         """Acceleration that the base model gives at the measured velocities and thrusts, shape (n, 3)."""
         return as_measured(self.picture)
 
-    def force_between(self, picture: Picture) -> Floats:
+    def force_between(self, picture: ForceModel) -> Floats:
         """Return by how much more force a picture moves the vessel than the base model does [N, N, N·m], shape (n, 3).
 
         Both at the measured velocities and thrusts. The measured acceleration plays no part in it: terms that held it beside
@@ -67,7 +67,7 @@ class Base:
         plain = self.picture
         return np.asarray(required_force(plain, as_measured(picture)) - required_force(plain, self.rates))
 
-    def expected(self, picture: Picture) -> Prediction:
+    def expected(self, picture: ForceModel) -> Prediction:
         """Return what a picture expects that has another hull, load, damping or external force than the base model's.
 
         External forces are taken as they were along the measured path, as for a diagnosed model.

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from ferryid.effects import Effect, effects
-from ferryid.effects.picture import COEFFICIENTS, Picture, between
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, between
 from ferryid.validation.rivals.base import Base
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Floats
@@ -43,7 +43,7 @@ CONSTANT = "constant force"
 ALIKE = 0.999
 """Correlation from which on a column is another's, and left out."""
 
-Change = Callable[[Picture], Picture]
+Change = Callable[[ForceModel], ForceModel]
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Candidate:
     unit: Change
     onset_s: float = 0.0
 
-    def added(self, base: Base) -> Picture:
+    def added(self, base: Base) -> ForceModel:
         """Return the base model's picture with a unit of the term in it, thrusters and measurements as they were."""
         plain = base.picture
         after = self.unit(plain)
@@ -124,7 +124,7 @@ def _hull(base: Base) -> Iterator[Candidate]:
         yield Candidate(name, "hull_parameters", None, partial(_with_coefficient, k, unit))
 
 
-def _with_coefficient(k: int, unit: float, picture: Picture) -> Picture:
+def _with_coefficient(k: int, unit: float, picture: ForceModel) -> ForceModel:
     return replace(picture, hull=picture.hull + np.where(np.arange(len(COEFFICIENTS)) == k, unit, 0.0))
 
 
@@ -140,7 +140,7 @@ def _load(base: Base) -> Iterator[Candidate]:
         yield Candidate(label, "payload", None, partial(_with_load, unit))
 
 
-def _with_load(unit: Floats, picture: Picture) -> Picture:
+def _with_load(unit: Floats, picture: ForceModel) -> ForceModel:
     more = np.tile(unit, (len(picture.scene.t), 1))
     return replace(picture, load=more if picture.load is None else picture.load + more)
 
@@ -158,7 +158,7 @@ def _world(base: Base) -> Iterator[Candidate]:
         yield Candidate(f"spring {label}", "mooring", None, partial(_pulled, axis, float(start[axis])))
 
 
-def _pulled(axis: int, start: float | None, picture: Picture) -> Picture:
+def _pulled(axis: int, start: float | None, picture: ForceModel) -> ForceModel:
     """Add a force of 1 N along north or east, or one against the way from `start` of 1 N/m."""
     scene = picture.scene
     pull = np.zeros((len(scene.t), 2))
@@ -192,13 +192,13 @@ def _wind(base: Base) -> Iterator[Candidate]:
         yield Candidate(f"load {label}", wind.id, None, partial(_blown, WIND_MPS * np.array(towards), sign))
 
 
-def _turned(of: Callable[[Floats], Floats], times: int, picture: Picture) -> Picture:
+def _turned(of: Callable[[Floats], Floats], times: int, picture: ForceModel) -> ForceModel:
     moment = of(times * picture.scene.psi)
     nothing = np.zeros_like(moment)
     return replace(picture, external=picture.external + np.column_stack([nothing, nothing, moment]))
 
 
-def _blown(towards: Floats, sign: float, picture: Picture) -> Picture:
+def _blown(towards: Floats, sign: float, picture: ForceModel) -> ForceModel:
     wind = effects()["wind"]
     with_it, against_it = (wind.act(picture, one, None).external - picture.external for one in (towards, -towards))
     return replace(picture, external=picture.external + 0.5 * (with_it + sign * against_it))
@@ -220,7 +220,7 @@ def _effects(base: Base) -> Iterator[Candidate]:
 
 
 def _applied(effect: Effect, values: Floats, instance: str | None) -> Change:
-    def change(picture: Picture) -> Picture:
+    def change(picture: ForceModel) -> ForceModel:
         return effect.act(picture, values, instance)
 
     return change
@@ -240,7 +240,7 @@ def _places(base: Base) -> Iterator[Candidate]:
             yield Candidate(label, "shallow_water", None, partial(_damped, np.array(low), np.array(high)))
 
 
-def _damped(low: Floats, high: Floats, picture: Picture) -> Picture:
+def _damped(low: Floats, high: Floats, picture: ForceModel) -> ForceModel:
     place = picture.scene.eta[:, :2]
     inside = ((place >= low) & (place < high)).all(axis=1)
     return replace(picture, damping_factor=np.where(inside, 2.0, 1.0))
@@ -252,5 +252,5 @@ def _constants() -> Iterator[Candidate]:
         yield Candidate(f"constant in {axis}", "", None, partial(_pushed, j))
 
 
-def _pushed(j: int, picture: Picture) -> Picture:
+def _pushed(j: int, picture: ForceModel) -> ForceModel:
     return replace(picture, external=picture.external + np.eye(3)[j])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.validation.rivals.base import Base
 from ferryid.vessel.profile import Floats
 
@@ -22,7 +22,7 @@ PROBE = 1e-3
 """Change of a coefficient by which the slope is taken."""
 
 
-def combined(base: Base, units: Sequence[Picture], coefficients: Floats) -> Picture:
+def combined(base: Base, units: Sequence[ForceModel], coefficients: Floats) -> ForceModel:
     """Return the base model's picture with terms in it, each as many units as its coefficient says."""
     plain = base.picture
     n = len(plain.scene.t)
@@ -50,7 +50,7 @@ def combined(base: Base, units: Sequence[Picture], coefficients: Floats) -> Pict
 
 
 def least_error(
-    base: Base, units: Sequence[Picture], several: Sequence[Floats], rows: Places, by_axis: Floats
+    base: Base, units: Sequence[ForceModel], several: Sequence[Floats], rows: Places, by_axis: Floats
 ) -> Floats:
     """Return those of several coefficients whose force errs least in the log; other arguments as of `joint_coefficients`.
 
@@ -67,7 +67,7 @@ def least_error(
     return min(several, key=error)
 
 
-def joint_coefficients(base: Base, units: Sequence[Picture], start: Floats, rows: Places, by_axis: Floats) -> Floats:
+def joint_coefficients(base: Base, units: Sequence[ForceModel], start: Floats, rows: Places, by_axis: Floats) -> Floats:
     """Return the coefficients with which the terms together leave least of the measured acceleration, shape (q,).
 
     Parameters
@@ -103,7 +103,7 @@ def joint_coefficients(base: Base, units: Sequence[Picture], start: Floats, rows
     return found
 
 
-def _has_mass(picture: Picture) -> bool:
+def _has_mass(picture: ForceModel) -> bool:
     """Return True where the mass matrix is positive on every row."""
     m11, m22, m23, m32, m33 = (picture.hull[:5] + (np.zeros((1, 5)) if picture.load is None else picture.load)).T
     return bool(min(m11.min(), m22.min(), (m22 * m33 - m23 * m32).min()) > 0.0)

@@ -12,7 +12,7 @@ from ferryid.validation.plant.plant import Plant, wrapped
 from ferryid.validation.plant.vessels import Vessel
 
 if TYPE_CHECKING:
-    from ferryid.effects.picture import Scene
+    from ferryid.effects.force_model import Measurements
     from ferryid.validation.oracle_sensors import SensorEstimate
 
 Floats = NDArray[np.float64]
@@ -39,7 +39,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
         plant.encoders.append(rounded)
 
 
-def oracle(scene: Scene) -> SensorEstimate:
+def oracle(scene: Measurements) -> SensorEstimate:
     """Return the step of the coarsest angle; the gain is that of its readings' being on a grid over being anywhere."""
     from math import log
 

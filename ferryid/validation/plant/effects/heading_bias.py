@@ -13,7 +13,7 @@ from ferryid.validation.plant.plant import Plant
 from ferryid.validation.plant.vessels import Vessel
 
 if TYPE_CHECKING:
-    from ferryid.effects.picture import Scene
+    from ferryid.effects.force_model import Measurements
     from ferryid.validation.oracle_sensors import SensorEstimate
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
     plant.reports.append(report)
 
 
-def oracle(scene: Scene) -> SensorEstimate:
+def oracle(scene: Measurements) -> SensorEstimate:
     """Return the estimate of a heading bias from kinematics."""
     from dataclasses import replace
     from math import degrees

@@ -13,7 +13,7 @@ from ferryid.validation.plant.plant import Plant
 from ferryid.validation.plant.vessels import Vessel
 
 if TYPE_CHECKING:
-    from ferryid.effects.picture import Scene
+    from ferryid.effects.force_model import Measurements
     from ferryid.validation.oracle_sensors import SensorEstimate
 
 Floats = NDArray[np.float64]
@@ -41,7 +41,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
     plant.reports.append(report)
 
 
-def oracle(scene: Scene) -> SensorEstimate:
+def oracle(scene: Measurements) -> SensorEstimate:
     """Return the estimate of a lever arm from kinematics."""
     from dataclasses import replace
 
@@ -55,7 +55,7 @@ def oracle(scene: Scene) -> SensorEstimate:
         return SensorEstimate(0.0, 2)
     x, y = found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         one = np.ones(len(seen.t))
         arm = np.column_stack([*to_world(x.value * one, y.value * one, seen.psi), 0.0 * one])
         return replace(seen, eta=seen.eta - arm)

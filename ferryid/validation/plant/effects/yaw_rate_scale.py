@@ -12,7 +12,7 @@ from ferryid.validation.plant.plant import Plant
 from ferryid.validation.plant.vessels import Vessel
 
 if TYPE_CHECKING:
-    from ferryid.effects.picture import Scene
+    from ferryid.effects.force_model import Measurements
     from ferryid.validation.oracle_sensors import SensorEstimate
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
     plant.reports.append(report)
 
 
-def oracle(scene: Scene) -> SensorEstimate:
+def oracle(scene: Measurements) -> SensorEstimate:
     """Return the estimate of the scale of the yaw rate from the reported heading."""
     from ferryid.diagnose.checks.yaw_rate_scale import LEAST, compared, corrected
     from ferryid.validation.oracle_sensors import SensorEstimate, gain_of_score
