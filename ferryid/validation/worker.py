@@ -46,6 +46,7 @@ def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
         Where the model could not be written.
     """
     from ferryid.diagnose import to_json
+    from ferryid.diagnose import diagnose_and_store, to_json
     from ferryid.vessel import load_profile
 
     start = time.perf_counter()
