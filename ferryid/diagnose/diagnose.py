@@ -166,6 +166,7 @@ def _begun(
             {},
             tuple(notes),
             duration_s=_duration_s(scene),
+            left_out=survey.motion.left_out,
         )
     if simulated is None:
         plain, spread = plain_picture(seen.scene, profile, model, survey.recording.sha256)
@@ -248,6 +249,7 @@ def _ended(
         against=log.compared,
         moved=_moved(trial, kept) if kept.suspects else None,
         duration_s=_duration_s(scene),
+        left_out=survey.motion.left_out,
         # A simulation's hull is not the vessel's, and the lift of a common one is in no model file.
         learnt=learnt(trial, kept, found.states, findings, survey) if simulated is None and common is None else None,
     )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ferryid.diagnose.locate import Location, plain_location
+from ferryid.signals.track import LeftOut
 from ferryid.vessel.profile import Floats
 
 if TYPE_CHECKING:
@@ -218,6 +219,8 @@ class Diagnosis:
         How far the hull went that was fitted together with the findings; None where there are none of forces.
     duration_s
         From the first to the last row of the log [s].
+    left_out
+        Rows of the log that are not used, by reason.
     """
 
     log: str
@@ -235,6 +238,7 @@ class Diagnosis:
     located: Location | None = None
     moved: Moved | None = None
     duration_s: float | None = None
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -262,6 +266,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.located is None else {"located": plain_location(diagnosis.located)}),
         **({} if diagnosis.moved is None else {"hull_moved": vars(diagnosis.moved)}),
         **({} if diagnosis.duration_s is None else {"duration_s": diagnosis.duration_s}),
+        "left_out": [asdict(one) for one in diagnosis.left_out],
     }
 
 

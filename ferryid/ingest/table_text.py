@@ -33,6 +33,8 @@ _LONGEST_HEAD = 1 << 22
 _HEAD_LINES = 8
 """The head is read on to its greatest length where it holds fewer lines."""
 _SAMPLE_LINES = 400
+_CONTROL = re.compile(rb"[\0-\x08\x0e-\x1f]")
+"""Characters that no text has; where every other line has one, a file is none."""
 _COMMA_NUMBER = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 _WORDS = {"true", "false", "nan", "inf", "-inf", "null", "none", ""}
 _BOMS = (
@@ -132,7 +134,7 @@ def _decode(path: Path, head: bytes, layout: TableLayout | None) -> tuple[str, s
     wide = wanted.lower().replace("_", "-").startswith(("utf-16", "utf-32", "utf16", "utf32"))
     # Zeros at the end are what a power loss leaves of a row that was not written; they cost that row only.
     lines = head.rstrip(b"\0").splitlines()
-    if not wide and sum(b"\0" in line for line in lines) * 2 >= len(lines):
+    if not wide and sum(_CONTROL.search(line) is not None for line in lines) * 2 >= len(lines):
         raise FerryIdError(
             f"{path}: this is binary data, not a text table. Fix: pass a log in one of the known formats; for UTF-16 "
             'text without a byte-order mark set encoding = "utf-16-le" under [table] in the profile'

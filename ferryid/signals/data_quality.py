@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ferryid.counts import counted, plural
 from ferryid.ingest.log import Loss
@@ -14,6 +15,8 @@ from ferryid.signals.parquet import unit_of
 from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.track import LeftOut, Motion, Track
+
+Flags = NDArray[np.bool_]
 
 
 def data_quality(recording: Recording, track: Track | Motion | None = None) -> dict[str, Any]:
@@ -78,11 +81,14 @@ def remarks(recording: Recording, repairs: Sequence[str] = ()) -> list[str]:
     return list(dict.fromkeys(told))
 
 
-def left_out_sentences(recording: Recording, track: Track | Motion) -> tuple[str, ...]:
-    """Return what of a log could not be read, and which rows are not used because of times, gaps or faults, as sentences."""
+def left_out_sentences(recording: Recording, left_out: Sequence[LeftOut], used: Flags) -> tuple[str, ...]:
+    """Return what of a log could not be read, and which rows are not used because of times, gaps or faults, as sentences.
+
+    `used` are flags of the rows that are, shape (n,).
+    """
     said = [*_unread(recording.losses)]
     said += grouped_notes({topic: _of_clock(stream) for topic, stream in recording.streams.items()})
-    said += rows_left_out(track.left_out, max(track.t.size, _rows(track.left_out) + int(np.count_nonzero(track.valid))))
+    said += rows_left_out(left_out, max(used.size, _rows(left_out) + int(np.count_nonzero(used))))
     return tuple(said)
 
 

@@ -73,7 +73,7 @@ def read_recording(reader: Reader, name: str, profile: Profile, *, verify: bool 
     FerryIdError
         As `record`.
     """
-    selection = select(profile, reader.topics, name_of(reader))
+    selection = select(profile, reader.topics, name_of(reader), reader.losses)
     series = reader.read(selection.wanted, verify=verify)
     return make_recording(reader, name, profile, selection, series, repair_all(series))
 
