@@ -109,6 +109,32 @@ def _rows(left_out: Sequence[LeftOut]) -> int:
     return sum(one.rows for one in left_out)
 
 
+def lost_plain(losses: Sequence[Loss], left_out: Sequence[LeftOut], total: int) -> dict[str, Any]:
+    """Return for JSON what was lost of a log, and what of the rest is not used.
+
+    Parameters
+    ----------
+    losses
+        What could not be read.
+    left_out, total
+        Rows that are not used, and how many there are.
+
+    Returns
+    -------
+    dict
+        ``messages`` and ``seconds`` that are known to be lost, ``unknown``: whether more may be, ``rows_left_out`` and
+        ``seconds_left_out``, and ``says``: all of it as sentences.
+    """
+    return {
+        "messages": sum(loss.messages or 0 for loss in losses),
+        "seconds": sum(loss.seconds or 0.0 for loss in losses),
+        "unknown": any(loss.messages is None for loss in losses),
+        "rows_left_out": _rows(left_out),
+        "seconds_left_out": float(sum(one.seconds for one in left_out)),
+        "says": [*(f"Lost: {loss_sentence(loss)}" for loss in losses), *rows_left_out(left_out, total)],
+    }
+
+
 def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
     """Return in one sentence what could not be read in all, and the largest or least certain part of it."""
     if not losses:

@@ -142,6 +142,11 @@ def test_batch(ferryid: Command, place: Path) -> None:
     options = (*VESSEL, "--recipe", recipe, "--processes", "1", "--out", place / "batch")
     (row,) = result(ferryid("batch", place / "gaps.mcap", *options, "--json", "-"))["rows"]
     assert row["status"] == "done", row
+    assert row["lost"]["seconds_left_out"] == pytest.approx(LOST, abs=2.0)
+    assert row["lost"]["rows_left_out"] == pytest.approx(20 * LOST, abs=40)
+    assert row["lost"]["messages"] == 0
+    assert counted(" ".join(row["lost"]["says"]))
+    assert counted((place / "batch" / "batch" / "index.html").read_text(encoding="utf-8"))
 
 
 def test_a_stray_time_is_counted_on_the_terminal_of_a_fit(ferryid: Command, place: Path) -> None:
