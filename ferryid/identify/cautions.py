@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted, plural
 from ferryid.identify.model import AXES
 from ferryid.identify.result import Excitation, FreeRun
 from ferryid.identify.settings import FitSettings
@@ -16,6 +17,8 @@ from ferryid.signals.track import Motion
 
 LEAST_VALIDATION_S = 60.0
 MANY_MOVED = 20
+MOST_LOGS_SAID = 10
+"""Logs of an archive whose own warnings are repeated for all of it."""
 USELESS_RAD, USELESS_S = 0.5, 10.0
 """A heading lost by this much within this time says that a model does not describe the turning at all."""
 
@@ -41,7 +44,7 @@ def cautions(
             "aboard there ends up in the coefficients."
         )
     for one in prepared:
-        warnings.extend(f"{one.recording.name}: {doubt}" for doubt in (*one.doubts, *one.left_out))
+        warnings += of_logs([(one.recording.name, (*one.doubts, *one.left_out))])
         moved = max((s.clock.out_of_order + s.clock.duplicates for s in one.recording.streams.values()), default=0)
         if moved >= MANY_MOVED:
             warnings.append(
@@ -78,6 +81,21 @@ def general_cautions(
                 "varies there, or something else moves the vessel."
             )
     return warnings
+
+
+def of_logs(told: Sequence[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
+    """Return what is told of single logs with their names, of the first `MOST_LOGS_SAID` that have anything to tell.
+
+    Parameters
+    ----------
+    told
+        Name of every log, and sentences.
+    """
+    those = [(name, sentences) for name, sentences in told if sentences]
+    said = [f"{name}: {sentence}" for name, sentences in those[:MOST_LOGS_SAID] for sentence in sentences]
+    if (others := len(those) - MOST_LOGS_SAID) > 0:
+        said.append(f"{counted(others, 'more log')} {plural(others, 'has')} such warnings, see the JSON.")
+    return tuple(said)
 
 
 def free_run_cautions(base: FreeRun, new: FreeRun) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify.bases import forms
 from ferryid.identify.basis import STRUCTURES, Basis, sized
 from ferryid.identify.bootstrap import FEW_BLOCKS, block_seconds, percentiles, times_drawn
+from ferryid.identify.cautions import of_logs
 from ferryid.identify.choose import Studied, choose, force_free, pieces_of
 from ferryid.identify.compared import LEVEL, Compared, Ratios, Structure, StructureSweep, over_base
 from ferryid.identify.confidence_set import confidence_set
@@ -116,14 +117,15 @@ def sweep_structures(
         by[key] = compared(
             profile, settings, bases, pieces, min(MOST_GROUPS, len(opened)) if key == "logs" else folds, key == "logs"
         )
+    told = tuple(log_json(one, log) for one, log in zip(opened, pieces["modulus"], strict=True))
     return StructureSweep(
         profile.name,
-        tuple(log_json(one, log) for one, log in zip(opened, pieces["modulus"], strict=True)),
+        told,
         settings,
         block_s,
         by,
         unusable,
-        tuple(_notes(by, settings)),
+        (*_notes(by, settings), *of_logs([(log["name"], log["warnings"]) for log in told])),
     )
 
 

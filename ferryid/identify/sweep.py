@@ -14,6 +14,7 @@ from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.archive import archive_folds
 from ferryid.identify.basis import Basis
+from ferryid.identify.cautions import of_logs
 from ferryid.identify.choose import (
     Choice,
     Studied,
@@ -48,7 +49,7 @@ class Sweep:
     what
         One of `KINDS`.
     vessel, logs
-        Name of the vessel; of each log its name, SHA-256, seconds and rows.
+        Name of the vessel; of each log its name, SHA-256, seconds, rows and warnings.
     settings
         How was fitted; its basis is the one that all logs allow.
     windows_s
@@ -151,7 +152,7 @@ def sweep(
         replace(settings, basis=functions.name),
         windows,
         by,
-        tuple(_notes(by, windows, settings)),
+        (*_notes(by, windows, settings), *of_logs([(log["name"], log["warnings"]) for log in told])),
     )
 
 
@@ -196,13 +197,14 @@ def read_logs(
 
 
 def log_json(one: Opened, log: Studied) -> dict[str, Any]:
-    """Return name, hash and length of a log."""
+    """Return name, hash, length and warnings of a log."""
     rows = int(log.test.n.sum())
     return {
         "name": one.recording.name,
         "sha256": one.recording.sha256,
         "seconds": rows / one.measured.rate_hz,
         "rows": rows,
+        "warnings": [*one.doubts, *one.left_out],
     }
 
 

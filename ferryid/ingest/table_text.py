@@ -34,6 +34,8 @@ _HEAD_LINES = 8
 _SAMPLE_LINES = 400
 _DAMAGED_LINES = 2
 """Lines without a number or the right number of fields that may stand between the column names and the rows."""
+_CONTROL = re.compile(rb"[\0-\x08\x0e-\x1f]")
+"""Characters that no text has; where every other line has one, a file is none."""
 _COMMA_NUMBER = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 _BEGINS_NUMBER = re.compile(r"\s*[+-]?\.?\d")
 _WORDS = {"true", "false", "nan", "inf", "-inf", "null", "none", ""}
@@ -134,7 +136,7 @@ def _decode(path: Path, head: bytes, layout: TableLayout | None) -> tuple[str, s
     wide = wanted.lower().replace("_", "-").startswith(("utf-16", "utf-32", "utf16", "utf32"))
     # Zeros at the end are what a power loss leaves of a row that was not written; they cost that row only.
     lines = head.rstrip(b"\0").splitlines()
-    if not wide and sum(b"\0" in line for line in lines) * 2 >= len(lines):
+    if not wide and sum(_CONTROL.search(line) is not None for line in lines) * 2 >= len(lines):
         raise FerryIdError(
             f"{path}: this is binary data, not a text table. Fix: pass a log in one of the known formats; for UTF-16 "
             'text without a byte-order mark set encoding = "utf-16-le" under [table] in the profile'

@@ -14,7 +14,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.files import scratch_folder
+from ferryid.files import remove_scratch, scratch_folder
 from ferryid.ingest.log import Loss
 
 PIECE_BYTES = {"zstd": 1 << 11, "lz4": 1 << 16}
@@ -140,7 +140,7 @@ def unpacked_batches(
 def working_folder(owner: object) -> Path:
     """Make a temporary folder that is removed together with its owner."""
     folder = scratch_folder()
-    weakref.finalize(owner, shutil.rmtree, folder, ignore_errors=True)
+    weakref.finalize(owner, remove_scratch, folder)
     return folder
 
 

@@ -11,6 +11,7 @@ from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
 
+from ferryid.counts import counted
 from ferryid.diagnose import HINT
 from ferryid.identify.result import AXES
 from ferryid.report import batch_figures
@@ -91,7 +92,7 @@ def _common(logs: Sequence[str]) -> str:
 
 
 def _headline(counts: Mapping[str, int]) -> str:
-    logs = f"{counts['logs']} log{'s' * (counts['logs'] != 1)}"
+    logs = counted(counts["logs"], "log")
     return f"{logs}, all done" if counts["logs"] == counts["done"] else f"{logs}, {counts['done']} done"
 
 
@@ -121,12 +122,27 @@ def _row(row: Mapping[str, Any]) -> dict[str, Any]:
         "effects": list(dict.fromkeys(title(one["effect"]) for one in findings)),
         "fit": "" if fit is None else "accepted" if fit["accepted"] else "not accepted",
         "fit_mse": None if fit is None else fit["normalised_mse"],
-        "warnings": len(fit["warnings"]) if fit else 0,
+        "warnings": list(dict.fromkeys(said for made in (fit, evaluation) if made for said in made["warnings"])),
+        "lost": _lost(row.get("lost")),
         "evaluated": None if evaluation is None else _mean_error(evaluation),
         "links": links,
         "bare": not (fit or evaluation or diagnosis),
         "seconds": sum(row["seconds"].values()),
         "peak": row["peak_bytes"],
+    }
+
+
+def _lost(lost: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return what a log lost, what of it is left out, both short, all sentences, and seconds of both to sort by."""
+    if lost is None:
+        return {"messages": "", "left_out": "", "says": [], "seconds": None}
+    parts = [counted(lost["messages"], "message")] if lost["messages"] else ["unknown"] if lost["unknown"] else []
+    parts += [f"{lost['seconds']:.1f} s"] if lost["seconds"] else []
+    return {
+        "messages": ", ".join(parts) + (" or more" if lost["unknown"] and lost["messages"] else ""),
+        "left_out": f"{lost['seconds_left_out']:.1f} s left out" if lost["rows_left_out"] else "",
+        "says": lost["says"],
+        "seconds": lost["seconds"] + lost["seconds_left_out"],
     }
 
 

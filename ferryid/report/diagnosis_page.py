@@ -14,6 +14,8 @@ from ferryid.identify.result import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
 from ferryid.report.figures import Floats
 from ferryid.report.html import template
+from ferryid.report.left_out import left_out_table
+from ferryid.signals.track import LeftOut
 
 MAX_LOGS = 6
 """Logs whose evidence is drawn; the page stays readable."""
@@ -116,7 +118,11 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) ->
         "vessel": diagnosis.vessel,
         "verdict": diagnosis.verdict,
         "headline": diagnosis_words.headline(diagnosis),
-        "findings": [_finding(one, f"{prefix}finding-{k}", drawn) for k, one in enumerate(diagnosis.findings, 1)],
+        "findings": [
+            _finding(one, f"{prefix}finding-{k}", drawn, diagnosis.left_out)
+            for k, one in enumerate(diagnosis.findings, 1)
+        ],
+        "left_out": left_out_table(diagnosis.left_out),
         "names": [diagnosis_words.title(one.effect, one.instance) for one in diagnosis.findings],
         "force_rows": force_rows,
         "free_run_rows": free_run_rows,
@@ -151,7 +157,7 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) ->
     }
 
 
-def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
+def _finding(finding: Finding, file: str, drawn: bool, left_out: Sequence[LeftOut]) -> dict[str, Any]:
     shown = []
     if drawn and diagnosis_figures.compared(finding):
         what = finding.labels.get("regressor", "") if "regressor" in finding.evidence else ""
@@ -169,9 +175,11 @@ def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
         )
     if drawn and diagnosis_figures.drawable(finding):
         caption = (
-            "The same over time; shaded: when it acts." if shown else "What is left over; shaded: when it acts most."
+            "The same over time; shaded: when it acts, and what is left out."
+            if shown
+            else "What is left over; shaded: when it acts most, and what is left out of the log."
         )
-        shown.append({"file": f"{file}-time", "svg": diagnosis_figures.in_time(finding), "caption": caption})
+        shown.append({"file": f"{file}-time", "svg": diagnosis_figures.in_time(finding, left_out), "caption": caption})
     if drawn and diagnosis_figures.spectral(finding):
         shown.append(
             {

@@ -12,6 +12,7 @@ from ferryid.identify.inertia import effective_mass
 from ferryid.identify.result import AXES, FitResult, LogFit
 from ferryid.report import figures
 from ferryid.report.html import template
+from ferryid.report.left_out import left_out_table
 from ferryid.report.structure import remainder, worst_and_best_minute
 from ferryid.vessel import parse_profile
 from ferryid.vessel.parse_hull import rigid_mass
@@ -179,7 +180,7 @@ def _force_figures(log: LogFit) -> list[dict[str, str]]:
             "file": f"forces-{log.motion.log}",
             "svg": figures.forces(log),
             "caption": "Applied force as measured at the actuators, and as each model estimates it from the motion. "
-            "Shaded: validation, which the new model did not see.",
+            "Shaded: validation, which the new model did not see, and what is left out.",
         }
     ]
     minutes = worst_and_best_minute(log)
@@ -307,7 +308,8 @@ def _quality(log: LogFit) -> dict[str, Any]:
                 ],
             }
         )
-    return {"name": log.motion.log, "remarks": quality["remarks"], "streams": streams}
+    left_out = left_out_table(log.motion.left_out)
+    return {"name": log.motion.log, "remarks": quality["remarks"], "streams": streams, "left_out": left_out}
 
 
 def _provenance(result: FitResult) -> list[dict[str, str]]:

@@ -16,7 +16,7 @@ from ferryid.signals.faults import Faults, find_faults
 from ferryid.signals.grid import EXACT_S, on_grid
 from ferryid.signals.poses import step_doubts
 from ferryid.signals.quality import NAVIGATION, POSE, REFERENCE, is_actuator, is_order
-from ferryid.signals.sampling import check_advancing
+from ferryid.signals.sampling import check_advancing, single_rows
 from ferryid.signals.source import Held, Source
 from ferryid.signals.track import LeftOut, Track
 from ferryid.vessel import actuator_columns, resolve, resolve_notes
@@ -104,7 +104,11 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
         if name in columns:
             columns[name][wrong] = np.nan
     repairs.extend(resolve_notes(profile, columns))
-    columns = resolve(profile, columns, rate)
+    try:
+        columns = resolve(profile, columns, rate)
+    except FerryIdError as error:
+        # What holds one row is not on the grid, and not the profile's fault.
+        raise (FerryIdError(message) if (message := single_rows(recording)) else error) from error
     measured = _measured(recording.name, profile, columns, wrong)
     valid = measured & ~wrong
     if not valid.any():

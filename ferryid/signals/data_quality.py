@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ferryid.counts import counted, plural
 from ferryid.ingest.log import Loss
@@ -14,6 +15,8 @@ from ferryid.signals.parquet import unit_of
 from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.track import LeftOut, Motion, Track
+
+Flags = NDArray[np.bool_]
 
 
 def data_quality(recording: Recording, track: Track | Motion | None = None) -> dict[str, Any]:
@@ -79,11 +82,14 @@ def remarks(recording: Recording, repairs: Sequence[str] = ()) -> list[str]:
     return list(dict.fromkeys(told))
 
 
-def left_out_sentences(recording: Recording, track: Track | Motion) -> tuple[str, ...]:
-    """Return what of a log could not be read, and which rows are not used because of times, gaps or faults, as sentences."""
+def left_out_sentences(recording: Recording, left_out: Sequence[LeftOut], used: Flags) -> tuple[str, ...]:
+    """Return what of a log could not be read, and which rows are not used because of times, gaps or faults, as sentences.
+
+    `used` are flags of the rows that are, shape (n,).
+    """
     said = [*_unread(recording.losses)]
     said += grouped_notes({topic: _of_clock(stream) for topic, stream in recording.streams.items()})
-    said += rows_left_out(track.left_out, max(track.t.size, _rows(track.left_out) + int(np.count_nonzero(track.valid))))
+    said += rows_left_out(left_out, max(used.size, _rows(left_out) + int(np.count_nonzero(used))))
     return tuple(said)
 
 
@@ -102,6 +108,32 @@ def rows_left_out(left_out: Sequence[LeftOut], total: int) -> tuple[str, ...]:
 def _rows(left_out: Sequence[LeftOut]) -> int:
     """Rows cut from the ends of a track count as well."""
     return sum(one.rows for one in left_out)
+
+
+def lost_plain(losses: Sequence[Loss], left_out: Sequence[LeftOut], total: int) -> dict[str, Any]:
+    """Return for JSON what was lost of a log, and what of the rest is not used.
+
+    Parameters
+    ----------
+    losses
+        What could not be read.
+    left_out, total
+        Rows that are not used, and how many there are.
+
+    Returns
+    -------
+    dict
+        ``messages`` and ``seconds`` that are known to be lost, ``unknown``: whether more may be, ``rows_left_out`` and
+        ``seconds_left_out``, and ``says``: all of it as sentences.
+    """
+    return {
+        "messages": sum(loss.messages or 0 for loss in losses),
+        "seconds": sum(loss.seconds or 0.0 for loss in losses),
+        "unknown": any(loss.messages is None for loss in losses),
+        "rows_left_out": _rows(left_out),
+        "seconds_left_out": float(sum(one.seconds for one in left_out)),
+        "says": [*(f"Lost: {loss_sentence(loss)}" for loss in losses), *rows_left_out(left_out, total)],
+    }
 
 
 def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:

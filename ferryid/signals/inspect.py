@@ -59,7 +59,7 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
     reader = open_log(path, profile.table if profile is not None else None)
     with ThreadPoolExecutor(1) as pool:
         hashing = pool.submit(content_hash, reader.paths, verify=verify)
-        selection = survey(profile, reader.topics) if profile is not None else None
+        selection = survey(profile, reader.topics, reader.losses) if profile is not None else None
         wanted: dict[str, Sequence[str]] = {topic.name: () for topic in reader.topics if _is_small(topic)}
         wanted |= selection.wanted if selection is not None else {}
         series, problems = _read(reader, wanted, verify=verify)
@@ -230,11 +230,11 @@ def _bundled_matches(path: str | Path, reader: Reader) -> list[dict[str, Any]]:
         try:
             # A table is named by the profile's own layout, so that it is opened the way the profile would.
             own = open_log(path, profile.table) if is_table and profile.table is not None else reader
-            found = survey(profile, own.topics)
-            select(profile, own.topics, str(path))
+            found = survey(profile, own.topics, own.losses)
+            select(profile, own.topics, str(path), own.losses)
         except FerryIdError:
             usable = False
-            found = survey(profile, reader.topics)
+            found = survey(profile, reader.topics, reader.losses)
         if usable:
             series, problems = _read(own, found.wanted, verify=False)
             judged = _vessel(own, log_name(path), profile, found, series, problems)

@@ -37,6 +37,11 @@ class Opened:
         """Contradictions between its signals, and actuators known by their orders alone, as sentences."""
         return doubts_of(self.recording, self.track)
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Which rows are not used whatever the smoothing, and why, as sentences."""
+        return left_out_sentences(self.recording, self.measured.left_out, self.measured.usable)
+
 
 @dataclass(frozen=True)
 class Prepared:
@@ -51,7 +56,7 @@ class Prepared:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Which rows are not used and why, as sentences."""
-        return left_out_sentences(self.recording, self.motion)
+        return left_out_sentences(self.recording, self.motion.left_out, self.motion.valid)
 
 
 def doubts_of(recording: Recording, track: Track) -> tuple[str, ...]:

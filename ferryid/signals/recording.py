@@ -101,7 +101,7 @@ def selected(reader: Reader, profile: Profile) -> Selection:
             f"{name_of(reader)}: the log holds no data, found {there} in a complete file. "
             "Fix: pass a log that was recorded while the topics were published"
         )
-    return select(profile, reader.topics, name_of(reader))
+    return select(profile, reader.topics, name_of(reader), reader.losses)
 
 
 def make_recording(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, sqrt
+from pathlib import PurePath
 
 import numpy as np
 
@@ -64,6 +65,15 @@ def check_advancing(recording: Recording) -> None:
             raise FerryIdError(_standing(recording, group))
 
 
+def single_rows(recording: Recording) -> str:
+    """Return the message on a topic of navigation or actuators that holds one row or one time, "" where each holds more."""
+    for stream in recording.streams.values():
+        moving = any(name in NAVIGATION or is_actuator(name) or is_order(name) for name in stream.columns)
+        if moving and len(stream.time_ns) < 2:
+            return _standing(recording, [stream])
+    return ""
+
+
 def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
     is_table = any(topic.encoding == "table" and topic.name == lead.topic for topic in recording.topics)
     if is_table:
@@ -79,9 +89,10 @@ def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
 def _standing(recording: Recording, streams: Sequence[Stream]) -> str:
     stream = max(streams, key=lambda one: one.clock.count + one.clock.dropped)
     rows = stream.clock.count + stream.clock.dropped
+    file = _file(recording, stream.topic)
     if rows < 2:
         found = "one row only" if rows else "no row"
-        return f"{_file(recording)}: {stream.topic} holds {found}, and motion needs many. Fix: use a longer log"
+        return f"{file}: {stream.topic} holds {found}, and motion needs many. Fix: use a longer log"
     is_table = any(topic.encoding == "table" for topic in recording.topics)
     found = f"{rows} rows of {stream.topic}" if is_table else f"{rows} messages on {stream.topic}"
     remedy = (
@@ -89,7 +100,7 @@ def _standing(recording: Recording, streams: Sequence[Stream]) -> str:
         if is_table
         else "record the log again with a running clock"
     )
-    return f"{_file(recording)}: time does not advance, found {found} with the same time. Fix: {remedy}"
+    return f"{file}: time does not advance, found {found} with the same time. Fix: {remedy}"
 
 
 def _length(profile: Profile) -> float:
@@ -98,5 +109,7 @@ def _length(profile: Profile) -> float:
     return hull.length_m if isfinite(hull.length_m) else 4.0 * sqrt(hull.inertia_z / hull.mass_kg)
 
 
-def _file(recording: Recording) -> str:
-    return recording.files[0] if recording.files else recording.name
+def _file(recording: Recording, topic: str = "") -> str:
+    """Return the file of a topic where each has its own, else the first of the log."""
+    own = (file for file in recording.files if topic and PurePath(file).with_suffix("").as_posix().endswith(topic))
+    return next(own, recording.files[0] if recording.files else recording.name)

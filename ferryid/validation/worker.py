@@ -45,7 +45,6 @@ def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
     UnwritableError
         Where the model could not be written.
     """
-    from ferryid.diagnose import to_json
     from ferryid.diagnose import diagnose_and_store, to_json
     from ferryid.vessel import load_profile
 

@@ -130,7 +130,7 @@ def test_quality_tells_all_of_it(log: Path, boat: Profile) -> None:
     assert quality["streams"]["table"]["signals"]["F_main"]["missing"] == 1
     assert quality["streams"]["table"]["signals"]["v"]["constant"]
     text = "\n".join(quality["remarks"])
-    for told in ("not numbers", "out of order", "repeat the time", "1 gaps", "4.10 s"):
+    for told in ("not numbers", "out of order", "repeats the time", "1 gap in", "4.10 s"):
         assert told in text
 
 

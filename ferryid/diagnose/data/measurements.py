@@ -154,7 +154,7 @@ def read_measurements(
     # Windows of a diagnosis end at a gap, so that smoothing loses nothing beside it; but they need the pose.
     placeless = LeftOut.of("the position or heading was not measured", measured.usable & ~scene.usable, track.rate_hz)
     motion = replace(motion, left_out=(*measured.left_out, *placeless))
-    said = left_out_sentences(recording, motion)
+    said = left_out_sentences(recording, motion.left_out, scene.usable)
     survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns, said)
     return scene, survey
 

@@ -81,6 +81,7 @@ def _too_short(log: AveragedLog, baseline: Baseline, campaign: tuple[frozenset[K
         {},
         (*survey_notes(screened), short, *notes),
         duration_s=_duration_s(screened),
+        left_out=screened.measured.survey.motion.left_out,
         remainder=remainder,
     )
 
@@ -121,6 +122,7 @@ def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosi
         against=estimated.expectation.comparison,
         moved=_moved(problem, kept) if kept.candidates else None,
         duration_s=_duration_s(screened),
+        left_out=survey.motion.left_out,
         posterior=posterior_of(problem, kept, selected.search.states, findings, survey) if updates else None,
         remainder=remainder,
     )

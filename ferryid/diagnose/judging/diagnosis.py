@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from ferryid.diagnose.data.estimate import Estimate
@@ -11,6 +11,7 @@ from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.locate import Location, plain_location
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.verdict import Remainder
+from ferryid.signals.track import LeftOut
 from ferryid.vessel.profile import Floats
 
 SCHEMA = "ferryid.diagnosis/1"
@@ -99,6 +100,8 @@ class Diagnosis:
         From the first to the last row of the log [s].
     remainder
         What is left beside the findings.
+    left_out
+        Rows of the log that are not used, by reason.
     """
 
     log: str
@@ -117,6 +120,7 @@ class Diagnosis:
     moved: HullChange | None = None
     duration_s: float | None = None
     remainder: Remainder = field(default_factory=Remainder)
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -144,6 +148,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.located is None else {"located": plain_location(diagnosis.located)}),
         **({} if diagnosis.moved is None else {"hull_moved": vars(diagnosis.moved)}),
         **({} if diagnosis.duration_s is None else {"duration_s": diagnosis.duration_s}),
+        "left_out": [asdict(one) for one in diagnosis.left_out],
     }
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ferryid.errors import FerryIdError
+from ferryid.files import remove_scratch
 from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
 from ferryid.ingest.unpack import codec_of, unpack_file, working_folder
 
@@ -36,7 +36,7 @@ class UnpackedLog:
                 raise FerryIdError(self._told(str(error))) from error
         except BaseException:
             # An exception keeps this object, and with it the folder, for as long as it is kept itself.
-            shutil.rmtree(folder, ignore_errors=True)
+            remove_scratch(folder)
             raise
         self.topics: tuple[Topic, ...] = self._inner.topics
 

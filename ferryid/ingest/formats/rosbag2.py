@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import mmap
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError
-from ferryid.files import scratch_folder
+from ferryid.files import remove_scratch, scratch_folder
 from ferryid.ingest.formats.mcap import SUFFIX as MCAP
 from ferryid.ingest.formats.mcap import McapLog
 from ferryid.ingest.formats.sqlite3_bag import SUFFIX as SQLITE
@@ -144,7 +143,7 @@ class FolderLog:
                 # The mapping keeps the bytes after the file's name is gone.
                 content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         finally:
-            shutil.rmtree(folder)
+            remove_scratch(folder)
         return _McapLog(path, content, codec, losses)
 
     def _described(self) -> tuple[Topic, ...]:
