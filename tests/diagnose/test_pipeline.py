@@ -2,21 +2,57 @@
 
 from __future__ import annotations
 
+import shutil
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
+from ferryid.diagnose.checks import screening
+from ferryid.diagnose.data import measurements
+from ferryid.diagnose.inference.baselines import HullBaseline
 from ferryid.diagnose.inference.estimation import HULL_SPREAD
-from ferryid.diagnose.judging.diagnosis import Diagnosis
-from ferryid.diagnose.pipeline import diagnose
+from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_campaign
 from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
+
+SHORT = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
 
 
 def diagnosed(name: str, folder: Path) -> Diagnosis:
     log = folder / f"{name}.mcap"
     write_log(simulate(load_scenario(name)), log)
     return diagnose([str(log)], load_profile("milliampere"), None, progress=lambda stage: None)[0]
+
+
+@pytest.mark.parametrize("together", [False, True])
+def test_every_log_is_read_aligned_and_checked_once(
+    together: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counts: Counter[str] = Counter()
+    for module, name in ((measurements, "record"), (measurements, "align"), (screening, "examine")):
+        stage = getattr(module, name)
+
+        def counted(*args: object, name: str = name, stage=stage, **more: object) -> object:
+            counts[name] += 1
+            return stage(*args, **more)
+
+        monkeypatch.setattr(module, name, counted)
+    logs = [str(shutil.copy(SHORT, tmp_path / f"{name}.mcap")) for name in "ab"]
+    settings = DiagnosisSettings(together=together)
+    made = diagnose(logs, load_profile("milliampere"), None, settings, progress=lambda stage: None)
+    assert [one.log for one in made] == ["a.mcap", "b.mcap"]
+    assert counts == {"record": 2, "align": 2, "examine": 2}
+
+
+def test_one_log_is_a_campaign_of_one() -> None:
+    ferry, log = load_profile("milliampere"), str(SHORT)
+    (alone,) = diagnose([log], ferry, None, progress=lambda stage: None)
+    (one,) = diagnose_campaign(
+        [log], ferry, None, HullBaseline(ferry), DiagnosisSettings(), progress=lambda stage: None
+    )
+    assert to_json(alone) == to_json(one)
 
 
 def test_a_thruster_that_gives_up_half_way_and_a_breeze(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_a_law_that_one_log_of_a_campaign_shows_is_a_hint() -> None:
 
 
 def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
-    least = absent_in_velocities.threshold or 0.0
+    least = 0.3
     assert stands(absent_in_velocities, found("waves"), on("disturbance", power_in_velocities=least))
     judged, _ = absent_in_velocities(found("waves"), on("disturbance", power_in_velocities=nextafter(least, 0.0)))
     assert judged is not None
@@ -105,6 +105,7 @@ def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
     [
         (0.5, 0.1, -0.1, 20.0, True),
         (0.5, -0.1, 0.1, 20.0, True),
+        (0.4, 0.1, -0.1, 20.0, True),
         (0.5, -0.1, -inf, 20.0, False),
         (0.3, 0.1, 0.1, 20.0, False),
         (0.3, 0.1, 0.1, STRONG, False),
@@ -239,8 +240,7 @@ def test_gusts_about_a_wind_that_is_not_sure_are_a_hint() -> None:
 
 @pytest.mark.parametrize("kind", ["force", "disturbance", "law", "unsteady", "bursts", "sensor"])
 def test_where_noise_drowns_an_axis_all_but_sensor_errors_are_hints(kind: Kind) -> None:
-    most = noise_drowns_an_axis.threshold or 0.0
-    for share, drowned in ((most, False), (nextafter(most, 1.0), True)):
+    for share, drowned in ((0.15, False), (nextafter(0.15, 1.0), True)):
         figures = LogFigures(velocity_noise={"surge": 0.0, "sway": share})
         sure = stands(noise_drowns_an_axis, found("wind"), Context(Figures(kind), figures))
         assert sure == (not drowned or kind == "sensor")
