@@ -22,7 +22,7 @@ evidence: $(VENV)/installed
 	$(BIN)/python -m tests.evidence
 
 demo: $(VENV)/installed
-	$(BIN)/ferryid simulate twelve-corner --out $(DEMO)/twelve-corner.mcap --overwrite
+	$(BIN)/ferryid simulate twelve-corner --out $(DEMO) --overwrite
 	$(BIN)/ferryid fit $(DEMO)/twelve-corner.mcap --vessel milliampere --delta 0.4 --sigma 0.4 --out $(DEMO)
 
 # The picture in the README.
@@ -80,7 +80,7 @@ wheel-check: $(VENV)/installed
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 	$(PYTHON) -m venv $(VENV)/wheel
 	$(VENV)/wheel/bin/pip install --quiet --constraint constraints.txt dist/*.whl
-	cd $(VENV)/wheel && bin/ferryid --version && bin/ferryid simulate four-corner --out four.bag --overwrite \
+	cd $(VENV)/wheel && bin/ferryid --version && bin/ferryid simulate four-corner --log four.bag --overwrite \
 	  && bin/ferryid fit four.bag --vessel milliampere --out out && bin/ferryid models --out out
 
 $(VENV)/installed: pyproject.toml constraints.txt

@@ -8,6 +8,7 @@ from math import inf, isfinite
 from typing import Any
 
 from ferryid.effects.force_model import ForceModel, Measurements, between
+from ferryid.effects.simulated import Simulated
 from ferryid.vessel.profile import Floats, Profile
 
 Values = Mapping[str, float]
@@ -111,6 +112,9 @@ class Effect:
         True where that sentence can be said of some of the values alone, those that a log tells.
     scenario
         What has to stand in a scenario file for the effect to act, from its values by name: nested tables as in TOML.
+    simulated
+        What it does to the simulated vessel, so that ``[[effects]]`` of a scenario can name it; None for one that the plant
+        knows by sections of its own.
     vessel
         True for a property of hull or actuators, which carries over to other logs; False for a condition of one log.
     choose
@@ -172,6 +176,7 @@ class Effect:
     unsteady: Callable[[ForceModel], Processes] | None = None
     about: str = ""
     regressor: Callable[[ForceModel, Floats, str | None, str], tuple[str, Floats]] | None = None
+    simulated: Simulated | None = None
 
     @property
     def turn(self) -> int:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import cos, sin
 from typing import Any
 
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.simulated import Simulated
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Floats, Profile
 
@@ -30,6 +32,15 @@ def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     scene = picture.scene
     X, Y = to_body(-p[0] * (scene.eta[:, 0] - p[2]), -p[1] * (scene.eta[:, 1] - p[3]), scene.psi)
     return replace(picture, external=picture.external + np.column_stack([X, Y, np.zeros_like(X)]))
+
+
+def load(
+    p: Floats, t: float, x: float, y: float, psi: float, u: float, v: float, r: float, u_r: float, v_r: float
+) -> tuple[float, float, float]:
+    """Return the spring's pull on the body origin [N, N, N·m] for the simulator; see `ferryid.effects.simulated.Simulated`."""
+    north, east = -p[0] * (x - p[2]), -p[1] * (y - p[3])
+    c, s = cos(psi), sin(psi)
+    return c * north + s * east, c * east - s * north, 0.0
 
 
 def cannot(scene: Measurements) -> str:
@@ -78,4 +89,5 @@ EFFECT = Effect(
     onset=True,
     regressor=regressor,
     form=0.05,
+    simulated=Simulated(load),
 )

@@ -1,4 +1,4 @@
-"""Where a simulated trial may be written: nothing is replaced unasked, and nothing that is not of the same kind."""
+"""Where a simulated trial is written: nothing is replaced unasked, and nothing that is not of the same kind."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.files import check_result, taken, unwritable
+from ferryid.ingest import log_suffixes
 from ferryid.ingest.rosbag2_metadata import NAME, read_metadata
 
 STORAGES = ("sqlite3", "mcap")
@@ -16,6 +17,19 @@ STARTS = {".mcap": b"\x89MCAP0\r\n", ".bag": b"#ROSBAG V"}
 PARQUET = b"PAR1"
 LONGEST_NAME = 200
 """Longest name in bytes; while it is written, a file has a longer one, and 255 is the most that file systems take."""
+
+
+def log_path(scenario: str, out: Path, log: Path | None) -> Path:
+    """Return the path of a trial's log: `log`, or else an MCAP file in the folder `out`, named after the scenario.
+
+    Raises
+    ------
+    FerryIdError
+        When `out` is named like a log.
+    """
+    if out.name.endswith(log_suffixes()) and not out.is_dir():
+        raise FerryIdError(f"--out: is the folder for results, found the name of a log, {out}. Fix: use --log {out}")
+    return log or out / f"{scenario}.mcap"
 
 
 def check_output(

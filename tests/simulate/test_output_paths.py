@@ -8,7 +8,7 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.files import replacing
-from ferryid.simulate.output_paths import check_output
+from ferryid.simulate.output_paths import check_output, log_path
 
 RECORDING = """rosbag2_bagfile_information:
   version: 9
@@ -137,3 +137,16 @@ def test_a_link_to_a_folder_is_replaced_without_a_rest(tmp_path: Path, recording
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "trial"]
     assert not link.is_symlink()
     assert sorted(path.name for path in recording.iterdir()) == ["metadata.yaml", "trial.db3"]
+
+
+@pytest.mark.parametrize("name", ["t.mcap", "t.bag", "t.bag.active", "t.db3", "t.csv", "t.mcap.zst"])
+def test_a_folder_for_results_is_not_named_like_a_log(tmp_path: Path, name: str) -> None:
+    with pytest.raises(FerryIdError, match=f"^--out: is the folder .*{name}.* Fix: use --log .*{name}$"):
+        log_path("short", tmp_path / name, None)
+    (tmp_path / name).mkdir()
+    assert log_path("short", tmp_path / name, None) == tmp_path / name / "short.mcap"
+
+
+def test_a_log_lies_in_the_folder_for_results_unless_it_is_given_a_place(tmp_path: Path) -> None:
+    assert log_path("short", tmp_path, None) == tmp_path / "short.mcap"
+    assert log_path("short", tmp_path, tmp_path / "trial") == tmp_path / "trial"
