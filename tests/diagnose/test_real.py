@@ -85,7 +85,7 @@ def test_the_receiver_of_milliampere_is_late(shared_data: Locate) -> None:
 
 def test_a_common_hull_points_to_the_hidden_wind_and_a_mirrored_one_does_not(shared_data: Locate) -> None:
     vessel = load_profile("esso-osaka")
-    logs = [str(shared_data(f"esso_osaka/random/random_06-Aug-2020_16_24_25_{k}.csv")) for k in (1, 3, 4, 5, 6)]
+    logs = sorted(str(path) for path in shared_data("esso_osaka/random").glob("*.csv"))
     joint = fit_campaign(averaged(logs, vessel, withhold=("wind",)), vessel, quiet)
     hidden = [read_measurements(log, vessel, None)[0].wind for log in logs]
     true = np.array([wind.mean(axis=0) for wind in hidden if wind is not None])
@@ -93,7 +93,7 @@ def test_a_common_hull_points_to_the_hidden_wind_and_a_mirrored_one_does_not(sha
     spread, lift = np.split(joint.hull.spread, [-len(INDUCED)])
     found = np.median(off(joint.hull, true))
     assert found < 25.0
-    assert np.median(off(fit_campaign_hull(mirrored, spread, lift), true)) > 4.0 * found
+    assert np.median(off(fit_campaign_hull(mirrored, spread, lift), true)) > 40.0
 
 
 def off(hull: CampaignHull, true: np.ndarray) -> np.ndarray:
