@@ -29,7 +29,7 @@ MAKERS: Mapping[str, tuple[str, ...]] = {
     "reports/waves.md": ("tests/wavy", *(f"cli/cmd_{name}.py" for name in ("simulate", "fit", "diagnose", "evaluate"))),
 }
 """Pages, and the folders or files of their makers."""
-BY_HAND = ("reports/proof/mended.md",)
+BY_HAND = ("reports/proof/changes.md",)
 """Pages that nothing makes."""
 STATES = "reports/sources.json"
 _NO_SOURCE = (".pyc", ".so")
