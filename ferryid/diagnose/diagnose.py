@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose.against import (
     Paths,
     Simulated,
@@ -154,7 +155,8 @@ def _begun(
     notes = [*survey.doubts, *survey.left_out, *_of_actuators(survey, profile)]
     if len(seen.starts) < FEWEST_WINDOWS:
         notes.append(
-            f"Only {len(seen.starts)} stretches of {window_lengths(profile)[0]:.0f} s without a gap: too little to tell. "
+            f"Only {counted(len(seen.starts), 'stretch')} of {window_lengths(profile)[0]:.0f} s without a "
+            "gap: too little to tell. "
             "Record at least ten minutes that excite every axis."
         )
         return Diagnosis(

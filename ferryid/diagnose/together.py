@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.hypothesis import Suspect
 from ferryid.diagnose.noise import ORDER
@@ -49,9 +50,7 @@ class Together:
             if apart > 1.0
             else "They disagree about it by no more than the noise in them explains."
         )
-        return (
-            f"The hull is that of {others} other log{'s' if others > 1 else ''} of the vessel, lift included. {agree}"
-        )
+        return f"The hull is that of {counted(others, 'other log')} of the vessel, lift included. {agree}"
 
 
 def together(
@@ -92,7 +91,7 @@ def together(
             f"--together: a common hull needs two logs of {profile.name} with a minute or more of motion each, found "
             f"{len(members)} of {len(logs)}. Fix: give more logs, or leave out --together"
         )
-    progress(f"fitting one hull to {len(members)} logs")
+    progress(f"fitting one hull to {counted(len(members), 'log')}")
     length, _, draught = dimensions(profile)
     induced_size = np.zeros(len(INDUCED)) if profile.hull.has_model else induced_spread(length, draught)
     return Together(tuple(members), fit_together(members, np.max(spreads, axis=0), induced_size), place)

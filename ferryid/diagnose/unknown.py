@@ -12,6 +12,7 @@ from math import exp
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose.bands import BURST_HZ, Band, Burst, bursts_of
 from ferryid.diagnose.folds import Folds, folds_of
 from ferryid.diagnose.hypothesis import Fit, Trial, fit, imagined
@@ -80,7 +81,9 @@ def unknown_of(trial: Trial, kept: Fit, scene: Scene, heard: Heard | None = None
     folds = folds_of(trial.windows)
     after, seen = kept, trial
     if folds is not None and heard is not None and (common := heard.common(trial, kept, folds)) is not None:
-        findings.append(_lawful(common, after, scene, f"that holds in all {heard.able} logs that can show it"))
+        findings.append(
+            _lawful(common, after, scene, f"that holds in all {counted(heard.able, 'log')} that can show it")
+        )
         after, seen = common.fit, common.trial
     if folds is not None and (law := law_of(seen, after, folds)) is not None:
         own = _lawful(law, after, scene, "that was seen in this log only")
@@ -143,7 +146,7 @@ def _displaced(trial: Trial, kept: Fit, index: int, folds: Folds) -> bool:
 def _of_one(finding: Finding, others: int, able: int, hold: int) -> Finding:
     """Return a law that is one log's alone as a hint, with what the vessel's other logs say of it."""
     shown = f", and {hold or 'none'} {'does' if hold < 2 else 'do'}" if able else ""
-    told = f"Of {others} other log{'s' if others > 1 else ''} {able or 'none'} could show it at this size{shown}."
+    told = f"Of {counted(others, 'other log')} {able or 'none'} could show it at this size{shown}."
     return replace(finding, probability=min(finding.probability, HINT), says=f"{finding.says} {told}")
 
 

@@ -17,6 +17,7 @@ from typing import Any
 
 from scipy.stats import chi2
 
+from ferryid.counts import counted
 from ferryid.diagnose.checks import resteadied
 from ferryid.diagnose.diagnose import FEWEST_WINDOWS
 from ferryid.diagnose.hypothesis import Suspect, Trial, trial_of
@@ -168,7 +169,7 @@ class _Log:
     def too_short(self) -> str:
         """Why nothing can be fitted; empty where it can."""
         found = len(self.windows.starts)
-        return f"only {found} stretches without a gap" if found < FEWEST_WINDOWS else ""
+        return f"only {counted(found, 'stretch')} without a gap" if found < FEWEST_WINDOWS else ""
 
 
 def _check(profile: Profile, truths: Sequence[Truth]) -> None:

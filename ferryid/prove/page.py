@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose.result import AXES
 from ferryid.prove.conceal import HIDINGS
 from ferryid.prove.curves import Curve
@@ -124,7 +125,8 @@ def page(result: Mapping[str, Any], scores: Scores) -> str:
     text = [
         "# Proof: what `ferryid diagnose` finds that was concealed",
         "",
-        f"Written by `{_command(result)}`: {scores.runs} logs, {result['settings']['runs']:g} of each size of each effect.",
+        f"Written by `{_command(result)}`: {counted(scores.runs, 'log')}, {result['settings']['runs']:g} of "
+        "each size of each effect.",
         _counted(result["counts"], scores.seconds),
         "What was mended because of such proofs, and what remains weak, stands in `reports/proof/mended.md`.",
         "",

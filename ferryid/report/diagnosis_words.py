@@ -7,6 +7,7 @@ from math import exp, isfinite, log
 from pathlib import PurePath
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.diagnose.result import AXES, NEAR, Diagnosis, Estimate, Finding
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS
@@ -263,7 +264,7 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     ]
     found = dict.fromkeys(_inline(title(f.effect, f.instance)) for one in diagnoses for f in one.findings)
     left_out = f" The model left out {listed(list(found))}." if found else ""
-    return f"Of {len(diagnoses)} logs, {listed(counts)}.{left_out}"
+    return f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}.{left_out}"
 
 
 def force_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
