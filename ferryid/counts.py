@@ -1,21 +1,22 @@
-"""Counted nouns in sentences: one row, two rows."""
+"""Counted nouns in sentences, and verbs that agree with them: "1 row is left out", "2 rows are left out"."""
 
 from __future__ import annotations
 
-_IRREGULAR = {"axis": "axes", "basis": "bases", "is": "are", "was": "were", "has": "have", "this": "these"}
+_NOUNS = {"axis": "axes", "basis": "bases"}
+_VERBS = {"is": "are", "was": "were", "has": "have", "does": "do"}
 _HISSING = ("s", "x", "ch", "sh")
 
 
 def plural(number: float, noun: str) -> str:
-    """Return a noun, or a verb such as "is", as it stands beside a number: ``plural(1, "row")`` is "row".
+    """Return a noun as it stands beside a number: ``plural(1, "row")`` is "row", ``plural(2, "row")`` is "rows".
 
     Of several words the last one changes: "damaged row" becomes "damaged rows".
     """
     if number == 1:
         return noun
     rest, space, last = noun.rpartition(" ")
-    if last in _IRREGULAR:
-        many = _IRREGULAR[last]
+    if last in _NOUNS:
+        many = _NOUNS[last]
     elif last.endswith(_HISSING):
         many = f"{last}es"
     elif last.endswith("y") and last[-2:-1] not in "aeiou":
@@ -23,6 +24,11 @@ def plural(number: float, noun: str) -> str:
     else:
         many = f"{last}s"
     return f"{rest}{space}{many}"
+
+
+def verb(number: float, singular: str) -> str:
+    """Return a verb as it agrees with a number: ``verb(1, "repeats")`` is "repeats", ``verb(2, "repeats")`` is "repeat"."""
+    return singular if number == 1 else _VERBS.get(singular, singular.removesuffix("s"))
 
 
 def counted(number: int, noun: str) -> str:

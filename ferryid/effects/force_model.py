@@ -13,6 +13,7 @@ from math import cos, inf, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.effects.equations_of_motion import Places, accelerations, from_antenna, required, slopes
 from ferryid.vessel.hull import payload_mass
 from ferryid.vessel.profile import Floats, Profile
@@ -256,7 +257,7 @@ def _forces(picture: ForceModel) -> tuple[Floats, Floats, Floats, Floats]:
     # Compiled code does not look where an array ends.
     lengths = {len(one) for one in (picture.external, flow, load, factor) if len(one)}
     if lengths - {n} or picture.scene.nu.shape != (n, 3) or picture.parts.shape[::2] != (n, 3):
-        raise ValueError(f"a picture of {n} rows has parts of other lengths: {sorted(lengths)}")
+        raise ValueError(f"a picture of {counted(n, 'row')} has parts of other lengths: {sorted(lengths)}")
     external, flow, load, factor = map(np.ascontiguousarray, (picture.external, flow, load, factor))
     return external, flow, load, factor
 

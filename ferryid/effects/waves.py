@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import plural
 from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
 from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats, Profile
@@ -65,7 +66,7 @@ def says(values: Values, instance: str | None) -> str:
     ]
     return (
         f"Waves of {1.0 / values['peak_frequency']:.1f} s pushed the vessel with {' and '.join(forces)} "
-        f"(standard deviation{'s' if len(forces) > 1 else ''}), which nothing measured explains."
+        f"({plural(len(forces), 'standard deviation')}), which nothing measured explains."
     )
 
 

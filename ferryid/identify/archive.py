@@ -341,7 +341,7 @@ def _scores(
         "seconds": validated,
         "split": settings.split,
         "split_notes": [
-            f"{len(sums.logs)} logs: {trained:.0f} s train, {validated:.0f} s validate, "
+            f"{counted(len(sums.logs), 'log')}: {trained:.0f} s train, {validated:.0f} s validate, "
             + ("whole logs, one of every three in a row." if settings.split == "logs" else "in blocks of every log.")
         ],
     }

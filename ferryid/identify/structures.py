@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.bases import forms
 from ferryid.identify.basis import STRUCTURES, Basis, sized
@@ -327,7 +328,9 @@ def _notes(by: Mapping[str, Compared], settings: FitSettings) -> list[str]:
         if least >= 1.0:
             notes.append(f"By {BY[key]} none predicts force better than the base model does without any.")
     if blocks.blocks < FEW_BLOCKS:
-        notes.append(f"Only {blocks.blocks} independent stretches to draw from: the intervals are probably too narrow.")
+        notes.append(
+            f"Only {counted(blocks.blocks, 'independent stretch')} to draw from: the intervals are probably too narrow."
+        )
     if settings.components == "auto" and any(one.folds < 3 for one in by.values()):
         notes.append("With two folds the number of components was chosen on both: errors are a little too small.")
     if settings.residual != "measured":

@@ -7,6 +7,7 @@ import pkgutil
 from functools import cache
 from pathlib import Path
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest import formats
 from ferryid.ingest.log import Format, Reader, TableLayout
@@ -113,7 +114,7 @@ def _open_folder(folder: Path, layout: TableLayout | None) -> Reader:
     if not parts:
         inside = sorted(file.name for file in folder.iterdir())
         found = (
-            f"{len(inside)} entries ({', '.join(inside[:3])}{', …' if len(inside) > 3 else ''})"
+            f"{counted(len(inside), 'entry')} ({', '.join(inside[:3])}{', …' if len(inside) > 3 else ''})"
             if inside
             else "nothing"
         )

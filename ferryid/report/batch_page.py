@@ -182,7 +182,8 @@ def _findings(trends: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
             {
                 "title": f"{head}, {vessel}",
                 "svg": batch_figures.findings(every),
-                "caption": f"{head} in {len(logs)} logs, with their 95 % intervals. Hollow: a hint, less likely than not. "
+                "caption": f"{head} in {counted(len(logs), 'log')}, with their 95 % intervals. Hollow: a "
+                "hint, less likely than not. "
                 f"Grey: logs whose diagnosis did not find it.{order}",
             }
         )
@@ -208,7 +209,7 @@ def _errors(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
             {
                 "title": f"Force errors, {vessel}",
                 "svg": batch_figures.errors(own, dated),
-                "caption": f"Root-mean-square force error of {len(own)} logs. {fitted}{evaluated}",
+                "caption": f"Root-mean-square force error of {counted(len(own), 'log')}. {fitted}{evaluated}",
             }
         )
     return shown

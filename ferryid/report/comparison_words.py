@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.effects.wording import listed
 from ferryid.identify.candidates import BASE
 from ferryid.identify.model import AXES
@@ -36,8 +37,8 @@ def about(scope: Row) -> str:
     blocks = scope["blocks"]
     length = f" of {scope['block_s']:.3g} s" if "block_s" in scope else ""
     return (
-        f"{scope['rows']} rows, {scope['seconds']:.0f} s, {blocks} block{'s' * (blocks != 1)}{length}, "
-        f"{scope['free_run']['starts']} free runs"
+        f"{counted(scope['rows'], 'row')}, {scope['seconds']:.0f} s, {counted(blocks, 'block')}{length}, "
+        f"{counted(scope['free_run']['starts'], 'free run')}"
     )
 
 
@@ -113,7 +114,7 @@ def headline(result: Row) -> str:
     known = scopes(result)
     models = [model["label"] for model in result["models"]]
     if not known:
-        return f"{len(models)} models by their coefficients alone: no log was given to judge them on."
+        return f"{counted(len(models), 'model')} by their coefficients alone: no log was given to judge them on."
     on, title, _ = known[-1]
     groups: dict[tuple[str, str], list[str]] = {}
     for axis in AXES:

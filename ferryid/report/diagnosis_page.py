@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose import AXES, Diagnosis, Finding, campaign_verdict
 from ferryid.identify.result import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
@@ -215,7 +216,8 @@ def _free_run_figures(diagnosis: Diagnosis, prefix: str) -> list[dict[str, str]]
         {
             "file": f"{prefix}free-run-errors",
             "svg": figures.free_run_errors(_free_run(before), _free_run(after)),
-            "caption": f"Root-mean-square error of {before.get('starts', 0)} free runs on held-out data: each takes the "
+            "caption": f"Root-mean-square error of {counted(before.get('starts', 0), 'free run')} on "
+            "held-out data: each takes the "
             "measured state once and then only the measured actuator forces. New model: with the findings.",
         }
     ]

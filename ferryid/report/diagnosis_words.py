@@ -7,6 +7,7 @@ from math import exp, isfinite, log
 from pathlib import PurePath
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.diagnose import AXES, CHANGED, NEAR, UNKNOWN, Diagnosis, Estimate, Finding, error_ratio, worse_axes
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
@@ -263,7 +264,7 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
     sure = list(dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if one.sure))
     doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
     perhaps = [one for one in doubtful if one not in sure]
-    parts = [f"Of {len(diagnoses)} logs, {listed(counts)}."]
+    parts = [f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}."]
     if sure:
         parts.append(f"The model left out {listed(sure)}.")
     if perhaps:

@@ -6,6 +6,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, Template
 
+from ferryid.counts import counted
 from ferryid.errors import printable
 
 
@@ -18,6 +19,7 @@ def template(name: str) -> Template:
         lstrip_blocks=True,
         finalize=_visible,
     )
+    environment.globals["counted"] = counted
     return environment.get_template(name)
 
 

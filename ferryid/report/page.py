@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.identify.excitation import RANGE_UNITS
 from ferryid.identify.inertia import effective_mass
 from ferryid.identify.result import AXES, FitResult, LogFit
@@ -51,7 +52,9 @@ def headline(result: FitResult) -> str:
         word = "below" if change < 0 else "above"
         told = f"mean square force error {abs(change):.1%} {word} {base} on data it did not see"
     count = len(result.warnings)
-    trust = f" Read the {count} warnings first." if count > 1 else " Read the warning first." if count else ""
+    trust = (
+        f" Read the {counted(count, 'warning')} first." if count > 1 else " Read the warning first." if count else ""
+    )
     if result.verdict.accepted:
         return f"Accepted: {told}.{trust}"
     return f"Not accepted: {told}."
@@ -204,7 +207,8 @@ def _free_run_figures(result: FitResult) -> list[dict[str, str]]:
             {
                 "file": "free-run-errors",
                 "svg": figures.free_run_errors(base, new),
-                "caption": f"Root-mean-square error of {max(base.starts, new.starts)} runs on validation rows: each takes "
+                "caption": f"Root-mean-square error of {counted(max(base.starts, new.starts), 'run')} on "
+                "validation rows: each takes "
                 "the measured state once and then only the measured actuator forces.",
             }
         )
@@ -275,7 +279,8 @@ def _excitation_lines(result: FitResult) -> list[str]:
     if values.size and values[0] > 0:
         weak = int(np.sum(values < 1e-3 * values[0]))
         lines.append(
-            f"{len(values)} basis terms; the weakest combination is excited {values[-1] / values[0]:.1e} times as much "
+            f"{counted(len(values), 'basis term')}; the weakest combination is excited "
+            f"{values[-1] / values[0]:.1e} times as much "
             f"as the strongest, and {weak} are below a thousandth."
         )
     if np.isfinite(excitation.heading_coverage):
@@ -330,7 +335,7 @@ def _provenance(result: FitResult) -> list[dict[str, str]]:
         rows.append(
             (
                 f"log {log['name']}",
-                f"{', '.join(log['files'])}; {log['seconds']:.0f} s, {log['rows']} rows; {log['sha256']}",
+                f"{', '.join(log['files'])}; {log['seconds']:.0f} s, {counted(log['rows'], 'row')}; {log['sha256']}",
             )
         )
     return [{"name": name, "value": value} for name, value in rows]

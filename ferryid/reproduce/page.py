@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ferryid.counts import counted
 from ferryid.reproduce.study import Row, Study, Table, high, low, number, percent
 
 HEAD = """# The thesis reproduced
@@ -50,7 +51,7 @@ def page(studies: Sequence[Study], seeds: Sequence[int], folder: str) -> str:
     folder
         Where the figures lie, as seen from the page.
     """
-    lines = [HEAD.format(runs=f"{len(seeds)} run" + "s" * (len(seeds) > 1)), *summary(studies)]
+    lines = [HEAD.format(runs=counted(len(seeds), "run")), *summary(studies)]
     lines += [f"- [{study.title}](#{study.name})" for study in studies]
     lines += ["- [What was chosen, and when](#chosen)"]
     for study in studies:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.counts import counted, plural
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.signals.consistency import cross_checks
 from ferryid.signals.faults import Faults, find_faults
@@ -136,7 +136,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
     t0_ns += round(int(rows[0]) * 1e9 / rate)
     repairs.extend(
         f"{one.rows} of {counted(total, 'row')} ({one.seconds:.1f} s in {counted(one.stretches, 'stretch')}) "
-        f"{plural(one.rows, 'is')} not used: {one.reason}."
+        f"{verb(one.rows, 'is')} not used: {one.reason}."
         for one in left_out
     )
     track = Track(recording.name, t[: valid.size], t0_ns, rate, columns, valid, tuple(repairs), left_out=left_out)
@@ -181,7 +181,7 @@ def _overlap(log: str, navigation: Sequence[Source], actuators: Sequence[Source]
 def _spread(log: str, lead: Source, seconds: float) -> str:
     """Return the message on a velocity whose samples are far apart: a long pause, or wrong times."""
     pause = np.diff(lead.time_ns).max() * 1e-9 if lead.time_ns.size > 1 else 0.0
-    found = f"{len(lead.time_ns)} samples of the velocity over {seconds:.4g} s"
+    found = f"{counted(len(lead.time_ns), 'sample')} of the velocity over {seconds:.4g} s"
     if pause < _PAUSE_SHARE * seconds:
         return (
             f"{log}: its times cannot be right, found {found}. "

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.counts import counted, plural
+from ferryid.counts import counted, verb
 from ferryid.ingest.log import Loss
 from ferryid.signals.parquet import unit_of
 from ferryid.signals.quality import clean
@@ -102,7 +102,7 @@ def rows_left_out(left_out: Sequence[LeftOut], total: int) -> tuple[str, ...]:
         for one in left_out
     )
     rows, seconds = _rows(left_out), sum(one.seconds for one in left_out)
-    return (f"{rows} of {counted(total, 'row')} ({seconds:.1f} s) {plural(rows, 'is')} left out: {reasons}.",)
+    return (f"{rows} of {counted(total, 'row')} ({seconds:.1f} s) {verb(rows, 'is')} left out: {reasons}.",)
 
 
 def _rows(left_out: Sequence[LeftOut]) -> int:
@@ -146,10 +146,8 @@ def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
     else:
         what = "messages may be lost" if unknown else "no message is known to be lost"
     others = len(losses) - 1
-    return (
-        f"{what}: {loss_sentence(main_loss(losses))[:-1]}"
-        + (f"; and {others} more, see ferryid inspect." if others else "."),
-    )
+    rest = f"; and {counted(others, 'more loss')}, see ferryid inspect." if others else "."
+    return (f"{what}: {loss_sentence(main_loss(losses))[:-1]}{rest}",)
 
 
 def main_loss(losses: Sequence[Loss]) -> Loss:
@@ -180,12 +178,12 @@ def dropped_rows(clocks: Sequence[Mapping[str, Any]]) -> dict[str, int]:
 def _of_clock(stream: Stream) -> list[str]:
     clock = stream.clock
     said = [
-        f"{count} of {counted(clock.count + clock.dropped, 'row')} {plural(count, 'is')} left out: {why}"
+        f"{count} of {counted(clock.count + clock.dropped, 'row')} {verb(count, 'is')} left out: {why}"
         for why, count in dropped_rows([clock.to_dict()]).items()
     ]
     if clock.replaced:
         said.append(
-            f"{clock.replaced} of {counted(clock.count, 'row')} had a senseless stamp and {plural(clock.replaced, 'is')} put "
+            f"{clock.replaced} of {counted(clock.count, 'row')} had a senseless stamp and {verb(clock.replaced, 'is')} put "
             f"at {'its' if clock.replaced == 1 else 'their'} receive time"
         )
     return said
@@ -206,11 +204,11 @@ def clock_notes(out_of_order: int, duplicates: int) -> list[str]:
     """Return what was done with the rows of a topic that were not in order or had the time of another."""
     told = []
     if out_of_order:
-        told.append(f"{counted(out_of_order, 'row')} out of order {plural(out_of_order, 'was')} sorted into place")
+        told.append(f"{counted(out_of_order, 'row')} out of order {verb(out_of_order, 'was')} sorted into place")
     if duplicates:
-        repeat = "repeats" if duplicates == 1 else "repeat"
         told.append(
-            f"{counted(duplicates, 'row')} {repeat} the time of another and {plural(duplicates, 'was')} left out"
+            f"{counted(duplicates, 'row')} {verb(duplicates, 'repeats')} the time of another and "
+            f"{verb(duplicates, 'was')} left out"
         )
     return told
 

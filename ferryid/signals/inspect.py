@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log, supported_formats
 from ferryid.ingest.clocks import ClockReport, repair_all
@@ -253,7 +254,7 @@ def _format_of(path: Path, reader: Reader) -> str:
         with first.open("rb") as file:
             head = file.read(64)
         name = next((entry.name for entry in supported_formats() if entry.matches(first, head)), "")
-    return f"{name}, {len(reader.paths)} files" if len(reader.paths) > 1 else name
+    return f"{name}, {counted(len(reader.paths), 'file')}" if len(reader.paths) > 1 else name
 
 
 def _size(path: Path) -> int:

@@ -171,7 +171,8 @@ def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
             if kind == "frequent":
                 far = f"{size:.2f} m" if signal == "position" else f"{np.degrees(size):.0f}°"
                 said.append(
-                    f"The {signal} jumps {len(those)} times farther than the vessel can move, by up to {far}: too often to "
+                    f"The {signal} jumps {counted(len(those), 'time')} farther than the vessel can move, by "
+                    f"up to {far}: too often to "
                     "know which samples are wrong, so that none is left out. Check the sensor and its fields in the profile."
                 )
                 continue

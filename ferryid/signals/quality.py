@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.counts import counted, plural
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.signals.track import Track
 from ferryid.vessel.frames import wrap
@@ -103,10 +103,10 @@ class ColumnQuality:
         said = []
         if self.missing:
             bridged = "the value before holds" if is_load(name) else "short ones are interpolated"
-            said.append(f"{name}: {self.missing} {of} {plural(self.missing, 'is')} missing (NaN); {bridged}.")
+            said.append(f"{name}: {self.missing} {of} {verb(self.missing, 'is')} missing (NaN); {bridged}.")
         if self.through_wrap:
             said.append(
-                f"{name}: {self.through_wrap} {of} {plural(self.through_wrap, 'was')} interpolated the wrong way round "
+                f"{name}: {self.through_wrap} {of} {verb(self.through_wrap, 'was')} interpolated the wrong way round "
                 "between 359° and 1°; removed and interpolated."
             )
         if self.spikes:
@@ -121,15 +121,15 @@ class ColumnQuality:
         said = []
         if self.jumps:
             kept = "" if name in POSE else " and kept"
-            said.append(f"{name}: {counted(self.jumps, 'implausible step')} {plural(self.jumps, 'was')} found{kept}.")
+            said.append(f"{name}: {counted(self.jumps, 'implausible step')} {verb(self.jumps, 'was')} found{kept}.")
         if self.held:
             share = self.held / max(1, self.count)
             which = (
                 "; most samples repeat the one before: it is updated slower than it is recorded" if share > 0.5 else ""
             )
-            repeat = "repeats" if self.held == 1 else "repeat"
             said.append(
-                f"{name}: {self.held} of {counted(self.count, 'sample')} {repeat} the one before, at most for "
+                f"{name}: {self.held} of {counted(self.count, 'sample')} {verb(self.held, 'repeats')} the one "
+                "before, at most for "
                 f"{self.longest_held_s:.2f} s{which}."
             )
         if self.constant and self.count > 1:

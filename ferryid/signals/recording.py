@@ -8,6 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
@@ -161,7 +162,8 @@ def _log_notes(streams: Mapping[str, Stream], selection: Selection, topics: tupl
     received = sorted(topic for topic, stream in streams.items() if stream.clock.source == "receive")
     if stamped and received:
         notes.append(
-            f"{len(stamped)} topic(s) are on their senders' stamps and {len(received)} on receive times "
+            f"{counted(len(stamped), 'topic')} {verb(len(stamped), 'is')} on senders' stamps and "
+            f"{len(received)} on receive times "
             f"({', '.join(received)}): the latter are later by their unknown latency"
         )
     elif received and not all(topic.encoding == "table" for topic in topics):

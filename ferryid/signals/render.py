@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ferryid.counts import counted, plural
+from ferryid.counts import counted, verb
 from ferryid.errors import one_line
 from ferryid.ingest.log import Loss
 from ferryid.signals.data_quality import dropped_rows, loss_sentence, named
@@ -55,7 +55,7 @@ def _left_out(result: Mapping[str, Any]) -> list[str]:
     if dropped:
         count = sum(dropped.values())
         why = ", ".join(f"{number} as {reason}" for reason, number in dropped.items())
-        said.append(f"{counted(count, 'row')} {plural(count, 'is')} left out for wrong times: {why}")
+        said.append(f"{counted(count, 'row')} {verb(count, 'is')} left out for wrong times: {why}")
     vessel = result["vessel"]
     rows = sum(one["rows"] for one in vessel["left_out"]) if vessel is not None else 0
     if rows:
@@ -143,17 +143,18 @@ def _fields(topics: Sequence[Mapping[str, Any]], width: int) -> str:
 def _matches(matches: Sequence[Mapping[str, Any]], width: int) -> str:
     usable = [match for match in matches if match["usable"]]
     lines = ["Bundled vessel profiles"]
-    lines += [f"  {one['name']}: fits, {one['found']} of {one['signals']} signals found" for one in usable]
+    lines += [f"  {one['name']}: fits, {one['found']} of {counted(one['signals'], 'signal')} found" for one in usable]
     for one in matches:
         if one["problem"]:
             lines += _wrapped(
-                f"{one['name']}: {one['found']} of {one['signals']} signals found, but a fit refuses the log: {one['problem']}",
+                f"{one['name']}: {one['found']} of {counted(one['signals'], 'signal')} found, but a fit "
+                f"refuses the log: {one['problem']}",
                 width,
             )
     if not usable and len(lines) == 1:
         best = max(matches, key=lambda one: int(one["found"]), default=None)
         near = (
-            f" (nearest: {best['name']}, {best['found']} of {best['signals']} signals)"
+            f" (nearest: {best['name']}, {best['found']} of {counted(best['signals'], 'signal')})"
             if best and best["found"]
             else ""
         )
@@ -257,4 +258,4 @@ def _bytes(size: int) -> str:
     for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if size >= scale:
             return f"{size / scale:.1f} {unit}"
-    return f"{size} bytes"
+    return f"{counted(size, 'byte')}"

@@ -8,6 +8,7 @@ from pathlib import PurePath
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.signals.quality import NAVIGATION, is_actuator, is_order
 from ferryid.signals.stream import Recording, Stream
@@ -94,7 +95,7 @@ def _standing(recording: Recording, streams: Sequence[Stream]) -> str:
         found = "one row only" if rows else "no row"
         return f"{file}: {stream.topic} holds {found}, and motion needs many. Fix: use a longer log"
     is_table = any(topic.encoding == "table" for topic in recording.topics)
-    found = f"{rows} rows of {stream.topic}" if is_table else f"{rows} messages on {stream.topic}"
+    found = f"{counted(rows, 'row')} of {stream.topic}" if is_table else f"{counted(rows, 'message')} on {stream.topic}"
     remedy = (
         "name another time column under [table] in the profile, or record the log again"
         if is_table

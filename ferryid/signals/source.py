@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.counts import counted
+from ferryid.counts import counted, verb
 from ferryid.signals.quality import VELOCITY, clean, is_actuator, is_load, is_order, stale, stuck
 from ferryid.signals.stream import Stream
 from ferryid.signals.track import segments
@@ -100,7 +100,8 @@ def source_of(stream: Stream) -> Source:
             values[old] = np.nan
         held += _stretches(tuple(columns), time_ns, old, f"{stream.topic} repeats an old measurement")
         taken_out.append(
-            f"{stream.topic}: {int(old.sum())} of {counted(old.size, 'message')} repeat an old measurement for more than "
+            f"{stream.topic}: {int(old.sum())} of {counted(old.size, 'message')} "
+            f"{verb(int(old.sum()), 'repeats')} an old measurement for more than "
             f"{bridge:.2f} s; taken as missing."
         )
     frozen = max(bridge, STUCK_PERIODS * period)
@@ -109,7 +110,8 @@ def source_of(stream: Stream) -> Source:
             columns[name][same] = np.nan
             held += _stretches((name,), time_ns, same, f"{name} repeats an old value to the last digit")
             taken_out.append(
-                f"{name}: {int(same.sum())} of {counted(same.size, 'sample')} repeat an old one to the last digit for more "
+                f"{name}: {int(same.sum())} of {counted(same.size, 'sample')} "
+                f"{verb(int(same.sum()), 'repeats')} an old one to the last digit for more "
                 f"than {frozen:.2f} s; taken as missing."
             )
     on_change = _on_change(time_s, stream.columns)

@@ -107,7 +107,7 @@ def held_sentences(held: Sequence[HeldVelocity], samples: Samples) -> tuple[str,
         those = [one for one in held if one.signal == name]
         if those:
             values = sorted({round(one.value, 6) for one in those})
-            at = f"{values[0]:g} {unit}" if len(values) == 1 else f"one of {len(values)} values"
+            at = f"{values[0]:g} {unit}" if len(values) == 1 else f"one of {counted(len(values), 'value')}"
             count = sum(one.samples for one in those)
             said.append(
                 f"{name}: the {what} stays at {at} while the {of} moves, {counted(len(those), 'time')}, at most for "

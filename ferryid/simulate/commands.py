@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.identify.store import load_file
@@ -145,7 +146,7 @@ def render_simulation(result: Mapping[str, Any]) -> str:
     if result["truth"] is not None:
         lines.append(f"true states: {result['truth']}")
     width = max(len(topic) for topic in result["topics"])
-    lines += [f"  {topic:<{width}}  {count:>7} messages" for topic, count in result["topics"].items()]
+    lines += [f"  {topic:<{width}}  {counted(count, 'message'):>16}" for topic, count in result["topics"].items()]
     rms = result["tracking_rms"]
     if rms["position_m"] is not None:
         lines.append(

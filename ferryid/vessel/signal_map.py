@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ferryid.counts import counted, plural
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import Loss, Series, Topic
 from ferryid.vessel.frames import heading_from_enu, local_north_east, yaw_of_quaternion
@@ -139,7 +139,7 @@ def select(profile: Profile, topics: Sequence[Topic], where: str, losses: Sequen
     if lacking:
         signal = lacking[0]
         others = len(lacking) - 1
-        more = f" ({counted(others, 'more required signal')} {plural(others, 'is')} missing)" if others else ""
+        more = f" ({counted(others, 'more required signal')} {verb(others, 'is')} missing)" if others else ""
         unread = _unread(signal, losses) if _topic(signal.topic, topics) is None else None
         if unread is not None:
             what, _, remedy = unread.what.partition(" Fix: ")
@@ -244,7 +244,8 @@ def _check_turns(profile: Profile, signal: Signal, values: list[Floats]) -> None
         return
     raise FerryIdError(
         f"{profile.path}:{signal.line}: {signal.quantity} is declared in {unit}, found a field {path} in {signal.topic} that "
-        f"stays within {turn:.4g} and jumps by as much {jumps} times, as {other} do at a full turn. Fix: correct the unit"
+        f"stays within {turn:.4g} and jumps by as much {counted(jumps, 'time')}, as {other} do at a full "
+        "turn. Fix: correct the unit"
     )
 
 

@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -33,7 +34,8 @@ def find(scene: Measurements) -> SensorFinding | None:
     return SensorFinding(
         "heading_wrap",
         {"samples": Estimate(count, count, count, "-")},
-        f"The heading was interpolated the long way round at the wrap: {count:.0f} samples in between are false.",
+        f"The heading was interpolated the long way round at the wrap: {counted(int(count), 'sample')} in "
+        f"between {verb(count, 'is')} false.",
         correct,
         {"time_s": scene.t[inside], "heading_rad": scene.psi[inside], "repaired_rad": psi[inside]},
     )

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
@@ -55,7 +56,7 @@ def find(scene: Measurements) -> SensorFinding | None:
     return SensorFinding(
         "held_samples",
         {"share": Estimate(percent, percent, percent, "%"), "longest": Estimate(longest, longest, longest, "s")},
-        f"Old samples were repeated {len(edges)} times, for up to {longest:.1f} s, "
+        f"Old samples were repeated {counted(len(edges), 'time')}, for up to {longest:.1f} s, "
         f"{percent:.1f} % of the log ({', '.join(names)}).",
         correct,
         {"first_s": scene.t[edges[:, 0]], "last_s": scene.t[edges[:, 1] - 1]},

@@ -8,6 +8,7 @@ from math import sqrt
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose.data.measurements import dimensions
 from ferryid.diagnose.inference.autoregression import ORDER
 from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, Member, fit_campaign_hull, induced_spread
@@ -49,9 +50,7 @@ class Campaign:
             if apart > 1.0
             else "They disagree about it by no more than the noise in them explains."
         )
-        return (
-            f"The hull is that of {others} other log{'s' if others > 1 else ''} of the vessel, lift included. {agree}"
-        )
+        return f"The hull is that of {counted(others, 'other log')} of the vessel, lift included. {agree}"
 
 
 def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callable[[str], None]) -> Campaign:
@@ -87,7 +86,7 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
             f"--together: a common hull needs two logs of {profile.name} with a minute or more of motion each, found "
             f"{len(members)} of {len(logs)}. Fix: give more logs, or leave out --together"
         )
-    progress(f"fitting one hull to {len(members)} logs")
+    progress(f"fitting one hull to {counted(len(members), 'log')}")
     length, _, draught = dimensions(profile)
     induced_size = np.zeros(len(INDUCED)) if profile.hull.has_model else induced_spread(length, draught)
     return Campaign(tuple(members), fit_campaign_hull(members, np.max(spreads, axis=0), induced_size), place)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.check import SensorFinding
 from ferryid.diagnose.data.estimate import Estimate
@@ -103,7 +104,8 @@ def learn_simulation(
     seen = windows(scene, *window_lengths(profile))
     if len(seen.starts) < FEWEST_WINDOWS:
         raise FerryIdError(
-            f"{name}: --against needs a simulation long enough to learn its model from, found {len(seen.starts)} stretches of "
+            f"{name}: --against needs a simulation long enough to learn its model from, found "
+            f"{counted(len(seen.starts), 'stretch')} of "
             f"{window_lengths(profile)[0]:.0f} s without a gap where {FEWEST_WINDOWS} are needed. "
             "Fix: simulate and record the whole trial"
         )

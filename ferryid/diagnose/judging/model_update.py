@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ferryid import __version__
+from ferryid.counts import counted
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.effects import effects
@@ -147,7 +148,9 @@ def _properties(logs: Sequence[Posterior], profile: Profile) -> tuple[tuple[Stor
             continue
         if len(found) < len(logs):
             where = ", ".join(one.sources[0].log for one in found)
-            notes.append(f"{title} was found in {len(found)} of {len(logs)} logs ({where}) and holds for the vessel.")
+            notes.append(
+                f"{title} was found in {len(found)} of {counted(len(logs), 'log')} ({where}) and holds for the vessel."
+            )
         kept.append(_together(found))
     return tuple(kept), tuple(notes)
 

@@ -12,6 +12,7 @@ from math import exp
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import AXES, Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
@@ -78,7 +79,7 @@ def find_unexplained(
     folds = folds_of(problem.windows)
     after, seen = kept, problem
     if folds is not None and laws is not None and (common := laws.common(problem, kept, folds)) is not None:
-        shared = _lawful(common, after, scene, f"that holds in all {laws.able} logs that can show it")
+        shared = _lawful(common, after, scene, f"that holds in all {counted(laws.able, 'log')} that can show it")
         claims.append(Claim(shared, Figures("law")))
         after, seen = common.fit, common.problem
     if folds is not None and (law := select_law(seen, after, folds)) is not None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.files import remove_scratch, scratch_folder
 from ferryid.ingest.formats.mcap import SUFFIX as MCAP
@@ -63,7 +64,7 @@ class FolderLog:
                 losses.append(_loss(path, about, f"the file cannot be read: {_cause(error, path)}"))
         if not parts:
             raise FerryIdError(
-                f"{folder}: none of the recording's {len(files)} files can be read; {losses[-1].file}: "
+                f"{folder}: none of the recording's {counted(len(files), 'file')} can be read; {losses[-1].file}: "
                 f"{losses[-1].what}. Fix: copy the folder from the recorder again"
             )
         self._joined = join(parts)
@@ -154,7 +155,7 @@ class FolderLog:
             about = stated.pop(topic.name, None)
             notes = [topic.note] if topic.note else []
             if about is not None and about.count < topic.count:
-                notes.append(f"metadata.yaml counts {about.count} messages, the files hold {topic.count}")
+                notes.append(f"metadata.yaml counts {counted(about.count, 'message')}, the files hold {topic.count}")
             if about is not None and about.type != topic.type:
                 notes.append(f"metadata.yaml gives the type {about.type}")
             topics.append(replace(topic, note="; ".join(notes)))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.judge import force_mse
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.settings import FitSettings
@@ -242,7 +243,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         values = [change(one[0, k], one[0, k - 1]) for one in ise]
         told.append(
             f"The {word} update changes ISE by {spread(values, '%', signed=True)}; "
-            f"it falls in {sum(value < 0 for value in values)} of {len(values)} runs."
+            f"it falls in {sum(value < 0 for value in values)} of {counted(len(values), 'run')}."
         )
     lot = np.std(ise[:, 2], axis=1, ddof=1) / np.mean(ise[:, 2], axis=1)
     told.append(

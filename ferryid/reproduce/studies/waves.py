@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.estimate import estimator
 from ferryid.identify.fit import fit
 from ferryid.identify.judge import force_mse
@@ -381,7 +382,8 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
     worst = [median([one.told[k].calm for one in outcomes]) for k in range(len(BREEZY))]
     count = len(outcomes)
     told.append(
-        f"`ferryid fit` accepts its model of the log without breeze and waves in {accepted[0]} of {count} runs, with the "
+        f"`ferryid fit` accepts its model of the log without breeze and waves in {accepted[0]} of "
+        f"{counted(count, 'run')}, with the "
         f"breeze alone in {accepted[1]}, and with breeze and waves in "
         + ", ".join(f"{accepted[k + 1]} ({HEIGHTS_M[k]:g} m)" for k in range(1, len(HEIGHTS_M)))
         + f". Judged in calm weather these models have {', '.join(number(value) for value in worst)} times the base "
