@@ -42,7 +42,7 @@ def test_every_log_is_read_aligned_and_checked_once(
     logs = [str(shutil.copy(SHORT, tmp_path / f"{name}.mcap")) for name in "ab"]
     settings = DiagnosisSettings(together=together)
     made = diagnose(logs, load_profile("milliampere"), None, settings, progress=lambda stage: None)
-    assert [one.log for one in made] == ["a.mcap", "b.mcap"]
+    assert [one.log for one in made] == ["a", "b"]
     assert counts == {"record": 2, "align": 2, "examine": 2}
 
 
