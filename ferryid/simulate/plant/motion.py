@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.simulate.added_effects import Added, acting, added_load, build_added
+from ferryid.simulate.added_effects import acting
 from ferryid.simulate.environment import wind_series
 from ferryid.simulate.plant import rolling
+from ferryid.simulate.plant.added import Added, added_load, build_added
 from ferryid.simulate.plant.current import current_series, turn_rate
 from ferryid.simulate.plant.hull import (
     Force,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
-from ferryid.simulate.added_effects import Added, added_thrust, build_added
+from ferryid.simulate.plant.added import Added, added_thrust, build_added
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.lags import Weights, decay_of, follow, lag_weights
 from ferryid.simulate.plant.rudder import COLUMNS, rudder_load, rudder_row
