@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from ferryid.diagnose.inference.estimation import HULL_SPREAD, Candidate, EstimationProblem, estimation_problem, fit
 from ferryid.diagnose.inference.folds import FOLDS, folds_of, subset
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
+from ferryid.diagnose.inference.search import ODDS
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.free_runs import free_runs
 from ferryid.diagnose.judging.held_out import HEADING, held_out, held_out_evidence, placebos
@@ -169,11 +170,12 @@ def test_a_wind_that_blew_holds_and_beats_every_placebo(windy: EstimationProblem
         np.testing.assert_allclose(values[:2], WIND, atol=0.15)
 
 
-def test_what_did_not_happen_does_not_hold(calm: EstimationProblem) -> None:
+def test_what_did_not_happen_gains_less_than_its_prior_odds_or_does_not_hold(calm: EstimationProblem) -> None:
+    """The interval of a gain by chance excludes zero now and then; no such gain makes up for the prior odds."""
     for name in ("wind", "current", "payload", "mooring"):
         told = held_out_evidence(calm, fit(calm, [candidate(name)]))
         assert told is not None
-        assert not told.proofs[0].holds, name
+        assert not told.proofs[0].holds or told.proofs[0].improvement.score < ODDS, name
 
 
 def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: EstimationProblem) -> None:
