@@ -87,7 +87,7 @@ def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
     parameters = effect.parameters_of(FERRY)
     truth = moderate(name)
     result = found_in(effect.scenario(truth, instance), 3, tmp_path)
-    assert [(one.effect.id, one.instance) for one in result.fit.suspects[:1]] == [(name, instance)]
+    assert [(one.effect.id, one.instance) for one in result.fit.candidates[:1]] == [(name, instance)]
     assert effect.says(truth, instance)
     for one, value, error in zip(parameters, result.fit.values[0], result.fit.errors(0), strict=True):
         assert abs(value - truth[one.name]) < max(4.0 * error, 0.15 * one.size), one.name

@@ -69,7 +69,7 @@ def _too_short(log: AveragedLog, baseline: Baseline, campaign: tuple[frozenset[K
     findings, notes = apply_rules(sensor_claims(screened.sensors), figures)
     profile, window_s = screened.scene.profile, _window_s(log.windows.weight, log.windows.scene.step_s)
     short = (
-        f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too little to tell. "
+        f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion. "
         "Record at least ten minutes that excite every axis."
     )
     remainder = Remainder(testable=False)
