@@ -98,7 +98,7 @@ def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
 def test_related_effects_are_not_mistaken_for_each_other(name: str, seed: int, tmp_path: Path) -> None:
     instance = effects()[name].instances(FERRY)[0]
     result = found_in(effects()[name].scenario(moderate(name), instance), seed, tmp_path)
-    assert [(one.effect.id, one.instance) for one in result.fit.suspects] == [(name, instance)]
+    assert [(one.effect.id, one.instance) for one in result.fit.candidates] == [(name, instance)]
 
 
 def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
@@ -108,9 +108,9 @@ def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
     seen = windows(scene, *window_lengths(FERRY))
     plain, spread = plain_picture(seen.scene, FERRY)
     result = search(trial_of(seen, replace(plain, hull=0.4 * plain.hull), 0.4 * spread), lambda stage: None)
-    assert [one.effect.id for one in result.fit.suspects] == ["hull_parameters"]
+    assert [one.effect.id for one in result.fit.candidates] == ["hull_parameters"]
     value, error = result.fit.values[0], result.fit.errors(0)
-    certain = np.abs(value - 1.0) - 2.0 * error > result.fit.suspects[0].effect.least
+    certain = np.abs(value - 1.0) - 2.0 * error > result.fit.candidates[0].effect.least
     assert np.count_nonzero(certain) >= 5
     assert (np.abs(value - 2.5) < 4.0 * error)[certain].all()
 
@@ -118,5 +118,5 @@ def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_nothing_is_found_where_nothing_acts(seed: int, tmp_path: Path) -> None:
     result = found_in({}, seed, tmp_path)
-    assert result.fit.suspects == ()
+    assert result.fit.candidates == ()
     assert result.rounds[0].none > 0.9

@@ -143,7 +143,7 @@ def test_an_entry_that_makes_no_sense_is_told(entry: str, match: str) -> None:
 def test_it_is_found_where_it_acts(tmp_path: Path) -> None:
     truth = {"north": 40.0, "east": -30.0, "moment": 30.0}
     result = found_in(effects()["push"].scenario(truth, None), 3, tmp_path)
-    assert [one.effect.id for one in result.fit.suspects[:1]] == ["push"]
+    assert [one.effect.id for one in result.fit.candidates[:1]] == ["push"]
     found = dict(zip(truth, result.fit.values[0], strict=True))
     errors = result.fit.errors(0)
     for (name, value), error in zip(truth.items(), errors, strict=True):
