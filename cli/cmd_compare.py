@@ -51,10 +51,11 @@ def command(
     from ferryid.identify.compare import compare
     from ferryid.identify.store import load
     from ferryid.report.comparison_report import report
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
     field = line_up(models, [load(name, out) for name in models], load_profile(vessel) if vessel else None)
-    comparison = compare(field, on or [], out, window_s=window, progress=progress)
+    comparison = compare(field, on or [], RunContext(out, progress), window_s=window)
     progress("writing the report")
     outcome = report(comparison, out, ("ferryid", *sys.argv[1:]))
     progress("")

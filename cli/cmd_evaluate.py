@@ -23,8 +23,9 @@ def command(
     """Judge a model on other logs: force MSE and R² per axis, free-run error."""
     from ferryid.identify.evaluate import evaluate, render_evaluation
     from ferryid.identify.store import load
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
     profile = load_profile(vessel) if vessel else None
-    result = evaluate(load(model, out), logs, out, profile=profile, window_s=window, progress=progress)
+    result = evaluate(load(model, out), logs, RunContext(out, progress), profile=profile, window_s=window)
     emit(result, render_evaluation(result), json)

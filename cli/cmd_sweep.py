@@ -61,6 +61,7 @@ def command(
     from ferryid.identify.settings import FitSettings, windows_of
     from ferryid.report.structures_report import structures_and_report
     from ferryid.report.sweep_report import sweep_and_report
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
     settings = FitSettings(
@@ -72,10 +73,9 @@ def command(
         logs or [] if archive else given(logs),
         load_profile(vessel),
         settings,
-        out,
+        RunContext(out, progress),
         windows_s=windows_of(windows),
         folds=folds,
         archive=archive,
-        progress=progress,
     )
     emit(outcome.json, outcome.text, json)

@@ -17,6 +17,7 @@ ORDER = (
     "files",
     "interrupts",
     "compiled",
+    "types",
     "ingest",
     "vessel",
     "signals",

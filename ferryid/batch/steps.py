@@ -18,6 +18,7 @@ from ferryid.identify.kept_pieces import kept
 from ferryid.identify.model import Model, blank
 from ferryid.report.diagnosis_report import report
 from ferryid.report.fit_report import fit_and_report
+from ferryid.types import RunContext, no_progress
 from ferryid.vessel.profile import Profile
 
 LONGEST_NAME = 80
@@ -65,13 +66,9 @@ class Job:
         return whole[: LONGEST_NAME - len(end)] + end
 
 
-def _quiet(_stage: str) -> None:
-    """Tell nobody."""
-
-
 def _fitted(job: Job) -> dict[str, Any]:
     made = fit_and_report(
-        [job.log], job.profile, job.recipe.fit, job.folder, name=job.model_name(), tables=job.tables, progress=_quiet
+        [job.log], job.profile, job.recipe.fit, RunContext(job.folder), name=job.model_name(), tables=job.tables
     )
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
     if job.recorded.exists():
@@ -92,7 +89,7 @@ def _fitted(job: Job) -> dict[str, Any]:
 
 def _evaluated(job: Job) -> dict[str, Any]:
     model = job.model or blank(job.profile, job.profile.name)
-    told = evaluate(model, [job.log], job.tables, profile=job.profile, progress=_quiet)
+    told = evaluate(model, [job.log], RunContext(job.tables), profile=job.profile)
     write_text(job.folder / "evaluation.json", dump_json(told))
     entry = told["logs"][0]
     return {
@@ -106,7 +103,9 @@ def _evaluated(job: Job) -> dict[str, Any]:
 
 
 def _diagnosed(job: Job) -> dict[str, Any]:
-    found = diagnose([job.log], job.profile, job.tables, model=job.model, withhold=job.recipe.withhold, progress=_quiet)
+    found = diagnose(
+        [job.log], job.profile, job.tables, model=job.model, withhold=job.recipe.withhold, progress=no_progress
+    )
     found = keep(found, job.profile, job.model, job.folder, name=job.model_name("-diagnosed"))
     words = ["ferryid", "diagnose", job.log, *(["--vessel", job.vessel] if job.vessel else [])]
     words += [word for signal in job.recipe.withhold for word in ("--withhold", signal)]

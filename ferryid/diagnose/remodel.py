@@ -17,12 +17,14 @@ from ferryid.diagnose.result import Diagnosis
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.files import alone
-from ferryid.identify.accept import accept
-from ferryid.identify.model import AXES, Model, blank
+from ferryid.identify.acceptance import accept
+from ferryid.identify.model import Model, blank
+from ferryid.identify.outcome import Acceptance
 from ferryid.identify.pictured import Pictured
-from ferryid.identify.result import Verdict
+from ferryid.identify.scores import ModelScores
 from ferryid.identify.store import checked_name, save
 from ferryid.identify.stored_effect import Conditions, Quantity, StoredEffect
+from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 
 APART = 0.25
@@ -88,7 +90,7 @@ def remodelled(
         settings={**start.settings, "diagnosed_from": diagnosed_from},
         ranges=start.ranges or _spanned([one.ranges for one in logs]),
         training=_trained(start, logs),
-        scores=scores,
+        scores=ModelScores.from_json(scores),
         accepted=verdict.accepted and bool(vessel),
         hull=_quantities(hull, covariance),
         vessel_effects=_composed(start.vessel_effects, vessel, profile),
@@ -233,7 +235,7 @@ def _spanned(several: Sequence[Mapping[str, tuple[float, float]]]) -> dict[str, 
     return {name: (min(one[name][0] for one in several), max(one[name][1] for one in several)) for name in several[0]}
 
 
-def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Learnt]) -> tuple[Verdict, dict[str, Any]]:
+def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Learnt]) -> tuple[Acceptance, dict[str, Any]]:
     """Return held-out force errors without and with the findings, pooled over logs, as a model file has its scores."""
     weights = np.array([float(one.before.get("rows", 0)) for one in diagnoses])
     weights = weights / weights.sum() if weights.sum() > 0.0 else np.full(len(diagnoses), 1.0 / len(diagnoses))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ferryid.effects import effects
-from ferryid.identify.model import AXES, Model, to_json
+from ferryid.identify.model import Model, to_json
 from ferryid.identify.store import Stored, Unreadable, problems, stored_models
 from ferryid.identify.stored_effect import StoredEffect
+from ferryid.types import AXES
 
 
 def listing(out: Path) -> dict[str, Any]:
@@ -41,7 +43,7 @@ def _row(stored: Stored | Unreadable) -> dict[str, Any]:
         "current": stored.current,
         "accepted": stored.model.accepted,
         "created": stored.model.created,
-        "normalised_mse": stored.model.scores.get("normalised_mse"),
+        "normalised_mse": None if stored.model.scores is None else stored.model.scores.force.normalised_mse,
         "logs": [str(log["name"]) for log in stored.model.training],
         "path": str(stored.path),
         **_effects_of(stored.model),
@@ -109,6 +111,8 @@ def render_model(model: Model) -> str:
     """Return one model as text: verdict, scores, and coefficients with their intervals."""
     data = to_json(model)
     settings = model.settings
+    force = None if model.scores is None else model.scores.force
+    mean, ratio = (None, [None] * 3) if force is None else (force.normalised_mse, force.ratio.tolist())
     wide = max([14, *(len(term) + 2 for axis in AXES for term in data["coefficients"][axis])])
     lines = [
         f"{model.name}@{model.version}  {_verdict(model)}  {model.created}",
@@ -116,8 +120,8 @@ def render_model(model: Model) -> str:
         if model.diagnosed and not model.terms
         else fitted_with(model),
         f"trained on {', '.join(str(log['name']) for log in model.training)}",
-        f"validation force MSE over the base model's: {_number(model.scores.get('normalised_mse'))} ("
-        + ", ".join(f"{axis} {_number(model.scores.get('per_axis', {}).get(axis))}" for axis in AXES)
+        f"validation force MSE over the base model's: {_number(mean)} ("
+        + ", ".join(f"{axis} {_number(value)}" for axis, value in zip(AXES, ratio, strict=True))
         + ")",
         "",
         f"{'term':<{wide}}{'axis':<7}{'value':>13}{'low':>13}{'high':>13}  unit",
@@ -157,5 +161,5 @@ def _verdict(model: Model) -> str:
     return "diagnosed" if model.diagnosed else "REJECTED"
 
 
-def _number(value: Any) -> str:
-    return "-" if value is None else f"{value:.3f}"
+def _number(value: float | None) -> str:
+    return "-" if value is None or not math.isfinite(value) else f"{value:.3f}"

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from ferryid.identify.model import AXES
-from ferryid.identify.result import Excitation, FreeRun
+from ferryid.identify.free_run import FreeRun
+from ferryid.identify.outcome import Excitation
+from ferryid.identify.scores import ModelScores
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import Split
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.track import Motion
+from ferryid.types import AXES
 
 LEAST_VALIDATION_S = 60.0
 MANY_MOVED = 20
@@ -26,14 +27,13 @@ def cautions(
     known: Excitation,
     prepared: Sequence[Prepared],
     motions: Sequence[Motion],
-    scores: Mapping[str, Any],
+    scores: ModelScores,
 ) -> tuple[str, ...]:
     """Return what a reader must know before trusting the verdict."""
     warnings = []
     if parts.kind == "every-kth":
         warnings.append("Validation rows share smoothing windows with training rows: the error is told too small.")
-    seconds = sum(float(mask.sum()) / motion.rate_hz for motion, mask in zip(motions, parts.validation, strict=True))
-    warnings += general_cautions(settings, known, scores, len(prepared), seconds)
+    warnings += general_cautions(settings, known, scores, len(prepared))
     weighed = [motion.payload is not None for motion in motions]
     if any(weighed) and not all(weighed):
         warnings.append(
@@ -51,9 +51,7 @@ def cautions(
     return tuple(warnings)
 
 
-def general_cautions(
-    settings: FitSettings, known: Excitation, scores: Mapping[str, Any], logs: int, validation_s: float
-) -> list[str]:
+def general_cautions(settings: FitSettings, known: Excitation, scores: ModelScores, logs: int) -> list[str]:
     """Return what scores and excitation alone tell a reader to mind."""
     warnings = []
     if np.isfinite(known.heading_coverage) and known.heading_coverage < 0.5:
@@ -66,12 +64,11 @@ def general_cautions(
         named = ", ".join(terms[:6]) + (f" and {len(terms) - 6} more" if len(terms) > 6 else "")
         which = "These logs" if logs > 1 else "This log"
         warnings.append(f"{which} cannot determine {len(terms)} of the terms: {named}.")
-    if validation_s < LEAST_VALIDATION_S:
-        warnings.append(f"Only {validation_s:.0f} s validate: the verdict rests on little data.")
+    if scores.seconds < LEAST_VALIDATION_S:
+        warnings.append(f"Only {scores.seconds:.0f} s validate: the verdict rests on little data.")
     if settings.residual == "commanded":
         warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
-    for axis in AXES:
-        share = scores["r2"]["model"][axis]
+    for axis, share in zip(AXES, scores.force.r2_model.tolist(), strict=True):
         if np.isfinite(share) and share < 0.0:
             warnings.append(
                 f"In {axis} the model explains the measured force worse than its mean does (R² {share:.2f}): hardly any force "

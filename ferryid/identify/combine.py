@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from ferryid import __version__
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.model import AXES, Model, to_json
-from ferryid.identify.scores import by_axis
+from ferryid.identify.model import Model, to_json
+from ferryid.identify.scores import ForceScores, ModelScores
 from ferryid.identify.store import checked_name
+from ferryid.types import AXES
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
 
@@ -235,19 +236,16 @@ def gathered(parts: Sequence[Sequence[Mapping[str, Any]]]) -> tuple[Mapping[str,
     return tuple(found.values())
 
 
-def not_judged() -> dict[str, Any]:
+def not_judged() -> ModelScores:
     """Return the scores of a model that was fitted to nothing itself."""
-    nothing = by_axis([math.nan] * len(AXES))
-    return {
-        "mse": {"base": nothing, "model": nothing},
-        "r2": {"base": nothing, "model": nothing},
-        "per_axis": nothing,
-        "normalised_mse": math.nan,
-        "rows": 0,
-        "seconds": 0.0,
-        "split": "none",
-        "split_notes": ["Made of other models and not judged on any log."],
-    }
+    unknown = np.full(len(AXES), math.nan)
+    return ModelScores(
+        ForceScores(unknown, unknown, unknown, unknown, unknown, math.nan),
+        rows=0,
+        seconds=0.0,
+        split="none",
+        split_notes=("Made of other models and not judged on any log.",),
+    )
 
 
 def _checked(models: Sequence[Model], weights: Sequence[float] | Floats) -> Floats:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.identify.candidates import Candidate, Field
 from ferryid.identify.estimate import estimator
 from ferryid.identify.evaluate import cautions_on
 from ferryid.identify.free_run import HORIZONS_S, NO_MASS, runs_free, single_runs, starting_points
-from ferryid.identify.model import AXES
 from ferryid.identify.paired import Paired, block_seconds, block_sums, compare_paired, enough
 from ferryid.identify.physics_rows import coefficient_rows, effect_rows, term_rows
 from ferryid.identify.predict import Prediction, predict
@@ -25,9 +23,7 @@ from ferryid.identify.tracking import tracked
 from ferryid.identify.verdicts import Judged, Row, verdicts
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.track import Motion
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from ferryid.types import AXES, Flags, Floats, RunContext
 
 TOLD_S = 30.0
 """Sentences on free runs are of this horizon, or of the longest below it that has intervals."""
@@ -89,10 +85,9 @@ class Comparison:
 def compare(
     field: Field,
     logs: Sequence[str],
-    out: Path,
+    run: RunContext,
     *,
     window_s: float = 1.0,
-    progress: Callable[[str], None],
 ) -> Comparison:
     """Compare two or more models, and their base model with them.
 
@@ -105,8 +100,8 @@ def compare(
         The models, from `ferryid.identify.candidates.line_up`.
     logs
         Paths; parts of one recording joined by ``+``.
-    out
-        Output folder, for the ingested tables.
+    run
+        Output folder and progress.
     window_s
         Smoothing window of the test data [s].
 
@@ -119,9 +114,9 @@ def compare(
     check_window(window_s)
     trials: list[Trial] = []
     for path in logs:
-        progress(f"comparing on {Path(path).name}")
-        trials.append(_trial(field, path, out, window_s, trials))
-    progress("comparing")
+        run.progress(f"comparing on {Path(path).name}")
+        trials.append(_trial(field, path, run.out, window_s, trials))
+    run.progress("comparing")
     runnable, notes = _runnable(field.candidates, trials)
     judged = [_judged(field, [trial], runnable) for trial in trials]
     pooled = _judged(field, trials, runnable) if len(trials) > 1 else None
@@ -148,7 +143,7 @@ def compare(
         "coefficients": {"physical": coefficient_rows(field.candidates), "terms": term_rows(field.candidates)},
         "effects": effect_rows(field.candidates),
     }
-    progress("")
+    run.progress("")
     return Comparison(result, tuple(trials))
 
 
@@ -164,8 +159,8 @@ def _entry(candidate: Candidate) -> Row:
         "diagnosed": model.diagnosed,
         "scale": dict(model.scale),
         "training": [str(log["name"]) for log in model.training],
-        "validation": model.scores.get("per_axis"),
-        "normalised_mse": model.scores.get("normalised_mse"),
+        "validation": None if model.scores is None else by_axis(model.scores.force.ratio),
+        "normalised_mse": None if model.scores is None else model.scores.force.normalised_mse,
     }
 
 

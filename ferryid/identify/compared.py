@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from ferryid.identify.basis import Basis
 from ferryid.identify.crossed import TEST_WINDOW_S
-from ferryid.identify.model import AXES
 from ferryid.identify.scores import by_axis
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweep import BY, SCHEMA
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

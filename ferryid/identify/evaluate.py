@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ferryid.identify.excitation import RANGE_UNITS, payload_kg, range_columns
-from ferryid.identify.model import AXES, Model
+from ferryid.identify.model import Model
 from ferryid.identify.predict import Prediction, predict, predict_before, signal_map
-from ferryid.identify.scores import Flags, force_scores, free_run_plain, outside_ranges, usable
+from ferryid.identify.scores import force_scores, outside_ranges, usable
 from ferryid.identify.settings import check_window
 from ferryid.identify.stored_effect import StoredEffect
 from ferryid.signals.prepare import prepare
 from ferryid.signals.track import Motion
+from ferryid.types import AXES, Flags, RunContext
 from ferryid.vessel.profile import Profile
 
 OUTSIDE_WARNING = 0.05
@@ -25,11 +26,10 @@ OUTSIDE_WARNING = 0.05
 def evaluate(
     model: Model,
     logs: Sequence[str],
-    out: Path,
+    run: RunContext,
     *,
     profile: Profile | None = None,
     window_s: float | None = None,
-    progress: Callable[[str], None],
 ) -> dict[str, Any]:
     """Compare a model's and its base model's force with the measured one, and run both free.
 
@@ -41,8 +41,8 @@ def evaluate(
         The model.
     logs
         Paths; parts of one recording joined by ``+``.
-    out
-        Output folder, for the ingested tables.
+    run
+        Output folder and progress.
     profile
         Signal map of the logs; the profile inside the model where None.
     window_s
@@ -59,11 +59,11 @@ def evaluate(
     smoother = str(model.settings.get("smoother", "square"))
     entries, parts = [], []
     for path in logs:
-        progress(f"evaluating on {Path(path).name}")
+        run.progress(f"evaluating on {Path(path).name}")
         prepared = prepare(
             path,
             profile,
-            out,
+            run.out,
             window_s=window,
             smoother=smoother,
             rate_hz=model.settings.get("rate_hz"),
@@ -81,10 +81,10 @@ def evaluate(
                 "sha256": prepared.recording.sha256,
                 "rows": int(rows.sum()),
                 "seconds": float(rows.sum() / motion.rate_hz),
-                **force_scores(motion.tau, tau_base, tau_model, rows),
+                **force_scores(motion.tau, tau_base, tau_model, rows).to_json(),
                 "free_run": {
-                    "base": free_run_plain(old.free_run(rows)),
-                    "model": free_run_plain(new.free_run(rows)),
+                    "base": old.free_run(rows).to_json(),
+                    "model": new.free_run(rows).to_json(),
                 },
                 **({"effects": _applied(new, prepared.recording.sha256)} if model.diagnosed else {}),
                 "outside": outside_of(model, motion, rows),
@@ -96,7 +96,7 @@ def evaluate(
                 "data_quality": prepared.quality,
             }
         )
-    progress("")
+    run.progress("")
     tau, base_all, model_all = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     return {
         "schema": "ferryid.evaluate/1",
@@ -108,7 +108,7 @@ def evaluate(
         },
         "window_s": window,
         "logs": entries,
-        "pooled": force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)),
+        "pooled": force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)).to_json(),
     }
 
 

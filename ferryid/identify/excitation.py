@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.cross_products import CrossProducts
+from ferryid.identify.outcome import Excitation
 from ferryid.identify.qr import QrFactor, standard_deviations
-from ferryid.identify.result import Excitation
 from ferryid.signals.track import Motion
 
 Floats = NDArray[np.float64]

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.result import FreeRun
 from ferryid.signals.track import Motion
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Rows = NDArray[np.int64]
+from ferryid.types import Flags, Floats, Ints
 
 ForceModel = Callable[..., Floats]
 """``force(nu_dot (s, 3), nu (s, 3), psi (s,), wind (s, 2), current (s, 2)) -> tau (s, 3)``, linear in ``nu_dot``.
@@ -27,6 +23,55 @@ STEP_S = 0.2
 NO_MASS = "the model's effective mass matrix is not positive definite: it cannot be run free"
 LEAP_MPS = 5.0
 """Added to twice the greatest speed: a position that moves faster has jumped."""
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """Free-run (open-loop) prediction error of a model against horizon, on held-out stretches.
+
+    Attributes
+    ----------
+    horizons_s
+        Prediction horizons [s], shape (H,).
+    position_m, heading_rad, speed_mps, yaw_rate_radps
+        Root-mean-square error at each horizon, shape (H,); NaN where a run diverged or no stretch was long enough.
+    starts
+        Number of starting points.
+    example
+        ``{"t": (n,), "measured": (n, 3), "predicted": (n, 3)}`` of `nu` over one stretch, for a figure.
+    note
+        Why there is no prediction, or an empty string.
+    diverged
+        Number of runs that diverged, which the means leave out.
+    """
+
+    horizons_s: Floats
+    position_m: Floats
+    heading_rad: Floats
+    speed_mps: Floats
+    yaw_rate_radps: Floats
+    starts: int
+    example: Mapping[str, Floats]
+    note: str = ""
+    diverged: int = 0
+
+    @classmethod
+    def not_run(cls, note: str) -> FreeRun:
+        """Return the result of no run at all, and why there is none."""
+        nothing = np.zeros(0)
+        return cls(nothing, nothing, nothing, nothing, nothing, starts=0, example={}, note=note)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the free run as plain values."""
+        return {
+            "horizons_s": self.horizons_s.tolist(),
+            "position_m": self.position_m.tolist(),
+            "heading_rad": self.heading_rad.tolist(),
+            "speed_mps": self.speed_mps.tolist(),
+            "yaw_rate_radps": self.yaw_rate_radps.tolist(),
+            "starts": self.starts,
+            "note": self.note,
+        }
 
 
 def free_run(
@@ -91,7 +136,7 @@ def runs_free(force: ForceModel, motion: Motion) -> bool:
     return _is_positive(_masses(force, replace(motion, payload=None))[0])
 
 
-def single_runs(force: ForceModel, motion: Motion, starts: Rows, ends: Rows, horizons_s: Sequence[float]) -> Floats:
+def single_runs(force: ForceModel, motion: Motion, starts: Ints, ends: Ints, horizons_s: Sequence[float]) -> Floats:
     """Return the error of every run by itself at every horizon, shape (starts, horizons, 4).
 
     Absolute errors of position [m], heading [rad], speed [m/s] and yaw rate [rad/s]; NaN where a run has diverged, or does
@@ -131,7 +176,7 @@ def _is_positive(mass: Floats) -> bool:
     return bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0))
 
 
-def starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[Rows, Rows]:
+def starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[Ints, Ints]:
     """Return start rows and the end of the unbroken stretch that each lies in."""
     good = allowed & motion.valid & np.isfinite(motion.nu).all(axis=1) & np.isfinite(motion.tau).all(axis=1)
     good = good & ~_jumps(motion)
@@ -156,7 +201,7 @@ def _jumps(motion: Motion) -> Flags:
     return leaps
 
 
-def _integrate(force: ForceModel, motion: Motion, starts: Rows, horizon_s: float) -> tuple[Floats, int]:
+def _integrate(force: ForceModel, motion: Motion, starts: Ints, horizon_s: float) -> tuple[Floats, int]:
     """Return states (starts, steps + 1, 6) of position, heading, velocity, and the rows per step."""
     stride = max(1, int(STEP_S * motion.rate_hz))
     substeps = max(1, int(np.ceil(1.0 / (STEP_S * motion.rate_hz))))
@@ -172,7 +217,7 @@ def _integrate(force: ForceModel, motion: Motion, starts: Rows, horizon_s: float
     path = np.empty((len(starts), steps + 1, 6))
     path[:, 0] = state
 
-    def derivative(at: Floats, rows: Rows, following: Rows, part: float) -> Floats:
+    def derivative(at: Floats, rows: Ints, following: Ints, part: float) -> Floats:
         psi, nu = at[:, 2], at[:, 3:]
         tau = _between(motion.tau, rows, following, part)
         wind = None if motion.wind is None else _between(motion.wind, rows, following, part)
@@ -202,12 +247,12 @@ def _integrate(force: ForceModel, motion: Motion, starts: Rows, horizon_s: float
     return path, stride
 
 
-def _between(values: Floats, rows: Rows, following: Rows, part: float) -> Floats:
+def _between(values: Floats, rows: Ints, following: Ints, part: float) -> Floats:
     result: Floats = (1.0 - part) * values[rows] + part * values[following]
     return result
 
 
-def _errors(path: Floats, stride: int, motion: Motion, starts: Rows, ends: Rows, horizons: Floats) -> Floats:
+def _errors(path: Floats, stride: int, motion: Motion, starts: Ints, ends: Ints, horizons: Floats) -> Floats:
     """Return |error| of position, heading, speed and yaw rate, shape (starts, horizons, 4)."""
     error = np.full((len(starts), len(horizons), 4), np.nan)
     for h, horizon in enumerate(horizons):

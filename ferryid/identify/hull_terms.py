@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ferryid.effects.picture import COEFFICIENTS
-from ferryid.identify.model import Floats, Model
+from ferryid.identify.model import Model
+from ferryid.types import Floats
 
 MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {
     "X_u": (("u", 0),),

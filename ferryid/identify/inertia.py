@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.model import AXES
+from ferryid.types import AXES
 from ferryid.vessel.parse_hull import rigid_mass
 from ferryid.vessel.profile import Hull, Profile
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.accept import accept
+from ferryid.identify.acceptance import accept
 from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.model import Model
-from ferryid.identify.result import Verdict
+from ferryid.identify.outcome import Acceptance
 from ferryid.identify.scores import mean_square, usable
 from ferryid.signals.track import Motion
 
@@ -51,7 +51,7 @@ def judge(
     new: Model | Estimator,
     motions: Motion | Sequence[Motion],
     rows: Sequence[Flags] | None = None,
-) -> Verdict:
+) -> Acceptance:
     """Say whether a new model may replace the old one, by the updating criterion of thesis 3.2.4; see `accept`.
 
     Both are judged on the same rows: those of motions that neither was fitted to, on which both can be evaluated.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ferryid import __version__
 from ferryid.errors import FerryIdError
+from ferryid.identify.scores import ModelScores
 from ferryid.identify.stored_effect import (
     Conditions,
     Quantity,
@@ -71,7 +72,7 @@ class Model:
     training
         One entry a log: ``{"name", "files", "sha256", "seconds", "rows"}``.
     scores
-        Validation scores: ``{"base": {...}, "model": {...}, "normalised_mse": ..., "per_axis": {...}}``.
+        Force errors on validation rows; None of a model that was not judged.
     accepted
         Verdict at the time of the fit.
     hull
@@ -101,7 +102,7 @@ class Model:
     covariance: Floats
     ranges: Mapping[str, tuple[float, float]]
     training: tuple[Mapping[str, Any], ...]
-    scores: Mapping[str, Any]
+    scores: ModelScores | None
     accepted: bool
     hull: Mapping[str, Quantity] = field(default_factory=dict)
     vessel_effects: tuple[StoredEffect, ...] = ()
@@ -154,7 +155,7 @@ def blank(profile: Profile, name: str) -> Model:
         covariance=np.zeros((3, 1, 1)),
         ranges={},
         training=(),
-        scores={},
+        scores=None,
         accepted=False,
     )
 
@@ -189,7 +190,7 @@ def to_json(model: Model) -> dict[str, Any]:
         "covariance": {axis: model.covariance[j].tolist() for j, axis in enumerate(AXES)},
         "ranges": {key: list(value) for key, value in model.ranges.items()},
         "training": [dict(log) for log in model.training],
-        "scores": dict(model.scores),
+        "scores": {} if model.scores is None else model.scores.to_json(),
         **_diagnosed(model),
         "profile": model.profile_text,
     }
@@ -259,7 +260,7 @@ def from_json(data: Mapping[str, Any], where: str) -> Model:
             covariance=np.array([data["covariance"][axis] for axis in AXES], dtype=float),
             ranges={key: (float(low), float(high)) for key, (low, high) in data["ranges"].items()},
             training=tuple(data["training"]),
-            scores=dict(data["scores"]),
+            scores=ModelScores.from_json(data["scores"]),
             accepted=bool(data["accepted"]),
             **_physics(data, where),
         )
@@ -283,7 +284,7 @@ def _physics(data: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 def _check_parts(data: Mapping[str, Any]) -> None:
     """Raise KeyError, TypeError or ValueError where a part that others rely on is missing or of another kind."""
-    settings, scores = data["settings"], data["scores"]
+    settings = data["settings"]
     for key in ("basis", "structure"):
         if not isinstance(settings[key], str):
             raise TypeError(f"settings.{key} is no text")
@@ -293,8 +294,6 @@ def _check_parts(data: Mapping[str, Any]) -> None:
         raise ValueError("base.scale is not finite")
     if not all(math.isfinite(row["value"]) for axis in AXES for row in data["coefficients"][axis].values()):
         raise ValueError("a coefficient is not finite")
-    if not isinstance(scores["normalised_mse"], int | float | type(None)) or not isinstance(scores["per_axis"], dict):
-        raise TypeError("scores are not numbers")
     for log in data["training"]:
         if not isinstance(log["name"], str) or not isinstance(log["sha256"], str):
             raise TypeError("training does not name its logs")

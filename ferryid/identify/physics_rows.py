@@ -13,8 +13,9 @@ from ferryid.effects.wording import titled
 from ferryid.identify.candidates import Candidate
 from ferryid.identify.estimate import estimator, hull_values
 from ferryid.identify.hull_terms import MAPPED, hull_part
-from ferryid.identify.model import AXES, Floats, Model
+from ferryid.identify.model import Model
 from ferryid.identify.stored_effect import StoredEffect, effect_json
+from ferryid.types import AXES, Floats
 
 Row = dict[str, Any]
 

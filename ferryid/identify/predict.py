@@ -12,10 +12,9 @@ from ferryid.effects import effects
 from ferryid.effects.picture import Picture, Scene, required_force
 from ferryid.errors import FerryIdError
 from ferryid.identify.estimate import base_estimator, estimator
-from ferryid.identify.free_run import ForceModel, free_run
+from ferryid.identify.free_run import ForceModel, FreeRun, free_run
 from ferryid.identify.model import Model
 from ferryid.identify.pictured import Pictured, bridged, pushes
-from ferryid.identify.result import FreeRun
 from ferryid.identify.stored_effect import StoredEffect
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.smooth import central_difference, measure, smooth_measured

@@ -36,7 +36,7 @@ class Split:
     Attributes
     ----------
     kind
-        ``"blocks"``, ``"logs"``, ``"every-kth"`` or ``"fold <i> of <k>"``.
+        ``"blocks"``, ``"logs"``, ``"every-kth"``, ``"fold <i> of <k>"``, or ``"none"`` where nothing is held out.
     training, validation
         One mask a log, shape (n,).
     purge_s
@@ -50,6 +50,12 @@ class Split:
     validation: tuple[Flags, ...]
     purge_s: float
     notes: tuple[str, ...] = ()
+
+    @classmethod
+    def nothing(cls, motions: Sequence[Motion]) -> Split:
+        """Return the split of motions of which no row is used yet."""
+        none = tuple(np.zeros(len(motion.t), dtype=bool) for motion in motions)
+        return cls("none", none, none, 0.0)
 
     def within(self, rows: Sequence[Flags]) -> Split:
         """Return the split without what lies outside `rows`, one mask a log, shape (n,)."""

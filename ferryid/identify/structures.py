@@ -7,12 +7,10 @@ are kept block by block; from blocks drawn again come the intervals, and the str
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.identify.bases import forms
@@ -24,20 +22,18 @@ from ferryid.identify.confidence_set import confidence_set
 from ferryid.identify.cross_products import CrossProducts
 from ferryid.identify.crossed import FOLDS, MOST_GROUPS, TEST_WINDOW_S, Curves, Folds, FoldSums
 from ferryid.identify.inertia import without_inertia
+from ferryid.identify.inputs import read_logs
 from ferryid.identify.pieces import together
 from ferryid.identify.residual import residual
 from ferryid.identify.rows import basis_of, known_rows, rows_of
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.simpls import simpls, total
 from ferryid.identify.split import correlation_time
-from ferryid.identify.sweep import BY, check_folds, log_json, read_logs
+from ferryid.identify.sweep import BY, check_folds, log_json
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.signals.track import Motion
+from ferryid.types import Flags, Floats, Ints, RunContext
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 
 DRAWS = 2000
 
@@ -67,16 +63,15 @@ def sweep_structures(
     logs: Sequence[str],
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     *,
     folds: int = FOLDS,
-    progress: Callable[[str], None],
 ) -> StructureSweep:
     """Cross-validate every basis, decoupled and coupled.
 
     Parameters
     ----------
-    logs, profile, out, folds, progress
+    logs, profile, run, folds
         As in `ferryid.identify.sweep.sweep`.
     settings
         How to fit. Of its basis only what stands behind ``+``, and a hull's length, count; of its structure nothing.
@@ -88,7 +83,7 @@ def sweep_structures(
     """
     check_folds(folds)
     usable, unusable = named(settings, profile)
-    opened = read_logs(logs, profile, settings, out, progress)
+    opened = read_logs(logs, profile, settings, run)
     motions = [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened]
     bases = {
         name: {
@@ -96,14 +91,14 @@ def sweep_structures(
         }
         for name, full in usable.items()
     }
-    progress("smoothing")
+    run.progress("smoothing")
     made = [_log(profile, settings, one.measured, bases["modulus"]["coupled"]) for one in opened]
-    progress("finding how long residuals remember")
+    run.progress("finding how long residuals remember")
     block_s = block_length(made, [one["decoupled"] for one in bases.values()])
     reach_s = max(TEST_WINDOW_S, settings.window_s)
     pieces: dict[str, list[Studied]] = {}
     for name, one in bases.items():
-        progress(f"cutting {name} into pieces")
+        run.progress(f"cutting {name} into pieces")
         pieces[name] = [
             pieces_of(
                 one["coupled"], log.test, [log.training], reach_s, blocks=_blocks(log, block_s, folds), wanted=log.used
@@ -112,7 +107,7 @@ def sweep_structures(
         ]
     by = {}
     for key in ("blocks", "logs") if len(opened) > 1 else ("blocks",):
-        progress(f"cross-validating by {key}")
+        run.progress(f"cross-validating by {key}")
         by[key] = compared(
             profile, settings, bases, pieces, min(MOST_GROUPS, len(opened)) if key == "logs" else folds, key == "logs"
         )

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
@@ -25,15 +23,15 @@ from ferryid.identify.choose import (
     tried,
 )
 from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S, Folds
-from ferryid.identify.model import AXES
+from ferryid.identify.inputs import read_logs
 from ferryid.identify.rows import basis_of
 from ferryid.identify.settings import WINDOWS_S, FitSettings
-from ferryid.signals.prepare import Opened, open_track, refuse_twice
+from ferryid.signals.prepare import Opened
 from ferryid.signals.smooth import smooth_measured
+from ferryid.types import AXES, Flags, RunContext
 from ferryid.vessel.profile import Profile
 
 KINDS = ("components", "window", "both")
-Flags = NDArray[np.bool_]
 
 SCHEMA = "ferryid.sweep/1"
 BY = {"blocks": "contiguous stretches of every log", "logs": "whole logs"}
@@ -78,12 +76,11 @@ def sweep(
     logs: Sequence[str],
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     *,
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
     archive: bool = False,
-    progress: Callable[[str], None],
 ) -> Sweep:
     """Cross-validate logs over smoothing windows and component counts.
 
@@ -96,16 +93,14 @@ def sweep(
         Paths; parts of one recording joined by ``+``.
     profile, settings
         The vessel and how to fit.
-    out
-        Output folder, whose ``logs`` keep the ingested tables.
+    run
+        Output folder and progress.
     windows_s
         Windows to try [s]; the usual ones where none is given.
     folds
         Number of folds by stretches, 2 to 20.
     archive
-        True: take what is kept of the logs that were ingested to `out`, all of them where `logs` is empty.
-    progress
-        Called with the name of each stage.
+        True: take what is kept of the logs that were ingested to the output folder, all of them where `logs` is empty.
 
     Raises
     ------
@@ -131,15 +126,15 @@ def sweep(
     fixed = (settings.window_s,) if what == "components" else tuple(windows_s)
     if archive:
         windows = fixed or WINDOWS_S
-        functions, free, cuts, told = archive_folds(profile, settings, out, windows, logs, folds, progress)
+        functions, free, cuts, told = archive_folds(profile, settings, run, windows, logs, folds)
     else:
-        windows, functions, free, cuts, told = _from_logs(logs, profile, settings, out, fixed, folds, progress)
+        windows, functions, free, cuts, told = _from_logs(logs, profile, settings, run, fixed, folds)
     if what != "components" and len(windows) < 2:
         raise FerryIdError(
             f"{told[0]['name']}: nothing to compare, as all windows come to {windows[0]:g} s at this log's rate. "
             "Fix: give --windows that are apart, or a higher --rate"
         )
-    progress("cross-validating")
+    run.progress("cross-validating")
     by = {
         key: choose(profile, settings, functions, windows, cut, free, where=str(told[0]["name"]))
         for key, cut in cuts.items()
@@ -159,18 +154,17 @@ def _from_logs(
     logs: Sequence[str],
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     windows_s: Sequence[float],
     folds: int,
-    progress: Callable[[str], None],
 ) -> tuple[tuple[float, ...], Basis, Flags, dict[str, Folds], list[dict[str, Any]]]:
     """Return windows, basis, axes without force, folds by stretches and whole logs, and what is told of the logs."""
-    opened = read_logs(logs, profile, settings, out, progress)
+    opened = read_logs(logs, profile, settings, run)
     windows = tried(windows_s, [one.measured for one in opened])
     functions = basis_of(settings, [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
     pieces = []
     for one in opened:
-        progress(f"cutting {one.recording.name} into pieces")
+        run.progress(f"cutting {one.recording.name} into pieces")
         pieces.append(studied(profile, settings, functions, one.measured, windows, blocks=folds))
     cuts = {"blocks": folds_by_blocks(pieces, folds)} | ({"logs": folds_by_logs(pieces)} if len(pieces) > 1 else {})
     told = [log_json(one, log) for one, log in zip(opened, pieces, strict=True)]
@@ -181,18 +175,6 @@ def check_folds(folds: int) -> None:
     """Refuse what is no number of folds."""
     if not 2 <= folds <= 20:
         raise FerryIdError(f"--folds: {folds} is no number of folds. Fix: give 2 to 20, {FOLDS} is usual")
-
-
-def read_logs(
-    logs: Sequence[str], profile: Profile, settings: FitSettings, out: Path, progress: Callable[[str], None]
-) -> list[Opened]:
-    """Return several logs before smoothing, each once; arguments and errors are those of `sweep`."""
-    opened = []
-    for path in logs:
-        progress(f"reading {Path(path).name}")
-        opened.append(open_track(path, profile, out, rate_hz=settings.rate_hz))
-    refuse_twice(opened)
-    return opened
 
 
 def log_json(one: Opened, log: Studied) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.identify.model import AXES
 from ferryid.identify.paired import Paired, holm
+from ferryid.types import AXES
 
 Row = dict[str, Any]
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import AXES, Model
+from ferryid.identify.free_run import FreeRun
+from ferryid.identify.model import Model
 from ferryid.identify.predict import Prediction, predict
-from ferryid.identify.result import FreeRun
 from ferryid.identify.scores import force_scores, usable
 from ferryid.identify.store import load_file
 from ferryid.identify.stored_effect import Conditions, StoredEffect
@@ -22,6 +22,7 @@ from ferryid.prove.rivals import RIVALS, Learner
 from ferryid.prove.rivals.base import base_of, prepared_log
 from ferryid.prove.rivals.learnt import SMOOTHER, WINDOW_S
 from ferryid.signals.prepare import Prepared
+from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 
 HORIZON_S = 60.0
@@ -157,12 +158,12 @@ def _acting(found: Prediction, sha256: str) -> dict[str, Any]:
 
 
 def _judged(tau: Floats, base: Floats, found: Prediction, rows: Rows, base_run: FreeRun) -> dict[str, Any]:
-    ratio = force_scores(tau, base, found.tau, rows)["per_axis"]
+    ratio = force_scores(tau, base, found.tau, rows).to_json()["per_axis"]
     return {"mse": {axis: _number(ratio[axis]) for axis in AXES}, **_ran(found.free_run(rows)), **_base_ran(base_run)}
 
 
 def _of_base(tau: Floats, base: Prediction, rows: Rows, run: FreeRun) -> dict[str, Any]:
-    error = force_scores(tau, base.tau, base.tau, rows)["mse"]["base"]
+    error = force_scores(tau, base.tau, base.tau, rows).to_json()["mse"]["base"]
     return {"mse": {axis: _number(error[axis]) for axis in AXES}, **_ran(run), "rows": int(rows.sum())}
 
 

@@ -12,10 +12,10 @@ from typing import Any
 from urllib.parse import quote
 
 from ferryid.diagnose.result import HINT
-from ferryid.identify.result import AXES
 from ferryid.report import batch_figures
 from ferryid.report.diagnosis_words import title
 from ferryid.report.html import template
+from ferryid.types import AXES
 
 WORDS = {
     "done": "done",

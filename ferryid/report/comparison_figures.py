@@ -11,9 +11,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from ferryid.identify.compare import Trial
-from ferryid.identify.model import AXES
 from ferryid.report.figures import MEASURED, STYLE, SYMBOLS, UNITS, canvas, legend_above, margins, svg_text
 from ferryid.report.structure import envelope
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 Row = dict[str, Any]

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ferryid.identify.compare import Trial
-from ferryid.identify.model import AXES
 from ferryid.identify.physics_rows import render_effects
 from ferryid.report import comparison_figures, comparison_words
 from ferryid.report.html import template
 from ferryid.report.structure import worst_minute
+from ferryid.types import AXES
 
 Row = dict[str, Any]
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ferryid.effects.wording import listed
 from ferryid.identify.candidates import BASE
-from ferryid.identify.model import AXES
 from ferryid.identify.physics_rows import is_of_a_hull
+from ferryid.types import AXES
 
 Row = dict[str, Any]
 

@@ -16,8 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
-from ferryid.identify.result import AXES, ComponentCurve, Excitation, FreeRun, LogFit
+from ferryid.identify.free_run import FreeRun
+from ferryid.identify.outcome import ComponentCurve, Excitation, LogFit
 from ferryid.report.structure import autocorrelation, envelope, spectrum
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.result import AXES, LogFit
+from ferryid.identify.outcome import LogFit
 from ferryid.signals.track import Motion
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -10,8 +10,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from ferryid.identify.compared import Compared
-from ferryid.identify.model import AXES
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, WIDTH, svg_text
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from ferryid.errors import FerryIdError
@@ -18,13 +17,13 @@ from ferryid.identify.compared import (
     verdict,
 )
 from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S
-from ferryid.identify.model import AXES
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.structures import sweep_structures
 from ferryid.identify.sweep import BY
 from ferryid.report.html import template
 from ferryid.report.structures_figures import forest
-from ferryid.report.sweep_report import Outcome, leave
+from ferryid.report.sweep_report import SweepReport, leave
+from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
 
@@ -32,25 +31,22 @@ def structures_and_report(
     logs: Sequence[str],
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     *,
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
     archive: bool = False,
-    progress: Callable[[str], None],
-) -> Outcome:
+) -> SweepReport:
     """Compare structures and write the page; arguments and errors are those of `sweep_structures`."""
     if archive:
         raise FerryIdError("--archive: what is kept of a log is of one basis. Fix: name the logs to compare bases on")
     if windows_s:
         raise FerryIdError("--windows: bases are compared at one window. Fix: give --window")
-    found = sweep_structures(logs, profile, settings, out, folds=folds, progress=progress)
-    progress("writing the report")
+    found = sweep_structures(logs, profile, settings, run, folds=folds)
+    run.progress("writing the report")
     page, drawings = render(found)
     text = render_structures(found)
-    return leave(
-        out, "basis", found.logs, page, drawings, lambda report: structures_json(found, report), text, progress
-    )
+    return leave(run, "basis", found.logs, page, drawings, lambda report: structures_json(found, report), text)
 
 
 def render(found: StructureSweep) -> tuple[str, dict[str, str]]:

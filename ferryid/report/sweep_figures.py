@@ -9,9 +9,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 
 from ferryid.identify.choose import Choice
-from ferryid.identify.model import AXES
 from ferryid.identify.sweep import Sweep
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, canvas, legend_above, svg_text
+from ferryid.types import AXES
 
 _COLOURS = (NEW, BASE, "#009e73")
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.adapt import data_matrix, fit_motions
+from ferryid.identify.adaptive import data_matrix, fit_motions
 from ferryid.identify.cross_products import CrossProducts, Rows
 from ferryid.identify.estimate import Estimator
 from ferryid.identify.model import Model
@@ -33,7 +33,7 @@ THESIS = FitSettings(
 
 def learn(motions: Sequence[Motion], profile: Profile, settings: FitSettings = THESIS) -> Model:
     """Return the model that the thesis would make of these rounds, (3.1)-(3.3); the motions' window is the settings'."""
-    return fit_motions(profile, motions, settings, name="reproduction")
+    return fit_motions(profile, motions, settings, name="reproduction").model
 
 
 def products(motions: Sequence[Motion], profile: Profile, settings: FitSettings = THESIS) -> CrossProducts | QrFactor:

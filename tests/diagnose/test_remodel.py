@@ -28,6 +28,7 @@ from ferryid.identify.physics_rows import render_effects
 from ferryid.identify.store import load_file
 from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.simulate.vessel_model import sailed_by
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 
@@ -128,7 +129,7 @@ def quiet(stage: str) -> None:
 
 
 def judged(model: Model, log: str, out: Path) -> dict[str, Any]:
-    return evaluate(model, [log], out, progress=quiet)
+    return evaluate(model, [log], RunContext(out))
 
 
 @pytest.fixture(scope="module")
@@ -406,7 +407,7 @@ def test_a_wrong_hull_model_becomes_the_hull(fouled: str) -> None:
 def test_compare_tells_the_difference_in_physics(model: Model, fouled: str, folder: Path) -> None:
     clean = replace(model.undiagnosed(), version=7)
     field = line_up(["clean", "found"], [clean, model])
-    result = compare(field, [fouled], folder / "out", progress=quiet).json
+    result = compare(field, [fouled], RunContext(folder / "out")).json
     pair = result["logs"][0]["pairs"][-1]
     assert (pair["first"], pair["second"]) == (clean.label, model.label)
     assert pair["mse"]["surge"]["value"] > 1.25

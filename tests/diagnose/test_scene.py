@@ -54,7 +54,7 @@ def model_of(
         covariance=np.tile(np.eye(k + 1), (3, 1, 1)),
         ranges={},
         training=(),
-        scores={},
+        scores=None,
         accepted=True,
     )
 

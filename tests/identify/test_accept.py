@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ferryid.identify.accept import accept
+from ferryid.identify.acceptance import accept
 
 
 def judge(*ratios: float) -> tuple[bool, tuple[str, ...]]:

@@ -12,12 +12,12 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.adapt import data_matrix, fit_motions, settings_of, update_axes
+from ferryid.identify.adaptive import data_matrix, fit_motions, settings_of, update_axes
 from ferryid.identify.combine import reference
 from ferryid.identify.estimate import Estimator, base_estimator, estimator
 from ferryid.identify.inertia import effective_mass
 from ferryid.identify.judge import force_mse, judge
-from ferryid.identify.model import AXES, Model, to_json
+from ferryid.identify.model import Model, to_json
 from ferryid.identify.residual import base_force
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.store import load, save
@@ -38,7 +38,7 @@ def loaded(mass_kg: float, made: Motion) -> Motion:
 
 
 def test_recovers_the_hull_that_made_the_motions() -> None:
-    model = fit_motions(PROFILE, [motion(1), motion(2), motion(3)], WEAK)
+    model = fit_motions(PROFILE, [motion(1), motion(2), motion(3)], WEAK).model
     mass = effective_mass(PROFILE, model.scale, model.terms, model.theta)
     np.testing.assert_allclose(mass, PROFILE.hull.M, rtol=1e-6, atol=1e-2)
     # All but what the basis does not hold at all: Y_|r|v and the like on other axes.
@@ -48,7 +48,7 @@ def test_recovers_the_hull_that_made_the_motions() -> None:
 
 def test_all_components_are_least_squares_of_the_residual() -> None:
     logs = [motion(1, noise=30.0), motion(2, noise=30.0)]
-    model = fit_motions(PROFILE, logs, COUPLED)
+    model = fit_motions(PROFILE, logs, COUPLED).model
     data = data_matrix(PROFILE, logs, COUPLED)
     want_y = np.concatenate([log.tau - base_force(PROFILE, log, WEAK.scale) for log in logs])
     np.testing.assert_array_equal(data.Y, want_y)
@@ -59,27 +59,27 @@ def test_all_components_are_least_squares_of_the_residual() -> None:
 def test_only_the_rows_asked_for_train() -> None:
     log, asked = motion(1, noise=30.0), np.arange(2400) < 1200
     poison = replace(log, tau=np.where(asked[:, None], log.tau, 1e6))
-    model = fit_motions(PROFILE, [poison], WEAK, rows=[asked])
-    np.testing.assert_array_equal(model.theta, fit_motions(PROFILE, [log], WEAK, rows=[asked]).theta)
+    model = fit_motions(PROFILE, [poison], WEAK, rows=[asked]).model
+    np.testing.assert_array_equal(model.theta, fit_motions(PROFILE, [log], WEAK, rows=[asked]).model.theta)
     assert [entry["rows"] for entry in model.training] == [1200]
     assert model.training[0]["seconds"] == pytest.approx(120.0)
 
 
 def test_scores_are_those_of_the_training_rows_and_say_so() -> None:
     log = motion(1, noise=30.0)
-    model = fit_motions(PROFILE, [log], WEAK)
+    model = fit_motions(PROFILE, [log], WEAK).model
     error = log.tau - estimator(model).of(log)
-    np.testing.assert_allclose([model.scores["mse"]["model"][axis] for axis in AXES], np.mean(error**2, axis=0))
-    assert model.scores["split"] == "none"
-    assert "flatter" in model.scores["split_notes"][0]
+    np.testing.assert_allclose(model.scores.force.mse_model, np.mean(error**2, axis=0))
+    assert model.scores.split == "none"
+    assert "flatter" in model.scores.split_notes[0]
     assert not model.accepted
 
 
 def test_on_top_of_a_model_least_squares_ends_where_it_would_without() -> None:
-    first = fit_motions(PROFILE, [motion(1, noise=30.0)], replace(COUPLED, components=4))
+    first = fit_motions(PROFILE, [motion(1, noise=30.0)], replace(COUPLED, components=4)).model
     logs = [motion(2, noise=30.0), motion(3, noise=30.0)]
-    on_top = fit_motions(PROFILE, logs, COUPLED, base=first)
-    without = fit_motions(PROFILE, logs, COUPLED)
+    on_top = fit_motions(PROFILE, logs, COUPLED, base=first).model
+    without = fit_motions(PROFILE, logs, COUPLED).model
     np.testing.assert_allclose(estimator(on_top).of(UNSEEN), estimator(without).of(UNSEEN), rtol=1e-5, atol=1e-4)
     assert on_top.settings["base_model"] == reference(first)
     assert {log["name"] for log in on_top.training} == {"round 1", "round 2", "round 3"}
@@ -87,67 +87,67 @@ def test_on_top_of_a_model_least_squares_ends_where_it_would_without() -> None:
 
 
 def test_few_components_on_top_of_a_good_model_stay_near_it() -> None:
-    good = fit_motions(PROFILE, [motion(1), motion(2), motion(3)], WEAK)
+    good = fit_motions(PROFILE, [motion(1), motion(2), motion(3)], WEAK).model
     few = replace(WEAK, components=1)
     short = [motion(4, seconds=60.0, noise=30.0)]
-    on_top, alone = fit_motions(PROFILE, short, few, base=good), fit_motions(PROFILE, short, few)
+    on_top, alone = fit_motions(PROFILE, short, few, base=good).model, fit_motions(PROFILE, short, few).model
     assert (force_mse(on_top, UNSEEN) < 0.1 * force_mse(alone, UNSEEN)).all()
 
 
 def test_a_base_brings_its_own_factors() -> None:
-    base = fit_motions(PROFILE, [motion(1)], replace(WEAK, sigma=1.0, zeta=1.1))
-    on_top = fit_motions(PROFILE, [motion(2)], FitSettings(components=21), base=base)
+    base = fit_motions(PROFILE, [motion(1)], replace(WEAK, sigma=1.0, zeta=1.1)).model
+    on_top = fit_motions(PROFILE, [motion(2)], FitSettings(components=21), base=base).model
     assert on_top.scale == {"delta": 0.4, "sigma": 1.0, "zeta": 1.1}
     np.testing.assert_allclose(base_estimator(on_top).of(UNSEEN), base_estimator(base).of(UNSEEN))
 
 
 def test_inertia_is_judged_together_with_that_of_the_base() -> None:
     # The base holds the hull's whole inertia: nothing is left for the correction, and that is no reason to distrust it.
-    base = fit_motions(PROFILE, [motion(1), motion(2)], WEAK)
-    on_top = fit_motions(PROFILE, [motion(3)], WEAK, base=base)
+    base = fit_motions(PROFILE, [motion(1), motion(2)], WEAK).model
+    on_top = fit_motions(PROFILE, [motion(3)], WEAK, base=base).model
     assert on_top.settings["notes"] == []
     still = replace(motion(3), tau=np.zeros((2400, 3)))
-    assert any("No actuator" in note for note in fit_motions(PROFILE, [still], WEAK, base=base).settings["notes"])
+    assert any("No actuator" in note for note in fit_motions(PROFILE, [still], WEAK, base=base).model.settings["notes"])
 
 
 def test_commanded_residual_on_top_of_a_model() -> None:
-    base = fit_motions(PROFILE, [motion(1)], COUPLED)
+    base = fit_motions(PROFILE, [motion(1)], COUPLED).model
     log = motion(2, noise=30.0)
     moved = replace(log, tau=log.tau + 500.0, tau_d=log.tau)
-    got = fit_motions(PROFILE, [moved], replace(COUPLED, residual="commanded"), base=base)
-    want = fit_motions(PROFILE, [log], COUPLED, base=base)
+    got = fit_motions(PROFILE, [moved], replace(COUPLED, residual="commanded"), base=base).model
+    want = fit_motions(PROFILE, [log], COUPLED, base=base).model
     np.testing.assert_allclose(got.theta, want.theta, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(got.intercept, want.intercept, rtol=1e-9, atol=1e-9)
 
 
 def test_wind_and_current_join_the_basis() -> None:
     logs = [with_flow(motion(seed), seed) for seed in (1, 2)]
-    model = fit_motions(PROFILE, logs, WEAK)
+    model = fit_motions(PROFILE, logs, WEAK).model
     assert model.settings["basis"] == "modulus+wind-thesis+current-thesis"
     # On top of a model without them the basis is the base's.
-    calm = fit_motions(PROFILE, [motion(1)], WEAK)
-    assert fit_motions(PROFILE, logs, WEAK, base=calm).terms == calm.terms
-    assert fit_motions(PROFILE, logs, WEAK, base=model).terms == model.terms
+    calm = fit_motions(PROFILE, [motion(1)], WEAK).model
+    assert fit_motions(PROFILE, logs, WEAK, base=calm).model.terms == calm.terms
+    assert fit_motions(PROFILE, logs, WEAK, base=model).model.terms == model.terms
 
 
 def test_components_by_cross_validation() -> None:
-    model = fit_motions(PROFILE, [motion(1, noise=30.0), motion(2, noise=30.0)], replace(WEAK, components="auto"))
+    model = fit_motions(PROFILE, [motion(1, noise=30.0), motion(2, noise=30.0)], replace(WEAK, components="auto")).model
     assert 1 <= model.settings["components"] <= 18
     assert (force_mse(model, UNSEEN) < force_mse(Estimator(PROFILE, WEAK.scale), UNSEEN)).all()
 
 
 def test_draws_give_intervals_that_hold_the_truth() -> None:
     quiet = motion(1, seconds=600.0)
-    truth = fit_motions(PROFILE, [quiet], WEAK)
+    truth = fit_motions(PROFILE, [quiet], WEAK).model
     rng = np.random.default_rng(0)
     noisy = replace(quiet, tau=quiet.tau + 30.0 * rng.standard_normal(quiet.tau.shape))
-    model = fit_motions(PROFILE, [noisy], WEAK, draws=200)
+    model = fit_motions(PROFILE, [noisy], WEAK, draws=200).model
     used = truth.theta != 0.0
     inside = (model.low <= truth.theta) & (truth.theta <= model.high)
     assert inside[used].mean() > 0.75
     assert np.isnan(truth.low).all()
     assert np.isnan(truth.covariance).all()
-    on_top = fit_motions(PROFILE, [noisy], WEAK, base=truth, draws=200)
+    on_top = fit_motions(PROFILE, [noisy], WEAK, base=truth, draws=200).model
     np.testing.assert_allclose(on_top.high, model.high, rtol=1e-4, atol=1e-3)
 
 
@@ -157,8 +157,8 @@ def crossing() -> Motion:
 
 
 def test_surge_update_finds_the_load_and_locks_sway_and_yaw() -> None:
-    before = fit_motions(PROFILE, [motion(1), motion(2), motion(3)], WEAK, draws=50)
-    after = update_axes(before, [crossing()])
+    before = fit_motions(PROFILE, [motion(1), motion(2), motion(3)], WEAK, draws=50).model
+    after = update_axes(before, [crossing()]).model
     row = after.terms.index("u_dot")
     assert after.theta[row, 0] - before.theta[row, 0] == pytest.approx(500.0, rel=1e-3)
     np.testing.assert_array_equal(estimator(after).of(UNSEEN)[:, 1:], estimator(before).of(UNSEEN)[:, 1:])
@@ -171,12 +171,12 @@ def test_surge_update_finds_the_load_and_locks_sway_and_yaw() -> None:
 
 
 def test_surge_update_does_not_mind_that_nothing_acts_on_locked_axes() -> None:
-    before = fit_motions(PROFILE, [motion(1)], WEAK)
+    before = fit_motions(PROFILE, [motion(1)], WEAK).model
     log = crossing()
     alone = replace(log, tau=log.tau * np.array([1.0, 0.0, 0.0]))
-    after = update_axes(before, [alone])
+    after = update_axes(before, [alone]).model
     assert after.settings["notes"] == []
-    still = update_axes(before, [replace(log, tau=0.0 * log.tau)])
+    still = update_axes(before, [replace(log, tau=0.0 * log.tau)]).model
     assert len(still.settings["notes"]) == 1
     row = after.terms.index("u_dot")
     assert still.theta[row, 0] == before.theta[row, 0]
@@ -184,20 +184,20 @@ def test_surge_update_does_not_mind_that_nothing_acts_on_locked_axes() -> None:
     # Nor that the earlier model's inertia there cannot be.
     light = before.theta.copy()
     light[before.terms.index("v_dot"), 1] -= 5000.0
-    assert update_axes(replace(before, theta=light), [log]).settings["notes"] == []
+    assert update_axes(replace(before, theta=light), [log]).model.settings["notes"] == []
 
 
 def test_surge_update_beats_a_whole_fit_of_a_crossing_elsewhere() -> None:
-    before = fit_motions(PROFILE, [motion(1), motion(2), motion(3)], COUPLED)
+    before = fit_motions(PROFILE, [motion(1), motion(2), motion(3)], COUPLED).model
     log = replace(crossing(), tau=crossing().tau + 20.0 * np.random.default_rng(1).standard_normal((900, 3)))
-    whole = fit_motions(PROFILE, [log], COUPLED)
+    whole = fit_motions(PROFILE, [log], COUPLED).model
     elsewhere = loaded(500.0, UNSEEN)
-    assert (force_mse(update_axes(before, [log]), elsewhere) < 0.1 * force_mse(whole, elsewhere)).all()
+    assert (force_mse(update_axes(before, [log]).model, elsewhere) < 0.1 * force_mse(whole, elsewhere)).all()
 
 
 def test_update_of_given_terms_and_axes() -> None:
-    before = fit_motions(PROFILE, [motion(1, noise=30.0)], COUPLED, draws=50)
-    after = update_axes(before, [motion(2, noise=30.0)], axes=("yaw", "sway"), terms=("v", "r"), draws=50)
+    before = fit_motions(PROFILE, [motion(1, noise=30.0)], COUPLED, draws=50).model
+    after = update_axes(before, [motion(2, noise=30.0)], axes=("yaw", "sway"), terms=("v", "r"), draws=50).model
     changed = after.theta != before.theta
     rows = [after.terms.index("v"), after.terms.index("r")]
     want = np.zeros_like(changed)
@@ -218,8 +218,8 @@ def test_update_of_given_terms_and_axes() -> None:
 
 
 def test_models_are_stored_and_read_like_any_other(tmp_path: Path) -> None:
-    first = fit_motions(PROFILE, [motion(1)], WEAK, name="first")
-    for model in (first, update_axes(first, [crossing()], name="updated")):
+    first = fit_motions(PROFILE, [motion(1)], WEAK, name="first").model
+    for model in (first, update_axes(first, [crossing()], name="updated").model):
         plain = json.loads(dump_json(to_json(model)))
         jsonschema.validate(plain, json.loads((SCHEMAS / "model.json").read_text()))
         save(model, tmp_path)
@@ -250,20 +250,23 @@ def test_judge_is_the_updating_criterion() -> None:
     assert judge(weak, true, shifted).accepted
     assert not judge(true, weak, shifted).accepted
     assert not judge(true, true, shifted).accepted
-    model = fit_motions(PROFILE, [log], WEAK)
+    model = fit_motions(PROFILE, [log], WEAK).model
     assert judge(weak, model, [UNSEEN]).per_axis["surge"] < 0.01
 
 
 def refusals() -> list[tuple[str, object]]:
     log = motion(1)
-    model = fit_motions(PROFILE, [log], WEAK)
+    model = fit_motions(PROFILE, [log], WEAK).model
     other = replace(model, profile_text=PROFILE.text.replace('"milliampere"', '"ferry"', 1))
     spoilt = replace(model, terms=model.terms[:-1], theta=model.theta[:-1])
     return [
         ("no motions", lambda: fit_motions(PROFILE, [], WEAK)),
         ("one mask", lambda: fit_motions(PROFILE, [log], WEAK, rows=[log.valid[:-1]])),
         ("none of the rows", lambda: fit_motions(PROFILE, [log], WEAK, rows=[~log.valid])),
-        ("must be that of the fit", lambda: fit_motions(PROFILE, [log], replace(WEAK, basis="thesis"), base=model)),
+        (
+            "must be that of the fit",
+            lambda: fit_motions(PROFILE, [log], replace(WEAK, basis="thesis"), base=model),
+        ),
         ("parallel", lambda: fit_motions(PROFILE, [log], replace(WEAK, residual="parallel"), base=model)),
         ("of the vessel ferry", lambda: fit_motions(PROFILE, [log], WEAK, base=other)),
         ("its terms are not those", lambda: fit_motions(PROFILE, [log], WEAK, base=spoilt)),
@@ -286,7 +289,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(says: str, call) -> None:
 def test_the_caller_keeps_motions_and_models_as_they_were() -> None:
     log = motion(1, noise=30.0)
     before = {key: value.copy() for key, value in vars(log).items() if isinstance(value, np.ndarray)}
-    model: Model = fit_motions(PROFILE, [log], WEAK)
+    model: Model = fit_motions(PROFILE, [log], WEAK).model
     theta = model.theta.copy()
     update_axes(model, [log])
     fit_motions(PROFILE, [log], WEAK, base=model)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ferryid.identify.cautions import free_run_cautions
-from ferryid.identify.result import FreeRun
+from ferryid.identify.free_run import FreeRun
 
 
 def run(position: float, heading: float, starts: int = 5, note: str = "") -> FreeRun:

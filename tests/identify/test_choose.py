@@ -10,15 +10,17 @@ import pytest
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify import fit as module
+from ferryid.identify import inputs
+from ferryid.identify import pipeline as module
 from ferryid.identify.basis import basis
 from ferryid.identify.choose import Choice, choose, distinct, folds_by_blocks, force_free, studied, tried
-from ferryid.identify.fit import fit
-from ferryid.identify.result import FitResult
+from ferryid.identify.outcome import FitOutcome
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import WINDOWS_S, FitSettings
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured
 from ferryid.signals.track import Motion
+from ferryid.types import RunContext
 from tests.identify.rounds import PROFILE
 from tests.identify.trials import measured
 
@@ -155,10 +157,10 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Opened:
     return open_track(str(FIXTURES / "short.mcap"), PROFILE, tmp_path_factory.mktemp("out"))
 
 
-def fitted(monkeypatch: pytest.MonkeyPatch, opened: Opened, log: Measured, windows_s: tuple[float, ...]) -> FitResult:
-    monkeypatch.setattr(module, "open_track", lambda *_, **__: replace(opened, measured=log))
+def fitted(monkeypatch: pytest.MonkeyPatch, opened: Opened, log: Measured, windows_s: tuple[float, ...]) -> FitOutcome:
+    monkeypatch.setattr(inputs, "open_track", lambda *_, **__: replace(opened, measured=log))
     settings = FitSettings(delta=0.4, sigma=0.4, draws=20, windows_s=windows_s)
-    return fit(["short.mcap"], PROFILE, settings, Path("nowhere"))
+    return fit_logs(["short.mcap"], PROFILE, settings, RunContext(Path("nowhere")))
 
 
 @pytest.mark.parametrize("windows_s", [(), WINDOWS_S])
@@ -178,6 +180,6 @@ def test_validation_rows_do_not_reach_the_choice(
     assert len(seen) == 2
     np.testing.assert_array_equal(seen[1].curves.mse, seen[0].curves.mse)
     np.testing.assert_array_equal(poisoned.model.theta, honest.model.theta)
-    assert poisoned.verdict.normalised_mse != honest.verdict.normalised_mse
+    assert poisoned.acceptance.normalised_mse != honest.acceptance.normalised_mse
     assert honest.model.settings["window_s"] == seen[0].window_s
     assert honest.model.settings["components"] == seen[0].components

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.adapt import fit_motions
+from ferryid.identify.adaptive import fit_motions
 from ferryid.identify.catalogue import render_model
 from ferryid.identify.combine import gathered, geometric_weights, mean_of_last, reference, spanned, weighted
 from ferryid.identify.estimate import estimator
@@ -32,7 +32,7 @@ def model(
     seed: int, scale: tuple[float, float, float] = (0.4, 0.4, 1.0), basis: str = "modulus", draws: int = 0
 ) -> Model:
     how = FitSettings(basis=basis, components=6, delta=scale[0], sigma=scale[1], zeta=scale[2])
-    return fit_motions(PROFILE, [with_flow(motion(seed, noise=40.0), seed)], how, name=f"m{seed}", draws=draws)
+    return fit_motions(PROFILE, [with_flow(motion(seed, noise=40.0), seed)], how, name=f"m{seed}", draws=draws).model
 
 
 MODELS = (model(1), model(2, (1.0, 0.5, 1.25)), model(3, (0.8, 1.3, 0.9)))

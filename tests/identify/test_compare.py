@@ -16,6 +16,7 @@ from ferryid.identify.predict import predict
 from ferryid.identify.scores import r_squared, usable
 from ferryid.signals.prepare import prepare
 from ferryid.simulate import load_scenario, simulate, write_log
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from tests.export.models import fitted
 
@@ -58,7 +59,7 @@ def field() -> Field:
 
 @pytest.fixture(scope="module")
 def compared(field: Field, folder: Path) -> Comparison:
-    return compare(field, logs_in(folder), folder / "out", progress=quiet)
+    return compare(field, logs_in(folder), RunContext(folder / "out"))
 
 
 def test_errors_are_those_that_one_sums_by_hand(field: Field, folder: Path, compared: Comparison) -> None:
@@ -129,7 +130,7 @@ def test_a_training_log_is_no_evidence(folder: Path, compared: Comparison) -> No
         heavier(1, 1.1), training=({"name": "trial-0", "sha256": sha256, "files": [], "seconds": 1.0, "rows": 1},)
     )
     field = line_up(["ferry@1", "ferry@2"], [learnt, heavier(2, 3.0)])
-    result = compare(field, logs_in(folder), folder / "out", progress=quiet).json
+    result = compare(field, logs_in(folder), RunContext(folder / "out")).json
     first, second = result["logs"]
     assert "ferry@1 was trained on this log: its scores here are no evidence" in first["warnings"]
     assert first["scores"]["ferry@1"]["trained"]
@@ -148,7 +149,7 @@ def test_a_training_log_is_no_evidence(folder: Path, compared: Comparison) -> No
 
 def test_a_short_log_has_no_intervals_and_says_so(field: Field, tmp_path: Path) -> None:
     short = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
-    result = compare(field, [str(short)], tmp_path, progress=quiet).json
+    result = compare(field, [str(short)], RunContext(tmp_path)).json
     (entry,) = result["logs"]
     assert entry["blocks"] == 3
     assert "3 blocks of 30 s are too few for an interval" in entry["warnings"][-1]
@@ -161,19 +162,19 @@ def test_what_a_model_needs_and_a_log_lacks_is_named(folder: Path) -> None:
     windy = replace(fitted("modulus+wind-paper", "decoupled"), version=4)
     field = line_up(["ferry@1", "windy"], [heavier(1, 1.1), windy])
     with pytest.raises(FerryIdError, match=r"trial-0: milliampere@4 needs the wind, found none .* Fix: "):
-        compare(field, logs_in(folder), folder / "out", progress=quiet)
+        compare(field, logs_in(folder), RunContext(folder / "out"))
 
 
 def test_a_force_without_bounds_is_refused(folder: Path) -> None:
     field = line_up(["ferry@1", "ferry@2"], [heavier(1, 1.1), heavier(2, 1e200)])
     with pytest.raises(FerryIdError, match=r"ferry@2: its force on .*trial-0.mcap is too large .*Fix: "):
-        compare(field, logs_in(folder), folder / "out", progress=quiet)
+        compare(field, logs_in(folder), RunContext(folder / "out"))
 
 
 def test_a_log_is_given_once(field: Field, folder: Path) -> None:
     log = logs_in(folder)[0]
     with pytest.raises(FerryIdError, match="the same log as another"):
-        compare(field, [log, log], folder / "out", progress=quiet)
+        compare(field, [log, log], RunContext(folder / "out"))
 
 
 def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: Path) -> None:
@@ -181,7 +182,7 @@ def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: 
     theta = backwards.theta.copy()
     theta[backwards.terms.index("v_dot"), 1] = -9000.0
     field = line_up(["ferry@1", "odd"], [heavier(1, 1.1), replace(backwards, theta=theta)])
-    result = compare(field, logs_in(folder)[:1], folder / "out", progress=quiet).json
+    result = compare(field, logs_in(folder)[:1], RunContext(folder / "out")).json
     assert any("milliampere@3 is left out of free runs" in warning for warning in result["warnings"])
     scores = result["logs"][0]["scores"]
     assert np.isnan(scores["milliampere@3"]["free_run"]["position_m"]).all()
@@ -190,7 +191,7 @@ def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: 
 
 
 def test_without_logs_coefficients_are_compared(field: Field, tmp_path: Path) -> None:
-    result = compare(field, [], tmp_path, progress=quiet).json
+    result = compare(field, [], RunContext(tmp_path)).json
     assert result["logs"] == [] == result["better"]
     mass = next(row for row in result["coefficients"]["physical"] if row["coefficient"] == "m11")
     assert mass["values"]["ferry@2"]["value"] == pytest.approx(3.0 * mass["values"][BASE]["value"])

@@ -34,5 +34,5 @@ def test_the_verdict_says_where_a_model_is_worse(ratios: tuple[float, float, flo
     base = tau + np.where(known, 1.0, 0.0)
     model = tau + np.sqrt(np.where(known, ratios, 1.0))
     scores = force_scores(tau, base, model, np.ones(N, dtype=bool))
-    text = render_evaluation({**HEAD, "logs": [{"name": "log", **scores}]})
+    text = render_evaluation({**HEAD, "logs": [{"name": "log", **scores.to_json()}]})
     assert f"  {told}" in text.splitlines()

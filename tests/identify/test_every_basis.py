@@ -14,17 +14,18 @@ from scipy.integrate import quad
 
 from ferryid.errors import FerryIdError
 from ferryid.identify import bases
-from ferryid.identify.adapt import fit_motions, settings_of
+from ferryid.identify.adaptive import fit_motions, settings_of
 from ferryid.identify.basis import BASES, Basis, basis, sized
 from ferryid.identify.combine import check_together
 from ferryid.identify.estimate import estimator
-from ferryid.identify.fit import fit
 from ferryid.identify.model import from_json, to_json
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.qr import QrFactor
 from ferryid.identify.residual import base_force
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.simpls import simpls
 from ferryid.identify.strips import strips
+from ferryid.types import RunContext
 from tests.identify.rounds import PROFILE, motion
 
 Floats = NDArray[np.float64]
@@ -182,7 +183,7 @@ def test_a_truth_of_its_form_is_found_again(name: str) -> None:
     settings = FitSettings(basis=name, components=len(functions.terms), inertia="fitted", window_s=0.0)
     trial = motion(1, seconds=1200.0)
     trial = replace(trial, tau=base_force(PROFILE, trial, settings.scale) + functions.of(trial) @ theta + constant)
-    model = fit_motions(PROFILE, [trial], settings)
+    model = fit_motions(PROFILE, [trial], settings).model
     assert model.settings["basis"] == functions.name
     np.testing.assert_allclose(model.theta, theta, rtol=1e-5, atol=1e-4)
     np.testing.assert_allclose(model.intercept, constant, rtol=1e-5)
@@ -192,7 +193,7 @@ def test_a_truth_of_its_form_is_found_again(name: str) -> None:
     np.testing.assert_allclose(estimator(kept).of(other), expected, rtol=1e-6, atol=1e-3)
     # A correction on top of it knows the basis by either name, and has nothing left to correct.
     for again in (settings, settings_of(kept)):
-        on_top = fit_motions(PROFILE, [trial], replace(again, inertia="fitted"), base=kept)
+        on_top = fit_motions(PROFILE, [trial], replace(again, inertia="fitted"), base=kept).model
         np.testing.assert_allclose(on_top.theta, theta, rtol=1e-4, atol=1e-3)
 
 
@@ -280,10 +281,10 @@ def test_a_profile_without_length_is_told_so_before_any_log_is_read(tmp_path: Pa
     settings = FitSettings(basis="cross-flow", components=6)
     wanted = r"^boat\.toml: the basis cross-flow needs the hull's length.* Fix: [^\n]*--basis cross-flow-5m[^\n]*$"
     with pytest.raises(FerryIdError, match=wanted):
-        fit(["nowhere.mcap"], nameless, settings, tmp_path)
+        fit_logs(["nowhere.mcap"], nameless, settings, RunContext(tmp_path))
     with pytest.raises(FerryIdError, match=wanted):
         fit_motions(nameless, [motion(1)], settings)
-    said = fit_motions(nameless, [motion(1)], replace(settings, basis="cross-flow-4m"))
+    said = fit_motions(nameless, [motion(1)], replace(settings, basis="cross-flow-4m")).model
     assert said.settings["basis"] == "cross-flow-4m"
 
 

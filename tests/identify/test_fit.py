@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
-from ferryid.identify import fit as module
+from ferryid.identify import inputs
 from ferryid.identify.estimate import estimator
-from ferryid.identify.fit import fit
 from ferryid.identify.inertia import effective_mass, unbelievable, unforced, without_inertia
-from ferryid.identify.result import FitResult
+from ferryid.identify.outcome import FitOutcome
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.signals.prepare import Opened, open_track
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -29,9 +30,9 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Opened:
     return open_track(str(FIXTURES / "short.mcap"), PROFILE, tmp_path_factory.mktemp("out"))
 
 
-def fitted(monkeypatch: pytest.MonkeyPatch, opened: Opened, settings: FitSettings = SETTINGS) -> FitResult:
-    monkeypatch.setattr(module, "open_track", lambda *_, **__: opened)
-    return fit(["short.mcap"], PROFILE, settings, Path("nowhere"))
+def fitted(monkeypatch: pytest.MonkeyPatch, opened: Opened, settings: FitSettings = SETTINGS) -> FitOutcome:
+    monkeypatch.setattr(inputs, "open_track", lambda *_, **__: opened)
+    return fit_logs(["short.mcap"], PROFILE, settings, RunContext(Path("nowhere")))
 
 
 @pytest.mark.parametrize("factor", ["delta", "sigma", "zeta"])
@@ -46,7 +47,7 @@ def test_recovers_the_true_inertia_from_a_base_at_forty_percent(
     monkeypatch: pytest.MonkeyPatch, opened: Opened
 ) -> None:
     result = fitted(monkeypatch, opened)
-    assert result.verdict.accepted
+    assert result.acceptance.accepted
     mass = effective_mass(PROFILE, result.model.scale, result.model.terms, result.model.theta)
     # Noise in the derivative pulls inertia down by some per cent; from 40 % it must come most of the way.
     np.testing.assert_allclose(np.diag(mass) / np.diag(PROFILE.hull.M), 1.0, atol=0.25)
@@ -61,19 +62,18 @@ def test_validation_rows_do_not_reach_the_coefficients(monkeypatch: pytest.Monke
     poisoned = fitted(monkeypatch, replace(opened, measured=replace(motion, tau=poison)))
     np.testing.assert_array_equal(poisoned.model.theta, honest.model.theta)
     np.testing.assert_array_equal(poisoned.model.low, honest.model.low)
-    assert not poisoned.verdict.accepted or poisoned.verdict.normalised_mse != honest.verdict.normalised_mse
+    assert not poisoned.acceptance.accepted or poisoned.acceptance.normalised_mse != honest.acceptance.normalised_mse
 
 
 def test_scores_are_those_of_the_stored_model(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
     result = fitted(monkeypatch, opened)
     log = result.logs[0]
     error = (log.motion.tau - estimator(result.model).of(log.motion))[log.validation]
-    mse = result.model.scores["mse"]["model"]
-    np.testing.assert_allclose((error**2).mean(axis=0), [mse["surge"], mse["sway"], mse["yaw"]], rtol=1e-9)
+    scores = result.scores.force
+    np.testing.assert_allclose((error**2).mean(axis=0), scores.mse_model, rtol=1e-9)
     # The curve comes from cross-products and never forms an estimate: it must agree at the chosen number.
-    base = result.model.scores["mse"]["base"]
     curve = result.curve.validation[result.curve.chosen - 1]
-    np.testing.assert_allclose(curve, [mse[a] / base[a] for a in ("surge", "sway", "yaw")], rtol=1e-6)
+    np.testing.assert_allclose(curve, scores.mse_model / scores.mse_base, rtol=1e-6)
 
 
 def test_an_axis_without_force_keeps_its_inertia_and_says_so(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
@@ -111,7 +111,7 @@ def test_held_axes_lose_their_acceleration_terms_only() -> None:
 
 def test_several_logs_and_whole_logs_for_validation(tmp_path: Path) -> None:
     logs = [str(FIXTURES / "short.mcap"), str(FIXTURES / "short.bag")]
-    result = fit(logs, PROFILE, replace(SETTINGS, split="logs"), tmp_path)
+    result = fit_logs(logs, PROFILE, replace(SETTINGS, split="logs"), RunContext(tmp_path))
     assert [log.training.any() for log in result.logs] == [True, False]
     assert [log.validation.any() for log in result.logs] == [False, True]
     assert [log.motion.log for log in result.logs] == ["short (1)", "short (2)"]
@@ -120,10 +120,13 @@ def test_several_logs_and_whole_logs_for_validation(tmp_path: Path) -> None:
 @pytest.mark.parametrize("residual", ["commanded", "parallel"])
 @pytest.mark.parametrize("smoother", ["savgol", "kalman"])
 def test_variants_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, residual: str, smoother: str) -> None:
-    result = fit(
-        [str(FIXTURES / "short.mcap")], PROFILE, replace(SETTINGS, residual=residual, smoother=smoother), tmp_path
+    result = fit_logs(
+        [str(FIXTURES / "short.mcap")],
+        PROFILE,
+        replace(SETTINGS, residual=residual, smoother=smoother),
+        RunContext(tmp_path),
     )
-    assert np.isfinite(result.verdict.normalised_mse)
+    assert np.isfinite(result.acceptance.normalised_mse)
     assert result.model.settings["residual"] == residual
 
 

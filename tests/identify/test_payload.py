@@ -18,14 +18,15 @@ from scipy.integrate import solve_ivp
 
 from ferryid.identify.estimate import Estimator
 from ferryid.identify.evaluate import evaluate
-from ferryid.identify.fit import fit
 from ferryid.identify.free_run import free_run
 from ferryid.identify.inertia import effective_mass
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.residual import base_force, force_of_motion, residual
 from ferryid.identify.settings import FitSettings
 from ferryid.report.fit_report import fit_and_report
 from ferryid.signals.prepare import prepare
 from ferryid.signals.track import Motion
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Hull
 
@@ -287,7 +288,7 @@ SETTINGS = FitSettings(delta=0.6, components=18, window_s=0.5, draws=20)
 def test_a_fit_recovers_the_bare_hull_only_where_the_payload_is_weighed(logs: dict[str, str], tmp_path: Path) -> None:
     masses = {}
     for name in ("boarded", "unweighed"):
-        result = fit([logs[name]], PROFILE, SETTINGS, tmp_path)
+        result = fit_logs([logs[name]], PROFILE, SETTINGS, RunContext(tmp_path))
         masses[name] = effective_mass(PROFILE, result.model.scale, result.model.terms, result.model.theta)
         assert ("payload_kg" in result.model.ranges) == (name == "boarded")
     true = np.diag(PROFILE.hull.M)
@@ -313,7 +314,7 @@ def conforms(data: dict, name: str) -> None:
 
 
 def test_current_and_payload_reach_basis_report_and_json(logs: dict[str, str], tmp_path: Path) -> None:
-    outcome = fit_and_report([logs["drifted"]], PROFILE, SETTINGS, tmp_path)
+    outcome = fit_and_report([logs["drifted"]], PROFILE, SETTINGS, RunContext(tmp_path))
     model = outcome.stored.model
     assert model.settings["basis"] == "modulus+current-thesis"
     assert outcome.accepted
@@ -325,14 +326,14 @@ def test_current_and_payload_reach_basis_report_and_json(logs: dict[str, str], t
     assert "Payload: 250 kg at x = -0.60 m" in page
     assert "current, payload" in page
     assert "<td>payload_kg</td><td>250</td><td>250</td>" in page
-    judged = evaluate(model, [logs["drifted"]], tmp_path, progress=lambda _: None)
+    judged = evaluate(model, [logs["drifted"]], RunContext(tmp_path))
     conforms(judged, "evaluate")
     assert judged["logs"][0]["outside"]["payload_kg"] == 0.0
     assert judged["logs"][0]["normalised_mse"] < 0.01
 
 
 def test_what_is_not_weighed_is_told(logs: dict[str, str], tmp_path: Path) -> None:
-    result = fit([logs["boarded"], logs["unweighed"]], PROFILE, SETTINGS, tmp_path)
+    result = fit_logs([logs["boarded"], logs["unweighed"]], PROFILE, SETTINGS, RunContext(tmp_path))
     assert any("1 of 2 logs have no payload measured" in warning for warning in result.warnings)
-    (entry,) = evaluate(result.model, [logs["unweighed"]], tmp_path, progress=lambda _: None)["logs"]
+    (entry,) = evaluate(result.model, [logs["unweighed"]], RunContext(tmp_path))["logs"]
     assert any("this log has none: it is taken as empty" in warning for warning in entry["warnings"])

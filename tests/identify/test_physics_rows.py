@@ -9,8 +9,9 @@ import pytest
 
 from ferryid.identify.candidates import Candidate
 from ferryid.identify.estimate import estimator
-from ferryid.identify.model import AXES, Model, blank
+from ferryid.identify.model import Model, blank
 from ferryid.identify.physics_rows import coefficient_rows, effect_rows, is_of_a_hull, render_effects, term_rows
+from ferryid.types import AXES
 from ferryid.vessel import load_profile
 from tests.export.models import MODELS, fitted
 

@@ -13,6 +13,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify.basis import basis
 from ferryid.identify.catalogue import listing, render_listing
 from ferryid.identify.model import Model, to_json
+from ferryid.identify.scores import ForceScores, ModelScores
 from ferryid.identify.store import Stored, load, load_file, save, stored_models
 from ferryid.vessel import load_profile
 
@@ -42,7 +43,9 @@ def made(accepted: bool = True, seed: int = 0) -> Model:
         covariance=covariance,
         ranges={"u": (-0.5, 1.25)},
         training=({"name": "log", "files": ["log.bag"], "sha256": "ab", "seconds": 60.0, "rows": 1200},),
-        scores={"normalised_mse": 0.5, "per_axis": {"surge": 0.4, "sway": 0.5, "yaw": 0.6}},
+        scores=ModelScores(
+            ForceScores.of(np.ones(3), np.array([0.4, 0.5, 0.6]), 2.0 * np.ones(3)), 60, 6.0, "blocks", ()
+        ),
         accepted=accepted,
     )
 

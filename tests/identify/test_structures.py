@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
+from ferryid.identify import inputs
 from ferryid.identify import structures as module
-from ferryid.identify import sweep as reading
 from ferryid.identify.bases import names
 from ferryid.identify.basis import STRUCTURES, Basis, basis, sized
 from ferryid.identify.compared import (
@@ -24,7 +24,6 @@ from ferryid.identify.compared import (
     structures_json,
     verdict,
 )
-from ferryid.identify.fit import quiet
 from ferryid.identify.residual import residual
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import correlation_time
@@ -32,6 +31,7 @@ from ferryid.identify.structures import named, sweep_structures
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.signals.track import Motion
+from ferryid.types import RunContext
 from tests.identify.rounds import PROFILE, RATE_HZ
 from tests.identify.trials import measured
 
@@ -64,8 +64,8 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
             )
             for log in logs
         }
-        monkeypatch.setattr(reading, "open_track", lambda path, *_, **__: ready[path])
-        return sweep_structures(list(ready), profile, settings, Path("nowhere"), folds=folds, progress=quiet)
+        monkeypatch.setattr(inputs, "open_track", lambda path, *_, **__: ready[path])
+        return sweep_structures(list(ready), profile, settings, RunContext(Path("nowhere")), folds=folds)
 
     return compare
 

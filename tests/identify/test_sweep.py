@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
-from ferryid.identify import sweep as module
-from ferryid.identify.fit import quiet
+from ferryid.identify import inputs
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweep import Sweep, headline, render_sweep, sweep, sweep_json
 from ferryid.signals.prepare import Opened, open_track, refuse_twice
 from ferryid.signals.smooth import Measured
+from ferryid.types import RunContext
 from tests.identify.rounds import PROFILE
 from tests.identify.trials import measured
 
@@ -43,8 +43,8 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
             )
             for log in logs
         }
-        monkeypatch.setattr(module, "open_track", lambda path, *_, **__: ready[path])
-        return sweep(what, list(ready), PROFILE, settings, Path("nowhere"), progress=quiet, **options)  # type: ignore[arg-type]
+        monkeypatch.setattr(inputs, "open_track", lambda path, *_, **__: ready[path])
+        return sweep(what, list(ready), PROFILE, settings, RunContext(Path("nowhere")), **options)  # type: ignore[arg-type]
 
     return swept
 
@@ -162,9 +162,9 @@ def test_what_cannot_be_swept(run: Run, what: str, options: dict[str, object], t
 def test_a_log_given_twice_is_refused(run: Run, opened: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
     again = replace(opened, recording=replace(opened.recording, files=("other.mcap",)))
     both = {"a": opened, "b": again}
-    monkeypatch.setattr(module, "open_track", lambda path, *_, **__: both[path])
+    monkeypatch.setattr(inputs, "open_track", lambda path, *_, **__: both[path])
     with pytest.raises(FerryIdError, match=r"other\.mcap: the same log as"):
-        sweep("components", ["a", "b"], PROFILE, SETTINGS, Path("nowhere"), progress=quiet)
+        sweep("components", ["a", "b"], PROFILE, SETTINGS, RunContext(Path("nowhere")))
 
 
 def test_a_part_of_two_logs_is_refused() -> None:

@@ -12,10 +12,10 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.identify.compared import StructureSweep, over_base, verdict
-from ferryid.identify.fit import quiet
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.structures import sweep_structures
 from ferryid.report.structures_report import render, structures_and_report
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -26,7 +26,7 @@ PROFILE = load_profile("milliampere")
 def found(tmp_path_factory: pytest.TempPathFactory) -> StructureSweep:
     logs = [str(FIXTURES / f"short.{suffix}") for suffix in ("bag", "mcap")]
     settings = FitSettings(delta=0.4, sigma=0.4)
-    return sweep_structures(logs, PROFILE, settings, tmp_path_factory.mktemp("out"), progress=quiet)
+    return sweep_structures(logs, PROFILE, settings, RunContext(tmp_path_factory.mktemp("out")))
 
 
 def test_a_forest_plot_for_each_way_of_cutting(found: StructureSweep) -> None:
@@ -102,4 +102,4 @@ def test_without_interval_there_is_still_a_page(found: StructureSweep) -> None:
 
 def test_windows_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FerryIdError, match=r"^--windows: bases are compared at one window\. Fix: give --window$"):
-        structures_and_report(["a"], PROFILE, FitSettings(), tmp_path, windows_s=(1.0,), progress=quiet)
+        structures_and_report(["a"], PROFILE, FitSettings(), RunContext(tmp_path), windows_s=(1.0,))

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.identify.fit import quiet
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.sweep import Sweep, headline, sweep
 from ferryid.report.sweep_report import render
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -25,7 +25,7 @@ def found(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     logs = [str(FIXTURES / f"short.{suffix}") for suffix in ("bag", "mcap")]
     return sweep(
         request.param, logs, load_profile("milliampere"), FitSettings(delta=0.4, sigma=0.4),
-        tmp_path_factory.mktemp("out"), windows_s=WINDOWS_S[request.param], progress=quiet,
+        RunContext(tmp_path_factory.mktemp("out")), windows_s=WINDOWS_S[request.param],
     )  # fmt: skip
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from ferryid.identify.fit import fit
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.predict import Prediction, predict
 from ferryid.prove.rivals.learnt import SMOOTHER, WINDOW_S, Learnt
 from ferryid.reproduce.learning import THESIS
 from ferryid.signals.prepare import Prepared
+from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
 SETTINGS = replace(THESIS, delta=1.0, sigma=1.0, window_s=WINDOW_S, smoother=SMOOTHER, draws=2)
@@ -33,7 +34,7 @@ def learn(log: str, profile: Profile, out: Path) -> Learnt:
     FerryIdError
         For a log that cannot be used.
     """
-    model = fit([log], profile, SETTINGS, out).model
+    model = fit_logs([log], profile, SETTINGS, RunContext(out)).model
 
     def expect(prepared: Prepared) -> Prediction:
         return predict(model, prepared, profile, window_s=WINDOW_S, smoother=SMOOTHER)

@@ -10,7 +10,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.adapt import data_matrix
+from ferryid.identify.adaptive import data_matrix
 from ferryid.identify.cross_products import Rows
 from ferryid.identify.nipals import covariances, nipals
 from ferryid.identify.pca import pca

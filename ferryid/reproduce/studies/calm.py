@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES, Model
+from ferryid.identify.model import Model
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.tracking import MEASURES
 from ferryid.report.drawing import Drawing
@@ -21,6 +21,7 @@ from ferryid.reproduce.study import Row, Study, Table, change, changes, number, 
 from ferryid.reproduce.variants import noiseless, prompt
 from ferryid.signals.smooth import moving_mean, odd_rows
 from ferryid.signals.track import Motion
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 

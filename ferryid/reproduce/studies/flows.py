@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.adapt import data_matrix
+from ferryid.identify.adaptive import data_matrix
 from ferryid.identify.basis import relative_flow
 from ferryid.identify.cross_products import Rows
 from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
 from ferryid.identify.qr import factorise
 from ferryid.identify.simpls import simpls
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
@@ -23,6 +22,7 @@ from ferryid.reproduce.study import Row, Study, Table, changes, median, number, 
 from ferryid.signals.track import Motion
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Current
+from ferryid.types import AXES
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.model import AXES
 from ferryid.identify.tracking import signal_power
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
@@ -16,6 +15,7 @@ from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, learn
 from ferryid.reproduce.pictures import control_shares
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
 from ferryid.reproduce.flight import campaign, trial
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, hull_alone
@@ -18,6 +17,7 @@ from ferryid.reproduce.pictures import against
 from ferryid.reproduce.study import Row, Study, Table, change, median, percent, spread
 from ferryid.reproduce.variants import windier
 from ferryid.simulate.scenario import Scenario
+from ferryid.types import AXES
 from ferryid.vessel.load import load_profile
 from ferryid.vessel.profile import Hull
 

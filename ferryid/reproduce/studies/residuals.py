@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
 from ferryid.identify.residual import FORMS
 from ferryid.identify.tracking import signal_power
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, spread
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 

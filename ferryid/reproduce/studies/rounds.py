@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ferryid.identify.estimate import estimator
 from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
 from ferryid.identify.tracking import MEASURES
 from ferryid.report.drawing import Drawing
 from ferryid.reproduce.flight import Flight, campaign, master_round, trial
@@ -18,6 +17,7 @@ from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, hull_alone
 from ferryid.reproduce.pictures import control_shares, integrals, model_fit
 from ferryid.reproduce.study import Row, Study, Table, change, changes, median, percent, spread
+from ferryid.types import AXES
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]

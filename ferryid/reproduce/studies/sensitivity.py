@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
 from ferryid.identify.tracking import MEASURES
 from ferryid.reproduce.flight import campaign, trial
 from ferryid.reproduce.lab import Lab
@@ -18,6 +17,7 @@ from ferryid.reproduce.learning import MASTER, THESIS, hull_alone
 from ferryid.reproduce.study import Study, Table, change, median, percent, spread
 from ferryid.reproduce.variants import noiseless, prompt, stronger, windier
 from ferryid.simulate.scenario import Scenario
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 

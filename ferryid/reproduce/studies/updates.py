@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.adapt import fit_motions, update_axes
+from ferryid.identify.adaptive import fit_motions, update_axes
 from ferryid.identify.combine import geometric_weights, mean_of_last, weighted
 from ferryid.identify.judge import force_mse, judge
-from ferryid.identify.model import AXES, Model
+from ferryid.identify.model import Model
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
@@ -19,6 +19,7 @@ from ferryid.reproduce.study import Study, Table, changes, median, number, perce
 from ferryid.signals.track import Motion
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Payload
+from ferryid.types import AXES
 
 Floats = NDArray[np.float64]
 
@@ -120,16 +121,16 @@ def _compare(folder: Path, seed: int) -> Outcome:
     old = learn(motions, profile)
     trip = fly(folder, "crossing", replace(crossing, payload=laden), weather_seed(seed, 4), old).motion(window)
     halves = [trip.t < trip.t[-1] / 2, trip.t >= trip.t[-1] / 2]
-    new = fit_motions(profile, [trip], THESIS, name="reproduction", rows=[halves[0]])
+    new = fit_motions(profile, [trip], THESIS, name="reproduction", rows=[halves[0]]).model
     mean = mean_of_last([*earlier], LAST)
     series = [*earlier, new]
     models = (
         old,
         new,
-        update_axes(old, [trip], axes=("surge",), rows=[halves[0]]),
+        update_axes(old, [trip], axes=("surge",), rows=[halves[0]]).model,
         weighted(series, geometric_weights(len(series), FACTOR)),
         mean_of_last(series, LAST),
-        fit_motions(profile, [trip], THESIS, name="reproduction", base=mean, rows=[halves[0]]),
+        fit_motions(profile, [trip], THESIS, name="reproduction", base=mean, rows=[halves[0]]).model,
     )
     test = fly(folder, "test", replace(calm, payload=laden), weather_seed(seed, 5), old).motion(window)
     base = hull_alone(profile, BASE)

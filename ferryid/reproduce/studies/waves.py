@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.estimate import estimator
-from ferryid.identify.fit import fit
 from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES, Model
+from ferryid.identify.model import Model
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import Flight, campaign, controlled, fly, master_round, trial, weather_seed
@@ -23,6 +23,7 @@ from ferryid.reproduce.pictures import FORCES, against, control_shares, integral
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 from ferryid.reproduce.variants import rougher, windier
 from ferryid.simulate.scenario import Scenario
+from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
@@ -204,13 +205,13 @@ def _sweep(
 
 def _told(folder: Path, log: str, profile: Profile, calm: Flight) -> Told:
     """Return what `ferryid fit` says of one log, with its default settings on the thesis's base model."""
-    result = fit([str(folder / f"{log}.mcap")], profile, FitSettings(delta=0.4, sigma=0.4), folder)
+    result = fit_logs([str(folder / f"{log}.mcap")], profile, FitSettings(delta=0.4, sigma=0.4), RunContext(folder))
     still = calm.motion(float(result.model.settings["window_s"]))
     return Told(
-        result.verdict.accepted,
+        result.acceptance.accepted,
         result.warnings,
         float(np.mean(force_mse(result.model, still) / force_mse(hull_alone(profile, BASE), still))),
-        result.verdict.normalised_mse,
+        result.acceptance.normalised_mse,
     )
 
 

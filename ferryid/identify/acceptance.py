@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.result import AXES, Verdict
-
-Floats = NDArray[np.float64]
+from ferryid.identify.outcome import Acceptance
+from ferryid.types import AXES, Floats
 
 IMPROVEMENT = 0.05
 """Fraction by which the mean normalised MSE must fall, thesis 3.2.4."""
@@ -16,9 +14,11 @@ WORSENING = 0.05
 _ROUNDING = 1e-12
 _NOTHING = 1e-9
 """Root-mean-square error [N, N·m] that counts as none: rounding of forces of thousands of newtons is below it."""
+NOT_JUDGED = Acceptance(False, float("nan"), dict.fromkeys(AXES, float("nan")), ("Not judged: no data were held out.",))
+"""Acceptance of a model that was fitted to all rows there are."""
 
 
-def accept(base_mse: Floats, model_mse: Floats) -> Verdict:
+def accept(base_mse: Floats, model_mse: Floats) -> Acceptance:
     """Judge a model by its force error on validation rows against the base model's.
 
     Accepted when the MSE of the estimated applied force, normalised per axis by the base model's and averaged over the
@@ -33,7 +33,7 @@ def accept(base_mse: Floats, model_mse: Floats) -> Verdict:
 
     Returns
     -------
-    Verdict
+    Acceptance
         With one sentence for the mean and one for every axis that stands in the way or needs an explanation.
     """
     base, model = np.asarray(base_mse, dtype=float), np.asarray(model_mse, dtype=float)
@@ -79,7 +79,7 @@ def accept(base_mse: Floats, model_mse: Floats) -> Verdict:
         else:
             reasons.insert(0, sentence)
     per_axis = {axis: float(ratio) for axis, ratio in zip(AXES, ratios, strict=True)}
-    return Verdict(not obstacles, mean, per_axis, (*obstacles, *reasons))
+    return Acceptance(not obstacles, mean, per_axis, (*obstacles, *reasons))
 
 
 def _change(ratio: float) -> str:

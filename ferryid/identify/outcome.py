@@ -9,17 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.model import AXES, Model
+from ferryid.identify.free_run import FreeRun
+from ferryid.identify.model import Model
+from ferryid.identify.scores import ModelScores, by_axis
 from ferryid.signals.track import Motion
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
-__all__ = ["AXES", "ComponentCurve", "Excitation", "FitResult", "FreeRun", "LogFit", "Verdict"]
+from ferryid.types import Flags, Floats
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Acceptance:
     """Whether a model is accepted and why, in sentences that a person can act on."""
 
     accepted: bool
@@ -81,37 +79,6 @@ class Excitation:
 
 
 @dataclass(frozen=True)
-class FreeRun:
-    """Free-run (open-loop) prediction error of a model against horizon, on held-out stretches.
-
-    Attributes
-    ----------
-    horizons_s
-        Prediction horizons [s], shape (H,).
-    position_m, heading_rad, speed_mps, yaw_rate_radps
-        Root-mean-square error at each horizon, shape (H,); NaN where a run diverged or no stretch was long enough.
-    starts
-        Number of starting points.
-    example
-        ``{"t": (n,), "measured": (n, 3), "predicted": (n, 3)}`` of `nu` over one stretch, for a figure.
-    note
-        Why there is no prediction, or an empty string.
-    diverged
-        Number of runs that diverged, which the means leave out.
-    """
-
-    horizons_s: Floats
-    position_m: Floats
-    heading_rad: Floats
-    speed_mps: Floats
-    yaw_rate_radps: Floats
-    starts: int
-    example: Mapping[str, Floats]
-    note: str = ""
-    diverged: int = 0
-
-
-@dataclass(frozen=True)
 class LogFit:
     """One log in a fit: its motion, which rows trained and which validated, and the forces estimated for it.
 
@@ -136,16 +103,59 @@ class LogFit:
 
 
 @dataclass(frozen=True)
-class FitResult:
-    """Everything that one fit found out; `report` renders it and never computes."""
+class ArchivedLog:
+    """One log in a fit to sums: its rows, and its validation MSE over the base model's per axis, shape (3,)."""
+
+    name: str
+    files: tuple[str, ...]
+    sha256: str
+    rows: int
+    validation_rows: int
+    mse_ratio: Floats
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the log as plain values."""
+        return {
+            "name": self.name,
+            "files": list(self.files),
+            "sha256": self.sha256,
+            "rows": self.rows,
+            "validation_rows": self.validation_rows,
+            "per_axis": by_axis(self.mse_ratio),
+        }
+
+
+@dataclass(frozen=True)
+class FitOutcome:
+    """Everything that one fit found out: a fit to logs, to an archive or to motions in memory.
+
+    Attributes
+    ----------
+    model, acceptance
+        The model, not stored yet, and whether it may replace the base model.
+    scores
+        The model's scores.
+    curve
+        Force error against the number of components.
+    excitation
+        What the training rows determine.
+    free_run_base, free_run_model
+        Free runs on validation rows.
+    warnings
+        What to know before trusting the model, as sentences.
+    logs
+        The logs of a fit to rows.
+    archive
+        The logs of a fit to sums.
+    """
 
     model: Model
-    verdict: Verdict
-    logs: tuple[LogFit, ...]
+    acceptance: Acceptance
+    scores: ModelScores
     curve: ComponentCurve
     excitation: Excitation
     free_run_base: FreeRun
     free_run_model: FreeRun
     warnings: tuple[str, ...]
-    archive: tuple[Mapping[str, Any], ...] = ()
-    """Instead of `logs`, of a fit to sums alone: each log with its rows and its validation MSE over the base model's."""
+    logs: tuple[LogFit, ...] = ()
+    archive: tuple[ArchivedLog, ...] = ()
