@@ -37,12 +37,12 @@ def command(
     """Say which physics a model left out of a recording, and what shows it."""
     from ferryid.diagnose.diagnose import diagnose
     from ferryid.diagnose.remodel import keep
-    from ferryid.identify.store import checked_name
+    from ferryid.models.store import check_name
     from ferryid.report.diagnosis_report import patient, report
 
     profile, examined = patient(vessel, model, out)
     if name:
-        checked_name(name)
+        check_name(name)
     hidden = tuple(withhold or ())
     diagnoses = diagnose(
         logs,

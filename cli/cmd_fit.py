@@ -61,13 +61,13 @@ def command(
     json: Json = None,
 ) -> None:
     """Fit a model to one or more logs, validate it, store it and write a report."""
-    from ferryid.identify.settings import FitSettings, window_choice
+    from ferryid.identify import FitSettings, parse_window
     from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
     from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
     settings = FitSettings(
-        basis=basis, structure=structure, components=components, **window_choice(window), smoother=smoother, residual=residual,
+        basis=basis, structure=structure, components=components, **parse_window(window), smoother=smoother, residual=residual,
         split=split, inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
     )  # fmt: skip
     profile, run = load_profile(vessel), RunContext(out, progress, verify)

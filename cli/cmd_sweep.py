@@ -58,7 +58,7 @@ def command(
     json: Json = None,
 ) -> None:
     """Cross-validate smoothing windows, component counts, or all bases in both structures, and mark which to fit with."""
-    from ferryid.identify.settings import FitSettings, windows_of
+    from ferryid.identify import FitSettings, parse_windows
     from ferryid.report.structures_report import structures_and_report
     from ferryid.report.sweep_report import sweep_and_report
     from ferryid.types import RunContext
@@ -74,7 +74,7 @@ def command(
         load_profile(vessel),
         settings,
         RunContext(out, progress),
-        windows_s=windows_of(windows),
+        windows_s=parse_windows(windows),
         folds=folds,
         archive=archive,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,3 +38,8 @@ class RunContext:
     out: Path
     progress: Callable[[str], None] = no_progress
     verify: bool = False
+
+
+def by_axis(values: Sequence[float] | Floats) -> dict[str, float]:
+    """Return three values under the names of the axes."""
+    return {axis: float(value) for axis, value in zip(AXES, values, strict=True)}

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.batch.recipe import Recipe
+from ferryid.compare import evaluate
 from ferryid.diagnose.diagnose import diagnose
 from ferryid.diagnose.remodel import keep
 from ferryid.files import dump_json, write_text
-from ferryid.identify.evaluate import evaluate
-from ferryid.identify.kept_pieces import kept
-from ferryid.identify.model import Model, blank
+from ferryid.identify import load_block_sums
+from ferryid.models import Model, blank_model
 from ferryid.report.diagnosis_report import report
 from ferryid.report.fit_report import fit_and_report
 from ferryid.types import RunContext, no_progress
@@ -73,7 +73,7 @@ def _fitted(job: Job) -> dict[str, Any]:
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
     if job.recorded.exists():
         settings = job.recipe.fit.on(job.profile)
-        kept(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
+        load_block_sums(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
     told, scores = made.json, made.json["scores"]
     return {
         "model": job.below(told["model"]["path"]),
@@ -88,7 +88,7 @@ def _fitted(job: Job) -> dict[str, Any]:
 
 
 def _evaluated(job: Job) -> dict[str, Any]:
-    model = job.model or blank(job.profile, job.profile.name)
+    model = job.model or blank_model(job.profile, job.profile.name)
     told = evaluate(model, [job.log], RunContext(job.tables), profile=job.profile)
     write_text(job.folder / "evaluation.json", dump_json(told))
     entry = told["logs"][0]

@@ -43,7 +43,7 @@ from ferryid.diagnose.weak import Windows, windows
 from ferryid.diagnose.withheld import withheld as withheld_beside
 from ferryid.effects.picture import COEFFICIENTS, UNITS, Scene
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model
+from ferryid.models import Model
 from ferryid.vessel.profile import Profile
 
 FEWEST_WINDOWS = 60

@@ -13,8 +13,7 @@ from ferryid.diagnose.result import Estimate, Finding
 from ferryid.diagnose.scene import Survey
 from ferryid.diagnose.unsteady import State
 from ferryid.effects.picture import COEFFICIENTS
-from ferryid.identify.excitation import ranges
-from ferryid.identify.stored_effect import Quantity, Source, StoredEffect
+from ferryid.models import Quantity, Source, StoredEffect, validity_ranges
 from ferryid.vessel.profile import Floats
 
 IN_THE_HULL = "hull_parameters"
@@ -123,7 +122,7 @@ def learnt(
             "seconds": float(rows.sum() / motion.rate_hz),
             "rows": int(rows.sum()),
         },
-        ranges=ranges(motion.nu[rows], motion.nu_dot[rows]),
+        ranges=validity_ranges(motion.nu[rows], motion.nu_dot[rows]),
         before=before,
         spread=spread,
         hull=hull,

@@ -17,13 +17,10 @@ from ferryid.diagnose.result import Diagnosis
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS, UNITS
 from ferryid.files import alone
-from ferryid.identify.acceptance import accept
-from ferryid.identify.model import Model, blank
-from ferryid.identify.outcome import Acceptance
-from ferryid.identify.pictured import Pictured
-from ferryid.identify.scores import ModelScores
-from ferryid.identify.store import checked_name, save
-from ferryid.identify.stored_effect import Conditions, Quantity, StoredEffect
+from ferryid.identify import Acceptance, accept
+from ferryid.models import Conditions, Model, ModelScores, Quantity, StoredEffect, blank_model
+from ferryid.models.forces import ModelForces
+from ferryid.models.store import check_name, save
 from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 
@@ -54,7 +51,7 @@ def keep(
     FerryIdError
         For a name that a model cannot have, and a folder that cannot be written.
     """
-    made, notes = remodelled(diagnoses, profile, model, checked_name(name or (model.name if model else profile.name)))
+    made, notes = remodelled(diagnoses, profile, model, check_name(name or (model.name if model else profile.name)))
     if made is None:
         return tuple(diagnoses)
     with alone(out / "models"):
@@ -74,11 +71,11 @@ def remodelled(
         return None, ()
     vessel, notes = _properties(logs, profile)
     verdict, scores = _scores([one for one in diagnoses if one.learnt is not None], logs)
-    start = blank(profile, name) if model is None else replace(model, name=name)
+    start = blank_model(profile, name) if model is None else replace(model, name=name)
     hull, covariance = _hull(logs)
     if model is not None and model.vessel_effects:
         # The picture that was refitted had these effects in it, which multiply coefficients and come on top again.
-        known = Pictured(model)
+        known = ModelForces(model)
         factor = np.divide(known.altered_hull(), known.hull, out=np.ones_like(hull), where=known.hull != 0.0)
         hull, covariance = hull / factor, covariance / np.outer(factor, factor)
     diagnosed_from = profile.name if model is None else model.label

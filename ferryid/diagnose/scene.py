@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from ferryid.diagnose.hypothesis import HULL_SPREAD
 from ferryid.diagnose.velocity import MEAN_S, steadied
 from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, hull_of
+from ferryid.effects.scenes import actuator_forces, hull_picture, interpolate_gaps
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.model import Model
-from ferryid.identify.pictured import Pictured, bare_picture, bridged, pushes
+from ferryid.models import Model
+from ferryid.models.forces import ModelForces
 from ferryid.signals.align import align
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.prepare import doubts_of
@@ -177,7 +178,7 @@ def plain_picture(
     """
     if model is not None:
         return _modelled(scene, profile, model, sha256)
-    bare = bare_picture(scene, hull_of(profile))
+    bare = hull_picture(scene, hull_of(profile))
     spread = HULL_SPREAD * np.abs(bare.hull) if profile.hull.has_model else broad_spread(scene, profile)
     return replace(bare, external=scene.air_load, ambient=lambda now: now.air_load), spread
 
@@ -238,7 +239,7 @@ def broad_spread(scene: Scene, profile: Profile) -> Floats:
 
 
 def _modelled(scene: Scene, profile: Profile, model: Model, sha256: str) -> tuple[Picture, Floats]:
-    known = Pictured(model)
+    known = ModelForces(model)
     if known.force.profile.name != profile.name:
         raise FerryIdError(
             f"{model.label}: a model of {known.force.profile.name} says nothing about {profile.name}. "
@@ -300,13 +301,13 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         usable &= placed
     else:
         eta = np.column_stack([np.full((len(eta), 2), np.nan), eta[:, 2]])
-    current = None if measured.current is None else bridged(measured.current, usable)
-    eta = np.column_stack([bridged(column[:, None], usable) for column in eta.T])
+    current = None if measured.current is None else interpolate_gaps(measured.current, usable)
+    eta = np.column_stack([interpolate_gaps(column[:, None], usable) for column in eta.T])
     through_water = (
         measured.nu if measured.current is None else measured.nu - current_in_body(measured.current, eta[:, 2])
     )
-    parts, angles = pushes(profile, track.columns, through_water, usable)
-    nu_raw = bridged(measured.nu, usable)
+    parts, angles = actuator_forces(profile, track.columns, through_water, usable)
+    nu_raw = interpolate_gaps(measured.nu, usable)
     return Scene(
         profile=profile,
         t=measured.t,
@@ -316,7 +317,7 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         parts=parts,
         angles=angles,
         usable=usable,
-        wind=None if measured.wind is None else steady_mean(bridged(measured.wind, usable), rows),
+        wind=None if measured.wind is None else steady_mean(interpolate_gaps(measured.wind, usable), rows),
         current=None if current is None else steady_mean(current, rows),
-        payload=None if measured.payload is None else bridged(measured.payload, usable, held=True),
+        payload=None if measured.payload is None else interpolate_gaps(measured.payload, usable, held=True),
     )

@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
-from ferryid.identify.outcome import Acceptance
-from ferryid.types import AXES, Floats
+from ferryid.errors import FerryIdError
+from ferryid.models import Model, mean_square, usable_rows
+from ferryid.models.forces import Estimator, model_estimator
+from ferryid.signals.track import Motion
+from ferryid.types import AXES, Flags, Floats
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """Whether a model is accepted and why, in sentences that a person can act on."""
+
+    accepted: bool
+    normalised_mse: float
+    """Validation MSE over the base model's, averaged over the three axes."""
+    per_axis: Mapping[str, float]
+    """The same per axis."""
+    reasons: tuple[str, ...]
+
 
 IMPROVEMENT = 0.05
 """Fraction by which the mean normalised MSE must fall, thesis 3.2.4."""
@@ -85,3 +104,64 @@ def accept(base_mse: Floats, model_mse: Floats) -> Acceptance:
 def _change(ratio: float) -> str:
     """Return a ratio as a signed change in per cent."""
     return f"{100.0 * (ratio - 1.0):+.1f} %"
+
+
+def force_mse(
+    model: Model | Estimator, motions: Motion | Sequence[Motion], rows: Sequence[Flags] | None = None
+) -> Floats:
+    """Return the mean square of measured less estimated force per axis, shape (3,) [N², N², (N·m)²].
+
+    Parameters
+    ----------
+    model
+        A model, or an estimator such as ``Estimator(profile, scale)`` for a base model alone.
+    motions
+        One or several motions, whose rows count alike.
+    rows
+        Rows to use, one mask a motion, shape (n,); None: all. Rows on which force or estimate are not known are
+        left out; NaN where none remains.
+    """
+    force = _force(model)
+    motions = [motions] if isinstance(motions, Motion) else list(motions)
+    estimates = [force.of(motion) for motion in motions]
+    masks = [
+        usable_rows(motion, estimate) & wanted
+        for motion, estimate, wanted in zip(motions, estimates, wanted_rows(motions, rows), strict=True)
+    ]
+    return mean_square(
+        np.concatenate([motion.tau for motion in motions]), np.concatenate(estimates), np.concatenate(masks)
+    )
+
+
+def accept_on_motions(
+    old: Model | Estimator,
+    new: Model | Estimator,
+    motions: Motion | Sequence[Motion],
+    rows: Sequence[Flags] | None = None,
+) -> Acceptance:
+    """Say whether a new model may replace the old one, by the updating criterion of thesis 3.2.4; see `accept`.
+
+    Both are judged on the same rows: those of motions that neither was fitted to, on which both can be evaluated.
+    """
+    motions = [motions] if isinstance(motions, Motion) else list(motions)
+    known = [
+        usable_rows(motion, _force(old).of(motion), _force(new).of(motion)) & wanted
+        for motion, wanted in zip(motions, wanted_rows(motions, rows), strict=True)
+    ]
+    return accept(force_mse(old, motions, known), force_mse(new, motions, known))
+
+
+def wanted_rows(motions: Sequence[Motion], rows: Sequence[Flags] | None) -> list[Flags]:
+    """Return the mask asked for of every motion."""
+    if rows is None:
+        return [np.ones(len(motion.t), dtype=bool) for motion in motions]
+    if [len(mask) for mask in rows] != [len(motion.t) for motion in motions]:
+        raise FerryIdError(
+            f"rows: every motion needs one mask of its own length, found lengths {[len(mask) for mask in rows]} for "
+            f"{[len(motion.t) for motion in motions]} rows. Fix: pass one mask a motion"
+        )
+    return [np.asarray(mask, dtype=bool) for mask in rows]
+
+
+def _force(model: Model | Estimator) -> Estimator:
+    return model_estimator(model) if isinstance(model, Model) else model

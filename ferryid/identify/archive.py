@@ -14,25 +14,25 @@ from typing import Any
 import numpy as np
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.archived_logs import folders
-from ferryid.identify.basis import Basis, basis
-from ferryid.identify.cautions import general_cautions
-from ferryid.identify.choose import choose, deviation
-from ferryid.identify.combine import spanned
-from ferryid.identify.cross_products import CrossProducts, total
-from ferryid.identify.crossed import FOLDS, MOST_GROUPS, Folds, FoldSums
+from ferryid.identify.archived_logs import archived_folders
+from ferryid.identify.block_sum_store import StoredSums, load_block_sums
 from ferryid.identify.estimation import estimate_correction
-from ferryid.identify.excitation import SECTORS, sector_coverage, singular_values, undetermined
+from ferryid.identify.excitation import SECTORS, sector_coverage
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
-from ferryid.identify.free_run import FreeRun
-from ferryid.identify.inertia import unforced
-from ferryid.identify.kept_pieces import Kept, kept
+from ferryid.identify.fit_warnings import general_warnings
+from ferryid.identify.inertia import axes_without_force
+from ferryid.identify.log_sums import pooled_deviation
+from ferryid.identify.model_selection import select_model
 from ferryid.identify.outcome import ArchivedLog, Excitation, FitOutcome, LogFit
 from ferryid.identify.pipeline import accept_estimate
-from ferryid.identify.scores import ForceScores, ModelScores
-from ferryid.identify.settings import FitSettings, check_components
-from ferryid.identify.split import validating
-from ferryid.identify.store import checked_name
+from ferryid.identify.settings import FOLDS, FitSettings, check_components
+from ferryid.identify.split import validation_blocks
+from ferryid.models import ForceScores, ModelScores, span_ranges
+from ferryid.models.prediction import FreeRun
+from ferryid.models.store import check_name
+from ferryid.regression import CrossProducts, singular_values, total, undetermined_terms
+from ferryid.regression.bases import Basis, make_basis
+from ferryid.regression.cross_validation import Folds, FoldSums
 from ferryid.types import Flags, Floats, RunContext
 from ferryid.vessel.profile import Profile
 
@@ -81,9 +81,9 @@ class _Sums:
         self.validation_force: list[Floats] = []
         self._apiece = max(1, MOST_DRAWN // logs)
         self._short = 0
-        self._whole = validating(logs) if by_logs else None
+        self._whole = validation_blocks(logs) if by_logs else None
 
-    def add(self, log: Kept) -> None:
+    def add(self, log: StoredSums) -> None:
         """Add one log."""
         one = log.studied
         validates = self._validates(one.test.blocks)
@@ -110,7 +110,7 @@ class _Sums:
         if self._whole is not None:
             return np.full(blocks, self._whole[len(self.logs)])
         if blocks >= 3:
-            return validating(blocks)
+            return validation_blocks(blocks)
         # A log too short for blocks of its own is one block among those of its kind.
         self._short += 1
         return np.full(blocks, self._short % 3 == 2)
@@ -161,7 +161,9 @@ class ArchiveData(FitData):
     @property
     def without_force(self) -> Flags:
         """Axes on which no actuator acts, shape (3,)."""
-        return unforced(deviation(np.concatenate(self.sums.force)), deviation(np.concatenate(self.sums.base)))
+        return axes_without_force(
+            pooled_deviation(np.concatenate(self.sums.force)), pooled_deviation(np.concatenate(self.sums.base))
+        )
 
     def resampling_blocks(
         self, theta: Floats, intercept: Floats
@@ -172,7 +174,7 @@ class ArchiveData(FitData):
     def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
         """Return the force errors on validation blocks."""
         logged, validation = self.sums.logs, self.validation
-        variance = deviation(np.concatenate(self.sums.validation_force)) ** 2
+        variance = pooled_deviation(np.concatenate(self.sums.validation_force)) ** 2
         trained = sum(log.training_rows / log.rate_hz for log in logged)
         validated = sum(log.validation.n / log.rate_hz for log in logged)
         by_logs = self.settings.split == "logs"
@@ -197,9 +199,9 @@ class ArchiveData(FitData):
         """Return what the training blocks determine."""
         return Excitation(
             singular_values=singular_values(self.training),
-            ranges=spanned(self.sums.ranges),
+            ranges=span_ranges(self.sums.ranges),
             heading_coverage=sector_coverage(self.sums.sectors),
-            undetermined=undetermined(self.training, self.functions.terms, estimate.functions.mask),
+            undetermined=undetermined_terms(self.training, self.functions.terms, estimate.functions.mask),
             vip=estimate.regression.vip(estimate.components),
         )
 
@@ -227,7 +229,7 @@ class ArchiveData(FitData):
 
     def warnings(self, excitation: Excitation, scores: ModelScores) -> list[str]:
         """Return what to know before trusting the scores, as sentences."""
-        return general_cautions(self.settings, excitation, scores, len(self.sums.logs))
+        return general_warnings(self.settings, excitation, scores, len(self.sums.logs))
 
 
 def fit_archive(
@@ -245,11 +247,11 @@ def fit_archive(
     FerryIdError
         For logs that cannot be added up, by name.
     """
-    name, settings = checked_name(name or profile.name), settings.on(profile)
+    name, settings = check_name(name or profile.name), settings.on(profile)
     if settings.split == "every-kth":
         raise FerryIdError("--split every-kth: an archive keeps blocks, no rows. Fix: give blocks or logs")
     windows_s = settings.windows_s or (settings.window_s,)
-    where = folders(run.out, profile, names)
+    where = archived_folders(run.out, profile, names)
     sums = _Sums(len(windows_s), len(where), by_logs=settings.split == "logs")
     functions = _added(where, profile, settings, windows_s, sums.add, run.progress)
     check_components(settings.components, functions)
@@ -262,7 +264,7 @@ def fit_archive(
     run.progress("fitting")
     components = settings.components
     if settings.windows_s or components == "auto":
-        choice = choose(
+        choice = select_model(
             profile, settings, functions, windows_s, sums.folds.folds(), data.without_force, where=data.where
         )
         components = choice.components
@@ -280,13 +282,13 @@ def archive_folds(
     folds: int,
 ) -> tuple[Basis, Flags, dict[str, Folds], list[dict[str, Any]]]:
     """Return what a sweep needs of an archive: basis, axes without force, folds by stretches and whole logs, and the logs."""
-    where = folders(run.out, profile, names)
+    where = archived_folders(run.out, profile, names)
     by = {"blocks": FoldSums(len(windows_s), folds)}
     if len(where) > 1:
-        by["logs"] = FoldSums(len(windows_s), min(MOST_GROUPS, len(where)), whole=True)
+        by["logs"] = FoldSums(len(windows_s), len(where), whole=True)
     force, base, told = [], [], []
 
-    def add(log: Kept) -> None:
+    def add(log: StoredSums) -> None:
         for sums in by.values():
             sums.add(log.studied.training, log.studied.test)
         force.append(log.studied.force)
@@ -295,7 +297,7 @@ def archive_folds(
         told.append({"name": log.name, "sha256": log.sha256, "seconds": rows / log.rate_hz, "rows": rows})
 
     functions = _added(where, profile, settings, windows_s, add, run.progress)
-    free = unforced(deviation(np.concatenate(force)), deviation(np.concatenate(base)))
+    free = axes_without_force(pooled_deviation(np.concatenate(force)), pooled_deviation(np.concatenate(base)))
     return functions, free, {key: sums.folds() for key, sums in by.items()}, told
 
 
@@ -304,14 +306,14 @@ def _added(
     profile: Profile,
     settings: FitSettings,
     windows_s: Sequence[float],
-    add: Callable[[Kept], None],
+    add: Callable[[StoredSums], None],
     progress: Callable[[str], None],
 ) -> Basis:
     """Add every log, one after the other, and return the basis that they share."""
-    first: Kept | None = None
+    first: StoredSums | None = None
     for number, folder in enumerate(where):
         progress(f"adding up log {number + 1} of {len(where)}")
-        log = kept(folder, profile, settings, windows_s)
+        log = load_block_sums(folder, profile, settings, windows_s)
         if first is not None and log.basis != first.basis:
             raise FerryIdError(
                 f"{log.name}: its basis is {log.basis}, as its measurements allow, that of {first.name} {first.basis}: they do "
@@ -320,7 +322,7 @@ def _added(
         first = first or log
         add(log)
     assert first is not None
-    return basis(first.basis, structure=settings.structure)
+    return make_basis(first.basis, structure=settings.structure)
 
 
 def _errors(rows: CrossProducts, found: Coefficients) -> tuple[Floats, Floats]:

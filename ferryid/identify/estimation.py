@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ferryid.identify.basis import Basis
-from ferryid.identify.bootstrap import bootstrap
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
-from ferryid.identify.inertia import effective_mass, reason, unbelievable, without_inertia
-from ferryid.identify.simpls import Simpls, simpls
+from ferryid.identify.inertia import held_inertia_reason, implausible_inertia, without_inertia
+from ferryid.models.forces import effective_mass
+from ferryid.regression import Simpls, fit_simpls
+from ferryid.regression.bases import Basis
+from ferryid.regression.resampling import bootstrap_coefficients
 
 
 def estimate_correction(data: FitData, components: int, draws: int, progress: Callable[[str], None]) -> Estimate:
@@ -41,7 +42,7 @@ def estimate_correction(data: FitData, components: int, draws: int, progress: Ca
         return Estimate(functions, regression, chosen, coefficients, held, ())
     progress("resampling blocks for the intervals")
     blocks, block_s, notes = data.resampling_blocks(theta, intercept)
-    spread = bootstrap(
+    spread = bootstrap_coefficients(
         blocks,
         chosen,
         draws=draws,
@@ -65,14 +66,16 @@ def _regress(data: FitData, components: int) -> tuple[Basis, Simpls, int, tuple[
     chosen = min(components, most)
     fitted = functions.mask.any(axis=0)
     axes = data.without_force & fitted if settings.inertia == "auto" else np.zeros(3, dtype=bool)
-    held = {axis: reason(axis, np.zeros((3, 3)), data.profile, True) for axis in np.flatnonzero(axes).tolist()}
+    held = {
+        axis: held_inertia_reason(axis, np.zeros((3, 3)), data.profile, True) for axis in np.flatnonzero(axes).tolist()
+    }
     while True:
         functions = replace(functions, mask=without_inertia(functions.mask, functions.terms, axes))
-        regression = simpls(data.training, most, allowed=functions.mask)
+        regression = fit_simpls(data.training, most, allowed=functions.mask)
         theta = regression.coefficients[chosen - 1] + already
         mass = effective_mass(data.profile, settings.scale, functions.terms, theta)
-        more = unbelievable(data.profile, mass) & fitted & ~axes
+        more = implausible_inertia(data.profile, mass) & fitted & ~axes
         if settings.inertia == "fitted" or not more.any():
             return functions, regression, chosen, tuple(held.values())
-        held |= {axis: reason(axis, mass, data.profile, False) for axis in np.flatnonzero(more).tolist()}
+        held |= {axis: held_inertia_reason(axis, mass, data.profile, False) for axis in np.flatnonzero(more).tolist()}
         axes = axes | more

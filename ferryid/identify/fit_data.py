@@ -7,15 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ferryid.identify.basis import Basis
-from ferryid.identify.bootstrap import Blocks
-from ferryid.identify.cross_products import CrossProducts
-from ferryid.identify.free_run import FreeRun
 from ferryid.identify.outcome import ArchivedLog, Excitation, LogFit
-from ferryid.identify.qr import QrFactor
-from ferryid.identify.scores import ModelScores
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.simpls import Simpls
+from ferryid.models import ModelScores
+from ferryid.models.prediction import FreeRun
+from ferryid.regression import CrossProducts, QrFactor, Simpls
+from ferryid.regression.bases import Basis
+from ferryid.regression.resampling import Blocks
 from ferryid.types import Flags, Floats
 from ferryid.vessel.profile import Profile
 

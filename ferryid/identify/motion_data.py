@@ -10,21 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.identify.bootstrap import Blocks, block_seconds
-from ferryid.identify.cautions import cautions
-from ferryid.identify.cross_products import CrossProducts, Rows
-from ferryid.identify.estimate import Estimator
-from ferryid.identify.excitation import excitation
+from ferryid.identify.excitation import assess_excitation
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
-from ferryid.identify.free_run import FreeRun, free_run
-from ferryid.identify.inertia import unforced
+from ferryid.identify.fit_warnings import fit_warnings
+from ferryid.identify.inertia import axes_without_force
 from ferryid.identify.outcome import Excitation, LogFit
-from ferryid.identify.qr import QrFactor, factorise
-from ferryid.identify.residual import residual
-from ferryid.identify.rows import basis_of, grids, known_rows, rows_of
-from ferryid.identify.scores import ModelScores, force_scores
+from ferryid.identify.rows import basis_for, grids, known_rows, rows_of
 from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.split import Split
+from ferryid.models import ModelScores, force_scores
+from ferryid.models.forces import Estimator, compute_residual
+from ferryid.models.prediction import FreeRun, run_free
+from ferryid.regression import CrossProducts, QrFactor, Rows, factorise
+from ferryid.regression.resampling import Blocks, block_seconds
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
@@ -74,7 +72,7 @@ class MotionData(FitData):
         """Axes on which no actuator acts on the training rows, shape (3,)."""
         rows = self.split.training
         tau = stacked([motion.tau for motion in self.motions], rows)
-        return unforced(np.std(tau, axis=0), np.std(tau - stacked(self.targets, rows), axis=0))
+        return axes_without_force(np.std(tau, axis=0), np.std(tau - stacked(self.targets, rows), axis=0))
 
     def resampling_blocks(self, theta: Floats, intercept: Floats) -> tuple[Blocks, float, tuple[str, ...]]:
         """Return blocks of training rows as long as the residual of these coefficients is correlated."""
@@ -92,7 +90,7 @@ class MotionData(FitData):
 
     def excitation(self, estimate: Estimate) -> Excitation:
         """Return what the training rows determine."""
-        return excitation(
+        return assess_excitation(
             self.training,
             self.functions.terms,
             estimate.regression.vip(estimate.components),
@@ -157,7 +155,7 @@ class LogData(MotionData):
         """Return free runs of the base model and of the new one on validation rows."""
         progress("running free")
         rows = self.split.validation
-        return free_run(self.base(), self.motions, rows), free_run(self.estimator(found), self.motions, rows)
+        return run_free(self.base(), self.motions, rows), run_free(self.estimator(found), self.motions, rows)
 
     def training_logs(self) -> tuple[Mapping[str, Any], ...]:
         """Return the training logs as a model file lists them."""
@@ -178,7 +176,7 @@ class LogData(MotionData):
 
     def warnings(self, excitation: Excitation, scores: ModelScores) -> tuple[str, ...]:
         """Return what to know before trusting the scores, as sentences."""
-        return cautions(self.settings, self.split, excitation, self.prepared, self.motions, scores)
+        return fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores)
 
 
 def compute_residuals(profile: Profile, settings: FitSettings, prepared: Sequence[Prepared]) -> LogData:
@@ -192,10 +190,10 @@ def compute_residuals(profile: Profile, settings: FitSettings, prepared: Sequenc
         For more components than the basis has functions, and a log without a row on which all is known.
     """
     motions = numbered_names([one.motion for one in prepared])
-    functions = basis_of(settings, motions)
+    functions = basis_for(settings, motions)
     check_components(settings.components, functions)
-    targets = [residual(profile, motion, settings.scale, settings.residual) for motion in motions]
-    errors = [residual(profile, motion, settings.scale) for motion in motions]
+    targets = [compute_residual(profile, motion, settings.scale, settings.residual) for motion in motions]
+    errors = [compute_residual(profile, motion, settings.scale) for motion in motions]
     motions = [
         replace(motion, valid=known_rows(motion, functions, target, error))
         for motion, target, error in zip(motions, targets, errors, strict=True)

@@ -9,23 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.free_run import FreeRun
-from ferryid.identify.model import Model
-from ferryid.identify.scores import ModelScores, by_axis
+from ferryid.identify.acceptance import Acceptance
+from ferryid.models import Model, ModelScores
+from ferryid.models.prediction import FreeRun
 from ferryid.signals.track import Motion
-from ferryid.types import Flags, Floats
-
-
-@dataclass(frozen=True)
-class Acceptance:
-    """Whether a model is accepted and why, in sentences that a person can act on."""
-
-    accepted: bool
-    normalised_mse: float
-    """Validation MSE over the base model's, averaged over the three axes."""
-    per_axis: Mapping[str, float]
-    """The same per axis."""
-    reasons: tuple[str, ...]
+from ferryid.types import Flags, Floats, by_axis
 
 
 @dataclass(frozen=True)

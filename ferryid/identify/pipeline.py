@@ -13,22 +13,21 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ferryid import __version__
-from ferryid.identify.acceptance import NOT_JUDGED, accept
-from ferryid.identify.basis import Basis
-from ferryid.identify.cautions import free_run_cautions
-from ferryid.identify.choose import Choice, choose, folds_by_blocks, force_free, studied, tried
-from ferryid.identify.crossed import TEST_WINDOW_S
+from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, accept
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
+from ferryid.identify.fit_warnings import free_run_warnings
 from ferryid.identify.inputs import read_logs
-from ferryid.identify.model import Model
+from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
+from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.motion_data import compute_residuals, numbered_names
-from ferryid.identify.outcome import Acceptance, ComponentCurve, Excitation, FitOutcome
-from ferryid.identify.rows import basis_of
-from ferryid.identify.scores import ModelScores
-from ferryid.identify.settings import FitSettings, check_components
-from ferryid.identify.split import Split, split
-from ferryid.identify.store import checked_name
+from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome
+from ferryid.identify.rows import basis_for
+from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
+from ferryid.identify.split import Split, split_rows
+from ferryid.models import Model, ModelScores
+from ferryid.models.store import check_name
+from ferryid.regression.bases import Basis
 from ferryid.signals.prepare import Opened, smoothed
 from ferryid.signals.smooth import smooth_measured
 from ferryid.types import Flags, RunContext
@@ -58,7 +57,7 @@ def fit_logs(
     FerryIdError
         For input that cannot be used, with file, cause and remedy.
     """
-    name, settings = checked_name(name or profile.name), settings.on(profile)
+    name, settings = check_name(name or profile.name), settings.on(profile)
     # Read, align.
     opened = read_logs(paths, profile, settings, run)
     parts = None
@@ -69,7 +68,7 @@ def fit_logs(
     run.progress("computing the residual")
     data = compute_residuals(profile, settings, prepared)
     if parts is None:
-        parts = split(data.motions, settings.split, window_s=settings.window_s)
+        parts = split_rows(data.motions, settings.split, window_s=settings.window_s)
     data = replace(data, split=parts.within([motion.valid for motion in data.motions]))
     run.progress("fitting")
     components = settings.components
@@ -100,7 +99,7 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
         warnings=(
             *estimate.held,
             *data.warnings(excitation, scores),
-            *free_run_cautions(free_base, free_new),
+            *free_run_warnings(free_base, free_new),
             *estimate.notes,
         ),
         logs=logs,
@@ -169,11 +168,13 @@ def _select_window(profile: Profile, settings: FitSettings, opened: Sequence[Ope
 
     Its split is to be kept: another, made for the window chosen, would validate on rows that took part in the choice.
     """
-    windows_s = tried(settings.windows_s, [one.measured for one in opened], in_blocks=settings.split == "blocks")
+    windows_s = windows_to_try(
+        settings.windows_s, [one.measured for one in opened], in_blocks=settings.split == "blocks"
+    )
     motions = numbered_names([smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
-    functions = basis_of(settings, motions)
+    functions = basis_for(settings, motions)
     check_components(settings.components, functions)
-    parts = split(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))
+    parts = split_rows(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))
     choice = _select(profile, settings, functions, opened, windows_s, parts.training)
     return replace(settings, window_s=choice.window_s, components=choice.components), parts
 
@@ -185,10 +186,12 @@ def _select(
     opened: Sequence[Opened],
     windows_s: Sequence[float],
     wanted: Sequence[Flags],
-) -> Choice:
+) -> Selection:
     """Return window and component count by cross-validation within the training rows."""
     logs = [
-        studied(profile, settings, functions, one.measured, windows_s, wanted=rows)
+        sum_log(profile, settings, functions, one.measured, windows_s, wanted=rows)
         for one, rows in zip(opened, wanted, strict=True)
     ]
-    return choose(profile, settings, functions, windows_s, folds_by_blocks(logs), force_free(logs), where=logs[0].log)
+    return select_model(
+        profile, settings, functions, windows_s, folds_by_blocks(logs), force_free_axes(logs), where=logs[0].log
+    )

@@ -12,12 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.free_run import FreeRun
-from ferryid.identify.model import Model
-from ferryid.identify.predict import Prediction, predict
-from ferryid.identify.scores import force_scores, usable
-from ferryid.identify.store import load_file
-from ferryid.identify.stored_effect import Conditions, StoredEffect
+from ferryid.models import Conditions, Model, StoredEffect, force_scores, usable_rows
+from ferryid.models.prediction import FreeRun, Prediction, predict
+from ferryid.models.store import load_file
 from ferryid.prove.rivals import RIVALS, Learner
 from ferryid.prove.rivals.base import base_of, prepared_log
 from ferryid.prove.rivals.learnt import SMOOTHER, WINDOW_S
@@ -103,7 +100,7 @@ def second(
         more[name] = {"names": [named.as_json() for named in learnt.names]}
     motion = other.motion
     # On the same rows for all, so that nobody gains by what it cannot predict.
-    rows = usable(motion, base.tau, *(each.tau for each in found.values()))
+    rows = usable_rows(motion, base.tau, *(each.tau for each in found.values()))
     run = base.free_run(rows)
     judged = {name: _judged(motion.tau, base.tau, each, rows, run) for name, each in found.items()}
     return {

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ferryid.identify.compare import Trial
-from ferryid.identify.physics_rows import render_effects
+from ferryid.compare import ComparedLog
 from ferryid.report import comparison_figures, comparison_words
+from ferryid.report.comparison_words import render_effects
 from ferryid.report.html import template
 from ferryid.report.structure import worst_minute
 from ferryid.types import AXES
@@ -18,7 +18,7 @@ MAX_LOGS = 6
 """Logs that are drawn; the page stays readable."""
 
 
-def render(result: Row, trials: Sequence[Trial], made: Mapping[str, str]) -> tuple[str, dict[str, str]]:
+def render(result: Row, trials: Sequence[ComparedLog], made: Mapping[str, str]) -> tuple[str, dict[str, str]]:
     """Return the page and its drawings (SVG) by name; `made` are date, version and command."""
     known = comparison_words.scopes(result)
     reference = result["models"][0]["label"]
@@ -90,7 +90,7 @@ def _overall(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> l
     return figures
 
 
-def _figures(result: Row, trial: Trial) -> list[dict[str, str]]:
+def _figures(result: Row, trial: ComparedLog) -> list[dict[str, str]]:
     start = worst_minute(trial.motion, trial.taus, trial.rows, comparison_figures.MINUTE_S)
     which = "This log" if start is None else f"The minute in which the models err most, from {start:.0f} s"
     return [

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from ferryid import __version__
+from ferryid.compare import Comparison
 from ferryid.files import dump_json, finite, replacing
-from ferryid.identify.compare import Comparison
-from ferryid.identify.physics_rows import render_effects
 from ferryid.report import comparison_words
 from ferryid.report.comparison_page import render
+from ferryid.report.comparison_words import render_effects
 
 NAMED = 2
 """Models and logs that the folder's name holds; a sum stands for the others."""

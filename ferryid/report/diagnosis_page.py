@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.diagnose.result import AXES, Diagnosis, Finding
-from ferryid.identify.free_run import FreeRun
+from ferryid.models.prediction import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
 from ferryid.report.figures import Floats
 from ferryid.report.html import template

@@ -15,8 +15,8 @@ from ferryid import __version__
 from ferryid.diagnose.result import AXES, SCHEMA, Diagnosis, to_json
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
-from ferryid.identify.model import Model
-from ferryid.identify.store import load
+from ferryid.models import Model
+from ferryid.models.store import load
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_words import overall
 from ferryid.vessel import load_profile, parse_profile

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
-from ferryid.identify.free_run import FreeRun
-from ferryid.identify.outcome import ComponentCurve, Excitation, LogFit
+from ferryid.identify import ComponentCurve, Excitation, LogFit
+from ferryid.models.prediction import FreeRun
 from ferryid.report.structure import autocorrelation, envelope, spectrum
 from ferryid.types import AXES
 

@@ -10,12 +10,9 @@ from typing import Any
 import numpy as np
 
 from ferryid.files import alone, dump_json, replacing
-from ferryid.identify.archive import fit_archive
-from ferryid.identify.catalogue import fitted_with
-from ferryid.identify.outcome import FitOutcome
-from ferryid.identify.pipeline import fit_logs
-from ferryid.identify.settings import FitSettings
-from ferryid.identify.store import Stored, numbered, planned, save
+from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
+from ferryid.models.store import StoredModel, assign_version, plan, save
+from ferryid.report.model_text import describe_settings
 from ferryid.report.page import headline, render
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
@@ -25,7 +22,7 @@ from ferryid.vessel.profile import Profile
 class FitReport:
     """What a fit leaves: the stored model, the report, and the same as JSON and as text for a terminal."""
 
-    stored: Stored
+    stored: StoredModel
     report: Path
     json: dict[str, Any]
     text: str
@@ -86,10 +83,10 @@ def _reported(result: FitOutcome, run: RunContext) -> FitReport:
     run.progress("writing the report")
     out = run.out
     with alone(out / "models"):
-        result = replace(result, model=numbered(result.model, out))
+        result = replace(result, model=assign_version(result.model, out))
         folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
         page, drawings = render(result)
-        stored = planned(result.model, out)
+        stored = plan(result.model, out)
         plain = as_json(result, stored, folder / "report.html")
         with replacing(folder) as temporary:
             temporary.mkdir()
@@ -103,7 +100,7 @@ def _reported(result: FitOutcome, run: RunContext) -> FitReport:
     return FitReport(stored, folder / "report.html", plain, as_text(result, stored, folder / "report.html"))
 
 
-def as_json(result: FitOutcome, stored: Stored, report: Path) -> dict[str, Any]:
+def as_json(result: FitOutcome, stored: StoredModel, report: Path) -> dict[str, Any]:
     """Return the result of a fit in the form of schema ``ferryid.fit/1``."""
     model = result.model
     return {
@@ -141,14 +138,14 @@ def as_json(result: FitOutcome, stored: Stored, report: Path) -> dict[str, Any]:
     }
 
 
-def as_text(result: FitOutcome, stored: Stored, report: Path) -> str:
+def as_text(result: FitOutcome, stored: StoredModel, report: Path) -> str:
     """Return the verdict for a terminal."""
     model, scores = result.model, result.scores.force
     lines = [
         headline(result),
         *(f"  {reason}" for reason in result.acceptance.reasons),
         "",
-        f"fitted with {fitted_with(model)}",
+        f"fitted with {describe_settings(model)}",
         "",
     ]
     lines.append(f"{'on validation rows':<28}" + "".join(f"{axis:>12}" for axis in AXES))

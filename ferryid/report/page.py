@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.identify.excitation import RANGE_UNITS
-from ferryid.identify.inertia import effective_mass
-from ferryid.identify.outcome import FitOutcome, LogFit
-from ferryid.identify.scores import ForceScores
+from ferryid.identify import FitOutcome, LogFit
+from ferryid.models import RANGE_UNITS, ForceScores
+from ferryid.models.forces import effective_mass
 from ferryid.report import figures
 from ferryid.report.html import template
 from ferryid.report.structure import remainder, worst_and_best_minute

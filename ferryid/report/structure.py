@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.outcome import LogFit
+from ferryid.identify import LogFit
 from ferryid.signals.track import Motion
 from ferryid.types import AXES
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from ferryid.identify.compared import Compared
+from ferryid.identify.sweeps import StructureComparison
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, WIDTH, svg_text
 from ferryid.types import AXES
 
@@ -27,7 +27,7 @@ _BETWEEN = (
 """Ticks of a decade, by the ratio of largest to least."""
 
 
-def forest(one: Compared) -> str:
+def forest(one: StructureComparison) -> str:
     """Return MSE over that of the best structure per axis, with its interval, a line for each structure."""
     with mpl.rc_context(STYLE):
         count = len(one.structures)

@@ -6,22 +6,19 @@ from collections.abc import Sequence
 from typing import Any
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.compared import (
-    Compared,
+from ferryid.identify import FOLDS, TEST_WINDOW_S, FitSettings
+from ferryid.identify.sweeps import (
+    BY,
     Ratios,
+    StructureComparison,
     StructureSweep,
     over_base,
-    render_structures,
     structures_json,
-    terms,
-    verdict,
+    sweep_structures,
 )
-from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S
-from ferryid.identify.settings import FitSettings
-from ferryid.identify.structures import sweep_structures
-from ferryid.identify.sweep import BY
 from ferryid.report.html import template
 from ferryid.report.structures_figures import forest
+from ferryid.report.structures_text import count_terms, render_structures, supported_structure
 from ferryid.report.sweep_report import SweepReport, leave
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
@@ -55,7 +52,7 @@ def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
     sections = [
         {
             "title": f"By {BY[key]}",
-            "verdict": verdict(one),
+            "verdict": supported_structure(one),
             "one": one,
             "best": one.structures[0].title,
             "simplest": one.simplest.title,
@@ -67,7 +64,7 @@ def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
     plain = structures_json(found)
     page = template("structures.html").render(
         vessel=found.vessel,
-        headline=verdict(found.by["blocks"]),
+        headline=supported_structure(found.by["blocks"]),
         notes=found.notes,
         unusable=found.unusable,
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
@@ -81,13 +78,13 @@ def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
     return page, drawings
 
 
-def _rows(one: Compared) -> list[dict[str, Any]]:
+def _rows(one: StructureComparison) -> list[dict[str, Any]]:
     return [
         {
             "basis": structure.basis,
             "structure": structure.structure,
             "functions": structure.functions.name,
-            "terms": terms(structure),
+            "terms": count_terms(structure),
             "components": structure.components,
             "within": f"{min(structure.within)} to {max(structure.within)}",
             "ratios": [f"{value:.4f}" for value in over_base(structure, one)],

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.files import dump_json, replacing
-from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S
-from ferryid.identify.settings import FitSettings
-from ferryid.identify.sweep import BY, Sweep, headline, render_sweep, sweep, sweep_json
+from ferryid.identify import FOLDS, TEST_WINDOW_S, FitSettings
+from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
 from ferryid.report.html import template
 from ferryid.report.sweep_figures import curves, heat_map
+from ferryid.report.sweep_text import headline, render_sweep
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
@@ -38,8 +38,8 @@ def sweep_and_report(
     folds: int = FOLDS,
     archive: bool = False,
 ) -> SweepReport:
-    """Sweep settings over logs and write the page; arguments and errors are those of `ferryid.identify.sweep.sweep`."""
-    found = sweep(what, logs, profile, settings, run, windows_s=windows_s, folds=folds, archive=archive)
+    """Sweep settings over logs and write the page; arguments and errors are those of `sweep_settings`."""
+    found = sweep_settings(what, logs, profile, settings, run, windows_s=windows_s, folds=folds, archive=archive)
     run.progress("writing the report")
     page, drawings = render(found)
     return leave(run, what, found.logs, page, drawings, lambda report: sweep_json(found, report), render_sweep(found))

@@ -9,12 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.identify import FitSettings
 from ferryid.identify.adaptive import data_matrix, fit_motions
-from ferryid.identify.cross_products import CrossProducts, Rows
-from ferryid.identify.estimate import Estimator
-from ferryid.identify.model import Model
-from ferryid.identify.qr import QrFactor, factorise
-from ferryid.identify.settings import FitSettings
+from ferryid.models import Model
+from ferryid.models.forces import Estimator
+from ferryid.regression import CrossProducts, QrFactor, Rows, factorise
 from ferryid.signals.track import Motion
 from ferryid.vessel.load import parse_profile
 from ferryid.vessel.profile import Profile

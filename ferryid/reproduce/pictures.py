@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.tracking import MEASURES
+from ferryid.compare import MEASURES
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.performance import Performance
 from ferryid.signals.track import Motion

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model
-from ferryid.identify.store import load_file
+from ferryid.models import Model
+from ferryid.models.store import load_file
 from ferryid.simulate.logs import write_log
 from ferryid.simulate.places import check_output
 from ferryid.simulate.scenario import Scenario, check_seed, list_scenarios, load_scenario

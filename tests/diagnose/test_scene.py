@@ -12,9 +12,9 @@ import pytest
 from ferryid.diagnose.scene import broad_spread, plain_picture, scene_of, window_lengths
 from ferryid.effects.picture import COEFFICIENTS, Scene, acceleration
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import basis
-from ferryid.identify.estimate import estimator
-from ferryid.identify.model import Model
+from ferryid.models.forces.estimator import model_estimator
+from ferryid.models.model import Model
+from ferryid.regression.bases.basis import make_basis
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
@@ -32,7 +32,7 @@ def short() -> Scene:
 def model_of(
     structure: str, theta_of: Callable[[tuple[int, int]], np.ndarray], profile_text: str = FERRY.text
 ) -> Model:
-    functions = basis("thesis", structure=structure)
+    functions = make_basis("thesis", structure=structure)
     theta = np.where(functions.mask, theta_of(functions.mask.shape), 0.0)
     k = len(functions.terms)
     return Model(
@@ -134,7 +134,7 @@ def test_a_model_becomes_a_picture_of_the_same_force(short: Scene, weather: bool
     model = model_of("decoupled", around)
     picture, spread = plain_picture(scene, FERRY, model)
     nu_dot = acceleration(picture)
-    needed = estimator(model)(nu_dot, scene.nu, scene.psi, scene.wind, None)
+    needed = model_estimator(model)(nu_dot, scene.nu, scene.psi, scene.wind, None)
     np.testing.assert_allclose(needed, scene.parts.sum(axis=1), atol=1e-6)
     fitted = dict(zip(COEFFICIENTS, picture.hull, strict=True))
     surge = model.theta[:, 0]

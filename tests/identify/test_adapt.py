@@ -12,15 +12,14 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.adaptive import data_matrix, fit_motions, settings_of, update_axes
-from ferryid.identify.combine import reference
-from ferryid.identify.estimate import Estimator, base_estimator, estimator
-from ferryid.identify.inertia import effective_mass
-from ferryid.identify.judge import force_mse, judge
-from ferryid.identify.model import Model, to_json
-from ferryid.identify.residual import base_force
+from ferryid.identify.acceptance import accept_on_motions, force_mse
+from ferryid.identify.adaptive.averaging import model_reference
+from ferryid.identify.adaptive.rounds import data_matrix, fit_motions, settings_of_model, update_axes
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.store import load, save
+from ferryid.models.forces.estimator import Estimator, base_estimator, effective_mass, model_estimator
+from ferryid.models.forces.residual import base_force
+from ferryid.models.model import Model, model_to_json
+from ferryid.models.store.versions import load, save
 from ferryid.signals.track import Motion
 from tests.identify.rounds import PROFILE, motion, with_flow
 
@@ -68,7 +67,7 @@ def test_only_the_rows_asked_for_train() -> None:
 def test_scores_are_those_of_the_training_rows_and_say_so() -> None:
     log = motion(1, noise=30.0)
     model = fit_motions(PROFILE, [log], WEAK).model
-    error = log.tau - estimator(model).of(log)
+    error = log.tau - model_estimator(model).of(log)
     np.testing.assert_allclose(model.scores.force.mse_model, np.mean(error**2, axis=0))
     assert model.scores.split == "none"
     assert "flatter" in model.scores.split_notes[0]
@@ -80,8 +79,10 @@ def test_on_top_of_a_model_least_squares_ends_where_it_would_without() -> None:
     logs = [motion(2, noise=30.0), motion(3, noise=30.0)]
     on_top = fit_motions(PROFILE, logs, COUPLED, base=first).model
     without = fit_motions(PROFILE, logs, COUPLED).model
-    np.testing.assert_allclose(estimator(on_top).of(UNSEEN), estimator(without).of(UNSEEN), rtol=1e-5, atol=1e-4)
-    assert on_top.settings["base_model"] == reference(first)
+    np.testing.assert_allclose(
+        model_estimator(on_top).of(UNSEEN), model_estimator(without).of(UNSEEN), rtol=1e-5, atol=1e-4
+    )
+    assert on_top.settings["base_model"] == model_reference(first)
     assert {log["name"] for log in on_top.training} == {"round 1", "round 2", "round 3"}
     assert on_top.ranges["u"][1] == max(first.ranges["u"][1], without.ranges["u"][1])
 
@@ -161,13 +162,13 @@ def test_surge_update_finds_the_load_and_locks_sway_and_yaw() -> None:
     after = update_axes(before, [crossing()]).model
     row = after.terms.index("u_dot")
     assert after.theta[row, 0] - before.theta[row, 0] == pytest.approx(500.0, rel=1e-3)
-    np.testing.assert_array_equal(estimator(after).of(UNSEEN)[:, 1:], estimator(before).of(UNSEEN)[:, 1:])
+    np.testing.assert_array_equal(model_estimator(after).of(UNSEEN)[:, 1:], model_estimator(before).of(UNSEEN)[:, 1:])
     np.testing.assert_array_equal(after.covariance[1:], before.covariance[1:])
     np.testing.assert_array_equal(after.low[:, 1:], before.low[:, 1:])
     other = [k for k, term in enumerate(after.terms) if term not in ("u_dot", "u", "u^3", "|u|u")]
     np.testing.assert_array_equal(after.theta[other], before.theta[other])
     assert after.settings["updated"] == ["surge", "u_dot", "u", "u^3", "|u|u"]
-    assert after.settings["base_model"] == reference(before)
+    assert after.settings["base_model"] == model_reference(before)
 
 
 def test_surge_update_does_not_mind_that_nothing_acts_on_locked_axes() -> None:
@@ -220,13 +221,13 @@ def test_update_of_given_terms_and_axes() -> None:
 def test_models_are_stored_and_read_like_any_other(tmp_path: Path) -> None:
     first = fit_motions(PROFILE, [motion(1)], WEAK, name="first").model
     for model in (first, update_axes(first, [crossing()], name="updated").model):
-        plain = json.loads(dump_json(to_json(model)))
+        plain = json.loads(dump_json(model_to_json(model)))
         jsonschema.validate(plain, json.loads((SCHEMAS / "model.json").read_text()))
         save(model, tmp_path)
         back = load(f"{model.name}@1", tmp_path)
         np.testing.assert_array_equal(back.theta, model.theta)
         np.testing.assert_array_equal(back.covariance, model.covariance)
-        assert settings_of(back).components == model.settings["components"]
+        assert settings_of_model(back).components == model.settings["components"]
 
 
 def test_force_mse_by_hand() -> None:
@@ -247,11 +248,11 @@ def test_judge_is_the_updating_criterion() -> None:
     log = motion(1)
     shifted = replace(log, tau=log.tau + np.array([3.0, 4.0, 0.5]))
     true, weak = Estimator(PROFILE, {}), Estimator(PROFILE, WEAK.scale)
-    assert judge(weak, true, shifted).accepted
-    assert not judge(true, weak, shifted).accepted
-    assert not judge(true, true, shifted).accepted
+    assert accept_on_motions(weak, true, shifted).accepted
+    assert not accept_on_motions(true, weak, shifted).accepted
+    assert not accept_on_motions(true, true, shifted).accepted
     model = fit_motions(PROFILE, [log], WEAK).model
-    assert judge(weak, model, [UNSEEN]).per_axis["surge"] < 0.01
+    assert accept_on_motions(weak, model, [UNSEEN]).per_axis["surge"] < 0.01
 
 
 def refusals() -> list[tuple[str, object]]:

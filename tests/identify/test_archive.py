@@ -14,13 +14,13 @@ import pytest
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.identify import archive as module
-from ferryid.identify import kept_pieces
+from ferryid.identify import block_sum_store
 from ferryid.identify.archive import fit_archive
-from ferryid.identify.archived_logs import folders
-from ferryid.identify.model import to_json
+from ferryid.identify.archived_logs import archived_folders
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.sweep import sweep
+from ferryid.identify.sweeps.settings_sweep import sweep_settings
+from ferryid.models.model import model_to_json
 from ferryid.report.fit_report import fit_archive_and_report
 from ferryid.signals.parquet import read_table, write_table
 from ferryid.signals.prepare import open_track
@@ -72,7 +72,7 @@ def test_rows_are_read_once(season: Path, monkeypatch: pytest.MonkeyPatch) -> No
     def never(*_: object) -> None:
         raise AssertionError("read again")
 
-    monkeypatch.setattr(kept_pieces, "load", never)
+    monkeypatch.setattr(block_sum_store, "load", never)
     again = fit_archive(PROFILE, replace(SETTINGS, structure="coupled", seed=3), RunContext(season))
     assert again.model.terms == first.model.terms
     with pytest.raises(AssertionError, match="read again"):
@@ -89,7 +89,7 @@ def test_a_damaged_file_is_made_anew(season: Path) -> None:
 def test_the_same_fit_again_is_the_same_model_file(season: Path, tmp_path: Path) -> None:
     shutil.copytree(season / "logs", tmp_path / "logs", ignore=shutil.ignore_patterns("pieces-*"))
     texts = [
-        dump_json(to_json(replace(fit_archive(PROFILE, SETTINGS, RunContext(tmp_path)).model, created="")))
+        dump_json(model_to_json(replace(fit_archive(PROFILE, SETTINGS, RunContext(tmp_path)).model, created="")))
         for _ in range(2)
     ]
     assert texts[0] == texts[1]
@@ -98,7 +98,7 @@ def test_the_same_fit_again_is_the_same_model_file(season: Path, tmp_path: Path)
 def test_sums_that_are_another_logs_are_made_anew(season: Path, tmp_path: Path) -> None:
     whole = fit_archive(PROFILE, SETTINGS, RunContext(season))
     shutil.copytree(season / "logs", tmp_path / "logs")
-    first, second, _ = folders(tmp_path, PROFILE)
+    first, second, _ = archived_folders(tmp_path, PROFILE)
     for path in first.glob("pieces-*.parquet"):
         shutil.copy(path, second)
     again = fit_archive(PROFILE, SETTINGS, RunContext(tmp_path))
@@ -141,9 +141,9 @@ def test_two_recordings_of_one_file_are_refused(tmp_path: Path, logs: list[str])
         shutil.copy(log, path)
         open_track(str(path), PROFILE, tmp_path)
     with pytest.raises(FerryIdError, match=r"day-\w+-\w+: read from .*day.mcap, as .* changed in between.*Fix: remove"):
-        folders(tmp_path, PROFILE)
+        archived_folders(tmp_path, PROFILE)
     open_track(logs[2], PROFILE, tmp_path)
-    assert [folder.name[:5] for folder in folders(tmp_path, PROFILE, ["day3"])] == ["day3-"]
+    assert [folder.name[:5] for folder in archived_folders(tmp_path, PROFILE, ["day3"])] == ["day3-"]
 
 
 def test_a_folder_whose_note_is_damaged_is_none(season: Path, tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_a_folder_whose_note_is_damaged_is_none(season: Path, tmp_path: Path) ->
     with pytest.raises(FerryIdError, match=r"recording.json: a part of it is missing or wrong .*Fix: delete"):
         fit_archive(PROFILE, replace(SETTINGS, sigma=0.7), RunContext(tmp_path))
     note.write_text(json.dumps({**told, "recording": []}))
-    assert len(folders(tmp_path, PROFILE)) == 2
+    assert len(archived_folders(tmp_path, PROFILE)) == 2
 
 
 def test_whole_logs_validate(season: Path) -> None:
@@ -167,8 +167,8 @@ def test_whole_logs_validate(season: Path) -> None:
 
 def test_a_sweep_of_the_archive_is_that_of_the_logs(logs: list[str], season: Path) -> None:
     settings = replace(SETTINGS, components="auto")
-    by_rows = sweep("both", logs, PROFILE, settings, RunContext(season), windows_s=(0.5, 1.0, 2.0))
-    by_sums = sweep("both", [], PROFILE, settings, RunContext(season), windows_s=(0.5, 1.0, 2.0), archive=True)
+    by_rows = sweep_settings("both", logs, PROFILE, settings, RunContext(season), windows_s=(0.5, 1.0, 2.0))
+    by_sums = sweep_settings("both", [], PROFILE, settings, RunContext(season), windows_s=(0.5, 1.0, 2.0), archive=True)
     # Whole logs are the same folds; stretches are cut elsewhere, along the blocks that are kept.
     np.testing.assert_allclose(by_sums.by["logs"].curves.mse, by_rows.by["logs"].curves.mse, rtol=1e-9)
     np.testing.assert_allclose(by_sums.by["blocks"].curves.mse[1, 11], by_rows.by["blocks"].curves.mse[1, 11], rtol=0.2)
@@ -177,33 +177,33 @@ def test_a_sweep_of_the_archive_is_that_of_the_logs(logs: list[str], season: Pat
 def test_few_blocks_are_drawn_from_however_many_there_are(season: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_DRAWN", 4)
     drawn = module._Sums(1, 3, by_logs=False)
-    for folder in folders(season, PROFILE):
-        drawn.add(kept_pieces.kept(folder, PROFILE, SETTINGS, (1.0,)))
+    for folder in archived_folders(season, PROFILE):
+        drawn.add(block_sum_store.kept(folder, PROFILE, SETTINGS, (1.0,)))
     assert len(drawn.drawn[0]) == 3
     assert sum(part.n for part in drawn.drawn[0]) == sum(log.training_rows for log in drawn.logs)
     monkeypatch.setattr(module, "MOST_DRAWN", 2)
     fewer = module._Sums(1, 3, by_logs=False)
-    for folder in folders(season, PROFILE):
-        fewer.add(kept_pieces.kept(folder, PROFILE, SETTINGS, (1.0,)))
+    for folder in archived_folders(season, PROFILE):
+        fewer.add(block_sum_store.kept(folder, PROFILE, SETTINGS, (1.0,)))
     assert len(fewer.drawn[0]) == 2
     assert sum(part.n for part in fewer.drawn[0]) == sum(log.training_rows for log in fewer.logs)
 
 
 def test_logs_are_named_and_those_of_another_profile_refused(season: Path, tmp_path: Path, logs: list[str]) -> None:
-    assert len(folders(season, PROFILE, ["day1", logs[1]])) == 2
+    assert len(archived_folders(season, PROFILE, ["day1", logs[1]])) == 2
     with pytest.raises(FerryIdError, match=r'day9: not among .* Did you mean "day\d"\? Fix: '):
-        folders(season, PROFILE, ["day9"])
+        archived_folders(season, PROFILE, ["day9"])
     with pytest.raises(FerryIdError, match=r"no log was ingested .*Fix: ferryid ingest"):
-        folders(tmp_path, PROFILE)
+        archived_folders(tmp_path, PROFILE)
     heavier = parse_profile(PROFILE.text.replace("mass_kg = 1670.0", "mass_kg = 1700.0"), "milliampere")
     assert heavier.sha256 != PROFILE.sha256
     with pytest.raises(FerryIdError, match=r"day1 \(and 2 more\): ingested with another profile .*Fix: "):
-        folders(season, heavier)
+        archived_folders(season, heavier)
     shutil.copytree(season / "logs", tmp_path / "logs")
     open_track(logs[0], heavier, tmp_path)
     with pytest.raises(FerryIdError, match=r"\(and 1 more\): ingested with another profile"):
-        folders(tmp_path, heavier)
-    assert len(folders(tmp_path, heavier, ["day1"])) == 1
+        archived_folders(tmp_path, heavier)
+    assert len(archived_folders(tmp_path, heavier, ["day1"])) == 1
 
 
 def test_a_log_with_other_measurements_is_refused_by_name(season: Path, tmp_path: Path) -> None:

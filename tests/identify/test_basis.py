@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import basis, relative_flow
+from ferryid.regression.bases.basis import make_basis, relative_flow
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import inverse_dynamics
 from ferryid.vessel.wind import wind_force
@@ -37,14 +37,14 @@ def test_the_thesis_basis_is_3_4_written_out() -> None:
             *(abs(u) * u, abs(v) * v, abs(r) * r, abs(v) * r, abs(r) * v),
         )
     )
-    thesis = basis("thesis")
+    thesis = make_basis("thesis")
     assert len(thesis.terms) == 21
     np.testing.assert_allclose(thesis.evaluate(nu, nu_dot), expected, rtol=1e-15)
 
 
 def test_the_thesis_basis_has_three_pairs_of_identical_columns_and_modulus_has_none() -> None:
     nu, nu_dot = states()
-    thesis, modulus = basis("thesis"), basis("modulus")
+    thesis, modulus = make_basis("thesis"), make_basis("modulus")
     columns = list(zip(thesis.terms, thesis.evaluate(nu, nu_dot).T, strict=True))
     twins = {(a, b) for i, (a, x) in enumerate(columns) for b, y in columns[i + 1 :] if np.array_equal(x, y)}
     assert twins == {("sgn(u)u^2", "|u|u"), ("sgn(v)v^2", "|v|v"), ("sgn(r)r^2", "|r|r")}
@@ -64,7 +64,7 @@ def fitted(columns: Floats, target: Floats) -> Floats:
 def test_every_hull_of_the_model_lies_in_the_span_on_the_axes_that_the_mask_allows(name: str, structure: str) -> None:
     rng = np.random.default_rng(3)
     nu, nu_dot = states()
-    functions = basis(name, structure=structure)
+    functions = make_basis(name, structure=structure)
     X = functions.evaluate(nu, nu_dot)
     M = np.array([[2000.0, 0, 0], [0, 2500.0, 60.0], [0, 30.0, 5000.0]]) * rng.uniform(0.5, 1.5, (3, 3))
     D = {key: value * rng.uniform(0.5, 1.5) for key, value in {**PROFILE.hull.D, "N_rrr": -50.0}.items()}
@@ -76,12 +76,12 @@ def test_every_hull_of_the_model_lies_in_the_span_on_the_axes_that_the_mask_allo
 
 
 def test_the_decoupled_mask_keeps_surge_apart() -> None:
-    functions = basis("modulus", structure="decoupled")
+    functions = make_basis("modulus", structure="decoupled")
     surge = [term for term, row in zip(functions.terms, functions.mask, strict=True) if row[0]]
     assert surge == ["u_dot", "vr", "rr", "u", "u^3", "|u|u"]
     assert not np.any(functions.mask[:, 0] & (functions.mask[:, 1] | functions.mask[:, 2]))
     assert functions.mask.any(axis=1).all()
-    assert basis("modulus").mask.all()
+    assert make_basis("modulus").mask.all()
 
 
 def flow(n: int, seed: int) -> tuple[Floats, Floats]:
@@ -96,7 +96,7 @@ def wind_columns(form: str, seed: int = 1) -> tuple[dict[str, Floats], Floats, F
     u_rw = nu[:, 0] - (np.cos(psi) * wind[:, 0] + np.sin(psi) * wind[:, 1])
     v_rw = nu[:, 1] - (-np.sin(psi) * wind[:, 0] + np.cos(psi) * wind[:, 1])
     V2, gamma = u_rw**2 + v_rw**2, -np.arctan2(v_rw, u_rw)
-    functions = basis("modulus", wind=form)
+    functions = make_basis("modulus", wind=form)
     X = functions.evaluate(nu, nu_dot, relative_flow(nu, psi, wind))
     return dict(zip(functions.terms, X.T, strict=True)), V2, gamma, psi, wind
 
@@ -134,32 +134,32 @@ def test_the_current_functions_are_3_7_and_19() -> None:
         "thesis": [V2 * c * abs(c), V2 * s * abs(s), V2 * s, V2 * np.sin(2 * gamma)],
         "paper": [V2 * c, V2 * s, V2 * s * gamma],
     }.items():
-        functions = basis("modulus", current=form)
+        functions = make_basis("modulus", current=form)
         X = functions.evaluate(nu, nu_dot, current_rel=relative)[:, 18:]
         np.testing.assert_allclose(X, np.column_stack(expected), rtol=1e-12, atol=1e-12)
 
 
 def test_still_air_and_water_give_zero_not_nan() -> None:
     still = np.zeros((2, 3))
-    functions = basis("modulus+wind-paper+current-thesis")
+    functions = make_basis("modulus+wind-paper+current-thesis")
     X = functions.evaluate(still, still, np.zeros((2, 2)), np.zeros((2, 2)))
     np.testing.assert_array_equal(X, 0.0)
 
 
 def test_a_name_says_everything_and_comes_back_as_it_went_in() -> None:
-    functions = basis("thesis", wind="paper", current="thesis", structure="decoupled")
+    functions = make_basis("thesis", wind="paper", current="thesis", structure="decoupled")
     assert functions.name == "thesis+wind-paper+current-thesis"
-    assert basis(functions.name, structure="decoupled").terms == functions.terms
+    assert make_basis(functions.name, structure="decoupled").terms == functions.terms
     assert len(functions.terms) == 21 + 3 + 4
     assert (functions.needs_wind, functions.needs_current) == (True, True)
-    assert (basis("thesis").needs_wind, basis("thesis").needs_current) == (False, False)
+    assert (make_basis("thesis").needs_wind, make_basis("thesis").needs_current) == (False, False)
 
 
 @settings(max_examples=30, deadline=None)
 @given(n=st.integers(1, 50), cut=st.integers(0, 50))
 def test_rows_do_not_know_of_each_other(n: int, cut: int) -> None:
     nu, nu_dot = states(n)
-    functions = basis("thesis")
+    functions = make_basis("thesis")
     whole = functions.evaluate(nu, nu_dot)
     parts = [functions.evaluate(nu[part], nu_dot[part]) for part in (slice(0, cut), slice(cut, None))]
     np.testing.assert_array_equal(whole, np.vstack(parts))
@@ -169,7 +169,7 @@ def test_rows_do_not_know_of_each_other(n: int, cut: int) -> None:
 
 
 def test_units_of_coefficients() -> None:
-    functions = basis("modulus+wind-thesis+current-thesis")
+    functions = make_basis("modulus+wind-thesis+current-thesis")
     units = dict(zip(functions.terms, functions.units, strict=True))
     assert units["u_dot"] == ("kg", "kg", "kg·m")
     assert units["r_dot"] == ("kg·m", "kg·m", "kg·m²")
@@ -183,11 +183,11 @@ def test_units_of_coefficients() -> None:
 
 def test_unknown_names_and_missing_measurements_are_refused() -> None:
     with pytest.raises(FerryIdError, match=r'no basis called "modulo". Did you mean "modulus"\? Fix: '):
-        basis("modulo")
+        make_basis("modulo")
     with pytest.raises(FerryIdError, match=r'no wind basis called "pper". Did you mean "paper"\?'):
-        basis("modulus+wind-pper")
+        make_basis("modulus+wind-pper")
     with pytest.raises(FerryIdError, match=r'no structure called "couple". Did you mean "coupled"\?'):
-        basis("modulus", structure="couple")
+        make_basis("modulus", structure="couple")
     nu, nu_dot = states(3)
     with pytest.raises(FerryIdError, match="needs wind, and there is none"):
-        basis("modulus+wind-thesis").evaluate(nu, nu_dot)
+        make_basis("modulus+wind-thesis").evaluate(nu, nu_dot)

@@ -8,11 +8,40 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.bootstrap import FEWEST_BLOCKS, Blocks, block_rows, block_seconds, bootstrap, bootstrap_rows
-from ferryid.identify.cross_products import CrossProducts, Rows
-from ferryid.identify.simpls import simpls
+from ferryid.regression.cross_products import CrossProducts, Rows
+from ferryid.regression.resampling.bootstrap import (
+    FEWEST_BLOCKS,
+    Blocks,
+    Bootstrap,
+    block_seconds,
+    bootstrap_coefficients,
+    correlated_rows,
+)
+from ferryid.regression.simpls import fit_simpls
+from ferryid.types import Flags
 
 Floats = NDArray[np.float64]
+
+
+def bootstrap_rows(
+    X: Floats,
+    Y: Floats,
+    rate_hz: float,
+    components: int,
+    *,
+    draws: int,
+    seed: int = 0,
+    scale: bool = True,
+    block_s: float | None = None,
+    mask: Flags | None = None,
+) -> Bootstrap:
+    """Bootstrap the rows of one log, in blocks as long as the residual of the fit is correlated."""
+    rows, notes = Rows.of(X, Y, mask), ()
+    if block_s is None:
+        fit = fit_simpls(CrossProducts.of(rows), components, scale=scale)
+        block_s, notes = block_seconds([rows], [rate_hz], fit.coefficients[-1], fit.intercepts[-1])
+    blocks = Blocks.of([rows], [rate_hz], block_s)
+    return bootstrap_coefficients(blocks, components, draws=draws, seed=seed, scale=scale, block_s=block_s, notes=notes)
 
 
 def coloured(n: int, columns: int, memory: float, rng: np.random.Generator) -> Floats:
@@ -38,11 +67,11 @@ def test_every_draw_is_a_fit_to_the_rows_drawn(allowed) -> None:
     cuts = np.array_split(np.arange(1200), 12)
     blocks = [CrossProducts.from_rows(X[rows], Y[rows]) for rows in cuts]
     options = {"allowed": allowed, "scale": False}
-    got = bootstrap(blocks, 3, draws=40, seed=7, level=1.0 - 1e-12, **options)
+    got = bootstrap_coefficients(blocks, 3, draws=40, seed=7, level=1.0 - 1e-12, **options)
     fits = []
     for picked in np.random.default_rng(7).integers(0, 12, (40, 12)):
         rows = np.concatenate([cuts[i] for i in picked])
-        fits.append(simpls(CrossProducts.from_rows(X[rows], Y[rows]), 3, **options))
+        fits.append(fit_simpls(CrossProducts.from_rows(X[rows], Y[rows]), 3, **options))
     theta = np.array([fit.coefficients[-1] for fit in fits])
     intercept = np.array([fit.intercepts[-1] for fit in fits])
     np.testing.assert_allclose(got.low, theta.min(axis=0), atol=1e-9)
@@ -50,7 +79,7 @@ def test_every_draw_is_a_fit_to_the_rows_drawn(allowed) -> None:
     np.testing.assert_allclose(got.intercept_low, intercept.min(axis=0), rtol=1e-8)
     np.testing.assert_allclose(got.intercept_high, intercept.max(axis=0), rtol=1e-8)
     # Hesterberg's expanded percentiles for 12 blocks: Φ(sqrt(12/11) t) with t = -2.2010 for 11 degrees, 1.0757 %.
-    usual = bootstrap(blocks, 3, draws=40, seed=7, **options)
+    usual = bootstrap_coefficients(blocks, 3, draws=40, seed=7, **options)
     np.testing.assert_allclose(usual.low, np.quantile(theta, 0.0107566, axis=0), rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(usual.high, np.quantile(theta, 1.0 - 0.0107566, axis=0), rtol=1e-4, atol=1e-6)
     for output in range(2):
@@ -61,9 +90,9 @@ def test_every_draw_is_a_fit_to_the_rows_drawn(allowed) -> None:
 def test_draws_keep_the_scale_of_the_whole() -> None:
     X, Y, _ = trial(0, n=600)
     X *= [1.0, 50.0, 1e-3]
-    spread = bootstrap_rows([Rows.of(X, Y)], [10.0], 2, draws=50, block_s=2.0)
+    spread = bootstrap_rows(X, Y, 10.0, 2, draws=50, block_s=2.0)
     plain = bootstrap_rows(
-        [Rows.of(X / X.std(axis=0, ddof=1), Y / Y.std(axis=0, ddof=1))], [10.0], 2, draws=50, block_s=2.0, scale=False
+        X / X.std(axis=0, ddof=1), Y / Y.std(axis=0, ddof=1), 10.0, 2, draws=50, block_s=2.0, scale=False
     )
     units = Y.std(axis=0, ddof=1) / X.std(axis=0, ddof=1)[:, None]
     np.testing.assert_allclose(spread.low, plain.low * units, rtol=1e-8)
@@ -73,7 +102,7 @@ def test_spread_of_independent_rows_is_that_of_least_squares() -> None:
     rng = np.random.default_rng(3)
     X = rng.standard_normal((5000, 4))
     Y = X @ rng.standard_normal((4, 2)) + rng.standard_normal((5000, 2)) * [1.0, 3.0]
-    got = bootstrap_rows([Rows.of(X, Y)], [1.0], 4, draws=2000)
+    got = bootstrap_rows(X, Y, 1.0, 4, draws=2000)
     assert got.blocks == 500
     want = np.sqrt(np.diag(np.linalg.inv(X.T @ X)))
     for output, noise in enumerate([1.0, 3.0]):
@@ -89,14 +118,14 @@ def test_intervals_hold_the_truth_as_often_as_they_say(memory: float) -> None:
     hits, naive = [], []
     for seed in range(40):
         X, Y, theta = trial(seed, memory=memory)
-        got = bootstrap_rows([Rows.of(X, Y)], [20.0], 3, draws=300, seed=seed)
+        got = bootstrap_rows(X, Y, 20.0, 3, draws=300, seed=seed)
         hits.append(
             np.append(
                 (got.low <= theta) & (theta <= got.high), (got.intercept_low <= 4.0) & (got.intercept_high >= 4.0)
             )
         )
         if memory == 0.98:
-            short = bootstrap_rows([Rows.of(X, Y)], [20.0], 3, draws=300, seed=seed, block_s=0.4)
+            short = bootstrap_rows(X, Y, 20.0, 3, draws=300, seed=seed, block_s=0.4)
             naive.append((short.low <= theta) & (theta <= short.high))
     assert 0.88 < np.mean(hits) < 0.99
     if naive:
@@ -105,21 +134,21 @@ def test_intervals_hold_the_truth_as_often_as_they_say(memory: float) -> None:
 
 def test_block_length_follows_the_memory_and_not_the_sampling() -> None:
     rng = np.random.default_rng(1)
-    lengths = [block_rows(coloured(8000, 2, memory, rng)) for memory in (0.0, 0.9, 0.98)]
+    lengths = [correlated_rows(coloured(8000, 2, memory, rng)) for memory in (0.0, 0.9, 0.98)]
     assert lengths[0] < 30 < lengths[1] < lengths[2]
     slow = coloured(2000, 1, 0.9, rng)
     held = np.repeat(slow, 50, axis=0)  # the same signal, sampled fifty times as often
-    assert block_rows(held) == pytest.approx(50 * block_rows(slow), rel=0.1)
-    assert block_rows(np.column_stack([rng.standard_normal(2000), slow[:, 0]])) == block_rows(slow)
-    assert block_rows(np.full((500, 2), 3.0)) == 1
-    assert block_rows(np.zeros((5, 1))) == 1
+    assert correlated_rows(held) == pytest.approx(50 * correlated_rows(slow), rel=0.1)
+    assert correlated_rows(np.column_stack([rng.standard_normal(2000), slow[:, 0]])) == correlated_rows(slow)
+    assert correlated_rows(np.full((500, 2), 3.0)) == 1
+    assert correlated_rows(np.zeros((5, 1))) == 1
 
 
 def test_block_length_of_politis_and_white_for_first_order_noise() -> None:
     """For correlation a^k, G = 2 a/(1 - a)² and spectrum (1 + a)/(1 - a), so b = (2 a/(1 - a²))^(2/3) n^(1/3)."""
     a, n = 0.9, 2000
     rng = np.random.default_rng(5)
-    found = [block_rows(coloured(n, 1, a, rng)) for _ in range(30)]
+    found = [correlated_rows(coloured(n, 1, a, rng)) for _ in range(30)]
     want = (2.0 * a / (1.0 - a**2)) ** (2.0 / 3.0) * n ** (1.0 / 3.0)
     assert np.median(found) == pytest.approx(want, rel=0.35)
 
@@ -157,8 +186,8 @@ def test_blocks_of_several_logs_cover_the_masked_rows_once() -> None:
 def test_constant_and_duplicate_terms_draw_no_noise() -> None:
     X, Y, _ = trial(0, n=900)
     wide = np.hstack([X, X[:, :1], np.full((900, 1), 0.7)])
-    got = bootstrap_rows([Rows.of(wide, Y)], [10.0], 5, draws=100, block_s=3.0)
-    alone = bootstrap_rows([Rows.of(X, Y)], [10.0], 5, draws=100, block_s=3.0)
+    got = bootstrap_rows(wide, Y, 10.0, 5, draws=100, block_s=3.0)
+    alone = bootstrap_rows(X, Y, 10.0, 5, draws=100, block_s=3.0)
     np.testing.assert_array_equal(got.low[4], 0.0)
     np.testing.assert_array_equal(got.high[4], 0.0)
     np.testing.assert_allclose(got.low[0], got.low[3], rtol=1e-9)
@@ -167,7 +196,7 @@ def test_constant_and_duplicate_terms_draw_no_noise() -> None:
 
 def test_a_seed_gives_the_same_bits_and_another_does_not() -> None:
     X, Y, _ = trial(0, n=500)
-    one, two, other = (bootstrap_rows([Rows.of(X, Y)], [10.0], 2, draws=30, seed=seed) for seed in (1, 1, 2))
+    one, two, other = (bootstrap_rows(X, Y, 10.0, 2, draws=30, seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.covariance, two.covariance)
     assert not np.array_equal(one.covariance, other.covariance)
 
@@ -175,7 +204,7 @@ def test_a_seed_gives_the_same_bits_and_another_does_not() -> None:
 def test_one_block_is_refused() -> None:
     X, Y, _ = trial(0, n=50)
     with pytest.raises(FerryIdError, match=r"trial: intervals by block bootstrap need two blocks or more, found 1"):
-        bootstrap([CrossProducts.from_rows(X, Y)], 2, where="trial")
+        bootstrap_coefficients([CrossProducts.from_rows(X, Y)], 2, where="trial")
     with pytest.raises(FerryIdError, match="no rows to draw from"):
         Blocks.of([Rows.of(X[:0], Y[:0])], [10.0], 1.0)
 
@@ -185,7 +214,7 @@ def test_a_term_excited_in_one_block_alone_is_as_uncertain_as_that() -> None:
     X, Y, _ = trial(0, n=1200)
     once = np.zeros((1200, 1))
     once[50:60] = np.random.default_rng(0).standard_normal((10, 1))
-    got = bootstrap_rows([Rows.of(np.hstack([X, once]), Y + 30.0 * once)], [10.0], 4, draws=400, block_s=10.0)
+    got = bootstrap_rows(np.hstack([X, once]), Y + 30.0 * once, 10.0, 4, draws=400, block_s=10.0)
     assert np.isfinite(got.covariance).all()
     assert got.low[3, 0] <= 1e-9
     assert got.high[3, 0] > 25.0

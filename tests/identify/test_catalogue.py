@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ferryid.identify.catalogue import render_listing
+from ferryid.report.model_text import render_listing
 
 
 def listed(logs: list[str], *, current: bool) -> str:

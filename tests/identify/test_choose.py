@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.identify import inputs
 from ferryid.identify import pipeline as module
-from ferryid.identify.basis import basis
-from ferryid.identify.choose import Choice, choose, distinct, folds_by_blocks, force_free, studied, tried
+from ferryid.identify.log_sums import force_free_axes, sum_log
+from ferryid.identify.model_selection import Selection, distinct_windows, folds_by_blocks, select_model, windows_to_try
 from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import WINDOWS_S, FitSettings
+from ferryid.regression.bases.basis import make_basis
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured
 from ferryid.signals.track import Motion
@@ -28,13 +29,13 @@ Floats = NDArray[np.float64]
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 SETTINGS = FitSettings(delta=0.4, sigma=0.4, inertia="fitted")
-FUNCTIONS = basis("modulus", structure="decoupled")
+FUNCTIONS = make_basis("modulus", structure="decoupled")
 K = len(FUNCTIONS.terms)
 
 
-def chosen(settings: FitSettings, windows_s: tuple[float, ...], *logs: Measured) -> Choice:
-    pieces = [studied(PROFILE, settings, FUNCTIONS, log, windows_s) for log in logs]
-    return choose(PROFILE, settings, FUNCTIONS, windows_s, folds_by_blocks(pieces), force_free(pieces))
+def chosen(settings: FitSettings, windows_s: tuple[float, ...], *logs: Measured) -> Selection:
+    pieces = [sum_log(PROFILE, settings, FUNCTIONS, log, windows_s) for log in logs]
+    return select_model(PROFILE, settings, FUNCTIONS, windows_s, folds_by_blocks(pieces), force_free_axes(pieces))
 
 
 def test_the_best_window_is_the_test_rows_own() -> None:
@@ -74,9 +75,9 @@ def test_error_over_the_base_models() -> None:
 
 def test_test_rows_are_the_same_for_all_windows_and_for_every_residual() -> None:
     log = replace(measured(1, noise=20.0), tau_d=measured(1).tau * 1.1)
-    alone = studied(PROFILE, SETTINGS, FUNCTIONS, log, (0.5, 3.0))
+    alone = sum_log(PROFILE, SETTINGS, FUNCTIONS, log, (0.5, 3.0))
     for residual, smoother in (("commanded", "square"), ("parallel", "square"), ("measured", "savgol")):
-        other = studied(PROFILE, replace(SETTINGS, residual=residual, smoother=smoother), FUNCTIONS, log, (0.5, 3.0))
+        other = sum_log(PROFILE, replace(SETTINGS, residual=residual, smoother=smoother), FUNCTIONS, log, (0.5, 3.0))
         np.testing.assert_array_equal(other.test.products, alone.test.products)
         np.testing.assert_array_equal(other.test.n, alone.test.n)
         assert not np.allclose(other.training[0].products, alone.training[0].products)
@@ -95,10 +96,10 @@ def test_inertia_that_a_fit_would_hold_is_held(held: bool) -> None:
 
 
 def test_inertia_is_held_where_it_is_told_that_no_actuator_acts() -> None:
-    pieces = [studied(PROFILE, SETTINGS, FUNCTIONS, measured(1, noise=5.0), (1.0,))]
+    pieces = [sum_log(PROFILE, SETTINGS, FUNCTIONS, measured(1, noise=5.0), (1.0,))]
     folds, forceless = folds_by_blocks(pieces), np.array([True, False, False])
     for inertia in ("auto", "fitted"):
-        choice = choose(PROFILE, replace(SETTINGS, inertia=inertia), FUNCTIONS, (1.0,), folds, forceless)
+        choice = select_model(PROFILE, replace(SETTINGS, inertia=inertia), FUNCTIONS, (1.0,), folds, forceless)
         assert choice.held.tolist() == [inertia == "auto", False, False]
 
 
@@ -117,32 +118,32 @@ def test_where_no_actuator_acts_is_told_of_all_logs_together() -> None:
     log = measured(1)
     scales = ([1.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0])
     pieces = [
-        studied(PROFILE, SETTINGS, FUNCTIONS, replace(log, tau=log.tau * scale + [0.0, 7.0, 0.0]), (1.0,))
+        sum_log(PROFILE, SETTINGS, FUNCTIONS, replace(log, tau=log.tau * scale + [0.0, 7.0, 0.0]), (1.0,))
         for scale in scales
     ]
-    told = [force_free(some).tolist() for some in (pieces, pieces[:1], pieces[1:2], pieces[1:])]
+    told = [force_free_axes(some).tolist() for some in (pieces, pieces[:1], pieces[1:2], pieces[1:])]
     assert told == [[False, True, False], [False, True, False], [True, True, False], [True, True, False]]
     # A force that is steady in each log and differs between them is a force.
-    other = studied(PROFILE, SETTINGS, FUNCTIONS, replace(log, tau=log.tau * [1.0, 0.0, 1.0] - [0.0, 7.0, 0.0]), (1.0,))
-    assert not force_free([pieces[0], other]).any()
+    other = sum_log(PROFILE, SETTINGS, FUNCTIONS, replace(log, tau=log.tau * [1.0, 0.0, 1.0] - [0.0, 7.0, 0.0]), (1.0,))
+    assert not force_free_axes([pieces[0], other]).any()
 
 
 def test_windows_that_come_to_the_same_rows_are_tried_once() -> None:
     # At 10 Hz 0.5 and 0.6 s are five and seven rows, 0.5 and 0.55 both five; at 40 Hz they differ.
-    assert distinct((1.0, 0.55, 0.5, 0.0, 0.1), [10.0]) == (0.0, 0.5, 1.0)
-    assert distinct((0.5, 0.55, 0.6), [10.0]) == (0.5, 0.6)
-    assert distinct((0.5, 0.55), [10.0, 40.0]) == (0.5, 0.55)
+    assert distinct_windows((1.0, 0.55, 0.5, 0.0, 0.1), [10.0]) == (0.0, 0.5, 1.0)
+    assert distinct_windows((0.5, 0.55, 0.6), [10.0]) == (0.5, 0.6)
+    assert distinct_windows((0.5, 0.55), [10.0, 40.0]) == (0.5, 0.55)
     log = measured(1, seconds=20.0)
-    assert tried((0.55, 0.5), [log]) == (0.5,)
+    assert windows_to_try((0.55, 0.5), [log]) == (0.5,)
 
 
 def test_usual_windows_are_tried_where_the_log_is_ten_times_as_long() -> None:
     long, short = measured(1), measured(1, seconds=20.0)
-    assert tried((), [long]) == tried(WINDOWS_S, [long]) == WINDOWS_S
-    assert tried((), [long, short]) == tuple(one for one in WINDOWS_S if one <= 2.0)
-    assert tried((5.0, 1.0), [short]) == (1.0, 5.0)
+    assert windows_to_try((), [long]) == windows_to_try(WINDOWS_S, [long]) == WINDOWS_S
+    assert windows_to_try((), [long, short]) == tuple(one for one in WINDOWS_S if one <= 2.0)
+    assert windows_to_try((5.0, 1.0), [short]) == (1.0, 5.0)
     with pytest.raises(FerryIdError, match=r"--window: 61\.0 s is no smoothing window"):
-        tried((1.0, 61.0), [long])
+        windows_to_try((1.0, 61.0), [long])
 
 
 def test_the_kalman_smoother_finds_its_window_itself() -> None:
@@ -169,8 +170,8 @@ def test_validation_rows_do_not_reach_the_choice(
     monkeypatch: pytest.MonkeyPatch, opened: Opened, seconds: float, gaps: int, windows_s: tuple[float, ...]
 ) -> None:
     log = measured(3, seconds=seconds, jitter=0.02, noise=20.0, gaps=gaps)
-    seen: list[Choice] = []
-    monkeypatch.setattr(module, "choose", lambda *a, **k: seen.append(choose(*a, **k)) or seen[-1])
+    seen: list[Selection] = []
+    monkeypatch.setattr(module, "choose", lambda *a, **k: seen.append(select_model(*a, **k)) or seen[-1])
     honest = fitted(monkeypatch, opened, log, windows_s)
     validation = honest.logs[0].validation
     assert validation.sum() > 200

@@ -15,13 +15,20 @@ from hypothesis import strategies as st
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.adaptive import fit_motions
-from ferryid.identify.catalogue import render_model
-from ferryid.identify.combine import gathered, geometric_weights, mean_of_last, reference, spanned, weighted
-from ferryid.identify.estimate import estimator
-from ferryid.identify.model import Model, to_json
+from ferryid.identify.adaptive.averaging import (
+    geometric_weights,
+    mean_of_last,
+    merge_training_logs,
+    model_reference,
+    weighted_mean,
+)
+from ferryid.identify.adaptive.rounds import fit_motions
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.store import load, save
+from ferryid.models.forces.estimator import model_estimator
+from ferryid.models.model import Model, model_to_json
+from ferryid.models.store.versions import load, save
+from ferryid.models.validity import span_ranges
+from ferryid.report.model_text import render_model
 from tests.identify.rounds import PROFILE, motion, with_flow
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "ferryid" / "schemas"
@@ -43,8 +50,8 @@ UNSEEN = with_flow(motion(7), 7)
 @settings(max_examples=15, deadline=None)
 def test_the_force_is_the_weighted_mean_of_the_forces(parts: list[float]) -> None:
     weights = np.array(parts) / np.sum(parts)
-    want = sum(w * estimator(one).of(UNSEEN) for w, one in zip(weights, MODELS, strict=True))
-    np.testing.assert_allclose(estimator(weighted(MODELS, weights)).of(UNSEEN), want, rtol=1e-9, atol=1e-7)
+    want = sum(w * model_estimator(one).of(UNSEEN) for w, one in zip(weights, MODELS, strict=True))
+    np.testing.assert_allclose(model_estimator(weighted_mean(MODELS, weights)).of(UNSEEN), want, rtol=1e-9, atol=1e-7)
 
 
 @pytest.mark.parametrize("basis", ["modulus", "cross-flow-5m+wind-paper"])
@@ -59,11 +66,11 @@ def test_every_term_is_told_apart_from_its_axis(basis: str) -> None:
 
 
 def test_the_mean_of_the_last_takes_the_last() -> None:
-    want = (estimator(MODELS[1]).of(UNSEEN) + estimator(MODELS[2]).of(UNSEEN)) / 2.0
+    want = (model_estimator(MODELS[1]).of(UNSEEN) + model_estimator(MODELS[2]).of(UNSEEN)) / 2.0
     mean = mean_of_last(MODELS, 2, name="mean")
-    np.testing.assert_allclose(estimator(mean).of(UNSEEN), want, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(model_estimator(mean).of(UNSEEN), want, rtol=1e-9, atol=1e-7)
     assert mean.name == "mean"
-    assert mean.settings["made_of"] == [reference(MODELS[1]), reference(MODELS[2])]
+    assert mean.settings["made_of"] == [model_reference(MODELS[1]), model_reference(MODELS[2])]
     assert mean.settings["weights"] == [0.5, 0.5]
     assert {log["name"] for log in mean.training} == {"round 2", "round 3"}
     assert not mean.accepted
@@ -71,7 +78,7 @@ def test_the_mean_of_the_last_takes_the_last() -> None:
 
 
 def test_equal_scales_stay_as_they_are() -> None:
-    assert weighted([model(1), model(2), model(3)], geometric_weights(3, 0.3)).scale == model(1).scale
+    assert weighted_mean([model(1), model(2), model(3)], geometric_weights(3, 0.3)).scale == model(1).scale
 
 
 @pytest.mark.parametrize(
@@ -89,7 +96,7 @@ def test_geometric_weights_sum_to_one_and_fade(count: int, factor: float) -> Non
 
 
 def test_a_model_of_weight_nothing_leaves_no_trace_but_its_name() -> None:
-    alone = weighted(MODELS, [0.0, 0.0, 1.0])
+    alone = weighted_mean(MODELS, [0.0, 0.0, 1.0])
     np.testing.assert_array_equal(alone.theta, MODELS[2].theta)
     assert alone.training == MODELS[2].training
     assert alone.ranges == MODELS[2].ranges
@@ -99,7 +106,7 @@ def test_a_model_of_weight_nothing_leaves_no_trace_but_its_name() -> None:
 def test_covariance_of_models_without_a_common_log_is_that_of_independent_ones() -> None:
     a, b = model(1, draws=60), model(2, draws=60)
     rng = np.random.default_rng(0)
-    got = weighted([a, b], [0.3, 0.7]).covariance
+    got = weighted_mean([a, b], [0.3, 0.7]).covariance
     nothing = np.zeros(len(a.terms) + 1)
     for axis in range(3):
         of_a = rng.multivariate_normal(nothing, a.covariance[axis], 40000, method="eigh")
@@ -113,7 +120,7 @@ def test_covariance_of_models_without_a_common_log_is_that_of_independent_ones()
 def test_covariance_of_models_with_a_common_log_is_never_too_small(correlation: float, w: float) -> None:
     a = model(1, draws=60)
     b = replace(a, covariance=4.0 * a.covariance)
-    got = weighted([a, b], [w, 1.0 - w]).covariance
+    got = weighted_mean([a, b], [w, 1.0 - w]).covariance
     # Errors of b are twice those of a in size, and correlated with them as the case may be.
     true = (w**2 + 4.0 * (1.0 - w) ** 2 + 4.0 * w * (1.0 - w) * correlation) * a.covariance
     for axis in range(3):
@@ -123,12 +130,12 @@ def test_covariance_of_models_with_a_common_log_is_never_too_small(correlation: 
 def test_logs_shared_over_a_third_model_tie_all_three() -> None:
     a, b, c = model(1, draws=60), model(2, draws=60), model(3)
     bridge = replace(c, training=(*a.training, *b.training), covariance=a.covariance)
-    got = weighted([a, b, bridge], [0.25, 0.25, 0.5]).covariance
+    got = weighted_mean([a, b, bridge], [0.25, 0.25, 0.5]).covariance
     np.testing.assert_allclose(got, 0.75 * a.covariance + 0.25 * b.covariance, rtol=1e-12)
     # Also where the third is tied to the first by a log that the second does not have.
     more = replace(a, training=(*a.training, *c.training))
     chain = replace(a, training=(*a.training, *b.training))
-    got = weighted([more, chain, replace(c, covariance=b.covariance)], [0.25, 0.25, 0.5]).covariance
+    got = weighted_mean([more, chain, replace(c, covariance=b.covariance)], [0.25, 0.25, 0.5]).covariance
     np.testing.assert_allclose(got, 0.5 * a.covariance + 0.5 * b.covariance, rtol=1e-12)
 
 
@@ -142,25 +149,28 @@ def test_intervals_are_normal_ones() -> None:
 
 def test_a_mean_is_stored_and_read_like_any_model(tmp_path: Path) -> None:
     mean = mean_of_last(MODELS, 3, name="mean")
-    plain = json.loads(dump_json(to_json(mean)))
+    plain = json.loads(dump_json(model_to_json(mean)))
     jsonschema.validate(plain, json.loads((SCHEMAS / "model.json").read_text()))
     save(mean, tmp_path)
     back = load("mean@1", tmp_path)
     np.testing.assert_array_equal(back.theta, mean.theta)
     assert back.settings["weights"] == mean.settings["weights"]
-    np.testing.assert_allclose(estimator(back).of(UNSEEN), estimator(mean).of(UNSEEN), rtol=1e-12)
+    np.testing.assert_allclose(model_estimator(back).of(UNSEEN), model_estimator(mean).of(UNSEEN), rtol=1e-12)
 
 
 def test_reference_tells_models_apart_but_not_dates() -> None:
-    assert reference(MODELS[0]) == reference(replace(MODELS[0], created="2001-01-01T00:00:00Z"))
-    assert reference(MODELS[0]) != reference(replace(MODELS[0], theta=MODELS[0].theta + 1e-9))
+    assert model_reference(MODELS[0]) == model_reference(replace(MODELS[0], created="2001-01-01T00:00:00Z"))
+    assert model_reference(MODELS[0]) != model_reference(replace(MODELS[0], theta=MODELS[0].theta + 1e-9))
 
 
 def test_ranges_span_and_logs_are_counted_once() -> None:
     parts = [{"u": (0.0, 1.0)}, {"u": (-1.0, 0.5), "v": (2.0, 3.0)}]
-    assert spanned(parts) == spanned(parts[::-1]) == {"u": (-1.0, 1.0), "v": (2.0, 3.0)}
+    assert span_ranges(parts) == span_ranges(parts[::-1]) == {"u": (-1.0, 1.0), "v": (2.0, 3.0)}
     small, large = {"sha256": "a", "rows": 3}, {"sha256": "a", "rows": 5}
-    assert gathered([[small], [large, {"sha256": "b", "rows": 1}], [small]]) == (large, {"sha256": "b", "rows": 1})
+    assert merge_training_logs([[small], [large, {"sha256": "b", "rows": 1}], [small]]) == (
+        large,
+        {"sha256": "b", "rows": 1},
+    )
 
 
 @pytest.mark.parametrize(
@@ -176,7 +186,7 @@ def test_ranges_span_and_logs_are_counted_once() -> None:
 )
 def test_unlike_models_are_refused_in_one_line(other, says: str) -> None:
     with pytest.raises(FerryIdError) as caught:
-        weighted([MODELS[0], other()], [0.5, 0.5])
+        weighted_mean([MODELS[0], other()], [0.5, 0.5])
     assert says in str(caught.value)
     assert "Fix:" in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -185,7 +195,7 @@ def test_unlike_models_are_refused_in_one_line(other, says: str) -> None:
 @pytest.mark.parametrize("weights", [[0.5, 0.5], [0.5, 0.4, 0.2], [1.5, -0.5, 0.0], [np.nan, 0.5, 0.5]])
 def test_impossible_weights_are_refused(weights: list[float]) -> None:
     with pytest.raises(FerryIdError, match="Fix:"):
-        weighted(MODELS, weights)
+        weighted_mean(MODELS, weights)
 
 
 def test_nothing_to_average_is_refused() -> None:

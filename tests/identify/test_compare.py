@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ferryid.compare.candidates import BASE, CandidateSet, select_candidates
+from ferryid.compare.comparison import Comparison, compare
 from ferryid.errors import FerryIdError
-from ferryid.identify.candidates import BASE, Field, line_up
-from ferryid.identify.compare import Comparison, compare
-from ferryid.identify.model import Model, blank
-from ferryid.identify.predict import predict
-from ferryid.identify.scores import r_squared, usable
+from ferryid.models.model import Model, blank_model
+from ferryid.models.prediction.log_prediction import predict
+from ferryid.models.scores import usable_rows
 from ferryid.signals.prepare import prepare
 from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.types import RunContext
@@ -31,7 +31,10 @@ def quiet(_: str) -> None:
 def heavier(version: int, factor: float) -> Model:
     """Return a model whose hull has all masses and damping times a factor: worse, the farther it is from one."""
     return replace(
-        blank(FERRY, "ferry"), version=version, scale={"delta": factor, "sigma": factor, "zeta": 1.0}, accepted=True
+        blank_model(FERRY, "ferry"),
+        version=version,
+        scale={"delta": factor, "sigma": factor, "zeta": 1.0},
+        accepted=True,
     )
 
 
@@ -53,27 +56,27 @@ def logs_in(folder: Path) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def field() -> Field:
-    return line_up(["ferry@1", "ferry@2"], [heavier(1, 1.1), heavier(2, 3.0)])
+def field() -> CandidateSet:
+    return select_candidates(["ferry@1", "ferry@2"], [heavier(1, 1.1), heavier(2, 3.0)])
 
 
 @pytest.fixture(scope="module")
-def compared(field: Field, folder: Path) -> Comparison:
+def compared(field: CandidateSet, folder: Path) -> Comparison:
     return compare(field, logs_in(folder), RunContext(folder / "out"))
 
 
-def test_errors_are_those_that_one_sums_by_hand(field: Field, folder: Path, compared: Comparison) -> None:
+def test_errors_are_those_that_one_sums_by_hand(field: CandidateSet, folder: Path, compared: Comparison) -> None:
     squares, forces, errors = [], [], []
     for log, entry in zip(logs_in(folder), compared.json["logs"], strict=True):
         prepared = prepare(log, FERRY, folder / "out", window_s=1.0)
         tau = prepared.motion.tau
         seen = [predict(one.model, prepared, FERRY, window_s=1.0, smoother="square") for one in field.candidates]
-        rows = usable(prepared.motion, *(one.tau for one in seen))
+        rows = usable_rows(prepared.motion, *(one.tau for one in seen))
         assert entry["rows"] == rows.sum()
         for one, prediction in zip(field.candidates, seen, strict=True):
             scores = entry["scores"][one.label]
             assert scores["mse"]["sway"] == pytest.approx(np.mean((tau - prediction.tau)[rows, 1] ** 2))
-            assert scores["r2"]["yaw"] == pytest.approx(r_squared(tau, prediction.tau, rows)[2])
+            assert scores["r2"]["yaw"] == pytest.approx(1.0 - scores["mse"]["yaw"] / np.var(tau[rows, 2]))
             run = prediction.free_run(rows)
             assert scores["free_run"]["position_m"] == pytest.approx(run.position_m.tolist(), nan_ok=True)
             assert scores["free_run"]["yaw_rate_radps"] == pytest.approx(run.yaw_rate_radps.tolist(), nan_ok=True)
@@ -129,7 +132,7 @@ def test_a_training_log_is_no_evidence(folder: Path, compared: Comparison) -> No
     learnt = replace(
         heavier(1, 1.1), training=({"name": "trial-0", "sha256": sha256, "files": [], "seconds": 1.0, "rows": 1},)
     )
-    field = line_up(["ferry@1", "ferry@2"], [learnt, heavier(2, 3.0)])
+    field = select_candidates(["ferry@1", "ferry@2"], [learnt, heavier(2, 3.0)])
     result = compare(field, logs_in(folder), RunContext(folder / "out")).json
     first, second = result["logs"]
     assert "ferry@1 was trained on this log: its scores here are no evidence" in first["warnings"]
@@ -147,7 +150,7 @@ def test_a_training_log_is_no_evidence(folder: Path, compared: Comparison) -> No
     assert rows[None, BASE]["evidence"]
 
 
-def test_a_short_log_has_no_intervals_and_says_so(field: Field, tmp_path: Path) -> None:
+def test_a_short_log_has_no_intervals_and_says_so(field: CandidateSet, tmp_path: Path) -> None:
     short = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
     result = compare(field, [str(short)], RunContext(tmp_path)).json
     (entry,) = result["logs"]
@@ -160,18 +163,18 @@ def test_a_short_log_has_no_intervals_and_says_so(field: Field, tmp_path: Path) 
 
 def test_what_a_model_needs_and_a_log_lacks_is_named(folder: Path) -> None:
     windy = replace(fitted("modulus+wind-paper", "decoupled"), version=4)
-    field = line_up(["ferry@1", "windy"], [heavier(1, 1.1), windy])
+    field = select_candidates(["ferry@1", "windy"], [heavier(1, 1.1), windy])
     with pytest.raises(FerryIdError, match=r"trial-0: milliampere@4 needs the wind, found none .* Fix: "):
         compare(field, logs_in(folder), RunContext(folder / "out"))
 
 
 def test_a_force_without_bounds_is_refused(folder: Path) -> None:
-    field = line_up(["ferry@1", "ferry@2"], [heavier(1, 1.1), heavier(2, 1e200)])
+    field = select_candidates(["ferry@1", "ferry@2"], [heavier(1, 1.1), heavier(2, 1e200)])
     with pytest.raises(FerryIdError, match=r"ferry@2: its force on .*trial-0.mcap is too large .*Fix: "):
         compare(field, logs_in(folder), RunContext(folder / "out"))
 
 
-def test_a_log_is_given_once(field: Field, folder: Path) -> None:
+def test_a_log_is_given_once(field: CandidateSet, folder: Path) -> None:
     log = logs_in(folder)[0]
     with pytest.raises(FerryIdError, match="the same log as another"):
         compare(field, [log, log], RunContext(folder / "out"))
@@ -181,7 +184,7 @@ def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: 
     backwards = fitted("modulus", "decoupled")
     theta = backwards.theta.copy()
     theta[backwards.terms.index("v_dot"), 1] = -9000.0
-    field = line_up(["ferry@1", "odd"], [heavier(1, 1.1), replace(backwards, theta=theta)])
+    field = select_candidates(["ferry@1", "odd"], [heavier(1, 1.1), replace(backwards, theta=theta)])
     result = compare(field, logs_in(folder)[:1], RunContext(folder / "out")).json
     assert any("milliampere@3 is left out of free runs" in warning for warning in result["warnings"])
     scores = result["logs"][0]["scores"]
@@ -190,7 +193,7 @@ def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: 
     assert np.isfinite(scores["milliampere@3"]["mse"]["yaw"])
 
 
-def test_without_logs_coefficients_are_compared(field: Field, tmp_path: Path) -> None:
+def test_without_logs_coefficients_are_compared(field: CandidateSet, tmp_path: Path) -> None:
     result = compare(field, [], RunContext(tmp_path)).json
     assert result["logs"] == [] == result["better"]
     mass = next(row for row in result["coefficients"]["physical"] if row["coefficient"] == "m11")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.identify.bootstrap import times_drawn
-from ferryid.identify.confidence_set import confidence_set
+from ferryid.regression.resampling.bootstrap import times_drawn
+from ferryid.regression.resampling.confidence_set import model_confidence_set
 
 Floats = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 def judged(errors: Floats, draws: int = 400) -> Floats:
     """Return p of models from their errors in blocks of equal size, shape (B, S)."""
     times = times_drawn(len(errors), draws, 1)
-    return confidence_set(errors.mean(axis=0), times @ errors / len(errors), len(errors))
+    return model_confidence_set(errors.mean(axis=0), times @ errors / len(errors), len(errors))
 
 
 @pytest.mark.parametrize("blocks", [20, 100])
@@ -103,7 +103,7 @@ def test_against_the_procedure_pair_by_pair() -> None:
         times = times_drawn(25, 200, 2)
         drawn = times @ errors / 25.0
         p = by_hand(errors.mean(axis=0), drawn, np.sqrt(25.0 / 24.0) * t.ppf(0.975, 24) / 1.959964)
-        np.testing.assert_allclose(confidence_set(errors.mean(axis=0), drawn, 25), p, atol=1e-12)
+        np.testing.assert_allclose(model_confidence_set(errors.mean(axis=0), drawn, 25), p, atol=1e-12)
         rose += len(set(p.tolist())) < 5
     # Where a later test is less sure than an earlier one, the earlier p stands for both.
     assert rose > 3

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify import cross_products
-from ferryid.identify.cross_products import Accumulator, CrossProducts, Rows
-from ferryid.identify.qr import CONDITION_FOR_QR, QrFactor, condition, factorise
+from ferryid.regression import cross_products
+from ferryid.regression.cross_products import Accumulator, CrossProducts, Rows
+from ferryid.regression.qr import CONDITION_FOR_QR, QrFactor, condition, factorise
 
 Floats = NDArray[np.float64]
 KINDS = (CrossProducts, QrFactor)
@@ -73,19 +73,18 @@ def test_chunks_layout_mask_and_evaluation_do_not_matter(kind, order: str, monke
     mask = np.random.default_rng(1).random(5000) < 0.7
     mask[1000:2100] = False
     want = kind.from_rows(X[mask], Y[mask])
-    for module in (cross_products, __import__("ferryid.identify.qr", fromlist=["qr"])):
+    for module in (cross_products, __import__("ferryid.regression.qr", fromlist=["qr"])):
         monkeypatch.setattr(module, "CHUNK_ROWS", 1000)
     monkeypatch.setattr(cross_products, "SEGMENT_ROWS", 2000)
     laid = np.asarray(X, order=order)
     whole = Rows((laid,), Y, mask)
-    fused = Rows((X[:, :2], None, X[:, 2:]), Y, mask, lambda a, _, b: np.asarray(np.hstack([a, b]), order=order))
 
     def write(out: Floats, a: Floats, _: None, b: Floats) -> None:
         out[:2], out[2:] = a.T, b.T
 
     filled = Rows((X[:, :2], None, X[:, 2:]), Y, mask, fill=write, terms=4)
     two = (Rows((laid[:1500],), Y[:1500], mask[:1500]), Rows((laid[1500:],), Y[1500:], mask[1500:]))
-    for parts in ((whole,), (fused,), (filled,), two):
+    for parts in ((whole,), (filled,), two):
         got = kind.of(*parts)
         assert got.n == mask.sum()
         for one, other in zip(got.moments(), want.moments(), strict=True):
@@ -112,12 +111,15 @@ def test_an_offset_of_a_million_costs_no_digits() -> None:
 
 
 def test_memory_does_not_grow_with_the_rows() -> None:
+    def fill(out: Floats, part: Floats) -> None:
+        out[:] = np.repeat(part, 7, axis=1).T
+
     def peak(n: int) -> int:
         nu = np.zeros((n, 3))
         Y = np.zeros((n, 3))
         accumulator = Accumulator(21, 3, workers=1)
         tracemalloc.start()
-        accumulator.add_evaluated(lambda part: np.repeat(part, 7, axis=1), (nu,), Y)
+        accumulator.add_rows(Rows((nu,), Y, fill=fill, terms=21))
         found = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return found

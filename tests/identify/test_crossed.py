@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from sklearn.cross_decomposition import PLSRegression
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import basis
-from ferryid.identify.choose import folds_by_blocks, folds_by_logs, studied
-from ferryid.identify.crossed import TEST_WINDOW_S, Curves, Folds, FoldSums
-from ferryid.identify.residual import residual
-from ferryid.identify.settings import FitSettings
+from ferryid.identify.log_sums import sum_log
+from ferryid.identify.model_selection import folds_by_blocks, folds_by_logs
+from ferryid.identify.settings import TEST_WINDOW_S, FitSettings
+from ferryid.models.forces.residual import compute_residual
+from ferryid.regression.bases.basis import make_basis
+from ferryid.regression.cross_validation.folds import Curves, Folds, FoldSums
 from ferryid.signals.smooth import Measured, smooth_measured
 from tests.identify.rounds import PROFILE, RATE_HZ
 from tests.identify.trials import measured
@@ -25,7 +26,7 @@ Flags = NDArray[np.bool_]
 Part = tuple[Floats, Floats, Flags]
 
 SETTINGS = FitSettings(delta=0.4, sigma=0.4, inertia="fitted")
-FUNCTIONS = basis("modulus", structure="decoupled")
+FUNCTIONS = make_basis("modulus", structure="decoupled")
 K = len(FUNCTIONS.terms)
 
 
@@ -58,7 +59,7 @@ def test_every_axis_counts_alike_by_hand() -> None:
 def parts(log: Measured, window_s: float) -> Part:
     """Basis, residual and known rows of a log, smoothed over a window."""
     motion = smooth_measured(log, window_s)
-    error = residual(PROFILE, motion, SETTINGS.scale)
+    error = compute_residual(PROFILE, motion, SETTINGS.scale)
     return FUNCTIONS.of(motion), error, motion.valid & np.isfinite(error).all(axis=1)
 
 
@@ -140,7 +141,7 @@ def joined(several: Sequence[Part]) -> Part:
 
 @pytest.fixture(scope="module")
 def cut() -> dict[str, Folds]:
-    pieces = [studied(PROFILE, SETTINGS, FUNCTIONS, log, WINDOWS_S) for log in LOGS]
+    pieces = [sum_log(PROFILE, SETTINGS, FUNCTIONS, log, WINDOWS_S) for log in LOGS]
     return {"stretches": folds_by_blocks(pieces), "logs": folds_by_logs(pieces)}
 
 
@@ -169,7 +170,7 @@ def test_an_error_of_one_fold_stays_in_it(cut: dict[str, Folds]) -> None:
 
 
 def test_logs_are_dealt_to_folds_where_they_are_short() -> None:
-    short = [studied(PROFILE, SETTINGS, FUNCTIONS, measured(seed, seconds=17.0), (1.0,), blocks=5) for seed in range(7)]
+    short = [sum_log(PROFILE, SETTINGS, FUNCTIONS, measured(seed, seconds=17.0), (1.0,), blocks=5) for seed in range(7)]
     assert {one.test.blocks for one in short} == {2}
     sums = FoldSums(1, 5)
     for one in short[:3]:
@@ -182,7 +183,7 @@ def test_logs_are_dealt_to_folds_where_they_are_short() -> None:
 
 
 def test_a_single_short_log_is_refused() -> None:
-    short = studied(PROFILE, SETTINGS, FUNCTIONS, measured(1, seconds=9.0), (1.0,))
+    short = sum_log(PROFILE, SETTINGS, FUNCTIONS, measured(1, seconds=9.0), (1.0,))
     for folds in (folds_by_blocks([short]), folds_by_logs([short])):
         with pytest.raises(FerryIdError, match=r"^trial: cross-validation needs two folds with rows, found 1. Fix: "):
             folds.curves(FUNCTIONS.mask, 3, "trial")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ferryid.identify.evaluate import render_evaluation
-from ferryid.identify.scores import force_scores
+from ferryid.models.scores import force_scores
+from ferryid.report.evaluation_text import render_evaluation
 
 N = 400
 HEAD = {"model": {"name": "ferry", "version": 1}, "window_s": 2.0}

@@ -13,25 +13,25 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from ferryid.errors import FerryIdError
-from ferryid.identify import bases
-from ferryid.identify.adaptive import fit_motions, settings_of
-from ferryid.identify.basis import BASES, Basis, basis, sized
-from ferryid.identify.combine import check_together
-from ferryid.identify.estimate import estimator
-from ferryid.identify.model import from_json, to_json
+from ferryid.identify.adaptive.averaging import check_compatible
+from ferryid.identify.adaptive.rounds import fit_motions, settings_of_model
 from ferryid.identify.pipeline import fit_logs
-from ferryid.identify.qr import QrFactor
-from ferryid.identify.residual import base_force
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.simpls import simpls
-from ferryid.identify.strips import strips
+from ferryid.models.forces.estimator import model_estimator
+from ferryid.models.forces.residual import base_force
+from ferryid.models.model import model_from_json, model_to_json
+from ferryid.regression.bases import forms
+from ferryid.regression.bases.basis import BASES, Basis, make_basis, with_hull_length
+from ferryid.regression.bases.crossflow_integrals import crossflow_integrals
+from ferryid.regression.qr import QrFactor
+from ferryid.regression.simpls import fit_simpls
 from ferryid.types import RunContext
 from tests.identify.rounds import PROFILE, motion
 
 Floats = NDArray[np.float64]
 State = dict[str, float]
 
-NAMES = bases.names()
+NAMES = forms.names()
 LENGTH_M = 5.0
 MIRROR = np.array([1.0, -1.0, -1.0])
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,7 +41,7 @@ _STRIP = re.compile(r"(fore|aft) (x?)\|v\+xr\|\(v\+xr\)")
 
 
 def built(name: str, structure: str = "coupled", length_m: float = LENGTH_M) -> Basis:
-    return basis(sized(name, length_m, "test"), structure=structure)
+    return make_basis(with_hull_length(name, length_m, "test"), structure=structure)
 
 
 def states(n: int = 200, seed: int = 0) -> tuple[Floats, Floats]:
@@ -85,9 +85,9 @@ def exponents(unit: str) -> dict[str, int]:
 
 
 def test_a_file_is_a_basis() -> None:
-    files = sorted(path.stem.replace("_", "-") for path in Path(bases.__file__).parent.glob("[!_]*.py"))
+    files = sorted(path.stem.replace("_", "-") for path in Path(forms.__file__).parent.glob("[!_]*.py"))
     assert tuple(files) == NAMES == tuple(BASES)
-    assert len({form.title for form in bases.forms().values()}) == len(NAMES)
+    assert len({form.title for form in forms.forms().values()}) == len(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -187,12 +187,12 @@ def test_a_truth_of_its_form_is_found_again(name: str) -> None:
     assert model.settings["basis"] == functions.name
     np.testing.assert_allclose(model.theta, theta, rtol=1e-5, atol=1e-4)
     np.testing.assert_allclose(model.intercept, constant, rtol=1e-5)
-    kept = from_json(to_json(model), "here")
+    kept = model_from_json(model_to_json(model), "here")
     other = motion(2)
     expected = base_force(PROFILE, other, settings.scale) + functions.of(other) @ theta + constant
-    np.testing.assert_allclose(estimator(kept).of(other), expected, rtol=1e-6, atol=1e-3)
+    np.testing.assert_allclose(model_estimator(kept).of(other), expected, rtol=1e-6, atol=1e-3)
     # A correction on top of it knows the basis by either name, and has nothing left to correct.
-    for again in (settings, settings_of(kept)):
+    for again in (settings, settings_of_model(kept)):
         on_top = fit_motions(PROFILE, [trial], replace(again, inertia="fitted"), base=kept).model
         np.testing.assert_allclose(on_top.theta, theta, rtol=1e-4, atol=1e-3)
 
@@ -202,13 +202,13 @@ def test_a_coupled_truth_is_found_again(name: str) -> None:
     functions = built(name)
     theta = truth(functions, 3)
     X = functions.evaluate(*states(4000))
-    found = simpls(QrFactor.from_rows(X, X @ theta), len(functions.terms)).coefficients[-1]
+    found = fit_simpls(QrFactor.from_rows(X, X @ theta), len(functions.terms)).coefficients[-1]
     np.testing.assert_allclose(found, theta, rtol=1e-7, atol=1e-6)
 
 
 def sums(v: float, r: float, length_m: float) -> tuple[float, float]:
     """Force and moment of the whole hull."""
-    made = strips(np.array([v]), np.array([r]), length_m)
+    made = crossflow_integrals(np.array([v]), np.array([r]), length_m)
     return float(made["fore"][0] + made["aft"][0]), float(made["x_fore"][0] + made["x_aft"][0])
 
 
@@ -226,7 +226,7 @@ def test_integrals_against_quadrature_wherever_the_flow_turns_round() -> None:
     for place in (-4.0, -3.0, -2.9, -1.0, -1e-9, 0.0, 1e-9, 0.5, 2.999, 3.0, 40.0):
         for r in (-0.7, 1e-7, 0.2):
             v = -place * r
-            made = strips(np.array([v]), np.array([r]), length_m)
+            made = crossflow_integrals(np.array([v]), np.array([r]), length_m)
             size = (abs(v) + abs(r) * length_m) ** 2
             for name, (low, high) in {"fore": (0.0, 3.0), "aft": (-3.0, 0.0)}.items():
                 turn = [place] if low < place < high else None
@@ -241,24 +241,24 @@ def test_integrals_against_quadrature_wherever_the_flow_turns_round() -> None:
 def test_integrals_keep_their_digits_where_the_vessel_hardly_turns() -> None:
     """∫(v + x r)² dx = v² h + v r h² + ..., to the first order in r."""
     for r in (1e-16, 1e-11, 1e-9):
-        made = strips(np.array([2.0]), np.array([r]), 6.0)
+        made = crossflow_integrals(np.array([2.0]), np.array([r]), 6.0)
         assert made["fore"][0] == pytest.approx(12.0 + 18.0 * r, rel=1e-15)
         assert made["x_aft"][0] == pytest.approx(-18.0 + 36.0 * r, rel=1e-15)
 
 
 def test_bow_and_stern_change_places_with_the_sense_of_the_turn() -> None:
     nu, _ = states()
-    one, other = strips(nu[:, 1], nu[:, 2], 7.0), strips(nu[:, 1], -nu[:, 2], 7.0)
+    one, other = crossflow_integrals(nu[:, 1], nu[:, 2], 7.0), crossflow_integrals(nu[:, 1], -nu[:, 2], 7.0)
     np.testing.assert_array_equal(one["fore"], other["aft"])
     np.testing.assert_array_equal(one["x_fore"], -other["x_aft"])
 
 
 def test_a_length_in_the_name_is_all_that_it_takes() -> None:
-    assert sized("cross-flow", 33.9, "boat.toml") == "cross-flow-33.9m"
-    assert sized("cross-flow+wind-paper", 5.0, "boat.toml") == "cross-flow-5m+wind-paper"
-    assert sized("cross-flow-4.5m", 5.0, "boat.toml") == "cross-flow-4.5m"
-    assert sized("modulus", float("nan"), "boat.toml") == "modulus"
-    functions = basis("cross-flow-4.50m+wind-paper")
+    assert with_hull_length("cross-flow", 33.9, "boat.toml") == "cross-flow-33.9m"
+    assert with_hull_length("cross-flow+wind-paper", 5.0, "boat.toml") == "cross-flow-5m+wind-paper"
+    assert with_hull_length("cross-flow-4.5m", 5.0, "boat.toml") == "cross-flow-4.5m"
+    assert with_hull_length("modulus", float("nan"), "boat.toml") == "modulus"
+    functions = make_basis("cross-flow-4.50m+wind-paper")
     assert (functions.name, functions.length_m) == ("cross-flow-4.5m+wind-paper", 4.5)
 
 
@@ -267,13 +267,13 @@ def test_a_length_that_is_missing_is_refused(name: str) -> None:
     with pytest.raises(
         FerryIdError, match=r'"cross-flow(-0m)?" needs the hull\'s length .* Fix: write cross-flow-5m [^\n]*$'
     ):
-        basis(name)
+        make_basis(name)
 
 
 @pytest.mark.parametrize("name", ["modulus-5m", "cross-flow-m", "cross-flow--5m"])
 def test_a_length_that_is_not_wanted_is_refused(name: str) -> None:
     with pytest.raises(FerryIdError, match=f'no basis called "{name}". Did you mean'):
-        basis(name)
+        make_basis(name)
 
 
 def test_a_profile_without_length_is_told_so_before_any_log_is_read(tmp_path: Path) -> None:
@@ -294,6 +294,6 @@ def test_models_over_different_lengths_do_not_add_up() -> None:
     )
     assert one.terms == other.terms
     with pytest.raises(FerryIdError, match="its basis is cross-flow-6m"):
-        check_together([one, other])
+        check_compatible([one, other])
     with pytest.raises(FerryIdError, match="its basis cross-flow-6m must be that of the fit"):
         fit_motions(PROFILE, [motion(1)], FitSettings(basis="cross-flow", components=6), base=other)

@@ -11,11 +11,11 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.identify import inputs
-from ferryid.identify.estimate import estimator
-from ferryid.identify.inertia import effective_mass, unbelievable, unforced, without_inertia
+from ferryid.identify.inertia import axes_without_force, implausible_inertia, without_inertia
 from ferryid.identify.outcome import FitOutcome
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
+from ferryid.models.forces.estimator import effective_mass, model_estimator
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
@@ -68,7 +68,7 @@ def test_validation_rows_do_not_reach_the_coefficients(monkeypatch: pytest.Monke
 def test_scores_are_those_of_the_stored_model(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
     result = fitted(monkeypatch, opened)
     log = result.logs[0]
-    error = (log.motion.tau - estimator(result.model).of(log.motion))[log.validation]
+    error = (log.motion.tau - model_estimator(result.model).of(log.motion))[log.validation]
     scores = result.scores.force
     np.testing.assert_allclose((error**2).mean(axis=0), scores.mse_model, rtol=1e-9)
     # The curve comes from cross-products and never forms an estimate: it must agree at the chosen number.
@@ -93,13 +93,13 @@ def test_an_axis_without_force_keeps_its_inertia_and_says_so(monkeypatch: pytest
 
 def test_beliefs_about_inertia() -> None:
     rigid = np.diag([1670.0, 1670.0, PROFILE.hull.inertia_z])
-    assert not unbelievable(PROFILE, rigid).any()
-    assert unbelievable(PROFILE, rigid * np.array([0.4, 1.0, 1.0])).tolist() == [True, False, False]
+    assert not implausible_inertia(PROFILE, rigid).any()
+    assert implausible_inertia(PROFILE, rigid * np.array([0.4, 1.0, 1.0])).tolist() == [True, False, False]
     indefinite = rigid.copy()
     indefinite[1, 2] = indefinite[2, 1] = 1e5
-    assert unbelievable(PROFILE, indefinite).all()
+    assert implausible_inertia(PROFILE, indefinite).all()
     tau = np.column_stack([np.sin(np.arange(50)), np.zeros(50), np.full(50, 3.0)])
-    assert unforced(tau.std(axis=0), np.full(3, 14.4)).tolist() == [False, True, True]
+    assert axes_without_force(tau.std(axis=0), np.full(3, 14.4)).tolist() == [False, True, True]
 
 
 def test_held_axes_lose_their_acceleration_terms_only() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ferryid.identify.estimate import Estimator
-from ferryid.identify.free_run import free_run
+from ferryid.models.forces.estimator import Estimator
+from ferryid.models.prediction.free_run import run_free
 from ferryid.signals.track import Motion
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import coriolis, damping
@@ -45,7 +45,7 @@ def _trial(seconds: float = 120.0, scale: float = 1.0) -> Motion:
 
 def test_true_model_follows_an_independent_integration() -> None:
     motion = _trial()
-    run = free_run(Estimator(load_profile("milliampere"), {}), [motion], [motion.valid])
+    run = run_free(Estimator(load_profile("milliampere"), {}), [motion], [motion.valid])
     assert run.starts > 10
     # What is left is the force taken as straight lines between rows: centimetres after a minute.
     assert np.all(run.position_m < 0.01)
@@ -55,7 +55,7 @@ def test_true_model_follows_an_independent_integration() -> None:
 
 def test_wrong_model_drifts_and_the_error_grows_with_the_horizon() -> None:
     motion = _trial()
-    run = free_run(Estimator(load_profile("milliampere"), {"delta": 1.3, "sigma": 1.3}), [motion], [motion.valid])
+    run = run_free(Estimator(load_profile("milliampere"), {"delta": 1.3, "sigma": 1.3}), [motion], [motion.valid])
     assert run.position_m[-1] > 0.5
     assert run.position_m[-1] > run.position_m[0]
 
@@ -64,7 +64,7 @@ def test_runs_stay_within_unbroken_stretches() -> None:
     motion = _trial()
     allowed = motion.valid.copy()
     allowed[::150] = False
-    run = free_run(Estimator(load_profile("milliampere"), {}), [motion], [allowed])
+    run = run_free(Estimator(load_profile("milliampere"), {}), [motion], [allowed])
     assert np.isfinite(run.position_m[:2]).all()
     assert np.isnan(run.position_m[2:]).all(), "no stretch of 14.9 s holds a horizon of 20 s"
 
@@ -73,7 +73,7 @@ def test_a_model_without_positive_mass_cannot_run() -> None:
     motion = _trial(20.0)
     profile = load_profile("milliampere")
     broken = replace(profile, hull=replace(profile.hull, M=np.diag([-1.0, 1.0, 1.0])))
-    run = free_run(Estimator(broken, {}), [motion], [motion.valid])
+    run = run_free(Estimator(broken, {}), [motion], [motion.valid])
     assert run.starts == 0
     assert "positive definite" in run.note
 
@@ -83,7 +83,7 @@ def test_a_diverging_run_is_counted_not_averaged() -> None:
     profile = load_profile("milliampere")
     # Damping of the wrong sign feeds the motion until it runs away.
     unstable = replace(profile, hull=replace(profile.hull, D={"X_u": 3000.0, "N_r": 3000.0}))
-    run = free_run(Estimator(unstable, {}), [motion], [motion.valid])
+    run = run_free(Estimator(unstable, {}), [motion], [motion.valid])
     assert "diverged" in run.note
     assert not np.isinf(run.position_m).any()
 
@@ -103,5 +103,5 @@ def test_slow_grids_take_substeps(rate_hz: float) -> None:
         valid=motion.valid[::step],
         raw_nu=motion.raw_nu[::step],
     )
-    run = free_run(Estimator(load_profile("milliampere"), {}), [thin], [thin.valid])
+    run = run_free(Estimator(load_profile("milliampere"), {}), [thin], [thin.valid])
     assert np.all(run.position_m < 0.05)

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ferryid.identify.paired import FEWEST_BLOCKS, block_seconds, block_sums, compare_paired, enough, holm
+from ferryid.regression.resampling.paired_bootstrap import (
+    FEWEST_BLOCKS,
+    compare_pairs,
+    has_enough_blocks,
+    holm,
+    paired_block_seconds,
+    sum_over_blocks,
+)
 
 RATE_HZ = 2.0
 DRAWS = 499
@@ -30,9 +37,9 @@ def judged(rng: np.random.Generator, lengths_s: tuple[float, ...], ratio: float,
     logs = []
     for seconds in lengths_s:
         squares = two_models(rng, seconds, ratio)
-        block_s, _ = block_seconds(squares[:, :, 0], RATE_HZ)
-        logs.append(block_sums(squares, np.arange(len(squares)) / RATE_HZ, block_s))
-    return compare_paired(logs, draws=DRAWS, seed=seed)
+        block_s, _ = paired_block_seconds(squares[:, :, 0], RATE_HZ)
+        logs.append(sum_over_blocks(squares, np.arange(len(squares)) / RATE_HZ, block_s))
+    return compare_pairs(logs, draws=DRAWS, seed=seed)
 
 
 @pytest.mark.parametrize("lengths_s", [(600.0,), (300.0,), (100.0, 150.0, 300.0)])
@@ -60,7 +67,7 @@ def test_intervals_of_free_runs_that_overlap_cover_as_often() -> None:
         shared = coloured(rng, int(720 * RATE_HZ), 4.0)
         paths = [np.cumsum(shared + 0.6 * coloured(rng, len(shared), 4.0)) for _ in range(2)]
         squares = np.stack([(path[starts + run] - path[starts]) ** 2 for path in paths], axis=1)[:, :, None]
-        one = compare_paired([block_sums(squares, starts / RATE_HZ, 60.0)], draws=DRAWS, seed=seed)
+        one = compare_pairs([sum_over_blocks(squares, starts / RATE_HZ, 60.0)], draws=DRAWS, seed=seed)
         covered.append(one.low[0, 0] < 1.0 < one.high[0, 0])
     assert 0.90 <= np.mean(covered) <= 0.99
 
@@ -79,7 +86,7 @@ def test_unpaired_scatter_cancels() -> None:
     n = int(600 * RATE_HZ)
     shared = coloured(rng, n, 4.0)
     squares = np.stack([shared, 1.02 * shared + 0.01 * rng.standard_normal(n)], axis=1)[:, :, None] ** 2
-    one = compare_paired([block_sums(squares, np.arange(n) / RATE_HZ, 30.0)], draws=DRAWS)
+    one = compare_pairs([sum_over_blocks(squares, np.arange(n) / RATE_HZ, 30.0)], draws=DRAWS)
     assert one.ratio[0, 0] == pytest.approx(1.0 / 1.02**2, rel=2e-3)
     assert one.high[0, 0] < 0.98
     assert one.p[0, 0] == pytest.approx(1.0 / (DRAWS + 1.0))
@@ -88,7 +95,7 @@ def test_unpaired_scatter_cancels() -> None:
 def test_ratios_of_several_logs_are_those_of_all_squares_together() -> None:
     first = np.array([[[4.0], [2.0]], [[6.0], [1.0]]])
     second = np.array([[[1.0], [9.0]]])
-    pooled = compare_paired([first, second])
+    pooled = compare_pairs([first, second])
     assert pooled.pairs == ((0, 1),)
     assert pooled.ratio[0, 0] == pytest.approx((4 + 6 + 1) / (2 + 1 + 9))
     assert np.isnan([pooled.low, pooled.high, pooled.p]).all()
@@ -100,7 +107,7 @@ def test_the_standard_error_is_that_of_a_ratio_of_sums() -> None:
     sums = rng.gamma(20.0, 1.0, (40, 2, 1))
     x, y = sums[:, :, 0].T / sums[:, :, 0].sum(axis=0)[:, None]
     error = np.sqrt(40.0 / 39.0 * np.sum((x - y) ** 2))
-    one = compare_paired([sums])
+    one = compare_pairs([sums])
     reach = np.log(one.high[0, 0] / one.low[0, 0]) / 2.0
     assert reach / error == pytest.approx(2.02, abs=0.15)
 
@@ -108,7 +115,7 @@ def test_the_standard_error_is_that_of_a_ratio_of_sums() -> None:
 def test_more_models_make_no_pair_another_one() -> None:
     rng = np.random.default_rng(7)
     sums = rng.gamma(5.0, 1.0, (20, 4, 2))
-    all_pairs, alone = compare_paired([sums], draws=DRAWS), compare_paired([sums[:, [1, 3]]], draws=DRAWS)
+    all_pairs, alone = compare_pairs([sums], draws=DRAWS), compare_pairs([sums[:, [1, 3]]], draws=DRAWS)
     k = all_pairs.pairs.index((1, 3))
     for part in ("ratio", "low", "high", "p"):
         assert getattr(all_pairs, part)[k] == pytest.approx(getattr(alone, part)[0])
@@ -117,29 +124,29 @@ def test_more_models_make_no_pair_another_one() -> None:
 def test_the_same_model_is_no_better_and_what_never_errs_has_no_ratio() -> None:
     sums = np.ones((12, 3, 1)) * np.arange(1.0, 13.0)[:, None, None]
     sums[:, 2] = 0.0
-    one = compare_paired([sums], draws=DRAWS)
+    one = compare_pairs([sums], draws=DRAWS)
     assert one.ratio[0, 0] == one.low[0, 0] == one.high[0, 0] == 1.0
     assert one.p[0, 0] == 1.0
     assert np.isnan(one.ratio[1:]).all()
     assert np.isnan(one.p[1:]).all()
     # Better in every block by as much.
     sums[:, 1] *= 2.0
-    assert compare_paired([sums], draws=DRAWS).p[0, 0] == pytest.approx(1.0 / (DRAWS + 1.0))
+    assert compare_pairs([sums], draws=DRAWS).p[0, 0] == pytest.approx(1.0 / (DRAWS + 1.0))
 
 
 def test_too_few_blocks_give_no_interval() -> None:
     many, few = np.ones((FEWEST_BLOCKS, 2, 1)), np.ones((FEWEST_BLOCKS - 1, 2, 1))
-    assert enough([many])
-    assert not enough([few])
+    assert has_enough_blocks([many])
+    assert not has_enough_blocks([few])
     # Short logs are blocks of one another.
-    assert enough([many[:1]] * FEWEST_BLOCKS)
-    assert not enough([many[:1]] * (FEWEST_BLOCKS - 1))
-    assert np.isnan(compare_paired([few]).p).all()
+    assert has_enough_blocks([many[:1]] * FEWEST_BLOCKS)
+    assert not has_enough_blocks([many[:1]] * (FEWEST_BLOCKS - 1))
+    assert np.isnan(compare_pairs([few]).p).all()
 
 
 def test_blocks_are_stretches_of_time_and_gaps_are_none() -> None:
     at = np.array([0.0, 10.0, 29.0, 30.0, 95.0, 130.0])
-    sums = block_sums(np.arange(1.0, 7.0)[:, None], at, 30.0)
+    sums = sum_over_blocks(np.arange(1.0, 7.0)[:, None], at, 30.0)
     # 0-30, 30-60, nothing from 60 to 90, and 90-130: a remainder of a third of a block joins the last one.
     assert sums[:, 0].tolist() == [6.0, 4.0, 11.0]
 
@@ -147,13 +154,13 @@ def test_blocks_are_stretches_of_time_and_gaps_are_none() -> None:
 def test_blocks_are_as_long_as_errors_are_remembered() -> None:
     rng = np.random.default_rng(8)
     n = int(7200 * RATE_HZ)
-    short, _ = block_seconds(coloured(rng, n, 2.0)[:, None] ** 2, RATE_HZ)
-    long, told = block_seconds(coloured(rng, n, 120.0)[:, None] ** 2, RATE_HZ)
+    short, _ = paired_block_seconds(coloured(rng, n, 2.0)[:, None] ** 2, RATE_HZ)
+    long, told = paired_block_seconds(coloured(rng, n, 120.0)[:, None] ** 2, RATE_HZ)
     assert short == 30.0
     assert long > 200.0
     assert not told
     # Errors that only grow are remembered throughout.
-    cut, told = block_seconds(np.linspace(1.0, 2.0, int(360 * RATE_HZ))[:, None], RATE_HZ)
+    cut, told = paired_block_seconds(np.linspace(1.0, 2.0, int(360 * RATE_HZ))[:, None], RATE_HZ)
     assert told
     assert cut == pytest.approx(360.0 / FEWEST_BLOCKS)
 

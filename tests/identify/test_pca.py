@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from sklearn.decomposition import PCA
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import basis
-from ferryid.identify.cross_products import CrossProducts
-from ferryid.identify.pca import pca, pca_of_basis
-from ferryid.identify.qr import QrFactor
+from ferryid.regression.bases.basis import make_basis
+from ferryid.regression.cross_products import CrossProducts
+from ferryid.regression.pca import principal_components
+from ferryid.regression.qr import QrFactor
 from tests.identify.rounds import motion
 
 Floats = NDArray[np.float64]
@@ -28,7 +26,7 @@ def data() -> Floats:
 @pytest.mark.parametrize("standardise", [True, False])
 def test_agrees_with_the_svd(kind, standardise: bool) -> None:
     X = data()
-    found = pca(kind.from_rows(X, np.zeros((300, 1))), standardise=standardise)
+    found = principal_components(kind.from_rows(X, np.zeros((300, 1))), standardise=standardise)
     E = X - X.mean(axis=0)
     E = E / E.std(axis=0, ddof=1) if standardise else E
     left, singular, right = np.linalg.svd(E, full_matrices=False)
@@ -43,7 +41,7 @@ def test_agrees_with_the_svd(kind, standardise: bool) -> None:
 def test_agrees_with_scikit_learn() -> None:
     X = data()
     other = PCA().fit(X)
-    found = pca(QrFactor.from_rows(X, np.zeros((300, 1))), standardise=False)
+    found = principal_components(QrFactor.from_rows(X, np.zeros((300, 1))), standardise=False)
     np.testing.assert_allclose(found.explained, other.explained_variance_ratio_, rtol=1e-9)
     np.testing.assert_allclose(found.variances, other.explained_variance_, rtol=1e-9)
 
@@ -54,7 +52,7 @@ def test_two_columns_by_hand() -> None:
     Z = np.linalg.qr(rng.standard_normal((50, 3)) - rng.standard_normal((50, 3)).mean(axis=0))[0]
     Z = np.linalg.qr(Z - Z.mean(axis=0))[0]
     X = np.column_stack([Z[:, 0], 500.0 * (0.6 * Z[:, 0] + 0.8 * Z[:, 1])])
-    found = pca(CrossProducts.from_rows(X, np.zeros((50, 1))))
+    found = principal_components(CrossProducts.from_rows(X, np.zeros((50, 1))))
     np.testing.assert_allclose(found.variances, [1.6, 0.4], rtol=1e-9)
     np.testing.assert_allclose(found.explained, [0.8, 0.2], rtol=1e-9)
     np.testing.assert_allclose(np.abs(found.loadings), np.sqrt(0.5), rtol=1e-9)
@@ -63,7 +61,7 @@ def test_two_columns_by_hand() -> None:
 def test_duplicate_and_constant_columns_add_no_component() -> None:
     X = data()
     wide = np.hstack([X, X[:, :2], np.full((300, 1), 2.0)])
-    found = pca(QrFactor.from_rows(wide, np.zeros((300, 1))))
+    found = principal_components(QrFactor.from_rows(wide, np.zeros((300, 1))))
     assert found.variances.shape == (6,)
     assert found.explained.sum() == pytest.approx(1.0)
     np.testing.assert_array_equal(found.loadings[8], 0.0)
@@ -73,30 +71,15 @@ def test_duplicate_and_constant_columns_add_no_component() -> None:
 def test_the_thesis_basis_has_eighteen_directions() -> None:
     # 21 functions with three pairs of identical columns.
     logs = [motion(1), motion(2)]
-    functions = basis("thesis")
-    found = pca_of_basis(logs, functions)
+    functions = make_basis("thesis")
     X = np.concatenate([functions.of(log) for log in logs])
+    found = principal_components(CrossProducts.from_rows(X, np.zeros((len(X), 1))))
     E = (X - X.mean(axis=0)) / X.std(axis=0, ddof=1)
     singular = np.linalg.svd(E, compute_uv=False)
     assert found.variances.shape == (18,)
     np.testing.assert_allclose(found.variances, singular[:18] ** 2 / (len(X) - 1), rtol=1e-8)
 
 
-def test_only_valid_rows_that_were_asked_for_count() -> None:
-    log = motion(3)
-    asked = log.t < 120.0
-    poisoned = replace(log, nu=np.where(log.t[:, None] < 100.0, log.nu, 1e3), valid=log.t < 100.0)
-    got = pca_of_basis([poisoned], basis("modulus"), rows=[asked])
-    want = pca_of_basis([log], basis("modulus"), rows=[log.t < 100.0])
-    np.testing.assert_array_equal(got.variances, want.variances)
-
-
 def test_refuses_what_has_no_direction() -> None:
-    still = replace(motion(4), nu=np.zeros((2400, 3)), nu_dot=np.zeros((2400, 3)))
-    for call in (
-        lambda: pca_of_basis([still], basis("modulus")),
-        lambda: pca_of_basis([], basis("modulus")),
-        lambda: pca_of_basis([motion(4)], basis("modulus+wind-thesis")),
-    ):
-        with pytest.raises(FerryIdError, match="Fix:"):
-            call()
+    with pytest.raises(FerryIdError, match="Fix:"):
+        principal_components(CrossProducts.from_rows(np.ones((50, 3)), np.zeros((50, 1))))

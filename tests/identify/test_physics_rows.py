@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.identify.candidates import Candidate
-from ferryid.identify.estimate import estimator
-from ferryid.identify.model import Model, blank
-from ferryid.identify.physics_rows import coefficient_rows, effect_rows, is_of_a_hull, render_effects, term_rows
+from ferryid.compare.candidates import Candidate
+from ferryid.compare.coefficient_table import coefficient_rows, effect_rows, is_of_a_hull, term_rows
+from ferryid.models.forces.estimator import model_estimator
+from ferryid.models.model import Model, blank_model
+from ferryid.report.comparison_words import render_effects
 from ferryid.types import AXES
 from ferryid.vessel import load_profile
 from tests.export.models import MODELS, fitted
@@ -69,7 +70,7 @@ def test_the_equations_of_motion_are_those_of_the_model(basis: str, structure: s
     model = fitted(basis, structure, seed=3, **scale)
     rng = np.random.default_rng(1)
     nu, nu_dot = rng.normal(size=(50, 3)), rng.normal(size=(50, 3))
-    expected = estimator(model)(nu_dot, nu, np.zeros(50), None, None)
+    expected = model_estimator(model)(nu_dot, nu, np.zeros(50), None, None)
     assert equations(model, nu, nu_dot) == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
 
@@ -78,12 +79,12 @@ def test_so_are_those_of_a_diagnosed_model() -> None:
     model = replace(model, hull=MODELS["diagnosed"].hull)
     rng = np.random.default_rng(2)
     nu, nu_dot = rng.normal(size=(20, 3)), rng.normal(size=(20, 3))
-    expected = estimator(model)(nu_dot, nu, np.zeros(20), None, None)
+    expected = model_estimator(model)(nu_dot, nu, np.zeros(20), None, None)
     assert equations(model, nu, nu_dot) == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
 
 def test_a_base_model_has_the_coefficients_of_its_profile() -> None:
-    rows = {row["coefficient"]: row for row in coefficient_rows([Candidate("base", blank(PROFILE, "base"))])}
+    rows = {row["coefficient"]: row for row in coefficient_rows([Candidate("base", blank_model(PROFILE, "base"))])}
     assert rows["m22"]["values"]["base"]["value"] == PROFILE.hull.M[1, 1]
     assert rows["m22"]["unit"] == "kg"
     assert rows["N_r"]["values"]["base"]["value"] == PROFILE.hull.D["N_r"]

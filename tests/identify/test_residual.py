@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.residual import base_force, force_of_motion, residual, scaled
+from ferryid.models.forces.residual import base_force, compute_residual, motion_force, scale_hull
 from ferryid.signals.track import Motion
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import current_in_body, forward, inverse_dynamics
@@ -66,12 +66,14 @@ def pushed() -> Motion:
 
 
 def test_a_perfect_model_leaves_nothing(calm: Motion) -> None:
-    np.testing.assert_allclose(residual(PROFILE, calm, NOTHING), 0.0, atol=1e-9)
+    np.testing.assert_allclose(compute_residual(PROFILE, calm, NOTHING), 0.0, atol=1e-9)
 
 
 def test_a_force_that_was_left_out_is_what_remains(pushed: Motion) -> None:
     # tau_mes + extra = F, so that tau_mes - F is the extra force with its sign turned.
-    np.testing.assert_allclose(residual(PROFILE, pushed, NOTHING), np.tile([30.0, -20.0, -40.0], (600, 1)), atol=1e-9)
+    np.testing.assert_allclose(
+        compute_residual(PROFILE, pushed, NOTHING), np.tile([30.0, -20.0, -40.0], (600, 1)), atol=1e-9
+    )
 
 
 def test_factors_of_the_base_model_by_hand() -> None:
@@ -79,22 +81,22 @@ def test_factors_of_the_base_model_by_hand() -> None:
     M = PROFILE.hull.M
     scale = {"delta": 0.4, "sigma": 0.5, "zeta": 2.0}
     # At rest only the mass acts: 0.4 M nu_dot / 2.
-    still = force_of_motion(PROFILE, scale, one, 0 * one, np.zeros(1))
+    still = motion_force(PROFILE, scale, one, 0 * one, np.zeros(1))
     np.testing.assert_allclose(still[0], 0.4 * M.sum(axis=1) / 2.0)
     # At steady surge only the damping does: 0.5 (27.632 + 110.064 + 13.965) / 2 at 1 m/s.
-    surge = force_of_motion(PROFILE, scale, 0 * one, np.array([[1.0, 0, 0]]), np.zeros(1))
+    surge = motion_force(PROFILE, scale, 0 * one, np.array([[1.0, 0, 0]]), np.zeros(1))
     np.testing.assert_allclose(surge[0], [0.5 * (27.632 + 110.064 + 13.965) / 2.0, 0.0, 0.0], atol=1e-12)
     # Surge and yaw rate: the Coriolis force in sway scales with the mass.
     both = np.array([[1.0, 0, 1.0]])
-    free = force_of_motion(PROFILE, {"delta": 1.0, "sigma": 0.0}, 0 * one, both, np.zeros(1))
-    less = force_of_motion(PROFILE, {"delta": 0.4, "sigma": 0.0}, 0 * one, both, np.zeros(1))
+    free = motion_force(PROFILE, {"delta": 1.0, "sigma": 0.0}, 0 * one, both, np.zeros(1))
+    less = motion_force(PROFILE, {"delta": 0.4, "sigma": 0.0}, 0 * one, both, np.zeros(1))
     assert free[0, 1] == pytest.approx(2389.657)
     np.testing.assert_allclose(less, 0.4 * free)
 
 
 def test_the_scaled_hull_is_new_and_the_profile_unchanged() -> None:
     before = PROFILE.hull.M.copy()
-    hull = scaled(PROFILE.hull, {"delta": 0.4, "sigma": 0.4})
+    hull = scale_hull(PROFILE.hull, {"delta": 0.4, "sigma": 0.4})
     assert hull.mass_kg == pytest.approx(0.4 * 1670)
     np.testing.assert_array_equal(PROFILE.hull.M, before)
 
@@ -107,22 +109,22 @@ def test_measured_wind_belongs_to_the_base_model() -> None:
         return wind_force(areas, wind[None], now[1:], nu[None])[0]
 
     motion = sail(blown, 10.0, wind=wind)
-    np.testing.assert_allclose(residual(PROFILE, motion, NOTHING), 0.0, atol=1e-9)
+    np.testing.assert_allclose(compute_residual(PROFILE, motion, NOTHING), 0.0, atol=1e-9)
     unmeasured = replace(motion, wind=None)
-    assert np.abs(residual(PROFILE, unmeasured, NOTHING)).max() > 50.0
+    assert np.abs(compute_residual(PROFILE, unmeasured, NOTHING)).max() > 50.0
 
 
 def test_a_measured_current_acts_through_the_relative_velocity() -> None:
     rng = np.random.default_rng(0)
     nu, nu_dot, psi = rng.normal(size=(50, 3)), rng.normal(size=(50, 3)), rng.uniform(-3, 3, 50)
     current = np.tile([0.3, -0.2], (50, 1))
-    ours = force_of_motion(PROFILE, NOTHING, nu_dot, nu, psi, current=current)
+    ours = motion_force(PROFILE, NOTHING, nu_dot, nu, psi, current=current)
     exact = inverse_dynamics(PROFILE.hull, nu_dot, nu, current_in_body(current, psi))
     np.testing.assert_allclose(ours, exact)
     # A vessel that drifts with the water feels none.
     drifting = current_in_body(current, psi)
     np.testing.assert_allclose(
-        force_of_motion(PROFILE, NOTHING, np.zeros((50, 3)), drifting, psi, current=current), 0.0, atol=1e-9
+        motion_force(PROFILE, NOTHING, np.zeros((50, 3)), drifting, psi, current=current), 0.0, atol=1e-9
     )
 
 
@@ -130,14 +132,14 @@ def test_commanded_force_in_place_of_measured(pushed: Motion) -> None:
     more = np.array([5.0, -6.0, 7.0])
     commanded = replace(pushed, tau_d=pushed.tau + more)
     np.testing.assert_allclose(
-        residual(PROFILE, commanded, NOTHING, "commanded"), residual(PROFILE, pushed, NOTHING) + more
+        compute_residual(PROFILE, commanded, NOTHING, "commanded"), compute_residual(PROFILE, pushed, NOTHING) + more
     )
     with pytest.raises(FerryIdError, match=r"trial: the commanded residual needs tau_d.*Fix: "):
-        residual(PROFILE, pushed, NOTHING, "commanded")
+        compute_residual(PROFILE, pushed, NOTHING, "commanded")
 
 
 def test_the_parallel_simulation_of_a_perfect_model_stays_with_the_vessel(calm: Motion) -> None:
-    error = residual(PROFILE, calm, NOTHING, "parallel")
+    error = compute_residual(PROFILE, calm, NOTHING, "parallel")
     inside = np.isfinite(error).all(axis=1)
     # One second: ten rows at either end cannot be judged.
     assert inside.sum() == 600 - 20
@@ -146,7 +148,7 @@ def test_the_parallel_simulation_of_a_perfect_model_stays_with_the_vessel(calm: 
 
 @pytest.mark.parametrize("horizon_s", [0.1, 0.5, 1.0])
 def test_the_parallel_simulation_finds_the_force_that_was_left_out(pushed: Motion, horizon_s: float) -> None:
-    error = residual(PROFILE, pushed, NOTHING, "parallel", horizon_s=horizon_s)
+    error = compute_residual(PROFILE, pushed, NOTHING, "parallel", horizon_s=horizon_s)
     inside = np.isfinite(error).all(axis=1)
     expected = np.array([30.0, -20.0, -40.0])
     np.testing.assert_allclose(error[inside], np.tile(expected, (inside.sum(), 1)), rtol=0.02)
@@ -155,13 +157,13 @@ def test_the_parallel_simulation_finds_the_force_that_was_left_out(pushed: Motio
 def test_the_parallel_simulation_does_not_cross_a_gap(pushed: Motion) -> None:
     tau = pushed.tau.copy()
     tau[300] = np.nan
-    error = residual(PROFILE, replace(pushed, tau=tau), NOTHING, "parallel")
+    error = compute_residual(PROFILE, replace(pushed, tau=tau), NOTHING, "parallel")
     lost = np.isnan(error).any(axis=1)
     np.testing.assert_array_equal(np.flatnonzero(lost[100:500]) + 100, np.arange(290, 311))
 
 
 def test_a_log_shorter_than_the_horizon_gives_no_parallel_residual(calm: Motion) -> None:
-    assert np.isnan(residual(PROFILE, sail(none, 0.5), NOTHING, "parallel")).all()
+    assert np.isnan(compute_residual(PROFILE, sail(none, 0.5), NOTHING, "parallel")).all()
 
 
 def test_the_base_force_of_a_log_is_that_of_its_motion(calm: Motion) -> None:
@@ -170,4 +172,4 @@ def test_the_base_force_of_a_log_is_that_of_its_motion(calm: Motion) -> None:
 
 def test_unknown_form(calm: Motion) -> None:
     with pytest.raises(FerryIdError, match=r'no residual called "paralel". Did you mean "parallel"\?'):
-        residual(PROFILE, calm, NOTHING, "paralel")
+        compute_residual(PROFILE, calm, NOTHING, "paralel")

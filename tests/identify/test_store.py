@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import basis
-from ferryid.identify.catalogue import listing, render_listing
-from ferryid.identify.model import Model, to_json
-from ferryid.identify.scores import ForceScores, ModelScores
-from ferryid.identify.store import Stored, load, load_file, save, stored_models
+from ferryid.models.model import Model, model_to_json
+from ferryid.models.scores import ForceScores, ModelScores
+from ferryid.models.store.listing import list_versions
+from ferryid.models.store.versions import StoredModel, list_models, load, load_file, save
+from ferryid.regression.bases.basis import make_basis
+from ferryid.report.model_text import render_listing
 from ferryid.vessel import load_profile
 
 
 def made(accepted: bool = True, seed: int = 0) -> Model:
-    functions = basis("modulus")
+    functions = make_basis("modulus")
     K = len(functions.terms)
     rng = np.random.default_rng(seed)
     theta = rng.normal(size=(K, 3)) * 1e3 / 7
@@ -55,7 +56,7 @@ def test_a_model_comes_back_to_the_last_digit(tmp_path: Path) -> None:
     again = load_file(stored.path)
     for name in ("theta", "intercept", "low", "high", "intercept_low", "intercept_high", "covariance"):
         np.testing.assert_array_equal(getattr(again, name), getattr(stored.model, name))
-    assert to_json(again) == to_json(stored.model)
+    assert model_to_json(again) == model_to_json(stored.model)
 
 
 def test_current_moves_only_on_acceptance(tmp_path: Path) -> None:
@@ -65,7 +66,7 @@ def test_current_moves_only_on_acceptance(tmp_path: Path) -> None:
     assert load("boat", tmp_path).version == 1
     assert save(made(seed=2), tmp_path).current
     assert load("boat", tmp_path).version == 3
-    stored = [one for one in stored_models(tmp_path) if isinstance(one, Stored)]
+    stored = [one for one in list_models(tmp_path) if isinstance(one, StoredModel)]
     assert [(s.model.version, s.model.accepted, s.current) for s in stored] == [
         (1, True, False),
         (2, False, False),
@@ -79,7 +80,7 @@ def test_the_same_model_at_another_time_is_the_same_version(tmp_path: Path) -> N
     again = save(replace(made(), created="2030-01-01T00:00:00Z"), tmp_path)
     assert again.model.version == first.model.version
     assert first.path.read_bytes() == before
-    assert len(stored_models(tmp_path)) == 1
+    assert len(list_models(tmp_path)) == 1
 
 
 def test_a_name_without_an_accepted_version_gives_the_newest(tmp_path: Path) -> None:
@@ -160,7 +161,7 @@ def test_a_damaged_version_is_a_row_and_keeps_its_number(tmp_path: Path, damage:
     before = path.read_bytes()
     path.write_bytes(DAMAGE[damage](before))
     assert path.read_bytes() != before
-    result = listing(tmp_path)
+    result = list_versions(tmp_path)
     first, second = result["models"]
     assert (first["version"], "unreadable" in first) == (1, False)
     assert (second["name"], second["version"], second["current"]) == ("boat", 2, True)
@@ -179,7 +180,7 @@ def test_a_folder_in_place_of_the_current_version_is_reported_with_a_remedy(tmp_
     current = tmp_path / "models" / "boat" / "current"
     current.unlink()
     current.mkdir()
-    assert "holds no number" in render_listing(listing(tmp_path), tmp_path).splitlines()[-1]
+    assert "holds no number" in render_listing(list_versions(tmp_path), tmp_path).splitlines()[-1]
     with pytest.raises(FerryIdError, match=r"current: the number .*, found a folder\. Fix: move or delete that folder"):
         save(made(seed=1), tmp_path)
     assert load("boat@1", tmp_path).version == 1
@@ -192,6 +193,6 @@ def test_a_damaged_note_of_the_current_version_is_told(tmp_path: Path, text: str
     with pytest.raises(FerryIdError, match=rf"current: .*{told}.* Fix: give a version as boat@NUMBER, there are 1"):
         load("boat", tmp_path)
     assert load("boat@1", tmp_path).version == 1
-    assert told in render_listing(listing(tmp_path), tmp_path).splitlines()[-1]
+    assert told in render_listing(list_versions(tmp_path), tmp_path).splitlines()[-1]
     save(made(seed=1), tmp_path)
     assert load("boat", tmp_path).version == 2

@@ -18,12 +18,12 @@ from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS, UNITS, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.estimate import estimator, hull_values
-from ferryid.identify.hull_terms import other_terms
-from ferryid.identify.model import Model, to_json
-from ferryid.identify.pictured import Pictured, acting_estimator
-from ferryid.identify.store import load_file, save
-from ferryid.identify.stored_effect import Conditions, Quantity, Source, StoredEffect
+from ferryid.models.forces.estimator import hull_coefficients, model_estimator
+from ferryid.models.forces.hull_terms import unmapped_terms
+from ferryid.models.forces.model_forces import ModelForces, acting_estimator
+from ferryid.models.model import Model, model_to_json
+from ferryid.models.store.versions import load_file, save
+from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect
 from ferryid.vessel import load_profile
 from tests.identify.test_store import made
 
@@ -60,7 +60,7 @@ WINDY = stored("wind", north=-4.0, east=3.0)
 
 def diagnosed(model: Model | None = None, *, factor: float = 1.1) -> Model:
     model = model or made()
-    values = factor * hull_values(model)
+    values = factor * hull_coefficients(model)
     hull = {
         name: Quantity(value, value - 1.0, value + 1.0, unit)
         for name, value, unit in zip(COEFFICIENTS, values.tolist(), UNITS, strict=True)
@@ -95,8 +95,8 @@ def test_a_hull_comes_back_with_its_lift_and_one_from_before_has_none(tmp_path: 
     path = save(lifts, tmp_path).path
     assert load_file(path).hull["N_uv"].value == -40.0
     # What the model's own term with u v does is counted in.
-    assert hull_values(load_file(path))[COEFFICIENTS.index("N_uv")] == -40.0
-    more, less = (estimator(one).profile.hull.D["N_uv"] for one in (load_file(path), diagnosed()))
+    assert hull_coefficients(load_file(path))[COEFFICIENTS.index("N_uv")] == -40.0
+    more, less = (model_estimator(one).profile.hull.D["N_uv"] for one in (load_file(path), diagnosed()))
     assert more - less == pytest.approx(-40.0 - diagnosed().hull["N_uv"].value)
     data = json.loads(path.read_text(encoding="utf-8"))
     for name in ("Y_uv", "Y_ur", "N_uv", "N_ur"):
@@ -108,8 +108,8 @@ def test_a_hull_comes_back_with_its_lift_and_one_from_before_has_none(tmp_path: 
 
 
 def test_a_model_of_a_fit_has_no_key_more() -> None:
-    text = dump_json(to_json(made()))
-    assert dump_json(to_json(diagnosed().undiagnosed())) == text
+    text = dump_json(model_to_json(made()))
+    assert dump_json(model_to_json(diagnosed().undiagnosed())) == text
     assert not {"hull", "vessel_effects", "conditions"} & json.loads(text).keys()
 
 
@@ -153,32 +153,32 @@ def test_the_refitted_hull_counts_the_terms_in() -> None:
     rng = np.random.default_rng(2)
     nu_dot, nu = rng.normal(size=(2, 50, 3))
     psi = rng.normal(size=50)
-    same = estimator(diagnosed(model, factor=1.0))(nu_dot, nu, psi, None, None)
-    np.testing.assert_allclose(same, estimator(model)(nu_dot, nu, psi, None, None), rtol=1e-9)
+    same = model_estimator(diagnosed(model, factor=1.0))(nu_dot, nu, psi, None, None)
+    np.testing.assert_allclose(same, model_estimator(model)(nu_dot, nu, psi, None, None), rtol=1e-9)
     # A mass more takes its weight times the acceleration more.
     heavy = diagnosed(model, factor=1.0)
     more = {**heavy.hull, "m11": replace(heavy.hull["m11"], value=heavy.hull["m11"].value + 100.0)}
     at_rest = np.zeros((1, 3))
-    pull = estimator(replace(heavy, hull=more))(np.array([[0.5, 0.0, 0.0]]), at_rest, np.zeros(1), None, None)
-    before = estimator(heavy)(np.array([[0.5, 0.0, 0.0]]), at_rest, np.zeros(1), None, None)
+    pull = model_estimator(replace(heavy, hull=more))(np.array([[0.5, 0.0, 0.0]]), at_rest, np.zeros(1), None, None)
+    before = model_estimator(heavy)(np.array([[0.5, 0.0, 0.0]]), at_rest, np.zeros(1), None, None)
     np.testing.assert_allclose(pull - before, [[50.0, 0.0, 0.0]], atol=1e-9)
 
 
 def test_what_no_hull_has_is_named() -> None:
-    left = other_terms(made())
+    left = unmapped_terms(made())
     assert "uv" in left
     assert "the constant" in left
-    assert other_terms(replace(made(), theta=0.0 * made().theta, intercept=np.zeros(3))) == ()
+    assert unmapped_terms(replace(made(), theta=0.0 * made().theta, intercept=np.zeros(3))) == ()
 
 
 def test_the_vessels_own_effects_alter_the_hull_that_a_controller_needs() -> None:
     bare = replace(made(), scale={}, theta=0.0 * made().theta, intercept=np.zeros(3))
     model = diagnosed(bare, factor=1.0)
     k = COEFFICIENTS.index("X_|u|u")
-    assert Pictured(model).altered_hull()[k] == pytest.approx(1.8 * hull_of(FERRY)[k])
+    assert ModelForces(model).altered_hull()[k] == pytest.approx(1.8 * hull_of(FERRY)[k])
     nu = np.array([[1.0, 0.0, 0.0]])
     force = acting_estimator(model)(0.0 * nu, nu, np.zeros(1), None, None)
-    clean = estimator(model)(0.0 * nu, nu, np.zeros(1), None, None)
+    clean = model_estimator(model)(0.0 * nu, nu, np.zeros(1), None, None)
     assert force[0, 0] - clean[0, 0] == pytest.approx(-0.8 * hull_of(FERRY)[k])
 
 

@@ -12,22 +12,21 @@ from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.identify import inputs
-from ferryid.identify import structures as module
-from ferryid.identify.bases import names
-from ferryid.identify.basis import STRUCTURES, Basis, basis, sized
-from ferryid.identify.compared import (
-    Compared,
-    Structure,
-    StructureSweep,
-    over_base,
-    render_structures,
-    structures_json,
-    verdict,
-)
-from ferryid.identify.residual import residual
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import correlation_time
-from ferryid.identify.structures import named, sweep_structures
+from ferryid.identify.sweeps import structure_sweep as module
+from ferryid.identify.sweeps.structure_comparison import (
+    Structure,
+    StructureComparison,
+    StructureSweep,
+    over_base,
+    structures_json,
+)
+from ferryid.identify.sweeps.structure_sweep import sweep_structures, usable_bases
+from ferryid.models.forces.residual import compute_residual
+from ferryid.regression.bases.basis import STRUCTURES, Basis, make_basis, with_hull_length
+from ferryid.regression.bases.forms import basis_names
+from ferryid.report.structures_text import render_structures, supported_structure
 from ferryid.signals.prepare import Opened, open_track
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.signals.track import Motion
@@ -71,7 +70,7 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
 
 
 def functions_of(name: str, structure: str) -> Basis:
-    return basis(sized(name, PROFILE.hull.length_m, "test"), structure=structure)
+    return make_basis(with_hull_length(name, PROFILE.hull.length_m, "test"), structure=structure)
 
 
 def logs_of(name: str, structure: str, count: int = 1, seconds: float = 900.0, noise: float = 100.0) -> list[Measured]:
@@ -88,12 +87,12 @@ def logs_of(name: str, structure: str, count: int = 1, seconds: float = 900.0, n
     return [measured(seed, seconds=seconds, jitter=0.002, noise=noise, force=force) for seed in range(count)]
 
 
-def find(one: Compared, name: str, structure: str) -> Structure:
+def find(one: StructureComparison, name: str, structure: str) -> Structure:
     return next(each for each in one.structures if (each.basis, each.structure) == (name, structure))
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", basis_names())
 def test_a_truth_is_supported_by_its_own_logs(run: Run, name: str, structure: str) -> None:
     one = run(logs_of(name, structure)).by["blocks"]
     assert find(one, name, structure).kept
@@ -150,7 +149,7 @@ def test_errors_and_intervals_are_those_of_fits_from_scratch(run: Run) -> None:
     log = logs_of("lift", "decoupled", seconds=400.0, noise=300.0)[0]
     one = run([log], replace(SETTINGS, components=40, inertia="fitted")).by["blocks"]
     motion = smooth_measured(log, 1.0)
-    error = residual(PROFILE, motion, SETTINGS.scale)
+    error = compute_residual(PROFILE, motion, SETTINGS.scale)
     cut = rows_of_blocks(motion.valid, one.blocks, round((1.0 + 2.0 / RATE_HZ + 2.0) * RATE_HZ), 5)
     assert one.rows == sum(rows.sum() for _, rows in cut)
     squares = {}
@@ -217,7 +216,7 @@ def test_blocks_are_as_long_as_residuals_remember(run: Run) -> None:
     log = measured(1, seconds=900.0, force=swell)
     slow = run([log])
     motion = smooth_measured(log, 1.0)
-    remembers = correlation_time(residual(PROFILE, motion, SETTINGS.scale), motion.valid, RATE_HZ)
+    remembers = correlation_time(compute_residual(PROFILE, motion, SETTINGS.scale), motion.valid, RATE_HZ)
     assert remembers > 8.0
     assert slow.block_s > 10.0 > quick.block_s
     assert slow.by["blocks"].blocks >= 20
@@ -244,7 +243,7 @@ def test_a_basis_that_cannot_be_used_is_listed(run: Run) -> None:
     found = run(logs, profile=NAMELESS)
     assert list(found.unusable) == ["cross-flow"]
     assert "boat.toml: the basis cross-flow needs the hull's length" in found.unusable["cross-flow"]
-    assert {each.basis for each in found.by["blocks"].structures} == set(names()) - {"cross-flow"}
+    assert {each.basis for each in found.by["blocks"].structures} == set(basis_names()) - {"cross-flow"}
     assert "left out: cross-flow: boat.toml" in render_structures(found)
     given = run(logs, replace(SETTINGS, basis="cross-flow-4m"), NAMELESS)
     assert given.unusable == {}
@@ -252,7 +251,7 @@ def test_a_basis_that_cannot_be_used_is_listed(run: Run) -> None:
 
 
 def test_names_of_bases_with_wind() -> None:
-    usable, unusable = named(FitSettings(basis="modulus+wind-paper"), PROFILE)
+    usable, unusable = usable_bases(FitSettings(basis="modulus+wind-paper"), PROFILE)
     assert unusable == {}
     assert usable["lift"] == "lift+wind-paper"
     assert usable["cross-flow"] == "cross-flow-5m+wind-paper"
@@ -300,12 +299,12 @@ def test_verdict_when_all_are_kept_and_when_one_is(run: Run) -> None:
     alone = replace(one, structures=tuple(replace(each, p=float(i == 0)) for i, each in enumerate(one.structures)))
     every = replace(one, structures=tuple(replace(each, p=1.0) for each in one.structures))
     some = replace(one, structures=tuple(replace(each, p=float(i < 4)) for i, each in enumerate(one.structures)))
-    assert "better than every other of 10 structures" in verdict(alone)
-    assert one.structures[0].title in verdict(alone)
-    assert "of all 10 structures, as none can be told from the best" in verdict(every)
+    assert "better than every other of 10 structures" in supported_structure(alone)
+    assert one.structures[0].title in supported_structure(alone)
+    assert "of all 10 structures, as none can be told from the best" in supported_structure(every)
     fewest = min(some.structures[:4], key=lambda each: each.coefficients)
-    assert verdict(some).startswith(f"The data support {fewest.title}, with {fewest.coefficients} free")
-    assert "of the 4 of 10 structures" in verdict(some)
+    assert supported_structure(some).startswith(f"The data support {fewest.title}, with {fewest.coefficients} free")
+    assert "of the 4 of 10 structures" in supported_structure(some)
 
 
 def test_what_cannot_be_compared(run: Run) -> None:

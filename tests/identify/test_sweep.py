@@ -13,7 +13,8 @@ import pytest
 from ferryid.errors import FerryIdError
 from ferryid.identify import inputs
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.sweep import Sweep, headline, render_sweep, sweep, sweep_json
+from ferryid.identify.sweeps.settings_sweep import Sweep, sweep_json, sweep_settings
+from ferryid.report.sweep_text import headline, render_sweep
 from ferryid.signals.prepare import Opened, open_track, refuse_twice
 from ferryid.signals.smooth import Measured
 from ferryid.types import RunContext
@@ -44,7 +45,7 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
             for log in logs
         }
         monkeypatch.setattr(inputs, "open_track", lambda path, *_, **__: ready[path])
-        return sweep(what, list(ready), PROFILE, settings, RunContext(Path("nowhere")), **options)  # type: ignore[arg-type]
+        return sweep_settings(what, list(ready), PROFILE, settings, RunContext(Path("nowhere")), **options)  # type: ignore[arg-type]
 
     return swept
 
@@ -164,7 +165,7 @@ def test_a_log_given_twice_is_refused(run: Run, opened: Opened, monkeypatch: pyt
     both = {"a": opened, "b": again}
     monkeypatch.setattr(inputs, "open_track", lambda path, *_, **__: both[path])
     with pytest.raises(FerryIdError, match=r"other\.mcap: the same log as"):
-        sweep("components", ["a", "b"], PROFILE, SETTINGS, RunContext(Path("nowhere")))
+        sweep_settings("components", ["a", "b"], PROFILE, SETTINGS, RunContext(Path("nowhere")))
 
 
 def test_a_part_of_two_logs_is_refused() -> None:

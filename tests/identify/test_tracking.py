@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.identify.tracking import tracked
+from ferryid.compare.tracking import tracking_scores
 from ferryid.signals.track import Motion
 
 N, RATE_HZ, LENGTH_M = 1001, 10.0, 5.0
@@ -27,7 +27,7 @@ def sailed(off: tuple[float, float, float], missing: tuple[int, ...] = ()) -> Mo
 def test_a_constant_error_has_the_integrals_of_a_rectangle() -> None:
     # 3 m, 4 m, and 0.4 rad over half a length of 2.5 m are another metre.
     e = np.sqrt(3.0**2 + 4.0**2 + 1.0**2)
-    found = tracked(sailed((3.0, 4.0, 0.4)), LENGTH_M)
+    found = tracking_scores(sailed((3.0, 4.0, 0.4)), LENGTH_M)
     assert found == pytest.approx(
         {
             "ISE": 100.0 * e**2,
@@ -42,7 +42,7 @@ def test_a_constant_error_has_the_integrals_of_a_rectangle() -> None:
 
 
 def test_a_whole_turn_is_no_error() -> None:
-    found = tracked(sailed((0.0, 0.0, 2.0 * np.pi + 0.2)), LENGTH_M)
+    found = tracking_scores(sailed((0.0, 0.0, 2.0 * np.pi + 0.2)), LENGTH_M)
     assert found is not None
     assert found["heading_rad"] == pytest.approx(0.2)
 
@@ -51,23 +51,23 @@ def test_gaps_count_for_nothing() -> None:
     motion = sailed((1.0, 0.0, 0.0))
     valid = motion.valid.copy()
     valid[301:700] = False
-    found = tracked(replace(motion, valid=valid), LENGTH_M)
+    found = tracking_scores(replace(motion, valid=valid), LENGTH_M)
     assert found is not None
     assert found["seconds"] == pytest.approx(60.0)
     assert (found["IAE"], found["EC"]) == pytest.approx((60.0, 60.0 * 50.0))
 
 
 def test_a_heading_alone_is_a_reference_too() -> None:
-    found = tracked(sailed((9.0, 9.0, 0.4), missing=(0, 1)), LENGTH_M)
+    found = tracking_scores(sailed((9.0, 9.0, 0.4), missing=(0, 1)), LENGTH_M)
     assert found is not None
     assert found["IAE"] == pytest.approx(100.0)
     assert np.isnan(found["position_m"])
-    unknown = tracked(sailed((9.0, 9.0, 0.4), missing=(0, 1)), float("nan"))
+    unknown = tracking_scores(sailed((9.0, 9.0, 0.4), missing=(0, 1)), float("nan"))
     assert unknown is not None
     assert np.isnan(unknown["IAE"])
     assert unknown["heading_rad"] == pytest.approx(0.4)
 
 
 def test_no_reference_no_measures() -> None:
-    assert tracked(replace(sailed((1.0, 1.0, 1.0)), eta_d=None), LENGTH_M) is None
-    assert tracked(sailed((1.0, 1.0, 1.0), missing=(0, 1, 2)), LENGTH_M) is None
+    assert tracking_scores(replace(sailed((1.0, 1.0, 1.0)), eta_d=None), LENGTH_M) is None
+    assert tracking_scores(sailed((1.0, 1.0, 1.0), missing=(0, 1, 2)), LENGTH_M) is None

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.compared import StructureSweep, over_base, verdict
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.structures import sweep_structures
+from ferryid.identify.sweeps.structure_comparison import StructureSweep, over_base
+from ferryid.identify.sweeps.structure_sweep import sweep_structures
 from ferryid.report.structures_report import render, structures_and_report
+from ferryid.report.structures_text import supported_structure
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
@@ -73,7 +74,7 @@ def test_every_number_is_on_it(found: StructureSweep) -> None:
             for against in (each.against_best, each.against_simplest):
                 for value, low, high in zip(against.value, against.low, against.high, strict=True):
                     assert f"<td>{value:.3g} [{low:.3g}, {high:.3g}]</td>" in page
-        assert verdict(one) in html.unescape(page)
+        assert supported_structure(one) in html.unescape(page)
     assert page.count('<tr class="chosen">') == 2
     kept = sum(each.kept for one in found.by.values() for each in one.structures)
     assert page.count('<tr class="kept">') == kept - 2

@@ -9,8 +9,8 @@ import pytest
 
 from ferryid.effects.picture import COEFFICIENTS, UNITS, hull_of
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model
-from ferryid.identify.stored_effect import Conditions, Quantity
+from ferryid.models.model import Model
+from ferryid.models.stored_effect import Conditions, Quantity
 from ferryid.simulate import load_scenario, parse_scenario, simulate
 from ferryid.simulate.vessel_model import sailed_by
 from ferryid.vessel import load_profile

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.result import Estimate
 from ferryid.effects.picture import Scene
-from ferryid.identify.pictured import bridged
+from ferryid.effects.scenes import interpolate_gaps
 from ferryid.vessel.profile import Floats
 
 NAMES = ("north", "east", "heading", "surge", "sway", "yaw rate")
@@ -49,7 +49,7 @@ def find(scene: Scene) -> SensorFinding | None:
     def correct(seen: Scene) -> Scene:
         # What was held is bridged: the jump at its end is no motion, and means reach over it.
         both = ((seen.eta, held[:, :3]), (seen.nu_raw, held[:, 3:]))
-        eta, nu_raw = (bridged(np.where(gone, np.nan, now), seen.usable) for now, gone in both)
+        eta, nu_raw = (interpolate_gaps(np.where(gone, np.nan, now), seen.usable) for now, gone in both)
         return replace(seen, eta=eta, nu_raw=nu_raw, usable=seen.usable & ~rows)
 
     return SensorFinding(

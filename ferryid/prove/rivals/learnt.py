@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ferryid.identify.predict import Prediction
+from ferryid.models.prediction import Prediction
 from ferryid.signals.prepare import Prepared
 from ferryid.vessel.profile import Profile
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.predict import Prediction
+from ferryid.models.prediction import Prediction
 from ferryid.prove.rivals.base import Base, base_of, prepared_log
 from ferryid.prove.rivals.candidates import CONSTANT, Candidate, candidates, told_apart
 from ferryid.prove.rivals.learnt import WINDOW_S, Learnt, Named

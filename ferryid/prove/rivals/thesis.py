@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from ferryid.identify.pipeline import fit_logs
-from ferryid.identify.predict import Prediction, predict
+from ferryid.identify import fit_logs
+from ferryid.models.prediction import Prediction, predict
 from ferryid.prove.rivals.learnt import SMOOTHER, WINDOW_S, Learnt
 from ferryid.reproduce.learning import THESIS
 from ferryid.signals.prepare import Prepared

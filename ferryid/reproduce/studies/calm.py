@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import Model
-from ferryid.identify.settings import FitSettings
-from ferryid.identify.tracking import MEASURES
+from ferryid.compare import MEASURES
+from ferryid.identify import FitSettings, force_mse
+from ferryid.models import Model
 from ferryid.report.drawing import Drawing
 from ferryid.reproduce.flight import Campaign, Flight, campaign, controlled, fly, master_round, trial, weather_seed
 from ferryid.reproduce.lab import Lab

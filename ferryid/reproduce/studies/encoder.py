@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.judge import force_mse
+from ferryid.identify import force_mse
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn

@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.identify import force_mse
 from ferryid.identify.adaptive import data_matrix
-from ferryid.identify.basis import relative_flow
-from ferryid.identify.cross_products import Rows
-from ferryid.identify.judge import force_mse
-from ferryid.identify.qr import factorise
-from ferryid.identify.simpls import simpls
+from ferryid.regression import Rows, factorise, fit_simpls
+from ferryid.regression.bases import relative_flow
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn, without_anemometer, without_wind_areas
@@ -252,7 +250,7 @@ def _error(motions: list[Motion], profile: Profile, name: str) -> Floats:
     seen = still if name == "thesis" else motions
     X = data_matrix(bare, seen[:2], settings)
     Y = data_matrix(bare, still[:2], THESIS)
-    fitted = simpls(factorise(Rows.of(X.X, Y.Y)), MOST)
+    fitted = fit_simpls(factorise(Rows.of(X.X, Y.Y)), MOST)
     base = hull_alone(bare, BASE)
     errors, unit = np.zeros(3), np.zeros(3)
     for motion, quiet in zip(seen[2:], still[2:], strict=True):

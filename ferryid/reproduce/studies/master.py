@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.judge import force_mse
+from ferryid.identify import force_mse
 from ferryid.reproduce.flight import campaign, trial
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, hull_alone

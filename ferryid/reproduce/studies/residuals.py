@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.judge import force_mse
-from ferryid.identify.residual import FORMS
-from ferryid.identify.tracking import signal_power
+from ferryid.compare import signal_power
+from ferryid.identify import force_mse
+from ferryid.models.forces import FORMS
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn

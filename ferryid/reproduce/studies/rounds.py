@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.estimate import estimator
-from ferryid.identify.judge import force_mse
-from ferryid.identify.tracking import MEASURES
+from ferryid.compare import MEASURES
+from ferryid.identify import force_mse
+from ferryid.models.forces import model_estimator
 from ferryid.report.drawing import Drawing
 from ferryid.reproduce.flight import Flight, campaign, master_round, trial
 from ferryid.reproduce.lab import Lab
@@ -133,7 +133,7 @@ def _experiment(folder: Path, seed: int) -> Outcome:
     flights = (*flown.flights, compared)
     profile = compared.profile
     motion = flown.flights[2].motion(THESIS.window_s)
-    new, master = estimator(flown.models[1]), hull_alone(profile, MASTER)
+    new, master = model_estimator(flown.models[1]), hull_alone(profile, MASTER)
     labels = ("round 1, base model", "round 2, Model 1", "round 3, Model 2", "Master Model")
     drawings = (
         integrals(

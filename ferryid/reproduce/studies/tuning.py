@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.estimate import Estimator, estimator
-from ferryid.identify.judge import force_mse
-from ferryid.identify.simpls import simpls, sse
+from ferryid.identify import force_mse
+from ferryid.models.forces import Estimator, model_estimator
+from ferryid.regression import fit_simpls
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
@@ -221,8 +221,8 @@ def _errors(pair: tuple[Flight, Flight], *, scale: bool) -> Floats:
     judge, unit = products([test], testing.profile), _unit(test, testing.profile)
     errors = []
     for window in WINDOWS_S:
-        fitted = simpls(products([training.motion(window)], training.profile), MOST, scale=scale)
-        errors.append(np.mean(sse(judge, fitted.coefficients, fitted.intercepts) / judge.n / unit, axis=1))
+        fitted = fit_simpls(products([training.motion(window)], training.profile), MOST, scale=scale)
+        errors.append(np.mean(judge.sse(fitted.coefficients, fitted.intercepts) / judge.n / unit, axis=1))
     return np.array(errors)
 
 
@@ -290,7 +290,7 @@ def _pictures(training: Flight, testing: Flight) -> tuple[Drawing, ...]:
                 Panel(
                     "surge X [N]",
                     (
-                        Line("model", test.t[rows], estimator(model).of(test)[rows, 0]),
+                        Line("model", test.t[rows], model_estimator(model).of(test)[rows, 0]),
                         Line("measured", test.t[rows], test.tau[rows, 0]),
                     ),
                     title=f"training log smoothed with {window:g} s",

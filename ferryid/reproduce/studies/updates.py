@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.adaptive import fit_motions, update_axes
-from ferryid.identify.combine import geometric_weights, mean_of_last, weighted
-from ferryid.identify.judge import force_mse, judge
-from ferryid.identify.model import Model
+from ferryid.identify import accept_on_motions, force_mse
+from ferryid.identify.adaptive import fit_motions, geometric_weights, mean_of_last, update_axes, weighted_mean
+from ferryid.models import Model
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
@@ -128,7 +127,7 @@ def _compare(folder: Path, seed: int) -> Outcome:
         old,
         new,
         update_axes(old, [trip], axes=("surge",), rows=[halves[0]]).model,
-        weighted(series, geometric_weights(len(series), FACTOR)),
+        weighted_mean(series, geometric_weights(len(series), FACTOR)),
         mean_of_last(series, LAST),
         fit_motions(profile, [trip], THESIS, name="reproduction", base=mean, rows=[halves[0]]).model,
     )
@@ -143,7 +142,7 @@ def _compare(folder: Path, seed: int) -> Outcome:
         errors(trip, halves[1]),
         errors(test),
         errors(fly(folder, "test-empty", calm, weather_seed(seed, 6), old).motion(window)),
-        tuple(judge(old, model, trip, [halves[1]]).accepted for model in models),
+        tuple(accept_on_motions(old, model, trip, [halves[1]]).accepted for model in models),
         _ise(folder, "crossing", replace(crossing, payload=laden), weather_seed(seed, 7), models),
         _ise(folder, "twelve", replace(calm, payload=laden), weather_seed(seed, 8), models),
     )

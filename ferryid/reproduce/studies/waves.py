@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.estimate import estimator
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import Model
-from ferryid.identify.pipeline import fit_logs
-from ferryid.identify.settings import FitSettings
+from ferryid.identify import FitSettings, fit_logs, force_mse
+from ferryid.models import Model
+from ferryid.models.forces import model_estimator
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import Flight, campaign, controlled, fly, master_round, trial, weather_seed
 from ferryid.reproduce.lab import Lab
@@ -234,7 +232,7 @@ def _pictures(
             "5-10-model-6",
             "Force in round 7: measured, Model 6 and the Master Model, t = 350 to 430 s, as in figure 5.10.",
             seventh,
-            {"Master Model": master, "Model 6": estimator(models["Model 6"]).of(seventh)},
+            {"Master Model": master, "Model 6": model_estimator(models["Model 6"]).of(seventh)},
             (350.0, 430.0),
         ),
         control_shares(
@@ -244,7 +242,7 @@ def _pictures(
             "5-12-model-2",
             "The same for Model 2, which never saw waves, as in figure 5.12.",
             seventh,
-            {"Master Model": master, "Model 2": estimator(models["Model 2"]).of(seventh)},
+            {"Master Model": master, "Model 2": model_estimator(models["Model 2"]).of(seventh)},
             (350.0, 430.0),
         ),
         control_shares(
@@ -262,7 +260,7 @@ def _feedforwards(models: dict[str, Model], flight: Flight) -> Drawing:
     control = flight.simulation.control
     nu_dot = np.gradient(control.nu_d, control.t, axis=0)
     wanted = {
-        name: estimator(models[name])(nu_dot, control.nu_d, control.eta_d[:, 2], None, None)
+        name: model_estimator(models[name])(nu_dot, control.nu_d, control.eta_d[:, 2], None, None)
         for name in ("Model 2", "Model 6")
     }
     panels = tuple(
