@@ -138,7 +138,7 @@ def effect_rows(candidates: Sequence[Candidate]) -> list[Row]:
     known = {one.label: _all(one.model) for one in candidates if not one.is_base}
     rows = []
     for key in dict.fromkeys(key for effects_of in known.values() for key in effects_of):
-        told = {label: _told(effects_of.get(key)) for label, effects_of in known.items()}
+        told = {label: _effect_values(effects_of.get(key)) for label, effects_of in known.items()}
         if any(value != next(iter(told.values())) for value in told.values()):
             log, _, effect, instance = key
             rows.append({"effect": effect, "instance": instance, "log": log or None, "values": told})
@@ -152,5 +152,5 @@ def _all(model: Model) -> dict[tuple[str, str, str, str | None], StoredEffect]:
     }
 
 
-def _told(stored: StoredEffect | None) -> Row | None:
+def _effect_values(stored: StoredEffect | None) -> Row | None:
     return None if stored is None else {"parameters": effect_to_json(stored)["parameters"], "says": stored.says()}

@@ -30,7 +30,7 @@ from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.track import Motion
 from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
 
-TOLD_S = 30.0
+STATEMENT_HORIZON_S = 30.0
 """Sentences on free runs are of this horizon, or of the longest below it that has intervals."""
 MOST_LOST = 0.1
 """Share of the free runs of a model that may diverge."""
@@ -81,10 +81,10 @@ class ComparedLog:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The result as one JSON object (schema ``ferryid.compare/1``), and the trials for figures."""
+    """The result as one JSON object (schema ``ferryid.compare/1``), and the logs for figures."""
 
     json: dict[str, Any]
-    trials: tuple[ComparedLog, ...]
+    logs: tuple[ComparedLog, ...]
 
 
 def compare(
@@ -117,14 +117,14 @@ def compare(
         on.
     """
     check_window(window_s)
-    trials: list[ComparedLog] = []
+    compared: list[ComparedLog] = []
     for path in logs:
         run.progress(f"comparing on {Path(path).name}")
-        trials.append(_trial(field, path, run.out, window_s, trials))
+        compared.append(_compare_log(field, path, run.out, window_s, compared))
     run.progress("comparing")
-    runnable, notes = _runnable(field.candidates, trials)
-    judged = [_judged(field, [trial], runnable) for trial in trials]
-    pooled = _judged(field, trials, runnable) if len(trials) > 1 else None
+    runnable, notes = _models_that_run(field.candidates, compared)
+    judged = [_pair_errors(field, [log], runnable) for log in compared]
+    pooled = _pair_errors(field, compared, runnable) if len(compared) > 1 else None
     every = [*judged, *([pooled] if pooled else [])]
     result = {
         "schema": "ferryid.compare/1",
@@ -134,22 +134,22 @@ def compare(
         "warnings": [*field.warnings, *notes],
         "logs": [
             {
-                "name": trial.name,
-                "sha256": trial.sha256,
-                "block_s": trial.block_s,
-                **_scores(field, [trial], one, runnable),
-                "tracking": tracking_scores(trial.motion, field.profile.hull.length_m),
-                "warnings": [*trial.warnings, *_few(trial)],
+                "name": log.name,
+                "sha256": log.sha256,
+                "block_s": log.block_s,
+                **_scores(field, [log], one, runnable),
+                "tracking": tracking_scores(log.motion, field.profile.hull.length_m),
+                "warnings": [*log.warnings, *_too_few_blocks(log)],
             }
-            for trial, one in zip(trials, judged, strict=True)
+            for log, one in zip(compared, judged, strict=True)
         ],
-        "pooled": _scores(field, trials, pooled, runnable) if pooled else None,
+        "pooled": _scores(field, compared, pooled, runnable) if pooled else None,
         "better": [row for one in every for row in comparison_statements(one)],
         "coefficients": {"physical": coefficient_rows(field.candidates), "terms": term_rows(field.candidates)},
         "effects": effect_rows(field.candidates),
     }
     run.progress("")
-    return Comparison(result, tuple(trials))
+    return Comparison(result, tuple(compared))
 
 
 def _entry(candidate: Candidate) -> Row:
@@ -169,7 +169,9 @@ def _entry(candidate: Candidate) -> Row:
     }
 
 
-def _trial(field: CandidateSet, path: str, out: Path, window_s: float, before: Sequence[ComparedLog]) -> ComparedLog:
+def _compare_log(
+    field: CandidateSet, path: str, out: Path, window_s: float, before: Sequence[ComparedLog]
+) -> ComparedLog:
     diagnosed = any(one.model.diagnosed for one in field.candidates)
     prepared = prepare(path, field.profile, out, window_s=window_s, keep_track=diagnosed)
     motion, sha256 = prepared.motion, prepared.recording.sha256
@@ -247,16 +249,16 @@ def _common_rows(field: CandidateSet, motion: Motion, taus: Floats) -> Flags:
     )
 
 
-def _runnable(candidates: Sequence[Candidate], trials: Sequence[ComparedLog]) -> tuple[Flags, list[str]]:
+def _models_that_run(candidates: Sequence[Candidate], compared: Sequence[ComparedLog]) -> tuple[Flags, list[str]]:
     """Return the models whose free runs can be compared, shape (m,), and why others cannot.
 
     A run that diverges counts for no model, so that all are judged by the same runs; a model of which many diverge is left out
     instead.
     """
     runs, notes = np.ones(len(candidates), dtype=bool), []
-    reached = sum(int(trial.reached.sum()) for trial in trials)
+    reached = sum(int(log.reached.sum()) for log in compared)
     for k, one in enumerate(candidates):
-        came = sum(int(np.isfinite(trial.errors[k, :, :, 2])[trial.reached].sum()) for trial in trials)
+        came = sum(int(np.isfinite(log.errors[k, :, :, 2])[log.reached].sum()) for log in compared)
         if not reached:
             continue
         lost = 1.0 - came / reached
@@ -270,36 +272,36 @@ def _runnable(candidates: Sequence[Candidate], trials: Sequence[ComparedLog]) ->
     return runs, notes
 
 
-def _counted(trial: ComparedLog, runnable: Flags) -> Flags:
+def _common_runs(log: ComparedLog, runnable: Flags) -> Flags:
     """Return the errors of free runs that count, as all models that run have them, shape (s, horizons, 4)."""
-    return np.asarray(np.isfinite(trial.errors[runnable]).all(axis=0) & runnable.any())
+    return np.asarray(np.isfinite(log.errors[runnable]).all(axis=0) & runnable.any())
 
 
-def _run_sums(trial: ComparedLog, runnable: Flags, h: int) -> Floats:
+def _run_sums(log: ComparedLog, runnable: Flags, h: int) -> Floats:
     """Return squared errors of free runs at a horizon summed over blocks of starts, shape (blocks, m, 4).
 
     Runs from starts that are close see the same waves and gusts, so that a block is twice as long as a run.
     """
-    counted = _counted(trial, runnable)[:, h]
+    counted = _common_runs(log, runnable)[:, h]
     some = counted.any(axis=1)
-    squares = np.where(counted[some, None], np.moveaxis(trial.errors[:, :, h], 0, 1)[some] ** 2, 0.0)
+    squares = np.where(counted[some, None], np.moveaxis(log.errors[:, :, h], 0, 1)[some] ** 2, 0.0)
     # A model that does not run has no errors, and no ratio.
     squares[:, ~runnable] = np.nan
-    return sum_over_blocks(squares, trial.starts_s[some], max(trial.block_s, 2.0 * HORIZONS_S[h]))
+    return sum_over_blocks(squares, log.starts_s[some], max(log.block_s, 2.0 * HORIZONS_S[h]))
 
 
-def _judged(field: CandidateSet, trials: Sequence[ComparedLog], runnable: Flags) -> PairedErrors:
+def _pair_errors(field: CandidateSet, compared: Sequence[ComparedLog], runnable: Flags) -> PairedErrors:
     runs, told = [], None
     for h, horizon in enumerate(HORIZONS_S):
-        sums = [_run_sums(trial, runnable, h) for trial in trials]
+        sums = [_run_sums(log, runnable, h) for log in compared]
         runs.append(compare_pairs(sums))
-        if horizon <= TOLD_S and has_enough_blocks(sums):
+        if horizon <= STATEMENT_HORIZON_S and has_enough_blocks(sums):
             told = horizon
-    trained = {one.label for one in field.candidates if any(one.trained_on(trial.sha256) for trial in trials)}
+    trained = {one.label for one in field.candidates if any(one.trained_on(log.sha256) for log in compared)}
     return PairedErrors(
-        on=trials[0].name if len(trials) == 1 else None,
+        on=compared[0].name if len(compared) == 1 else None,
         labels=field.labels,
-        force=compare_pairs([trial.sums for trial in trials]),
+        force=compare_pairs([log.sums for log in compared]),
         runs=tuple(runs),
         horizons_s=HORIZONS_S,
         told_s=told,
@@ -307,34 +309,34 @@ def _judged(field: CandidateSet, trials: Sequence[ComparedLog], runnable: Flags)
     )
 
 
-def _few(trial: ComparedLog) -> list[str]:
-    if has_enough_blocks([trial.sums]):
+def _too_few_blocks(log: ComparedLog) -> list[str]:
+    if has_enough_blocks([log.sums]):
         return []
-    count = len(trial.sums)
+    count = len(log.sums)
     return [
-        f"{count} block{'s' * (count != 1)} of {trial.block_s:.3g} s {'are' if count != 1 else 'is'} too few for an interval, "
+        f"{count} block{'s' * (count != 1)} of {log.block_s:.3g} s {'are' if count != 1 else 'is'} too few for an interval, "
         "so that nothing is said to be better on this log alone"
     ]
 
 
-def _scores(field: CandidateSet, trials: Sequence[ComparedLog], judged: PairedErrors, runnable: Flags) -> Row:
+def _scores(field: CandidateSet, compared: Sequence[ComparedLog], judged: PairedErrors, runnable: Flags) -> Row:
     """Return rows, blocks, errors of every model and ratios of every two, on one log or on several together."""
-    tau = np.concatenate([trial.motion.tau[trial.rows] for trial in trials])
-    mse = np.sum([trial.sums.sum(axis=0) for trial in trials], axis=0) / len(tau)
+    tau = np.concatenate([log.motion.tau[log.rows] for log in compared])
+    mse = np.sum([log.sums.sum(axis=0) for log in compared], axis=0) / len(tau)
     variance = np.var(tau, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         r2 = np.where(variance > 0.0, 1.0 - mse / variance, np.nan)
-        counted = [_counted(trial, runnable) for trial in trials]
+        counted = [_common_runs(log, runnable) for log in compared]
         squares = np.sum(
-            [np.where(use, trial.errors**2, 0.0).sum(axis=1) for trial, use in zip(trials, counted, strict=True)],
+            [np.where(use, log.errors**2, 0.0).sum(axis=1) for log, use in zip(compared, counted, strict=True)],
             axis=0,
         )
         rms = np.sqrt(squares / np.sum([use.sum(axis=0) for use in counted], axis=0))
     rms[~runnable] = np.nan
     return {
         "rows": len(tau),
-        "seconds": float(sum(trial.rows.sum() / trial.motion.rate_hz for trial in trials)),
-        "blocks": sum(len(trial.sums) for trial in trials),
+        "seconds": float(sum(log.rows.sum() / log.motion.rate_hz for log in compared)),
+        "blocks": sum(len(log.sums) for log in compared),
         "scores": {
             label: {
                 "mse": by_axis(mse[k]),
@@ -347,9 +349,9 @@ def _scores(field: CandidateSet, trials: Sequence[ComparedLog], judged: PairedEr
         "free_run": {
             "horizons_s": list(HORIZONS_S),
             "told_s": judged.told_s,
-            "starts": sum(len(trial.starts_s) for trial in trials),
+            "starts": sum(len(log.starts_s) for log in compared),
             "counted": [int(sum(use[:, h].any(axis=1).sum() for use in counted)) for h in range(len(HORIZONS_S))],
-            "blocks": [sum(len(_run_sums(trial, runnable, h)) for trial in trials) for h in range(len(HORIZONS_S))],
+            "blocks": [sum(len(_run_sums(log, runnable, h)) for log in compared) for h in range(len(HORIZONS_S))],
         },
         "pairs": [
             {

@@ -83,7 +83,7 @@ def evaluate(
                     "base": old.free_run(rows).to_json(),
                     "model": new.free_run(rows).to_json(),
                 },
-                **({"effects": _applied(new, prepared.recording.sha256)} if model.diagnosed else {}),
+                **({"effects": _list_effects(new, prepared.recording.sha256)} if model.diagnosed else {}),
                 "outside": outside_ranges(model.ranges, motion, rows),
                 "warnings": [
                     *prepared.doubts,
@@ -109,7 +109,7 @@ def evaluate(
     }
 
 
-def _applied(found: Prediction, sha256: str) -> dict[str, Any]:
+def _list_effects(found: Prediction, sha256: str) -> dict[str, Any]:
     """Return the effects that act on a log, and why others do not."""
 
     def told(several: Iterable[StoredEffect]) -> list[dict[str, Any]]:

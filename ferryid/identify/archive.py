@@ -85,7 +85,7 @@ class _Sums:
 
     def add(self, log: StoredSums) -> None:
         """Add one log."""
-        one = log.studied
+        one = log.sums
         validates = self._validates(one.test.blocks)
         self.folds.add(one.training, one.test, ~validates)
         training_rows = 0
@@ -253,7 +253,7 @@ def fit_archive(
     windows_s = settings.windows_s or (settings.window_s,)
     where = archived_folders(run.out, profile, names)
     sums = _Sums(len(windows_s), len(where), by_logs=settings.split == "logs")
-    functions = _added(where, profile, settings, windows_s, sums.add, run.progress)
+    functions = _add_logs(where, profile, settings, windows_s, sums.add, run.progress)
     check_components(settings.components, functions)
     data = ArchiveData(profile, settings, functions, sums)
     if not data.validation.n or not any(one.n for one in sums.training if one is not None):
@@ -290,18 +290,18 @@ def archive_folds(
 
     def add(log: StoredSums) -> None:
         for sums in by.values():
-            sums.add(log.studied.training, log.studied.test)
-        force.append(log.studied.force)
-        base.append(log.studied.base)
-        rows = int(log.studied.test.n.sum())
+            sums.add(log.sums.training, log.sums.test)
+        force.append(log.sums.force)
+        base.append(log.sums.base)
+        rows = int(log.sums.test.n.sum())
         told.append({"name": log.name, "sha256": log.sha256, "seconds": rows / log.rate_hz, "rows": rows})
 
-    functions = _added(where, profile, settings, windows_s, add, run.progress)
+    functions = _add_logs(where, profile, settings, windows_s, add, run.progress)
     free = axes_without_force(pooled_deviation(np.concatenate(force)), pooled_deviation(np.concatenate(base)))
     return functions, free, {key: sums.folds() for key, sums in by.items()}, told
 
 
-def _added(
+def _add_logs(
     where: Sequence[Path],
     profile: Profile,
     settings: FitSettings,

@@ -49,8 +49,8 @@ class StoredSums:
         Ranges of validity, as in a model file.
     sectors
         Rows in each of twelve sectors of heading.
-    studied
-        Its pieces at every window.
+    sums
+        Its block sums at every window.
     """
 
     name: str
@@ -60,7 +60,7 @@ class StoredSums:
     rate_hz: float
     ranges: Mapping[str, tuple[float, float]]
     sectors: Sequence[int]
-    studied: LogSums
+    sums: LogSums
 
 
 def load_block_sums(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequence[float]) -> StoredSums:
@@ -94,12 +94,12 @@ def load_block_sums(folder: Path, profile: Profile, settings: FitSettings, windo
             return _read(path, key)
         except (FerryIdError, LookupError, TypeError, ValueError, AttributeError):
             pass  # a damaged file, or one of another log, is made anew
-    made = _made(folder, profile, settings, windows_s)
+    made = _compute(folder, profile, settings, windows_s)
     write_block_sums(path, key, made)
     return made
 
 
-def _made(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequence[float]) -> StoredSums:
+def _compute(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequence[float]) -> StoredSums:
     recording = load(folder)
     opened = track_of(recording, profile, settings.rate_hz)
     motion = smooth_measured(opened.measured, TEST_WINDOW_S)
@@ -118,7 +118,7 @@ def _made(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequ
             motion.nu[used], motion.nu_dot[used], None if motion.payload is None else payload_kg(motion, used)
         ),
         sectors=heading_sectors(motion.eta[used, 2]).tolist(),
-        studied=sum_log(
+        sums=sum_log(
             profile,
             settings,
             functions,
@@ -131,7 +131,7 @@ def _made(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequ
 
 def write_block_sums(path: Path, key: Mapping[str, Any], log: StoredSums) -> None:
     """Keep a log in a file; `key` says by what it is found again."""
-    one = log.studied
+    one = log.sums
     every = (*one.training, one.test)
     # Rows trained on are often those tested on: then they are kept once.
     same = [k for k, pieces in enumerate(one.training) if np.array_equal(pieces.products, one.test.products)]
@@ -188,7 +188,7 @@ def _read(path: Path, key: Mapping[str, Any]) -> StoredSums:
         rate_hz=told["rate_hz"],
         ranges={name: (low, high) for name, low, high in told["ranges"]},
         sectors=told["sectors"],
-        studied=LogSums(
+        sums=LogSums(
             told["name"],
             tuple(pieces[:windows]),
             pieces[told["test"]],

@@ -102,7 +102,7 @@ def sum_motions(
     reach_s
         Longest smoothing window of all [s].
     blocks, wanted
-        As in `studied`.
+        As in `sum_log`.
     """
     motion, error = test
     every = np.ones(len(motion.t), dtype=bool) if wanted is None else wanted

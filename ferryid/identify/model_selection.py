@@ -66,7 +66,7 @@ def distinct_windows(windows_s: Iterable[float], rates_hz: Sequence[float]) -> t
 def windows_to_try(
     windows_s: Sequence[float], measured: Sequence[Measured], *, in_blocks: bool = False
 ) -> tuple[float, ...]:
-    """Return the windows to try [s], as `distinct` does; of the usual ones, where none is given, those that suit the logs.
+    """Return the windows to try [s], distinct ones; of the usual, where none is given, those that suit the logs.
 
     With `in_blocks` those, too, that leave no log with blocks to train and blocks to validate on do not suit.
     """
@@ -103,11 +103,11 @@ def select_model(
     Parameters
     ----------
     profile, settings, functions, windows_s
-        As in `studied`. The inertia is held where a fit would hold it.
+        As in `ferryid.identify.log_sums.sum_log`. The inertia is held where a fit would hold it.
     folds
         Of logs that were studied at these windows.
     without_force
-        Axes on which no actuator acts, shape (3,); see `force_free`.
+        Axes on which no actuator acts, shape (3,); see `force_free_axes`.
     before
         Coefficients that those fitted here come on top of, shape (K, 3).
     rule

@@ -165,7 +165,7 @@ def _number(used: Flags, parts: int) -> NDArray[np.int64]:
     return number
 
 
-def _purged(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
+def _purge(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
     """Return training and validation masks at least `purge` + 1 rows apart; the purge is taken from training."""
     validation = used & validates
     reach = np.concatenate([[0], np.cumsum(validation)])
@@ -192,7 +192,7 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
             number, short = 1, short + 1
         else:
             validates = validation_blocks(number)[_number(motion.valid, number)]
-        train, check = _purged(motion.valid, validates, round(purge_s * motion.rate_hz))
+        train, check = _purge(motion.valid, validates, round(purge_s * motion.rate_hz))
         training.append(train)
         validation.append(check)
         purges.append(purge_s)
@@ -207,7 +207,7 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
 
 
 def block_number(seconds: float, purge_s: float, wanted: int | None = None) -> int:
-    """Return the number of blocks of a log of `seconds`, none shorter than four purge gaps; see `split`."""
+    """Return the number of blocks of a log of `seconds`, none shorter than four purge gaps; see `split_rows`."""
     usual = wanted or min(max(round(seconds / BLOCK_S), FEWEST_BLOCKS), MOST_BLOCKS)
     return min(usual, int(seconds / (_LEAST_PURGES * purge_s)))
 

@@ -23,14 +23,13 @@ from ferryid.models.stored_effect import (
     hull_from_json,
     hull_to_json,
 )
-from ferryid.types import Floats
+from ferryid.types import AXES, Floats
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
 
 SCHEMA = "ferryid.model/1"
 NO_BASIS = "none"
 """Basis of a model without terms: a diagnosed hull."""
-AXES = ("surge", "sway", "yaw")
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class Model:
     covariance
         Bootstrap covariance of the coefficients per axis, shape (3, K + 1, K + 1), intercept last.
     ranges
-        Ranges of validity, as in `Excitation.ranges`.
+        Ranges of validity, see `ferryid.models.validity`.
     training
         One entry a log: ``{"name", "files", "sha256", "seconds", "rows"}``.
     scores

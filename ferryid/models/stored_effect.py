@@ -174,7 +174,7 @@ def effects_from_json(data: Any, profile: Profile, where: str, *, vessel: bool) 
 
 
 def conditions_from_json(data: Any, profile: Profile, where: str) -> tuple[Conditions, ...]:
-    """Read the conditions of logs; see `effects_from`."""
+    """Read the conditions of logs; see `effects_from_json`."""
     if not isinstance(data, list):
         raise TypeError("conditions are no list")
     return tuple(

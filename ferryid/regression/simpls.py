@@ -149,7 +149,7 @@ def fit_simpls_many(
     allowed: Flags | None = None,
     where: str = "fit",
 ) -> list[Simpls]:
-    """Fit several sets of rows side by side, each exactly as `simpls` does, which also lists the parameters."""
+    """Fit several sets of rows side by side, each exactly as `fit_simpls` does, which also lists the parameters."""
     if components < 1:
         raise FerryIdError(f"{where}: a fit needs at least one component, {components} asked. Fix: ask for 1 or more")
     fewest = min(source.n for source in sources)

@@ -8,14 +8,12 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-from numpy.typing import NDArray
 
 from ferryid.compare import ComparedLog
 from ferryid.report.figures import MEASURED, STYLE, SYMBOLS, UNITS, canvas, legend_above, margins, svg_text
 from ferryid.report.structure import envelope
-from ferryid.types import AXES
+from ferryid.types import AXES, Floats
 
-Floats = NDArray[np.float64]
 Row = dict[str, Any]
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

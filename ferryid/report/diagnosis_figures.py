@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ferryid.types import Floats
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -22,7 +24,6 @@ from ferryid.report.figures import (
     STYLE,
     SYMBOLS,
     UNITS,
-    Floats,
     canvas,
     legend_above,
     plain_log,

@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 from ferryid.identify import ComponentCurve, Excitation, LogFit
 from ferryid.models.prediction import FreeRun
 from ferryid.report.structure import autocorrelation, envelope, spectrum
-from ferryid.types import AXES
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 WIDTH = 6.0
 MEASURED, BASE, NEW, SHADE = "#222222", "#d55e00", "#0072b2", "#e8eef4"

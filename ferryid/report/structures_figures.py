@@ -7,13 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from ferryid.identify.sweeps import StructureComparison
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, WIDTH, svg_text
-from ferryid.types import AXES
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 1.85, 0.15, 0.35, 0.55
 """Margins in inches."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ferryid.types import Floats
+
 import io
 from math import ceil
 
@@ -12,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ferryid.report.drawing import Drawing, Floats, Panel
+from ferryid.report.drawing import Drawing, Panel
 from ferryid.report.figures import STYLE, WIDTH
 from ferryid.report.structure import envelope
 

@@ -6,9 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ferryid.identify import FitSettings
 from ferryid.identify.adaptive import data_matrix, fit_motions
 from ferryid.models import Model
@@ -17,8 +14,6 @@ from ferryid.regression import CrossProducts, QrFactor, Rows, factorise
 from ferryid.signals.track import Motion
 from ferryid.vessel.load import parse_profile
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 BASE = {"delta": 0.4, "sigma": 0.4, "zeta": 1.0}
 """The thesis's base model, (4.2)-(4.5)."""

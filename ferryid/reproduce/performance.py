@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compare import Tracking, cumulative_integral, signal_power, tracking_error
 from ferryid.simulate.states import Control, Truth
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 
 @dataclass(frozen=True)

@@ -136,9 +136,9 @@ def _season(out: Path, logs: int) -> None:
 
 def _lengthened(log: StoredSums) -> StoredSums:
     """Return a log of 36 blocks and two hours that repeats the blocks of a shorter one."""
-    blocks = log.studied.test.blocks
+    blocks = log.sums.test.blocks
     chosen = np.arange(36) % blocks
-    times = ROWS_A_LOG / log.studied.test.n[chosen].sum()
+    times = ROWS_A_LOG / log.sums.test.n[chosen].sum()
 
     def longer(pieces: BlockSums) -> BlockSums:
         n = np.round(pieces.n[chosen] * times).astype(np.int64)
@@ -146,10 +146,10 @@ def _lengthened(log: StoredSums) -> StoredSums:
         products[..., -1, -1] = n
         return replace(pieces, n=n, products=products)
 
-    one = log.studied
+    one = log.sums
     return replace(
         log,
-        studied=replace(
+        sums=replace(
             one,
             training=tuple(longer(pieces) for pieces in one.training),
             test=longer(one.test),

@@ -109,7 +109,7 @@ def weighted_mean(models: Sequence[Model], weights: Sequence[float] | Floats, *,
     FerryIdError
         Where the models do not belong together or the weights are not possible.
     """
-    share = _checked(models, weights)
+    share = _check_weights(models, weights)
     check_compatible(models)
     newest = models[-1]
     counting = [(model, w) for model, w in zip(models, share.tolist(), strict=True) if w > 0.0]
@@ -146,7 +146,7 @@ def weighted_mean(models: Sequence[Model], weights: Sequence[float] | Floats, *,
         covariance=covariance,
         ranges=span_ranges([model.ranges for model, _ in counting]),
         training=merge_training_logs([model.training for model, _ in counting]),
-        scores=not_judged(),
+        scores=unknown_scores(),
         accepted=False,
     )
 
@@ -205,7 +205,7 @@ def check_vessel(vessel: Profile, other: Profile, model: str) -> None:
         )
 
 
-def not_judged() -> ModelScores:
+def unknown_scores() -> ModelScores:
     """Return the scores of a model that was fitted to nothing itself."""
     unknown = np.full(len(AXES), math.nan)
     return ModelScores(
@@ -217,7 +217,7 @@ def not_judged() -> ModelScores:
     )
 
 
-def _checked(models: Sequence[Model], weights: Sequence[float] | Floats) -> Floats:
+def _check_weights(models: Sequence[Model], weights: Sequence[float] | Floats) -> Floats:
     share = np.array(weights, dtype=np.float64)
     if not models:
         raise FerryIdError("weighted models: there are no models. Fix: give one or more")
@@ -247,7 +247,7 @@ def _scale(counting: Sequence[tuple[Model, float]]) -> dict[str, float]:
 
 
 def _covariance(counting: Sequence[tuple[Model, float]]) -> Floats:
-    """Return the covariance of the weighted mean, shape (3, K + 1, K + 1); see `weighted`."""
+    """Return the covariance of the weighted mean, shape (3, K + 1, K + 1); see `weighted_mean`."""
     # A model is at most as exact as the mean of its group's covariances; groups share no log and are independent.
     groups: list[tuple[set[str], list[tuple[Model, float]]]] = []
     for model, w in counting:

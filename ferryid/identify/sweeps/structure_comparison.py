@@ -32,7 +32,7 @@ class Structure:
     Attributes
     ----------
     basis, structure
-        Names that `fit` takes, the former without wind and current.
+        Names that a fit takes, the former without wind and current.
     functions
         The functions, with those of wind and current.
     allowed

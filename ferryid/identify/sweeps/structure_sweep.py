@@ -52,7 +52,7 @@ class _Log:
 
 
 @dataclass(frozen=True, eq=False)
-class _Tried:
+class _StructureErrors:
     """A structure's choices, and its errors in blocks, shape (B, 3)."""
 
     basis: str
@@ -128,7 +128,7 @@ def sweep_structures(
 
 
 def usable_bases(settings: FitSettings, profile: Profile) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the bases that can be used on a vessel, by the name that `basis` takes, and why the others cannot."""
+    """Return the bases that can be used on a vessel, by the name that `make_basis` takes, and why the others cannot."""
     own, plus, extensions = settings.basis.partition("+")
     usable, unusable = {}, {}
     for name in basis_names():
@@ -187,7 +187,7 @@ def compare_structures(
     k, whole
         As in `ferryid.regression.cross_validation.folds.FoldSums`.
     """
-    tried: list[_Tried] = []
+    tried: list[_StructureErrors] = []
     base, rows = np.zeros((0, 3)), np.zeros(0)
     for name, logs in pieces.items():
         sums = FoldSums(1, k, whole=whole)
@@ -196,7 +196,7 @@ def compare_structures(
         blocks = [
             (fold, cross)
             for log, label in zip(logs, labels, strict=True)
-            for fold, cross in _cut(log, label)
+            for fold, cross in _cut_test_rows(log, label)
             if cross.n
         ]
         free = force_free_axes(logs)
@@ -205,11 +205,11 @@ def compare_structures(
         rows = np.array([cross.n for _, cross in blocks], dtype=np.float64)
         for structure in STRUCTURES:
             functions = bases[name][structure]
-            tried.append(_tried(profile, settings, name, functions, folds, blocks, free, logs[0].log))
-    return _ordered(tried, base, rows, len(folds.test))
+            tried.append(_cross_validate(profile, settings, name, functions, folds, blocks, free, logs[0].log))
+    return _rank(tried, base, rows, len(folds.test))
 
 
-def _tried(
+def _cross_validate(
     profile: Profile,
     settings: FitSettings,
     name: str,
@@ -218,13 +218,13 @@ def _tried(
     blocks: Sequence[tuple[int, CrossProducts]],
     free: Flags,
     where: str,
-) -> _Tried:
+) -> _StructureErrors:
     """Fit one structure without each fold in turn, as the other folds choose, and test it on the fold's blocks."""
     window = (settings.window_s,)
     whole = select_model(profile, settings, functions, window, folds, free, rule=Curves.best, where=where)
     fits, within = [], []
     for fold in range(len(folds.test)):
-        rest = Folds((_without(folds.training[0], fold),), _without(folds.test, fold))
+        rest = Folds((_leave_out(folds.training[0], fold),), _leave_out(folds.test, fold))
         # Two folds leave one, which cannot choose: both then take what they choose together.
         choice = (
             whole
@@ -236,10 +236,10 @@ def _tried(
         within.append(choice.components)
     errors = [cross.sse(fits[fold].coefficients[-1:], fits[fold].intercepts[-1:])[0] for fold, cross in blocks]
     allowed = without_inertia(functions.mask, functions.terms, whole.held)
-    return _Tried(name, functions, allowed, whole.components, tuple(within), np.array(errors))
+    return _StructureErrors(name, functions, allowed, whole.components, tuple(within), np.array(errors))
 
 
-def _ordered(tried: Sequence[_Tried], base: Floats, rows: Floats, folds: int) -> StructureComparison:
+def _rank(tried: Sequence[_StructureErrors], base: Floats, rows: Floats, folds: int) -> StructureComparison:
     """Draw blocks, and order the structures by their score."""
     errors = np.array([one.errors for one in tried])
     mse = errors.sum(axis=1) / rows.sum()
@@ -293,7 +293,7 @@ def _blocks(log: _Log, block_s: float, folds: int) -> int:
     return folds * max(1, int(seconds / block_s / folds + 1e-9))
 
 
-def _cut(log: LogSums, labels: Ints) -> list[tuple[int, CrossProducts]]:
+def _cut_test_rows(log: LogSums, labels: Ints) -> list[tuple[int, CrossProducts]]:
     """Return fold and cross-products of the test rows of every block."""
     kept = unpurged_parts(labels)
     cut = []
@@ -304,7 +304,7 @@ def _cut(log: LogSums, labels: Ints) -> list[tuple[int, CrossProducts]]:
     return cut
 
 
-def _without(parts: Sequence[CrossProducts], number: int) -> tuple[CrossProducts, ...]:
+def _leave_out(parts: Sequence[CrossProducts], number: int) -> tuple[CrossProducts, ...]:
     return (*parts[:number], *parts[number + 1 :])
 
 

@@ -25,7 +25,7 @@ _RUNS = 4096
 def base_force(profile: Profile, motion: Motion, scale: Mapping[str, float]) -> Floats:
     """Return the applied force as the base model estimates it from the motion of a log [N, N, N·m], shape (n, 3).
 
-    See `force_of_motion`; wind, current and payload take part where the log has them.
+    See `motion_force`; wind, current and payload take part where the log has them.
     """
     return motion_force(
         profile,
@@ -111,7 +111,7 @@ def compute_residual(
     Parameters
     ----------
     profile, scale
-        Base model, as in `force_of_motion`.
+        Base model, as in `motion_force`.
     motion
         Smoothed motion and forces of one log.
     form

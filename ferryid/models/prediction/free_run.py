@@ -135,7 +135,7 @@ def single_runs(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horiz
     """Return the error of every run by itself at every horizon, shape (starts, horizons, 4).
 
     Absolute errors of position [m], heading [rad], speed [m/s] and yaw rate [rad/s]; NaN where a run has diverged, or does
-    not reach the horizon within its stretch. Parameters as of `free_run`, and starts and ends as of `starting_points`.
+    not reach the horizon within its stretch. Parameters as of `run_free`, and starts and ends as of `starting_points`.
     """
     horizons = np.asarray(horizons_s, dtype=float)
     path, stride = _integrate(force, motion, starts, float(horizons[-1]))

@@ -67,7 +67,7 @@ class Basis:
     Attributes
     ----------
     name
-        Name that `basis` takes: ``"modulus"``, ``"thesis+wind-paper"``, ``"cross-flow-5m"``.
+        Name that `make_basis` takes: ``"modulus"``, ``"thesis+wind-paper"``, ``"cross-flow-5m"``.
     structure
         ``"coupled"`` or ``"decoupled"``.
     functions
@@ -192,7 +192,7 @@ def make_basis(
     Parameters
     ----------
     name
-        One of `BASES`. One that needs the hull's length has it behind: ``"cross-flow-5m"``; see `sized`. A name as in
+        One of `BASES`. One that needs the hull's length has it behind, see `with_hull_length`. A name as in
         `Basis.name`, ``"modulus+wind-paper+current-thesis"``, sets wind and current too.
     wind, current
         ``"thesis"``, ``"paper"`` or None for no such functions.
@@ -212,7 +212,7 @@ def make_basis(
         if kind not in extensions_of:
             raise _unknown("basis extension", extension, [f"{k}-{f}" for k in extensions_of for f in WIND])
         extensions_of[kind] = form
-    head, length_m = _measured(head)
+    head, length_m = _split_length(head)
     functions = _choose("basis", head, BASES)
     if isfinite(length_m):
         head = _with_length(head, length_m)
@@ -238,7 +238,7 @@ def with_hull_length(name: str, length_m: float, where: str) -> str:
     Parameters
     ----------
     name
-        As for `basis`.
+        As for `make_basis`.
     length_m
         Length of the hull [m], NaN where it is not known.
     where
@@ -277,7 +277,7 @@ def relative_flow(nu: Floats, psi: Floats, flow_ne: Floats) -> Floats:
     return np.column_stack([nu[:, 0] - (c * north + s * east), nu[:, 1] - (c * east - s * north)])
 
 
-def _measured(head: str) -> tuple[str, float]:
+def _split_length(head: str) -> tuple[str, float]:
     """Return the name of a basis of motion without its length, and the length, NaN where it needs none."""
     found = _SIZED.fullmatch(head)
     if found and found[1] in BASES and basis_forms()[found[1]].needs_length and float(found[2]) > 0.0:

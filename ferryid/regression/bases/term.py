@@ -59,7 +59,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Form:
-    """Functions of motion alone: one file in `ferryid.regression.bases.forms`, by whose name ``basis`` knows it.
+    """Functions of motion alone: one file in `ferryid.regression.bases.forms`, by whose name ``make_basis`` knows it.
 
     Attributes
     ----------

@@ -218,7 +218,7 @@ def block_seconds(
 ) -> tuple[float, tuple[str, ...]]:
     """Length of a block [s] for a fit with `coefficients` (K, m) and `intercepts` (m,), and what to know about it.
 
-    The longest of `block_rows` over the logs, but so that there are from 10 to 500 blocks.
+    The longest of `correlated_rows` over the logs, but so that there are from 10 to 500 blocks.
     """
     lengths, seconds = [0.0], 0.0
     for rows, rate in zip(parts, rate_hz, strict=True):

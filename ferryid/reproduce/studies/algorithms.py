@@ -8,7 +8,6 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.identify.adaptive import data_matrix
 from ferryid.regression import Rows, component_covariances, factorise, fit_nipals, fit_simpls, principal_components
@@ -17,8 +16,7 @@ from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS
 from ferryid.reproduce.study import Row, Study, Table, median, number, spread
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 PLACE = 90
 COMPONENTS = 12

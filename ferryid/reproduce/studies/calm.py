@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compare import MEASURES
 from ferryid.identify import FitSettings, force_mse
@@ -20,9 +19,7 @@ from ferryid.reproduce.study import Row, Study, Table, change, changes, number, 
 from ferryid.reproduce.variants import noiseless, prompt
 from ferryid.signals.smooth import moving_mean, odd_rows
 from ferryid.signals.track import Motion
-from ferryid.types import AXES
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 12
 ROUNDS = 4

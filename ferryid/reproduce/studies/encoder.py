@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.identify import force_mse
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
@@ -15,9 +14,7 @@ from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
 from ferryid.reproduce.pictures import against
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 from ferryid.simulate.scenario import Scenario
-from ferryid.types import AXES
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 40
 STEPS_DEG = (0.0, 1.0, 5.0, 15.0, 45.0)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.identify import force_mse
 from ferryid.identify.adaptive import data_matrix
@@ -20,10 +19,8 @@ from ferryid.reproduce.study import Row, Study, Table, changes, median, number, 
 from ferryid.signals.track import Motion
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Current
-from ferryid.types import AXES
+from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 PLACE = 60
 UNITS = ("N", "N", "N·m")

@@ -15,9 +15,7 @@ from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, learn
 from ferryid.reproduce.pictures import control_shares
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
-from ferryid.types import AXES
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 80
 AFTER_S = 30.0

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compare import signal_power
 from ferryid.identify import force_mse
@@ -15,9 +14,7 @@ from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, spread
-from ferryid.types import AXES
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 50
 LABELS = {

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compare import MEASURES
 from ferryid.identify import force_mse
@@ -17,10 +16,8 @@ from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, hull_alone
 from ferryid.reproduce.pictures import control_shares, integrals, model_fit
 from ferryid.reproduce.study import Row, Study, Table, change, changes, median, percent, spread
-from ferryid.types import AXES
+from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 PLACE = 10
 ROUNDS = 3

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compare import MEASURES
 from ferryid.identify import force_mse
@@ -17,9 +16,7 @@ from ferryid.reproduce.learning import MASTER, THESIS, hull_alone
 from ferryid.reproduce.study import Study, Table, change, median, percent, spread
 from ferryid.reproduce.variants import noiseless, prompt, stronger, windier
 from ferryid.simulate.scenario import Scenario
-from ferryid.types import AXES
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 13
 THEIRS = (-75.0, -46.0, -57.0, -20.0)

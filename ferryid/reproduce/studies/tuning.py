@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.identify import force_mse
 from ferryid.models.forces import Estimator, model_estimator
@@ -22,9 +21,8 @@ from ferryid.reproduce.study import Row, Study, Table, median, number, spread
 from ferryid.reproduce.variants import rougher
 from ferryid.signals.smooth import Measured, moving_mean, smooth_measured
 from ferryid.signals.track import Motion
+from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 PLACE = 20
 WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5)

@@ -18,9 +18,7 @@ from ferryid.reproduce.study import Study, Table, changes, median, number, perce
 from ferryid.signals.track import Motion
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Payload
-from ferryid.types import AXES
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 70
 PASSENGERS_KG = 480.0

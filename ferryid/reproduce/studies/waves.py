@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.identify import FitSettings, fit_logs, force_mse
 from ferryid.models import Model
@@ -21,10 +20,8 @@ from ferryid.reproduce.pictures import FORCES, against, control_shares, integral
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 from ferryid.reproduce.variants import rougher, windier
 from ferryid.simulate.scenario import Scenario
-from ferryid.types import AXES, RunContext
+from ferryid.types import AXES, Floats, RunContext
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 PLACE = 30
 THEIRS = (217.0, 171.0, 58.0)

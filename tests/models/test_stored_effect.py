@@ -13,6 +13,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from tests.identify.test_store import made
 
 from ferryid.effects import effects
 from ferryid.effects.picture import COEFFICIENTS, UNITS, hull_of
@@ -25,7 +26,6 @@ from ferryid.models.model import Model, model_to_json
 from ferryid.models.store.versions import load_file, save
 from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect
 from ferryid.vessel import load_profile
-from tests.identify.test_store import made
 
 FERRY = load_profile("milliampere")
 HERE = "ab" * 32
