@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
+.PHONY: test docs evidence demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
 
 test: $(VENV)/installed
 	$(BIN)/ruff check .
@@ -12,14 +12,24 @@ test: $(VENV)/installed
 	$(BIN)/mypy
 	$(BIN)/pytest -n 2
 
+# The documents as a site, in build/site; a broken link is an error.
+docs: $(VENV)/installed
+	$(BIN)/python -m tests.docs.drawing
+	$(BIN)/mkdocs build --strict
+
+# Which pages in reports/ are older than the sources that they were made from.
+evidence: $(VENV)/installed
+	$(BIN)/python -m tests.evidence
+
 demo: $(VENV)/installed
-	$(BIN)/ferryid simulate twelve-corner --out $(DEMO)/twelve-corner.mcap --overwrite
+	$(BIN)/ferryid simulate twelve-corner --out $(DEMO) --overwrite
 	$(BIN)/ferryid fit $(DEMO)/twelve-corner.mcap --vessel milliampere --delta 0.4 --sigma 0.4 --out $(DEMO)
 
 # The picture in the README.
 picture: demo
 	mkdir -p reports/demo
 	cp $(DEMO)/reports/milliampere-v1/forces-twelve-corner-worst-minute.svg reports/demo/forces.svg
+	$(BIN)/python -m tests.evidence reports/demo/forces.svg
 
 bench: $(VENV)/installed $(VENV)/bench-installed
 	$(BIN)/python -m tests.bench
@@ -38,8 +48,9 @@ real: $(VENV)/installed
 # The thesis's trials, flown again: writes reports/thesis.md and its figures.
 thesis: $(VENV)/installed
 	$(BIN)/ferryid reproduce thesis --out reports --json reports/thesis.json
+	$(BIN)/python -m tests.evidence reports/thesis.md
 
-# Conceals physics in trials of a plant of its own, seals the answers and diagnoses blind: writes reports/proof.md and its
+# Injects effects into trials of an independent plant and diagnoses them blind: writes reports/proof.md and its
 # figures. SEED=N draws other cases, RUNS=N more of them. It goes on where it was interrupted.
 SEED ?= 20261223
 RUNS ?= 1
@@ -49,6 +60,7 @@ proof: $(VENV)/installed
 	mkdir -p reports/proof && cp $(DEMO)/proof/proof/*.svg $(DEMO)/proof/answers.json $(DEMO)/proof/seal.json \
 	  $(DEMO)/proof/lines/diagnosed.jsonl reports/proof/
 	cp $(DEMO)/proof.json reports/proof.json
+	$(BIN)/python -m tests.evidence reports/proof.md
 
 # Learns a hull in waves that nobody measured, and uses it in calm water: writes reports/waves.md.
 wavy: $(VENV)/installed
@@ -68,7 +80,7 @@ wheel-check: $(VENV)/installed
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 	$(PYTHON) -m venv $(VENV)/wheel
 	$(VENV)/wheel/bin/pip install --quiet --constraint constraints.txt dist/*.whl
-	cd $(VENV)/wheel && bin/ferryid --version && bin/ferryid simulate four-corner --out four.bag --overwrite \
+	cd $(VENV)/wheel && bin/ferryid --version && bin/ferryid simulate four-corner --log four.bag --overwrite \
 	  && bin/ferryid fit four.bag --vessel milliampere --out out && bin/ferryid models --out out
 
 $(VENV)/installed: pyproject.toml constraints.txt

@@ -30,7 +30,7 @@ def command(
         typer.Option(help="Address of a Dask scheduler whose workers do the work; they must share logs and --out."),
     ] = None,
     memory: Annotated[
-        str, typer.Option(help="Most memory of one process; a log that needs more is told in its row.")
+        str, typer.Option(help="Most memory of one process; a log that needs more is marked in its row.")
     ] = "4G",
     again: Annotated[bool, typer.Option("--again", help="Try again what went wrong before.")] = False,
     out: Out = OUT,

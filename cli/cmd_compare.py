@@ -43,7 +43,7 @@ def command(
 ) -> None:
     """Compare models on the same rows of logs, and by their coefficients.
 
-    Every two models are held against each other: by the mean square of their force errors, and by how far they stray when run
+    Every two models are compared: by the mean square of their force errors, and by how far they stray when run
     free. A ratio comes with a 95 % interval and a probability p: how likely a ratio this far from one is if both err alike,
     from resampling blocks of 30 s or more of each log, in pairs, and corrected for the number of comparisons (Holm).
     """

@@ -18,7 +18,8 @@ def command(
         str | None, typer.Option(help="Model to examine: path, name or name@version; the profile's hull if left out.")
     ] = None,
     against: Annotated[
-        str | None, typer.Option(help="A simulated log of the trial to hold the recording against, instead of a model.")
+        str | None,
+        typer.Option(help="A simulated log of the same trial to compare the recording with, instead of a model."),
     ] = None,
     together: Annotated[
         bool,
@@ -35,28 +36,12 @@ def command(
     json: Json = None,
 ) -> None:
     """Say which physics a model left out of a recording, and what shows it."""
-    from ferryid.diagnose.diagnose import diagnose
-    from ferryid.diagnose.remodel import keep
-    from ferryid.identify.store import checked_name
-    from ferryid.report.diagnosis_report import patient, report
+    from ferryid.diagnose import DiagnosisSettings
+    from ferryid.report.diagnosis_report import diagnose_and_report, patient
 
     profile, examined = patient(vessel, model, out)
-    if name:
-        checked_name(name)
-    hidden = tuple(withhold or ())
-    diagnoses = diagnose(
-        logs,
-        profile,
-        out,
-        model=examined,
-        against=against,
-        shared=together,
-        withhold=hidden,
-        verify=verify,
-        progress=progress,
-    )
-    progress("writing the report")
-    diagnoses = keep(diagnoses, profile, examined, out, name=name)
-    outcome = report(diagnoses, out, ("ferryid", *sys.argv[1:]))
+    settings = DiagnosisSettings(examined, against, together, tuple(withhold or ()), verify)
+    words = ("ferryid", *sys.argv[1:])
+    outcome = diagnose_and_report(logs, profile, out, settings, tables=out, name=name, command=words, progress=progress)
     progress("")
     emit(outcome.json, outcome.text, json)

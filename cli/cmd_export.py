@@ -19,7 +19,7 @@ def command(
     to: Annotated[str | None, typer.Option(help=f"Form of a model: {', '.join(names())}.")] = None,
     file: Annotated[Path | None, typer.Option(help="File for a model; one in exports/ of --out if left out.")] = None,
     mcap: Annotated[Path | None, typer.Option(help="MCAP file for a log: its forces, motion and findings.")] = None,
-    model: Annotated[str | None, typer.Option(help="With --mcap: the model to hold against the log.")] = None,
+    model: Annotated[str | None, typer.Option(help="With --mcap: the model to compare with the log.")] = None,
     vessel: MaybeVessel = None,
     diagnosis: Annotated[Path | None, typer.Option(help="With --mcap: JSON of ferryid diagnose on this log.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an export that is there.")] = False,

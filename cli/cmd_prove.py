@@ -27,23 +27,32 @@ def command(
         str | None, typer.Option(help="Address of a Dask scheduler whose workers do the work; they must share --out.")
     ] = None,
     check: Annotated[
-        Path | None, typer.Option(help="Only hash the answers.json of this folder, and compare its seal.json.")
+        Path | None,
+        typer.Option(help="Only check the answers.json of this folder against the commitment in its seal.json."),
     ] = None,
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """Conceal physics in trials, diagnose them without the answers, and score what was found against these."""
+    """Inject effects into simulated trials, diagnose them without the answers, and score what is found."""
     if check is not None:
-        from ferryid.prove.seal import verified
+        from ferryid.validation.commitment import verified_answers
 
-        cases = verified(check)["cases"]
-        typer.echo(f"{check}: the answers to {len(cases)} cases are those that were sealed")
+        cases = verified_answers(check)["cases"]
+        typer.echo(f"{check}: the answers to {len(cases)} cases match their commitment")
         return
-    from ferryid.prove.judges import parts
-    from ferryid.prove.run import prove, render_proof
+    from ferryid.validation.evaluators import pipeline
+    from ferryid.validation.run import render_summary, run_validation
 
     cells = tuple(name.strip() for name in only.split(",") if name.strip())
-    result = prove(
-        out, parts(), seed=seed, runs=runs, only=cells, processes=processes, dask=dask, progress=progress, tell=tell
+    result = run_validation(
+        out,
+        pipeline(),
+        seed=seed,
+        runs=runs,
+        only=cells,
+        processes=processes,
+        dask=dask,
+        progress=progress,
+        announce=tell,
     )
-    emit(result, render_proof(result), json)
+    emit(result, render_summary(result), json)

@@ -13,8 +13,9 @@ from ferryid.cli.output import emit, progress
 
 def command(
     scenario: Annotated[str, typer.Argument(help="Name of a bundled scenario, or the path of a TOML file.")] = "",
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Log to write: .mcap, .bag (ROS1), or a folder (ROS2).")
+    out: Annotated[Path, typer.Option("--out", help="Folder for the log, which is SCENARIO.mcap there.")] = OUT,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="Log to write instead: .mcap, .bag (ROS1), or a folder (ROS2).")
     ] = None,
     storage: Annotated[str, typer.Option(help="Storage of a ROS2 folder: sqlite3 or mcap.")] = "sqlite3",
     truth: Annotated[Path | None, typer.Option(help="Write the true states to this Parquet file as well.")] = None,
@@ -28,7 +29,9 @@ def command(
     conditions: Annotated[
         str, typer.Option(help="With --model: a log that it was diagnosed on, whose wind, payload and so on prevail.")
     ] = "",
-    models: Annotated[Path, typer.Option(help="Output folder in whose store --model finds names.")] = OUT,
+    models: Annotated[
+        Path | None, typer.Option(help="Output folder in whose store --model finds names; --out if left out.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing log.")] = False,
     list_: Annotated[bool, typer.Option("--list", help="List the bundled scenarios.")] = False,
     json: Json = None,
@@ -41,15 +44,16 @@ def command(
         listing = scenario_listing()
         emit(listing, render_scenarios(listing), json)
         return
-    if not scenario or out is None:
-        raise typer.BadParameter("give a scenario and --out LOG, or --list")
+    if not scenario:
+        raise typer.BadParameter("give a scenario, or --list")
     result = run_scenario(
         scenario,
         out,
+        log=log,
         storage=storage,
         truth=truth,
         seed=seed,
-        model=load(model, models) if model else None,
+        model=load(model, models or out) if model else None,
         conditions=conditions,
         overwrite=overwrite,
         json=None if json in (None, "-") else Path(json),

@@ -59,6 +59,10 @@ class _Draft:
 _unfinished: dict[str, _Draft] = {}
 """Drafts of this process by their keys."""
 _scratch: set[Path] = set()
+_held: dict[Path, int] = {}
+"""Locks of this process's temporary folders, open files by the folder."""
+_SCRATCH = "ferryid-"
+_SCRATCH_NAME = re.compile(r"(?P<name>ferryid-[0-9a-f]{32})(\.lock)?")
 _swept: set[Path] = set()
 """Folders that this process has looked through for what others left."""
 
@@ -179,14 +183,72 @@ def remove_unfinished() -> None:
     for draft in list(_unfinished.values()):
         draft.remove()
     for folder in list(_scratch):
-        shutil.rmtree(folder, ignore_errors=True)
+        remove_scratch(folder)
 
 
 def scratch_folder() -> Path:
-    """Make a folder for temporary files, which whoever asked for it removes."""
-    folder = Path(tempfile.mkdtemp(prefix="ferryid-"))
+    """Make a folder for temporary files, which whoever asked for it removes.
+
+    Beside it lies a lock, as beside a draft; what processes that were killed left in the same place is removed.
+    """
+    place = Path(tempfile.gettempdir())
+    _remove_scratch(place)
+    folder = place / f"{_SCRATCH}{uuid.uuid4().hex}"
+    # Its lock first, and never given back while the process lives: whoever finds the folder finds it held.
+    _held[folder] = _locked(_lock_of(folder))
+    folder.mkdir(mode=0o700)
     _scratch.add(folder)
     return folder
+
+
+def remove_scratch(folder: Path) -> None:
+    """Remove what `scratch_folder` made."""
+    shutil.rmtree(folder, ignore_errors=True)
+    _scratch.discard(folder)
+    lock = _held.pop(folder, None)
+    if lock is not None:
+        with suppress(OSError):
+            _lock_of(folder).unlink(missing_ok=True)
+        os.close(lock)
+
+
+def _lock_of(folder: Path) -> Path:
+    return folder.with_name(f"{folder.name}.lock")
+
+
+def _remove_scratch(place: Path) -> None:
+    """Remove the temporary folders of this user whose processes are gone; a process looks once."""
+    if place / _SCRATCH in _swept:
+        return
+    _swept.add(place / _SCRATCH)
+    with suppress(OSError):
+        found = [_SCRATCH_NAME.fullmatch(name) for name in os.listdir(place)]
+        for name in {one["name"] for one in found if one is not None}:
+            folder = place / name
+            if folder in _held:
+                continue
+            with suppress(OSError):
+                _remove_scratch_if_abandoned(folder)
+
+
+def _remove_scratch_if_abandoned(folder: Path) -> None:
+    path = _lock_of(folder)
+    if hasattr(os, "getuid") and os.lstat(path if path.exists() else folder).st_uid != os.getuid():
+        return  # another user's, in a place that all share
+    try:
+        lock = os.open(path, os.O_RDWR)
+    except FileNotFoundError:  # removed before the folder by a process that was killed then
+        shutil.rmtree(folder, ignore_errors=True)
+        return
+    try:
+        free = _lock(lock, wait=False)
+        if free is None:
+            free = time.time() - os.stat(path).st_mtime > ABANDONED_S
+        if free:
+            shutil.rmtree(folder, ignore_errors=True)
+            path.unlink(missing_ok=True)
+    finally:
+        os.close(lock)
 
 
 def make_folder(path: Path) -> None:

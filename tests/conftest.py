@@ -25,9 +25,11 @@ def shared_data() -> Callable[[str], Path]:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Show how a test with a seed is repeated, whether it passed or failed."""
+    """Show how a test with a seed is repeated, and what tests give notice of, whether they passed or failed."""
     for outcome in ("passed", "failed"):
         for report in terminalreporter.stats.get(outcome, []):
             for name, value in report.user_properties:
                 if name == "repeat":
                     terminalreporter.write_line(f"{report.nodeid} drew its cases from a seed; to repeat it: {value}")
+                elif name == "notice":
+                    terminalreporter.write_line(f"notice: {value}", yellow=True)

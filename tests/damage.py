@@ -17,6 +17,7 @@ from ferryid.simulate.trial import Simulation
 Columns = Mapping[str, NDArray[Any]]
 NAVIGATION, THRUSTER = "/navigation/odometry", "/thruster1/state"
 _HEADING = "pose.pose.orientation"
+SURGE, SWAY, YAW_RATE = "twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.angular.z"
 X, Y = "pose.pose.position.x", "pose.pose.position.y"
 
 
@@ -44,6 +45,16 @@ def silent(made: Simulation, topic: str, gaps: Sequence[tuple[float, float]]) ->
     return replace(made, streams=tuple(streams))
 
 
+def paused(made: Simulation, at_s: float, seconds: float) -> Simulation:
+    """Return a trial in which every clock goes on later from a time on, as when a recorder rested."""
+    streams = []
+    for stream in made.streams:
+        first = made.streams[0].stamp_ns[0]
+        late = (stream.stamp_ns - first > at_s * 1e9) * np.int64(seconds * 1e9)
+        streams.append(replace(stream, stamp_ns=stream.stamp_ns + late, receive_ns=stream.receive_ns + late))
+    return replace(made, streams=tuple(streams))
+
+
 def changed(
     made: Simulation, gaps: Sequence[tuple[float, float]], edit: Callable[[Columns, Any], Columns]
 ) -> Simulation:
@@ -67,10 +78,30 @@ def without_heading(made: Simulation, gaps: Sequence[tuple[float, float]]) -> Si
 
 
 def turned(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
-    """Turn the heading of some rows by 180°: about the vertical, (x, y, z, w) becomes (-y, x, w, -z)."""
-    x, y, z, w = (columns[f"{_HEADING}.{name}"] for name in "xyzw")
-    half = {"x": -y, "y": x, "z": w, "w": -z}
-    return {f"{_HEADING}.{name}": np.where(rows, half[name], columns[f"{_HEADING}.{name}"]) for name in "xyzw"}
+    """Turn the heading of some rows by 180°."""
+    return turned_by(180.0)(columns, rows)
+
+
+def turned_by(degrees: float) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
+    """Return an edit that turns the heading of some rows about the vertical: q becomes (0, 0, sin a/2, cos a/2) q."""
+    sine, cosine = np.sin(np.radians(degrees) / 2), np.cos(np.radians(degrees) / 2)
+
+    def edit(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
+        x, y, z, w = (columns[f"{_HEADING}.{name}"] for name in "xyzw")
+        after = {
+            "x": cosine * x - sine * y,
+            "y": cosine * y + sine * x,
+            "z": cosine * z + sine * w,
+            "w": cosine * w - sine * z,
+        }
+        return {f"{_HEADING}.{name}": np.where(rows, after[name], columns[f"{_HEADING}.{name}"]) for name in "xyzw"}
+
+    return edit
+
+
+def stuck(names: Sequence[str], value: float) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
+    """Return an edit that writes one value for some columns on some rows."""
+    return lambda columns, rows: {name: np.where(rows, value, columns[name]) for name in names}
 
 
 def moved(by_m: float) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
@@ -85,8 +116,22 @@ def zeros(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
 
 def repeated(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
     """Repeat the last pose before some rows."""
-    last = np.maximum.accumulate(np.where(rows, 0, np.arange(rows.size)))
-    return {name: values[last] for name, values in columns.items() if name.startswith("pose.pose")}
+    return held_at_its_last("pose.pose")(columns, rows)
+
+
+def scaled(name: str, factor: float) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
+    """Return an edit that multiplies a column on some rows."""
+    return lambda columns, rows: {name: np.where(rows, factor * columns[name], columns[name])}
+
+
+def held_at_its_last(prefix: str) -> Callable[[Columns, NDArray[np.bool_]], Columns]:
+    """Return an edit that repeats the last value before some rows in the columns whose names begin so."""
+
+    def edit(columns: Columns, rows: NDArray[np.bool_]) -> Columns:
+        last = np.maximum.accumulate(np.where(rows, 0, np.arange(rows.size)))
+        return {name: values[last] for name, values in columns.items() if name.startswith(prefix)}
+
+    return edit
 
 
 def inside(stamp_ns: NDArray[np.int64], gaps: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:

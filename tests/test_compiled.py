@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import errno
 import importlib.util
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -71,3 +74,72 @@ def test_a_full_disk_only_costs_the_time_to_compile(fresh: Any, monkeypatch: pyt
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile._open_for_write", full)
     assert _hits(fresh()) == 0
     assert _hits(fresh()) == 0
+
+
+CALLER = """
+from callee import FACTOR, Pair, callee
+from ferryid.compiled import compiled
+
+
+@compiled
+def caller(pair):
+    return callee(pair.a) * FACTOR
+"""
+CALLEE = """
+from typing import NamedTuple
+
+from ferryid.compiled import compiled
+
+FACTOR = 2.0
+
+
+class Pair(NamedTuple):
+    a: float
+    b: float
+
+
+@compiled
+def callee(x):
+    return x + 1.0
+"""
+USE = "from caller import Pair, caller; print(caller(Pair(3.0, 5.0)), sum(caller.stats.cache_hits.values()))"
+
+
+def _called(folder: Path, callee: str, caller: str = CALLER) -> list[str]:
+    """Write both modules, and return what another process makes of them: the value, and how many times it was kept."""
+    (folder / "caller.py").write_text(caller)
+    (folder / "callee.py").write_text(callee)
+    done = subprocess.run(
+        [sys.executable, "-c", USE],
+        cwd=folder,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.split()
+
+
+def test_what_is_called_from_another_file_counts_and_nothing_else(tmp_path: Path) -> None:
+    assert _called(tmp_path, CALLEE) == ["8.0", "0"]
+    assert _called(tmp_path, CALLEE) == ["8.0", "1"]
+    # Text beside the function, and where it stands.
+    more = CALLEE.replace("def callee(x):", 'def callee(x):\n    """Say something."""').replace(
+        "FACTOR", "# Two.\nFACTOR"
+    )
+    assert _called(tmp_path, more + "\n\ndef other():\n    return 5\n", f"# A remark.\n{CALLER}") == ["8.0", "1"]
+    assert _called(tmp_path, CALLEE.replace("x + 1.0", "x + 2.0")) == ["10.0", "0"]
+    assert _called(tmp_path, CALLEE.replace("FACTOR = 2.0", "FACTOR = 3.0")) == ["12.0", "0"]
+    assert _called(tmp_path, CALLEE.replace("a: float\n    b: float", "b: float\n    a: float")) == ["12.0", "0"]
+
+
+def test_of_several_processes_one_compiles(tmp_path: Path) -> None:
+    source = "import time\nfrom ferryid.compiled import compiled\n\n\n@compiled\ndef twice(x):\n    return 2.0 * x\n"
+    (tmp_path / "both.py").write_text(source)
+    program = "import both; both.twice(1.0); print(sum(both.twice.stats.cache_hits.values()))"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    several = [
+        subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path, env=environment, stdout=subprocess.PIPE)
+        for _ in range(3)
+    ]
+    assert sorted(int(one.communicate()[0]) for one in several) == [0, 1, 1]

@@ -96,6 +96,57 @@ def test_what_a_killed_process_left_is_removed_and_what_a_living_one_writes_is_n
     assert sorted(path.name for path in tmp_path.iterdir()) == ["alive", "other"]
 
 
+UNPACKING = """
+import os, signal, sys, tempfile
+from pathlib import Path
+from ferryid.files import scratch_folder
+tempfile.tempdir = sys.argv[1]
+folder = scratch_folder()
+(folder / "unpacked.bag").write_bytes(b"x" * 1000)
+print(folder.name, flush=True)
+if sys.argv[2] == "killed":
+    os.kill(os.getpid(), signal.SIGKILL)
+sys.stdin.read()
+"""
+
+
+def test_unpacked_logs_of_a_killed_process_are_removed_by_the_next_and_those_of_a_living_one_are_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def process(what: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [sys.executable, "-c", UNPACKING, str(tmp_path), what],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment(),
+        )
+
+    with process("lives") as living:
+        assert living.stdout is not None
+        alive = tmp_path / living.stdout.readline().decode().strip()
+        with process("killed") as killed:
+            assert killed.stdout is not None
+            left = tmp_path / killed.stdout.readline().decode().strip()
+            assert killed.wait(60) == -signal.SIGKILL
+        assert (left / "unpacked.bag").exists()
+        others = tmp_path / "ferryid-bench-x", tmp_path / ("a" * 32)
+        for other in others:
+            other.mkdir()
+        monkeypatch.setattr(files.tempfile, "tempdir", str(tmp_path))
+        own = files.scratch_folder()
+        assert not left.exists()
+        assert (alive / "unpacked.bag").exists()
+        assert own.is_dir()
+        assert all(other.is_dir() for other in others)
+        files.remove_scratch(own)
+        living.kill()
+    assert {path.name for path in tmp_path.iterdir()} == {
+        alive.name,
+        f"{alive.name}.lock",
+        *(other.name for other in others),
+    }
+
+
 def test_foreign_files_are_not_taken_for_leftovers(tmp_path: Path) -> None:
     names = [".film.part", f"{0:032x}.part", ".a.lock", f".a.{0:031x}.part", "b.old"]
     for name in names:

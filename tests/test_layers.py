@@ -14,6 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = (
     "errors",
+    "counts",
     "files",
     "interrupts",
     "compiled",
@@ -28,7 +29,7 @@ ORDER = (
     "export",
     "reproduce",
     "batch",
-    "prove",
+    "validation",
     "cli",
 )
 HOMES = {
@@ -40,7 +41,7 @@ HOMES = {
     "google": ("ingest",),
     "lz4": ("ingest", "simulate"),
     "zstandard": ("ingest", "simulate"),
-    "pysindy": ("prove",),
+    "pysindy": ("validation",),
     "distributed": ("batch",),
 }
 """Packages and the layers that may import them; the simulator writes logs, which is why it may know their formats."""

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest import existing_parts
 
@@ -234,7 +235,7 @@ def _table(path: Path, text: str, vessel: str | None, tell: Callable[[str], None
             continue
         if len(cells) > len(header):
             raise FerryIdError(
-                f"{path}: row {number} has {len(cells)} cells, the header {len(header)}. "
+                f"{path}: row {number} has {counted(len(cells), 'cell')}, the header {len(header)}. "
                 "Fix: put a path or note with a comma in quotes"
             )
         row = {name: cell.strip() for name, cell in zip(header, cells, strict=False)}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from ferryid.diagnose.scene import check_withheld
+from ferryid.diagnose import check_withheld
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.settings import FitSettings
 from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of, too_deep

@@ -27,6 +27,7 @@ from ferryid.batch.spread import spread
 from ferryid.batch.summary import lines_of, table_of, write_table
 from ferryid.batch.task import DONE, STATUSES, Task, lost, work
 from ferryid.batch.trend import trends_of
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, one_line
 from ferryid.files import alone, dump_json, finite, remove_abandoned, write_text
 from ferryid.identify.model import Model, to_json
@@ -130,7 +131,7 @@ def _patients(entries: Sequence[Entry], recipe: Recipe, out: Path) -> dict[str |
         if entry.vessel not in found:
             if entry.vessel is None and not recipe.model:
                 raise FerryIdError(
-                    f"batch: nothing says whose log {entry.log} is, found neither --vessel nor a model nor a manifest "
+                    f"batch: no vessel is given for the log {entry.log}, found neither --vessel nor a model nor a manifest "
                     "that names it. Fix: give --vessel a bundled profile's name or a TOML file"
                 )
             found[entry.vessel] = patient(entry.vessel, recipe.model or None, out)
@@ -181,7 +182,7 @@ def _tell_done(tell: Callable[[str], None], statuses: Sequence[str], left: Seque
     if statuses:
         bad = sum(status != DONE for status in statuses)
         vain = f", {bad} of them in vain (--again tries these again)" if bad else ""
-        tell(f"{len(statuses)} of {len(statuses) + len(left)} logs done already{vain}; {len(left)} left")
+        tell(f"{len(statuses)} of {counted(len(statuses) + len(left), 'log')} done already{vain}; {len(left)} left")
     differing = [kept.differing(task.files, task.stamp) for task in left]
     others = sum(map(bool, differing))
     if others:
@@ -209,7 +210,7 @@ def _carry_out(
         names = [tasks[one].name[:LONGEST] for one in at_work[:SHOWN]]
         more = f" and {len(at_work) - SHOWN} more" if len(at_work) > SHOWN else ""
         now = f"; {', '.join(names)}{more}" if names else ""
-        progress(f"{len(rows)} of {count} logs{left}{now}")
+        progress(f"{len(rows)} of {counted(count, 'log')}{left}{now}")
 
     def begin(number: int) -> None:
         if number not in at_work:
@@ -265,7 +266,7 @@ def render_batch(result: Mapping[str, Any]) -> str:
     """Return a short account of a batch as text."""
     counts = result["counts"]
     bad = [f"{counts[status]} {status}" for status in STATUSES if status != DONE and counts[status]]
-    lines = [f"{counts['logs']} logs: {counts[DONE]} done{''.join(f', {one}' for one in bad)}"]
+    lines = [f"{counted(counts['logs'], 'log')}: {counts[DONE]} done{''.join(f', {one}' for one in bad)}"]
     verdicts = Counter(row["diagnose"]["verdict"] for row in result["rows"] if row["diagnose"])
     if verdicts:
         lines.append("  " + ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(verdicts.items())))
@@ -275,7 +276,7 @@ def render_batch(result: Mapping[str, Any]) -> str:
     judged = [row["evaluate"] for row in result["rows"] if row["evaluate"]]
     ratios = [one["normalised_mse"] for one in judged if one["normalised_mse"] is not None]
     if ratios:
-        told = f"{median(ratios):.3f} of its base model's, median of {len(ratios)} logs"
+        told = f"{median(ratios):.3f} of its base model's, median of {counted(len(ratios), 'log')}"
         lines.append(f"  force MSE of {judged[0]['of']}: {told}")
     lines += [f"  {trend['says']}" for trend in result["trends"] if trend["says"]]
     peak = result["memory"]["peak_bytes"]

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.batch.recipe import Recipe
-from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.remodel import keep
+from ferryid.diagnose import DiagnosisSettings
 from ferryid.files import dump_json, write_text
 from ferryid.identify.evaluate import evaluate
 from ferryid.identify.kept_pieces import kept
 from ferryid.identify.model import Model, blank
-from ferryid.report.diagnosis_report import report
+from ferryid.report.diagnosis_report import diagnose_and_report
 from ferryid.report.fit_report import fit_and_report
 from ferryid.vessel.profile import Profile
 
@@ -106,11 +105,18 @@ def _evaluated(job: Job) -> dict[str, Any]:
 
 
 def _diagnosed(job: Job) -> dict[str, Any]:
-    found = diagnose([job.log], job.profile, job.tables, model=job.model, withhold=job.recipe.withhold, progress=_quiet)
-    found = keep(found, job.profile, job.model, job.folder, name=job.model_name("-diagnosed"))
     words = ["ferryid", "diagnose", job.log, *(["--vessel", job.vessel] if job.vessel else [])]
     words += [word for signal in job.recipe.withhold for word in ("--withhold", signal)]
-    made = report(found, job.folder, [*words, *(["--model", job.recipe.model] if job.recipe.model else [])])
+    made = diagnose_and_report(
+        [job.log],
+        job.profile,
+        job.folder,
+        DiagnosisSettings(model=job.model, withhold=job.recipe.withhold),
+        tables=job.tables,
+        name=job.model_name("-diagnosed"),
+        command=[*words, *(["--model", job.recipe.model] if job.recipe.model else [])],
+        progress=_quiet,
+    )
     told = made.json
     return {
         "report": job.below(made.report),

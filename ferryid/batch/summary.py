@@ -46,6 +46,7 @@ def lines_of(entry: Entry, vessel: str, row: Row, folder: str) -> dict[str, Any]
         "date": date,
         "date_from": source,
         "duration_s": row["duration_s"],
+        "lost": row.get("lost"),
         "vessel": vessel,
         "note": entry.note,
         "folder": f"results/{folder}",
@@ -85,6 +86,9 @@ def table_of(rows: Sequence[Mapping[str, Any]]) -> pa.Table:
     put("date", pa.timestamp("us", "UTC"), [row["date"] and datetime.fromisoformat(row["date"]) for row in rows])
     put("date_from", text, [row["date_from"] for row in rows])
     put("duration_s", number, [row["duration_s"] for row in rows])
+    put("lost_messages", whole, [_of(row, "lost", "messages") for row in rows])
+    put("lost_s", number, [_of(row, "lost", "seconds") for row in rows])
+    put("left_out_s", number, [_of(row, "lost", "seconds_left_out") for row in rows])
     for step, path in (("fit", "model"), ("fit", "report"), ("diagnose", "model"), ("diagnose", "report")):
         put(f"{step}_{path}", text, [_below(row, step, path) for row in rows])
     put("evaluation", text, [_below(row, "evaluate", "result") for row in rows])

@@ -11,13 +11,17 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ferryid.batch import memory
 from ferryid.batch.kept import Row, clear, read_row, write_row
 from ferryid.batch.recipe import Recipe
 from ferryid.errors import FerryIdError, UnwritableError, one_line
 from ferryid.files import alone, finite, unwritable, write_text
+
+if TYPE_CHECKING:
+    from ferryid.signals.stream import Recording
+    from ferryid.vessel.profile import Profile
 
 # Heavy packages are imported by the work itself, so that what it needs of memory is counted.
 
@@ -82,6 +86,7 @@ class Task:
             "sha256": None,
             "start_ns": None,
             "duration_s": None,
+            "lost": None,
             "memory_bytes": self.memory_bytes,
             "peak_bytes": 0,
             "seconds": {},
@@ -161,6 +166,7 @@ def _carry_out(task: Task, row: Row) -> None:
         "sha256": recording.sha256,
         "start_ns": recording.start_ns,
         "duration_s": (recording.end_ns - recording.start_ns) * 1e-9,
+        "lost": _lost(recording, profile),
     }
     row["seconds"]["read"] = time.perf_counter() - begun
     recorded = folder_of(task.tables, recording.name, recording.sha256, profile.sha256)
@@ -185,6 +191,19 @@ def _carry_out(task: Task, row: Row) -> None:
         row["reason"] = "; ".join(f"{step}: {reason}" for step, reason in refused.items())
         if len(set(refused.values())) == 1 and row["status"] == REFUSED:
             row["reason"] = next(iter(refused.values()))
+
+
+def _lost(recording: Recording, profile: Profile) -> dict[str, Any]:
+    """Return what of a log could not be read, and which rows no step uses; of one that is refused only the first."""
+    from ferryid.signals.data_quality import lost_plain
+    from ferryid.signals.prepare import track_of
+
+    try:
+        measured = track_of(recording, profile).measured
+    except FerryIdError:
+        return lost_plain(recording.losses, (), 0)
+    rows = sum(one.rows for one in measured.left_out)
+    return lost_plain(recording.losses, measured.left_out, rows + int(measured.usable.sum()))
 
 
 def _told(task: Task, error: Exception) -> tuple[str, str]:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.batch.summary import found_in, parameters_of
-from ferryid.diagnose.result import HINT
+from ferryid.counts import counted, verb
+from ferryid.diagnose import HINT
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.vessel.profile import Profile
@@ -89,7 +90,7 @@ def _trend(
     kind, change = trend([value for _, value in seen])
     unit = points[0]["unit"]
     hints = sum(point["probability"] <= HINT for point in points)
-    doubt = f" ({hints} of {len(points)} findings are hints)" if hints else ""
+    doubt = f" ({hints} of {counted(len(points), 'finding')} {verb(hints, 'is')} hints)" if hints else ""
     what = f"{vessel}: {title}, {name.replace('_', ' ')}"
     return {
         "vessel": vessel,

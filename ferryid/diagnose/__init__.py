@@ -1,1 +1,32 @@
-"""What a model left out: sensor checks, hypotheses, evidence, verdict."""
+"""Diagnosis of missing physics: what a model left out of a recording, and what shows it."""
+
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.measurements import check_withheld
+from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, to_json
+from ferryid.diagnose.judging.error_profiles import Profiled
+from ferryid.diagnose.judging.finding import HINT, NEAR, UNKNOWN, Finding
+from ferryid.diagnose.judging.verdict import CHANGED, campaign_verdict, error_ratio, worse_axes
+from ferryid.diagnose.parallel import keep_to_one_thread
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
+
+__all__ = [
+    "AXES",
+    "CHANGED",
+    "HINT",
+    "NEAR",
+    "SCHEMA",
+    "UNKNOWN",
+    "Diagnosis",
+    "DiagnosisSettings",
+    "Estimate",
+    "Finding",
+    "Profiled",
+    "campaign_verdict",
+    "check_withheld",
+    "diagnose",
+    "diagnose_and_store",
+    "error_ratio",
+    "keep_to_one_thread",
+    "to_json",
+    "worse_axes",
+]

@@ -1,4 +1,4 @@
-"""Azimuth offset: one thruster points elsewhere than its encoder says."""
+"""Azimuth offset: one thruster points elsewhere than its encoder reads."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -23,7 +23,7 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
     return tuple(actuator.name for actuator in profile.actuators if actuator.kind == "azimuth")
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Turn the force of the thruster."""
     k = picture.scene.names.index(str(instance))
     x, y = picture.scene.profile.actuators[k].position_m
@@ -39,7 +39,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
     side = "clockwise" if values["angle"] > 0.0 else "counterclockwise"
-    return f"{instance} points {abs(values['angle']):.1f} deg further {side} than its encoder says."
+    return f"{instance} points {abs(values['angle']):.1f} deg further {side} than its encoder reads."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
@@ -47,7 +47,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"faults": [{"thruster": instance, "offset_deg": values["angle"]}]}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the thruster's own force turned by a right angle."""
     k = picture.scene.names.index(str(instance))
     x, y = picture.scene.profile.actuators[k].position_m

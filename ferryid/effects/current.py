@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.wording import bearing
 from ferryid.vessel.profile import Floats, Profile
 
@@ -19,13 +19,13 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("north", "m/s", 0.2, -3.0, 3.0), Parameter("east", "m/s", 0.2, -3.0, 3.0))
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let the water move."""
     flow = np.broadcast_to(p, (len(picture.scene.t), 2))
     return replace(picture, flow=flow if picture.flow is None else picture.flow + flow)
 
 
-def cannot(scene: Scene) -> str:
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show a current."""
     return "the current was measured and is part of the model" if scene.current is not None else ""
 
@@ -42,7 +42,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"current": {"north_mps": values["north"], "east_mps": values["east"]}}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the heading: what is constant over ground turns with it."""
     return "heading [deg]", np.asarray(np.degrees(picture.scene.psi) % 360.0)
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
 
-from ferryid.effects.picture import Picture, Scene, between
+from ferryid.effects.force_model import ForceModel, Measurements, between
+from ferryid.effects.simulated import Simulated
 from ferryid.vessel.profile import Floats, Profile
 
 Values = Mapping[str, float]
-Residual = Callable[[Picture], Floats]
+Residual = Callable[[ForceModel], Floats]
 """What a picture leaves of a log, whitened: so that its square is twice what the logarithm of the likelihood loses."""
 
 FORMULA, DEFINITION = 0.1, 0.02
@@ -111,6 +112,9 @@ class Effect:
         True where that sentence can be said of some of the values alone, those that a log tells.
     scenario
         What has to stand in a scenario file for the effect to act, from its values by name: nested tables as in TOML.
+    simulated
+        What it does to the simulated vessel, so that ``[[effects]]`` of a scenario can name it; None for one that the plant
+        knows by sections of its own.
     vessel
         True for a property of hull or actuators, which carries over to other logs; False for a condition of one log.
     choose
@@ -150,18 +154,18 @@ class Effect:
     id: str
     title: str
     parameters_of: Callable[[Profile], tuple[Parameter, ...]]
-    apply: Callable[[Picture, Floats, str | None], Picture]
+    apply: Callable[[ForceModel, Floats, str | None], ForceModel]
     says: Callable[[Values, str | None], str]
     scenario: Callable[[Values, str | None], dict[str, Any]]
     instances: Callable[[Profile], tuple[str | None, ...]] = lambda profile: (None,)
-    cannot: Callable[[Scene], str] = lambda scene: ""
+    cannot: Callable[[Measurements], str] = lambda scene: ""
     onset: bool = False
-    kick: Callable[[Picture, Floats], Floats] | None = None
+    kick: Callable[[ForceModel, Floats], Floats] | None = None
     vessel: bool = False
-    choose: Callable[[Picture, Floats, Residual], Choice] | None = None
+    choose: Callable[[ForceModel, Floats, Residual], Choice] | None = None
     least: float = 0.0
-    untold: Callable[[Scene, Floats], frozenset[str]] = lambda scene, p: frozenset()
-    once: Callable[[Scene, Floats], bool] = lambda scene, p: False
+    untold: Callable[[Measurements, Floats], frozenset[str]] = lambda scene, p: frozenset()
+    once: Callable[[Measurements, Floats], bool] = lambda scene, p: False
     in_part: bool = False
     idle: float = 0.0
     form: float = FORMULA
@@ -169,9 +173,10 @@ class Effect:
     bends_hull: bool = False
     ridge: str = ""
     of_sensor: bool = False
-    unsteady: Callable[[Picture], Processes] | None = None
+    unsteady: Callable[[ForceModel], Processes] | None = None
     about: str = ""
-    regressor: Callable[[Picture, Floats, str | None, str], tuple[str, Floats]] | None = None
+    regressor: Callable[[ForceModel, Floats, str | None, str], tuple[str, Floats]] | None = None
+    simulated: Simulated | None = None
 
     @property
     def turn(self) -> int:
@@ -179,8 +184,8 @@ class Effect:
         return 0 if self.of_sensor else 1 if self.unsteady is not None else 2
 
     def act(
-        self, picture: Picture, p: Floats, instance: str | None, onset_s: float = 0.0, offset_s: float = inf
-    ) -> Picture:
+        self, picture: ForceModel, p: Floats, instance: str | None, onset_s: float = 0.0, offset_s: float = inf
+    ) -> ForceModel:
         """Return the picture with the effect in it from an onset until an offset [s]; as they stand here, all along."""
         after = self.apply(picture, p, instance)
         if onset_s <= 0.0 and not isfinite(offset_s):

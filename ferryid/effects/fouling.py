@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.picture import COEFFICIENTS, Picture, Scene
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements
 from ferryid.vessel.profile import Floats, Profile
 
 SECOND_ORDER = (
@@ -23,7 +23,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return tuple(Parameter(axis, "-", 1.0, 0.3, 6.0, neutral=1.0) for axis in ("surge", "sway", "yaw"))
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the coefficients."""
     hull = picture.hull.copy()
     for names, factor in zip(SECOND_ORDER, p.tolist(), strict=True):
@@ -32,7 +32,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, hull=hull)
 
 
-def cannot(scene: Scene) -> str:
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show fouling."""
     return "" if scene.profile.hull.has_model else "the profile has no hull model"
 
@@ -48,7 +48,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"fouling": {axis: values[axis] for axis in ("surge", "sway", "yaw")}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the squared speed along the axis, with its sign."""
     k = ("surge", "sway", "yaw").index(axis)
     speed = picture.scene.nu[:, k]

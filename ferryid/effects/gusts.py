@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.vessel.profile import Floats, Profile
 from ferryid.vessel.wind import wind_force
 
@@ -21,12 +21,12 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("std", "m/s", 1.0, 0.0, 15.0), Parameter("time_constant", "s", 8.0, 0.1, 300.0))
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let a wind be gusty, which raises its mean load."""
     return replace(picture, gust_std=float(p[0]))
 
 
-def unsteady(picture: Picture) -> Processes:
+def unsteady(picture: ForceModel) -> Processes:
     """Return the load of a gust to the north and to the east; none in still air, whose load is of second order."""
     scene, areas = picture.scene, picture.scene.profile.wind
     if areas is None or picture.air is None:
@@ -43,7 +43,7 @@ def unsteady(picture: Picture) -> Processes:
     return lambda p: tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
 
 
-def cannot(scene: Scene) -> str:
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show gusts."""
     if scene.wind is not None:
         return "the wind was measured, gusts included"

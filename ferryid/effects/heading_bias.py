@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
-from ferryid.effects.picture import Picture, corrected
+from ferryid.effects.force_model import ForceModel, corrected
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -21,7 +21,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("angle", "deg", 4.0, -90.0, 90.0),)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Turn heading and velocity to the true axes, for all that depends on them; what is compared stays along those measured."""
     b = radians(float(p[0]))
     if b == 0.0:
@@ -45,7 +45,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"heading_bias_deg": values["angle"]}}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the thrust along the other axis, some of which seems to act along this one."""
     j, other = (1, "sway") if axis == "surge" else (0, "surge")
     return f"thrusters' {other} force [N]", picture.parts[:, :, j].sum(axis=1)

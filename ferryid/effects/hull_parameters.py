@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import HELD, Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.picture import COEFFICIENTS, MASS, Picture, Scene, hull_of
-from ferryid.effects.scan import USUAL, by_hull
+from ferryid.effects.force_model import COEFFICIENTS, MASS, ForceModel, Measurements, hull_of
+from ferryid.effects.linear_evidence import HULL_STD, hull_jacobian
 from ferryid.vessel.profile import Floats, Profile
 
 TELLING = 0.25
@@ -46,12 +46,12 @@ def _factor(name: str, size: float) -> Parameter:
     return Parameter(name, "-", size, 0.05, 10.0, neutral=1.0)
 
 
-def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
+def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
     """Return factors of which only those of the coefficients that are worth it can move."""
     names = _named(picture.scene.profile)
     able = [name for name in names if name not in ARMS]
     places = [COEFFICIENTS.index(name) for name in able]
-    J, e = by_hull(picture, believed, residual, places)
+    J, e = hull_jacobian(picture, believed, residual, places)
     chosen, doubt = _best_subset(J.T @ J, -J.T @ e, able)
     if 2 * len(chosen) > len(able):
         # A model that is wrong all over is wrong there, too.
@@ -70,7 +70,7 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
     def score(chosen: frozenset[str]) -> float:
         if not chosen or chosen == SURGE_ALONE:
             return -np.inf
-        spread = np.array([OFF if name in chosen else USUAL for name in names])
+        spread = np.array([OFF if name in chosen else HULL_STD for name in names])
         A = np.eye(n) + G * np.outer(spread, spread)
         c = spread * b
         return 0.5 * float(c @ np.linalg.solve(A, c)) - 0.5 * float(np.linalg.slogdet(A)[1]) - doubt(chosen)
@@ -87,14 +87,14 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
     return best, doubt(best)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the coefficients."""
     factor = np.ones(len(COEFFICIENTS))
     factor[hull_of(picture.scene.profile) != 0.0] = p
     return replace(picture, hull=picture.hull * factor)
 
 
-def cannot(scene: Scene) -> str:
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show a wrong hull model."""
     return "" if scene.profile.hull.has_model else "the profile has no hull model"
 

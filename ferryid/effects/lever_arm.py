@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
-from ferryid.effects.picture import Picture, corrected
+from ferryid.effects.force_model import ForceModel, corrected
 from ferryid.vessel.frames import to_world
 from ferryid.vessel.profile import Floats, Profile
 
@@ -23,7 +23,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return tuple(Parameter(axis, "m", 0.4 * half, -2.0 * half, 2.0 * half) for axis in ("x", "y"))
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Move position and velocity to the body origin, for all that depends on them; what is compared stays the antenna's."""
     x, y = float(p[0]), float(p[1])
     if x == 0.0 and y == 0.0:
@@ -49,7 +49,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"antenna_m": [values["x"], values["y"]]}}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the yaw rate, with which the antenna swings."""
     return "yaw rate [deg/s]", np.degrees(picture.scene.nu[:, 2])
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import cos, sin
 from typing import Any
 
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.simulated import Simulated
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Floats, Profile
 
@@ -25,14 +27,23 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the spring's pull on the body origin."""
     scene = picture.scene
     X, Y = to_body(-p[0] * (scene.eta[:, 0] - p[2]), -p[1] * (scene.eta[:, 1] - p[3]), scene.psi)
     return replace(picture, external=picture.external + np.column_stack([X, Y, np.zeros_like(X)]))
 
 
-def cannot(scene: Scene) -> str:
+def load(
+    p: Floats, t: float, x: float, y: float, psi: float, u: float, v: float, r: float, u_r: float, v_r: float
+) -> tuple[float, float, float]:
+    """Return the spring's pull on the body origin [N, N, N·m] for the simulator; see `ferryid.effects.simulated.Simulated`."""
+    north, east = -p[0] * (x - p[2]), -p[1] * (y - p[3])
+    c, s = cos(psi), sin(psi)
+    return c * north + s * east, c * east - s * north, 0.0
+
+
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show a mooring."""
     return "" if np.isfinite(scene.eta[scene.usable, :2]).all() else "the log has no position"
 
@@ -58,7 +69,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"mooring": spring}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return how far the vessel is from the point, along the axis."""
     eta = picture.scene.eta
     ahead, aside = to_body(eta[:, 0] - p[2], eta[:, 1] - p[3], eta[:, 2])
@@ -78,4 +89,5 @@ EFFECT = Effect(
     onset=True,
     regressor=regressor,
     form=0.05,
+    simulated=Simulated(load),
 )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
-from ferryid.effects.picture import Picture, Scene, aboard, added_mass
+from ferryid.effects.force_model import ForceModel, Measurements, aboard, added_mass
 from ferryid.vessel.profile import Floats, Profile
 
 WATERPLANE = 0.85
@@ -41,7 +41,7 @@ def _by_mass(profile: Profile) -> float:
     return 1.0 / (WATER * WATERPLANE * hull.length_m * hull.beam_m * hull.draught_m)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Put the mass aboard."""
     n = len(picture.scene.t)
     load, damping = aboard(np.tile(p[:2], (n, 1))), picture.damping_factor
@@ -52,19 +52,19 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, load=load if picture.load is None else picture.load + load, damping_factor=damping)
 
 
-def untold(scene: Scene, p: Floats) -> frozenset[str]:
+def untold(scene: Measurements, p: Floats) -> frozenset[str]:
     """Return what is fitted so that the rest comes out right, and is of no interest itself."""
     return frozenset({DEEPER})
 
 
-def kick(picture: Picture, p: Floats) -> Floats:
+def kick(picture: ForceModel, p: Floats) -> Floats:
     """Return the momentum that a load takes which lay still over ground before it came aboard, shape (n, 3)."""
     m, x = float(p[0]), float(p[1])
     u, v, r = picture.scene.nu.T
     return -m * np.column_stack([u, v + x * r, x * (v + x * r)])
 
 
-def cannot(scene: Scene) -> str:
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show a payload."""
     return "the payload was measured and is part of the model" if scene.payload is not None else ""
 
@@ -81,7 +81,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"payload": [{"mass_kg": values["mass"], "x_m": values["x"], **span(values)}]}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the acceleration along the axis, that of turning included."""
     scene = picture.scene
     u, v, r = scene.nu.T

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.picture import Picture, Scene, added_mass
-from ferryid.effects.scan import by_hull, linear_gains
+from ferryid.effects.force_model import ForceModel, Measurements, added_mass
+from ferryid.effects.linear_evidence import hull_jacobian, log_evidence_gains
 from ferryid.vessel.profile import Floats, Profile
 
 Places = NDArray[np.int64]
@@ -54,26 +54,26 @@ def _share(outside: Floats) -> Floats:
     return np.asarray(s * s * (3.0 - 2.0 * s))
 
 
-def inside(scene: Scene, sides: Floats) -> Floats:
+def inside(scene: Measurements, sides: Floats) -> Floats:
     """Return how much of the factor acts in every row, 0 to 1, shape (n,)."""
     x, y = scene.eta[:, 0], scene.eta[:, 1]
     south, north, west, east = sides.tolist()
     return _share(south - x) * _share(x - north) * _share(west - y) * _share(y - east)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the damping in the place, and let the added mass grow."""
     growth = (float(p[0]) - 1.0) * inside(picture.scene, p[1:5])
     load = float(p[5]) * growth[:, None] * added_mass(picture)
     return replace(_damped(picture, 1.0 + growth), load=load if picture.load is None else picture.load + load)
 
 
-def _damped(picture: Picture, factor: Floats) -> Picture:
+def _damped(picture: ForceModel, factor: Floats) -> ForceModel:
     before = picture.damping_factor
     return replace(picture, damping_factor=factor if before is None else before * factor)
 
 
-def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
+def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
     """Return the place whose damping explains most of what is left, with its neighbours on the grid as the usual error."""
     scene = picture.scene
     place = scene.eta[:, :2]
@@ -110,7 +110,8 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
         return Choice(parameters_of(scene.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
     columns = (sums[north, east] - sums[south, east] - sums[north, west] + sums[south, west]).T
-    gains = linear_gains(*by_hull(picture, believed, residual, np.flatnonzero(believed).tolist()), columns, FACTOR.size)
+    J, linear = hull_jacobian(picture, believed, residual, np.flatnonzero(believed).tolist())
+    gains = log_evidence_gains(J, linear, columns, FACTOR.size)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
     sizes = np.repeat((high - low) / CELLS, 2)
@@ -118,14 +119,14 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
     return Choice((FACTOR, *parameters, HEAVIER), log(len(gains)))
 
 
-def cannot(scene: Scene) -> str:
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show shallow water."""
     if not scene.profile.hull.has_model:
         return "the profile has no hull model"
     return "" if np.isfinite(scene.eta[scene.usable, :2]).all() else "the log has no position"
 
 
-def untold(scene: Scene, p: Floats) -> frozenset[str]:
+def untold(scene: Measurements, p: Floats) -> frozenset[str]:
     """Return the sides beyond which the vessel hardly went, as the place may reach any farther there, and the added mass."""
     x, y = scene.eta[scene.usable, 0], scene.eta[scene.usable, 1]
     south, north, west, east = p[1:5].tolist()
@@ -134,7 +135,7 @@ def untold(scene: Scene, p: Floats) -> frozenset[str]:
     return frozenset({HEAVIER.name, *far})
 
 
-def once(scene: Scene, p: Floats) -> bool:
+def once(scene: Measurements, p: Floats) -> bool:
     """Tell whether the vessel was in the place a single time, or hardly: then it is a time as well as a place."""
     there = inside(scene, p[1:5])[scene.usable] > 0.5
     entered = int(there[0]) + int(np.count_nonzero(there[1:] & ~there[:-1]))

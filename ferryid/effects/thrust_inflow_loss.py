@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.picture import Picture, body_current
+from ferryid.effects.force_model import ForceModel, body_current
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -17,7 +17,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("per_mps", "s/m", 0.2, -0.2, 2.0),)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take ``k V_a`` off each force, V_a the velocity of the thruster through the water along its own push."""
     scene = picture.scene
     u_c, v_c = body_current(picture)
@@ -42,7 +42,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"inflow_loss_per_mps": values["per_mps"]}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return force times inflow, of all thrusters together."""
     j = ("surge", "sway", "yaw").index(axis)
     # A hundredth of the loss, so that nothing is clipped.

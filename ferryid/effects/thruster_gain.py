@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values, span
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -20,7 +20,7 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
     return tuple(actuator.name for actuator in profile.actuators)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the force of the thruster."""
     k = picture.scene.names.index(str(instance))
     parts = picture.parts.copy()
@@ -30,7 +30,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    return f"{instance} gives {100.0 * values['factor']:.0f} % of the force that its curve says."
+    return f"{instance} gives {100.0 * values['factor']:.0f} % of the force of its thrust curve."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
@@ -39,7 +39,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"faults": [fault]}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the thruster's own force."""
     k = picture.scene.names.index(str(instance))
     j = ("surge", "sway", "yaw").index(axis)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.picture import Picture, Scene
+from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.vessel.profile import Floats, Profile
 from ferryid.vessel.thrusters import thrust
 
@@ -22,7 +22,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("fraction", "-", 0.2, 0.0, 1.0),)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the loss off, which grows with the root of the force behind the wake as a jet's speed does."""
     actuators = picture.scene.profile.actuators
     parts = picture.parts.copy()
@@ -41,7 +41,7 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, parts=parts)
 
 
-def _full(picture: Picture, j: int, size: Floats) -> Floats:
+def _full(picture: ForceModel, j: int, size: Floats) -> Floats:
     """Return the most that a thruster can push, ahead or astern as it does [N], shape (n,); the log's most without a curve."""
     actuator = picture.scene.profile.actuators[j]
     most = np.full(len(size), max(float(size.max()), 1e-9))
@@ -54,7 +54,7 @@ def _full(picture: Picture, j: int, size: Floats) -> Floats:
     return np.asarray(np.maximum(np.abs(np.where(along < 0.0, astern, ahead)), 1e-9))
 
 
-def cannot(scene: Scene) -> str:
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show it."""
     return "" if len(scene.names) > 1 else "there is one actuator only"
 
@@ -69,7 +69,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"interaction_fraction": values["fraction"]}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the force of a thruster by how much of a full wake it lies in: the angle alone leaves its direction open."""
     j = ("surge", "sway", "yaw").index(axis)
     lost = picture.parts.sum(axis=1) - apply(picture, np.array([1.0]), instance).parts.sum(axis=1)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -20,7 +20,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("time_constant", "s", 0.5, 0.0, 10.0),)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let the strength of each thruster lag; its direction is as measured."""
     if p[0] < 1e-3:
         return picture
@@ -59,7 +59,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"force_lag_s": values["time_constant"]}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return how fast the thrust changes."""
     j = ("surge", "sway", "yaw").index(axis)
     rate = np.gradient(picture.parts[:, :, j].sum(axis=1), picture.scene.step_s)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -17,7 +17,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("seconds", "s", 0.3, -3.0, 3.0),)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Look the actuators' forces up at the time that the motion was measured at."""
     if p[0] == 0.0:
         return picture
@@ -44,7 +44,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"delay_s": values["seconds"]}}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return how fast the thrust changes."""
     j = ("surge", "sway", "yaw").index(axis)
     rate = np.gradient(picture.parts[:, :, j].sum(axis=1), picture.scene.step_s)

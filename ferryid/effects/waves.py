@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import plural
 from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
-from ferryid.effects.picture import Picture
+from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats, Profile
 
 USUAL_HZ = 0.35
@@ -40,12 +41,12 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Change nothing: what waves push on average is not theirs alone."""
     return picture
 
 
-def unsteady(picture: Picture) -> Processes:
+def unsteady(picture: ForceModel) -> Processes:
     """Return a process on each axis."""
     loads = [np.tile(axis, (len(picture.scene.t), 1)) for axis in np.eye(3)]
 
@@ -65,7 +66,7 @@ def says(values: Values, instance: str | None) -> str:
     ]
     return (
         f"Waves of {1.0 / values['peak_frequency']:.1f} s pushed the vessel with {' and '.join(forces)} "
-        f"(standard deviation{'s' if len(forces) > 1 else ''}), which nothing measured explains."
+        f"({plural(len(forces), 'standard deviation')}), which nothing measured explains."
     )
 
 

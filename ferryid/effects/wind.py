@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.picture import Picture, Scene
-from ferryid.effects.scan import by_hull, refitted
+from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.wording import bearing
 from ferryid.vessel.profile import Floats, Profile, WindAreas
 from ferryid.vessel.wind import wind_force
@@ -36,7 +36,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
-def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
+def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
     """Return the parameters with the wind to begin with."""
     parameters = parameters_of(picture.scene.profile)
     angles = np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS
@@ -45,17 +45,17 @@ def choose(picture: Picture, believed: Floats, residual: Residual) -> Choice:
         for speed in SPEEDS_MPS
         for angle in (angles if speed > 0.0 else angles[:1])
     ]
-    J, e = by_hull(picture, believed, residual, np.flatnonzero(believed).tolist())
+    J, e = hull_jacobian(picture, believed, residual, np.flatnonzero(believed).tolist())
     calm = residual(picture)
     left = np.column_stack([e + residual(apply(picture, wind, None)) - calm for wind in winds])
     sizes = np.array([one.size for one in parameters[:2]])
     away = np.array([float(np.sum((wind / sizes) ** 2)) for wind in winds])
-    best = winds[int(np.argmin(refitted(J, left) + 0.5 * away))]
+    best = winds[int(np.argmin(profiled_loss(J, left) + 0.5 * away))]
     begun = (replace(one, start=float(at)) for one, at in zip(parameters[:2], best, strict=True))
     return Choice((*begun, *parameters[2:]), 0.0)
 
 
-def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the wind's load, less that of still air, which is there already."""
     scene, areas = picture.scene, picture.scene.profile.wind
     if areas is None:
@@ -66,12 +66,12 @@ def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
     return replace(picture, external=picture.external + more, air=air, air_factors=factors)
 
 
-def untold(scene: Scene, p: Floats) -> frozenset[str]:
+def untold(scene: Measurements, p: Floats) -> frozenset[str]:
     """Return what is fitted so that the rest comes out right, and is of no interest itself."""
     return frozenset(COEFFICIENTS)
 
 
-def mean_load(scene: Scene, areas: WindAreas, air: Floats, gust_std: float) -> Floats:
+def mean_load(scene: Measurements, areas: WindAreas, air: Floats, gust_std: float) -> Floats:
     """Return what a wind loads the vessel with on average [N, N, N·m], shape (n, 3).
 
     A load that goes with the square of the speed is larger in gusts: the mean over a normal distribution, by Gauss's and
@@ -90,7 +90,7 @@ def mean_load(scene: Scene, areas: WindAreas, air: Floats, gust_std: float) -> F
     )
 
 
-def cannot(scene: Scene) -> str:
+def cannot(scene: Measurements) -> str:
     """Say why the scene cannot show a wind."""
     if scene.wind is not None:
         return "the wind was measured and is part of the model"
@@ -109,7 +109,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"wind": {"north_mps": values["north"], "east_mps": values["east"]}}}
 
 
-def regressor(picture: Picture, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the heading: what is constant over ground turns with it."""
     return "heading [deg]", np.asarray(np.degrees(picture.scene.psi) % 360.0)
 

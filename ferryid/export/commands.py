@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.export.formats import formats
 from ferryid.export.log_file import export_log
@@ -66,7 +67,7 @@ def export(
         )
     if mcap is None and to is None:
         raise FerryIdError(
-            f"{what}: nothing says what to write. Fix: give --to {'|'.join(formats())} for a model, --mcap FILE for a log"
+            f"{what}: the form is missing. Fix: give --to {'|'.join(formats())} for a model, --mcap FILE for a log"
         )
     if json is not None:
         check_result(json)
@@ -104,8 +105,11 @@ def render_export(result: Mapping[str, Any]) -> str:
         lines += [f"  {effect['acts_on']}: {effect['says']}" for effect in result["effects"]]
         return "\n".join([*lines, form.hint.format(file=result["file"], name=result["name"])])
     used = len(result["topics"])
-    lines = [f"{result['file']}: {result['log']['name']}, {used} topics for PlotJuggler or Foxglove"]
+    lines = [f"{result['file']}: {result['log']['name']}, {counted(used, 'topic')} for PlotJuggler or Foxglove"]
     lines += [f"  {one['topic']:<26}{one['messages']:>9}  {one['type']}" for one in result["topics"]]
     if result["rows_left_out"]:
-        lines.append(f"  {result['rows_left_out']} of {result['rows']} rows are not known and left out")
+        lines.append(
+            f"  {result['rows_left_out']} of {counted(result['rows'], 'row')} "
+            f"{verb(result['rows_left_out'], 'is')} not known and left out"
+        )
     return "\n".join(lines)

@@ -127,7 +127,7 @@ class Exported:
                 f"{', '.join(beside[SENSORS])}: named numbers in the file. Correct what is measured before it goes in."
             )
         if not invertible(self.mass):
-            told.append("the mass matrix cannot be inverted: force is exported, acceleration says nothing.")
+            told.append("the mass matrix cannot be inverted: force is exported, acceleration is undefined.")
         elif np.linalg.eigvalsh((self.mass + self.mass.T) / 2).min() <= 0.0:
             told.append("the mass matrix is not positive definite: a simulation with it runs away.")
         return tuple(told)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.result import HINT, SCHEMA
+from ferryid.diagnose import HINT, SCHEMA
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.errors import FerryIdError
@@ -110,7 +110,7 @@ def _of_log(data: Mapping[str, Any], log: str, path: Path) -> Mapping[str, Any]:
     if len(named) != 1:
         logs = ", ".join(str(one["log"]) for one in several)
         raise FerryIdError(
-            f"{path}: is to tell of the log {log}, found {logs or 'none'}. Fix: give the diagnosis of this very log"
+            f"{path}: is to be the diagnosis of the log {log}, found {logs or 'none'}. Fix: give the diagnosis of this very log"
             + (" alone" if named else "")
         )
     return named[0]
@@ -151,7 +151,7 @@ def _values(finding: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for axis, share in finding["improvement"].items():
         yield f"held-out error removed, {axis}", _text(share)
     if finding["unresolved_with"]:
-        yield "not told apart from", ", ".join(finding["unresolved_with"])
+        yield "not separated from", ", ".join(finding["unresolved_with"])
 
 
 def _text(value: float | None) -> str:

@@ -20,7 +20,7 @@ from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.recording import log_name
 from ferryid.signals.track import Motion
 from ferryid.simulate.logs import CHUNK_BYTES
-from ferryid.simulate.places import check_output
+from ferryid.simulate.output_paths import check_output
 from ferryid.simulate.recorders import write_mcap
 from ferryid.simulate.sensors import Stream
 from ferryid.vessel.profile import Floats, Profile
@@ -82,7 +82,7 @@ def export_log(
         profile = signal_map(model, profile)
     if profile is None:
         raise FerryIdError(
-            f"{log}: nothing tells where its signals are, found neither model nor profile. Fix: give --model or --vessel"
+            f"{log}: where its signals are is not known, found neither model nor profile. Fix: give --model or --vessel"
         )
     _check_place(log, mcap, overwrite=overwrite)
     found = None if diagnosis is None else read_diagnosis(diagnosis, log_name(log))

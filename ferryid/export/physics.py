@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite, pi
 
-from ferryid.effects.picture import COEFFICIENTS, UNITS
+from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.export.exported import Exported
 from ferryid.export.names import legal, number
 from ferryid.identify.strips import LEAST

@@ -52,7 +52,9 @@ def frames(one: Exported) -> Iterator[str]:
     areas = one.force.profile.wind is not None
     for what, needed, load in (("wind", one.needs_wind, areas), ("current", one.needs_current, True)):
         if needed:
-            yield from wrapped(f"The model has terms of the {what}: without one it says nothing; still is 0, 0.")
+            yield from wrapped(
+                f"The model has terms of the {what}: without a value the result is undefined; still is 0, 0."
+            )
         elif load:
             without = (
                 "there is no load of the air, not even of still air: that is 0, 0" if what == "wind" else "it is still"

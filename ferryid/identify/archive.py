@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid import __version__
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.accept import accept
 from ferryid.identify.archived_logs import folders
 from ferryid.identify.basis import Basis, basis
 from ferryid.identify.bootstrap import bootstrap
-from ferryid.identify.cautions import general_cautions
+from ferryid.identify.cautions import general_cautions, of_logs
 from ferryid.identify.choose import choose, deviation
 from ferryid.identify.combine import spanned
 from ferryid.identify.cross_products import CrossProducts, total
@@ -66,6 +67,7 @@ class _Log:
     rows: int
     training_rows: int
     validation: CrossProducts
+    warnings: tuple[str, ...]
 
 
 class _Sums:
@@ -116,7 +118,9 @@ class _Sums:
         self.sectors += log.sectors
         validation = one.test.summed(validates[:, None])
         rows = int(one.test.n.sum())
-        self.logs.append(_Log(log.name, log.sha256, log.files, log.rate_hz, rows, training_rows, validation))
+        self.logs.append(
+            _Log(log.name, log.sha256, log.files, log.rate_hz, rows, training_rows, validation, log.warnings)
+        )
 
     def _validates(self, blocks: int) -> Flags:
         if self._whole is not None:
@@ -171,8 +175,8 @@ def fit_archive(
     validation = total([log.validation for log in sums.logs])
     if not validation.n or not any(one.n for one in sums.training if one is not None):
         raise FerryIdError(
-            f"{sums.logs[0].name}: too little for training and validation, found {len(sums.logs)} log(s) of "
-            f"{sum(log.rows for log in sums.logs)} rows. Fix: ingest more or longer logs"
+            f"{sums.logs[0].name}: too little for training and validation, found {counted(len(sums.logs), 'log')} of "
+            f"{counted(sum(log.rows for log in sums.logs), 'row')}. Fix: ingest more or longer logs"
         )
     progress("fitting")
     free = unforced(deviation(np.concatenate(sums.force)), deviation(np.concatenate(sums.base)))
@@ -240,6 +244,7 @@ def fit_archive(
         *held,
         *general_cautions(settings, known, scores, len(sums.logs), float(scores["seconds"])),
         *spread.notes,
+        *of_logs([(log.name, log.warnings) for log in sums.logs]),
     )
     return FitResult(
         model,
@@ -276,7 +281,15 @@ def archive_folds(
         force.append(log.studied.force)
         base.append(log.studied.base)
         rows = int(log.studied.test.n.sum())
-        told.append({"name": log.name, "sha256": log.sha256, "seconds": rows / log.rate_hz, "rows": rows})
+        told.append(
+            {
+                "name": log.name,
+                "sha256": log.sha256,
+                "seconds": rows / log.rate_hz,
+                "rows": rows,
+                "warnings": [*log.warnings],
+            }
+        )
 
     functions = _added(where, profile, settings, windows_s, add, progress)
     free = unforced(deviation(np.concatenate(force)), deviation(np.concatenate(base)))
@@ -328,7 +341,7 @@ def _scores(
         "seconds": validated,
         "split": settings.split,
         "split_notes": [
-            f"{len(sums.logs)} logs: {trained:.0f} s train, {validated:.0f} s validate, "
+            f"{counted(len(sums.logs), 'log')}: {trained:.0f} s train, {validated:.0f} s validate, "
             + ("whole logs, one of every three in a row." if settings.split == "logs" else "in blocks of every log.")
         ],
     }
@@ -353,4 +366,5 @@ def _per_log(sums: _Sums, theta: Floats, intercept: Floats) -> Iterator[dict[str
             "rows": log.rows,
             "validation_rows": log.validation.n,
             "per_axis": by_axis(ratio),
+            "warnings": list(log.warnings),
         }

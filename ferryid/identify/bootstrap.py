@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.cross_products import CHUNK_ROWS, CrossProducts, Rows, gram, subtract
 from ferryid.identify.qr import standard_deviations
@@ -179,7 +180,10 @@ def bootstrap(
             f"{where}: intervals by block bootstrap need two blocks or more, found {count}. Fix: use a longer log"
         )
     if count < FEW_BLOCKS:
-        notes = (*notes, f"Only {count} independent stretches to draw from: the intervals are probably too narrow.")
+        notes = (
+            *notes,
+            f"Only {counted(count, 'independent stretch')} to draw from: the intervals are probably too narrow.",
+        )
     coefficients, intercepts = _draw(stacked, components, draws, seed, scale, scale_y, allowed)
     table = np.concatenate([coefficients, intercepts[:, None, :]], axis=1).transpose(2, 1, 0)
     widened = count / (count - 1)

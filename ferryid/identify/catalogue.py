@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.effects import effects
 from ferryid.identify.model import AXES, Model, to_json
 from ferryid.identify.store import Stored, Unreadable, problems, stored_models
@@ -143,9 +144,9 @@ def render_model(model: Model) -> str:
 def fitted_with(model: Model) -> str:
     """Return basis, structure, components and window of a fit, those that were chosen for it as well."""
     settings = model.settings
-    count = settings.get("components")
+    count: Any = settings.get("components")
     return (
-        f"basis {settings.get('basis')}, {settings.get('structure')}, {count} component{'s' * (count != 1)}, "
+        f"basis {settings.get('basis')}, {settings.get('structure')}, {counted(count, 'component')}, "
         f"window {settings.get('window_s')} s"
     )
 

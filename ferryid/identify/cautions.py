@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted, verb
 from ferryid.identify.model import AXES
 from ferryid.identify.result import Excitation, FreeRun
 from ferryid.identify.settings import FitSettings
@@ -16,6 +17,8 @@ from ferryid.signals.track import Motion
 
 LEAST_VALIDATION_S = 60.0
 MANY_MOVED = 20
+MOST_LOGS_SAID = 10
+"""Logs of an archive whose own warnings are repeated for all of it."""
 USELESS_RAD, USELESS_S = 0.5, 10.0
 """A heading lost by this much within this time says that a model does not describe the turning at all."""
 
@@ -35,18 +38,21 @@ def cautions(
     seconds = sum(float(mask.sum()) / motion.rate_hz for motion, mask in zip(motions, parts.validation, strict=True))
     warnings += general_cautions(settings, known, scores, len(prepared), seconds)
     weighed = [motion.payload is not None for motion in motions]
-    if any(weighed) and not all(weighed):
+    without = len(weighed) - sum(weighed)
+    if any(weighed) and without:
         warnings.append(
-            f"{len(weighed) - sum(weighed)} of {len(weighed)} logs have no payload measured and are taken as empty: a load "
-            "aboard there ends up in the coefficients."
+            f"{without} of {counted(len(weighed), 'log')} {verb(without, 'has')} no payload measured and "
+            f"{verb(without, 'is')} taken as "
+            "empty: a load aboard there ends up in the coefficients."
         )
     for one in prepared:
-        warnings.extend(f"{one.recording.name}: {doubt}" for doubt in (*one.doubts, *one.left_out))
+        warnings += of_logs([(one.recording.name, (*one.doubts, *one.left_out))])
         moved = max((s.clock.out_of_order + s.clock.duplicates for s in one.recording.streams.values()), default=0)
         if moved >= MANY_MOVED:
             warnings.append(
-                f"{one.recording.name}: up to {moved} rows of a topic were out of order or repeated a time, as when a clock is "
-                "set back during the recording: stretches may lie over one another."
+                f"{one.recording.name}: up to {counted(moved, 'row')} of a topic were out of order or "
+                "repeated a time, as when a clock "
+                "is set back during the recording: stretches may lie over one another."
             )
     return tuple(warnings)
 
@@ -78,6 +84,21 @@ def general_cautions(
                 "varies there, or something else moves the vessel."
             )
     return warnings
+
+
+def of_logs(told: Sequence[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
+    """Return what is told of single logs with their names, of the first `MOST_LOGS_SAID` that have anything to tell.
+
+    Parameters
+    ----------
+    told
+        Name of every log, and sentences.
+    """
+    those = [(name, sentences) for name, sentences in told if sentences]
+    said = [f"{name}: {sentence}" for name, sentences in those[:MOST_LOGS_SAID] for sentence in sentences]
+    if (others := len(those) - MOST_LOGS_SAID) > 0:
+        said.append(f"{counted(others, 'more log')} {verb(others, 'has')} such warnings, see the JSON.")
+    return tuple(said)
 
 
 def free_run_cautions(base: FreeRun, new: FreeRun) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid import __version__
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.identify.model import AXES, Model, to_json
@@ -256,7 +257,7 @@ def _checked(models: Sequence[Model], weights: Sequence[float] | Floats) -> Floa
         raise FerryIdError("weighted models: there are no models. Fix: give one or more")
     if share.shape != (len(models),):
         raise FerryIdError(
-            f"weighted models: every model needs one weight, {len(models)} models came with weights of shape "
+            f"weighted models: every model needs one weight, {counted(len(models), 'model')} came with weights of shape "
             f"{share.shape}. Fix: give {len(models)} weights"
         )
     if not (np.isfinite(share).all() and (share >= 0.0).all() and abs(share.sum() - 1.0) <= _SUM):

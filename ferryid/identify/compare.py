@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.identify.candidates import Candidate, Field
 from ferryid.identify.estimate import estimator
@@ -312,7 +313,7 @@ def _few(trial: Trial) -> list[str]:
         return []
     count = len(trial.sums)
     return [
-        f"{count} block{'s' * (count != 1)} of {trial.block_s:.3g} s {'are' if count != 1 else 'is'} too few for an interval, "
+        f"{counted(count, 'block')} of {trial.block_s:.3g} s {verb(count, 'is')} too few for an interval, "
         "so that nothing is said to be better on this log alone"
     ]
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.basis import Basis
 from ferryid.identify.crossed import TEST_WINDOW_S
 from ferryid.identify.model import AXES
@@ -220,13 +221,16 @@ def verdict(one: Compared) -> str:
     """Return in a sentence which structures the data support."""
     kept = [structure for structure in one.structures if structure.kept]
     supported, count = one.supported, len(one.structures)
-    size = f"{supported.coefficients} free coefficients"
+    size = f"{counted(supported.coefficients, 'free coefficient')}"
     if len(kept) == 1:
-        return f"The data support {supported.title}, with {size}: at 95 % it is better than every other of {count} structures."
+        return (
+            f"The data support {supported.title}, with {size}: at 95 % it is better than every other of "
+            f"{counted(count, 'structure')}."
+        )
     which = (
-        f"all {count} structures, as none can be told from the best at 95 %"
+        f"all {counted(count, 'structure')}, as none can be told from the best at 95 %"
         if len(kept) == count
-        else f"the {len(kept)} of {count} structures that cannot be told from the best at 95 %"
+        else f"the {len(kept)} of {counted(count, 'structure')} that cannot be told from the best at 95 %"
     )
     return f"The data support {supported.title}, with {size}: the fewest of {which}."
 
@@ -235,7 +239,11 @@ def render_structures(found: StructureSweep) -> str:
     """Return a comparison of structures for a terminal."""
     lines = [verdict(found.by["blocks"]), ""]
     for key, one in found.by.items():
-        lines += [f"by {BY[key]}, {one.folds} folds, {one.rows} rows, {one.blocks} blocks", *_scores(one), ""]
+        lines += [
+            f"by {BY[key]}, {counted(one.folds, 'fold')}, {counted(one.rows, 'row')}, {counted(one.blocks, 'block')}",
+            *_scores(one),
+            "",
+        ]
         lines += [f"by {BY[key]}: MSE over that of {one.structures[0].title}, 95 % intervals", *_intervals(one), ""]
     lines += [f"left out: {name}: {reason}" for name, reason in found.unusable.items()]
     lines += [f"note: {note}" for note in found.notes]

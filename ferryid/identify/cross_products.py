@@ -12,6 +12,7 @@ from operator import add
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 
 Floats = NDArray[np.float64]
@@ -95,7 +96,9 @@ class CrossProducts:
         if not isinstance(other, CrossProducts):
             return NotImplemented
         if (self.K, self.m) != (other.K, other.m):
-            raise ValueError(f"cross-products of {self.K}+{self.m} and {other.K}+{other.m} columns do not add up")
+            raise ValueError(
+                f"cross-products of {self.K}+{self.m} and {other.K}+{counted(other.m, 'column')} do not add up"
+            )
         if self.n == 0:
             return other
         moved = other if np.array_equal(other.shift, self.shift) else other.shifted(self.shift)
@@ -343,7 +346,7 @@ def not_finite(X: Floats, Y: Floats, names: Sequence[str], where: str) -> FerryI
     row = int(np.argmax(bad[:, column]))
     return FerryIdError(
         f"{where}: {name} must be finite for a fit, found {columns[row, column]} in {int(bad[:, column].sum())} "
-        f"of {len(columns)} rows looked at. Fix: mask rows without measurements, or correct the signal's unit"
+        f"of {counted(len(columns), 'row')} looked at. Fix: mask rows without measurements, or correct the signal's unit"
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import COEFFICIENTS, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import Basis, basis, relative_flow
 from ferryid.identify.hull_terms import hull_part

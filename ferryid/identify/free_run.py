@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.identify.result import FreeRun
 from ferryid.signals.track import Motion
 
@@ -82,7 +83,11 @@ def free_run(
         rms = np.sqrt(np.nansum(every**2, axis=0) / counts[:, None])
     blind = np.all(np.isnan(every[:, :, 0]), axis=0)
     rms[blind, 0] = np.nan
-    note = f"{diverged} of {len(every)} runs diverged and are left out of the means" if diverged else ""
+    note = (
+        f"{diverged} of {counted(len(every), 'run')} diverged and {verb(diverged, 'is')} left out of the means"
+        if diverged
+        else ""
+    )
     return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note, diverged)
 
 

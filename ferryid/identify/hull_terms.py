@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.identify.model import Floats, Model
 
 MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {

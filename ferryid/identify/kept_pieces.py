@@ -31,7 +31,7 @@ from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
 
-SCHEMA = "ferryid.pieces/2"
+SCHEMA = "ferryid.pieces/3"
 _MATTERS = ("basis", "smoother", "residual", "rate_hz", "delta", "sigma", "zeta")
 """Settings that change the pieces; all others are chosen when they are added up."""
 
@@ -54,6 +54,8 @@ class Kept:
         Rows in each of twelve sectors of heading.
     studied
         Its pieces at every window.
+    warnings
+        Signals that contradict each other, and which rows are not used and why, as sentences.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Kept:
     ranges: Mapping[str, tuple[float, float]]
     sectors: Sequence[int]
     studied: Studied
+    warnings: tuple[str, ...] = ()
 
 
 def kept(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequence[float]) -> Kept:
@@ -129,6 +132,7 @@ def _made(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequ
             windows_s,
             blocks=blocks if blocks >= 3 else 1,
         ),
+        warnings=(*opened.doubts, *opened.left_out),
     )
 
 
@@ -159,6 +163,7 @@ def write(path: Path, key: Mapping[str, Any], log: Kept) -> None:
         "test": same[0] if same else len(stored) - 1,
         "force": one.force.tolist(),
         "base": one.base.tolist(),
+        "warnings": log.warnings,
     }
     with replacing(path) as draft:
         write_table(draft, {"sums": sums}, told)
@@ -198,4 +203,5 @@ def _read(path: Path, key: Mapping[str, Any]) -> Kept:
             force,
             base,
         ),
+        warnings=tuple(told["warnings"]),
     )

@@ -75,7 +75,7 @@ class Model:
     accepted
         Verdict at the time of the fit.
     hull
-        The hull's coefficients as a diagnosis refitted them, by the names of `ferryid.effects.picture.COEFFICIENTS`; those
+        The hull's coefficients as a diagnosis refitted them, by the names of `ferryid.effects.force_model.COEFFICIENTS`; those
         of acceleration and damping among `terms` are counted in. Empty in a model that was fitted alone.
     vessel_effects
         Properties of hull and thrusters, in the order in which they act.

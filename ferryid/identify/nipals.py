@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.qr import standard_deviations
 
@@ -115,7 +116,7 @@ def nipals(
     E, mean_x, scale_x = _standardised(X, scale)
     F, mean_y, scale_y = _standardised(Y, scale)
     if len(E) != len(F):
-        raise FerryIdError(f"NIPALS: X has {len(E)} rows and Y {len(F)}. Fix: pass the same rows")
+        raise FerryIdError(f"NIPALS: X has {counted(len(E), 'row')} and Y {len(F)}. Fix: pass the same rows")
     K, m = E.shape[1], F.shape[1]
     W, P, C = np.zeros((K, components)), np.zeros((K, components)), np.zeros((m, components))
     squares_x, squares_y = float(np.sum(E**2)), np.sum(F**2, axis=0)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.basis import Basis
 from ferryid.identify.cross_products import CrossProducts
@@ -71,8 +72,8 @@ def pca(source: CrossProducts | QrFactor, *, standardise: bool = True) -> Pca:
     columns = np.flatnonzero(varying[:K])
     if source.n < 2 or not len(columns):
         raise FerryIdError(
-            f"PCA: two or more rows and a column that varies are needed, found {source.n} rows and {len(columns)} such "
-            "columns. Fix: use a longer log, or one in which the vessel moves"
+            f"PCA: two or more rows and a column that varies are needed, found {counted(source.n, 'row')} and "
+            f"{counted(len(columns), 'such column')}. Fix: use a longer log, or one in which the vessel moves"
         )
     divisor = deviation if standardise else np.where(varying, 1.0, np.inf)
     eigenvalues, vectors, _ = source.spectrum(columns, np.arange(0), np.where(varying, divisor, 1.0))

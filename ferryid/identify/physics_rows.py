@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS, LIFT, MASS, UNITS
+from ferryid.effects.force_model import COEFFICIENTS, LIFT, MASS, UNITS
 from ferryid.effects.wording import titled
 from ferryid.identify.candidates import Candidate
 from ferryid.identify.estimate import estimator, hull_values

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS, Picture, Scene, aboard, required_force
+from ferryid.effects.force_model import COEFFICIENTS, aboard, required_force
+from ferryid.effects.force_model import ForceModel as Picture
+from ferryid.effects.force_model import Measurements as Scene
 from ferryid.errors import FerryIdError
 from ferryid.identify.estimate import Estimator, estimator, hull_values, with_hull
 from ferryid.identify.hull_terms import hull_part

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects import effects
-from ferryid.effects.picture import Picture, Scene, required_force
+from ferryid.effects.force_model import ForceModel as Picture
+from ferryid.effects.force_model import Measurements as Scene
+from ferryid.effects.force_model import required_force
 from ferryid.errors import FerryIdError
 from ferryid.identify.estimate import base_estimator, estimator
 from ferryid.identify.free_run import ForceModel, free_run

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.cross_products import CHUNK_ROWS, LARGEST, CrossProducts, Rows, not_finite
 
 Floats = NDArray[np.float64]
@@ -97,7 +98,7 @@ class QrFactor:
         if not isinstance(other, QrFactor):
             return NotImplemented
         if (self.K, self.m) != (other.K, other.m):
-            raise ValueError(f"factors of {self.K}+{self.m} and {other.K}+{other.m} columns do not add up")
+            raise ValueError(f"factors of {self.K}+{self.m} and {other.K}+{counted(other.m, 'column')} do not add up")
         if self.n == 0:
             return other
         moved = other if np.array_equal(other.shift, self.shift) else other.shifted(self.shift)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.track import Motion
 
@@ -244,7 +245,7 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
         purges.append(purge_s)
         lost = np.count_nonzero(motion.valid & ~train & ~check) / motion.rate_hz
         notes.append(
-            f"{motion.log}: {number} block{'s' if number > 1 else ''} of {seconds / number:.0f} s; "
+            f"{motion.log}: {counted(number, 'block')} of {seconds / number:.0f} s; "
             f"{np.count_nonzero(train) / motion.rate_hz:.0f} s train, "
             f"{np.count_nonzero(check) / motion.rate_hz:.0f} s validate, "
             f"{lost:.0f} s purged in gaps of {purge_s:.1f} s."

@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.files import dump_json, remove_abandoned, write_text
 from ferryid.identify.model import Model, from_json, to_json
@@ -157,7 +158,9 @@ def load_file(path: Path) -> Model:
     try:
         text = path.read_text(encoding="utf-8")
         if not text.strip("\0 \r\n\t"):
-            raise ValueError(f"its {len(text)} bytes hold nothing, as after a loss of power")
+            raise ValueError(
+                f"its {counted(len(text), 'byte')} {verb(len(text), 'holds')} nothing, as after a loss of power"
+            )
         data = json.loads(text)
     # Thousands of brackets, or of digits, end in errors of Python rather than of JSON.
     except (OSError, ValueError, RecursionError) as error:

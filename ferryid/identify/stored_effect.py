@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects import Effect, effects
-from ferryid.effects.picture import COEFFICIENTS, LIFT, UNITS, Picture
+from ferryid.effects.force_model import COEFFICIENTS, LIFT, UNITS
+from ferryid.effects.force_model import ForceModel as Picture
 from ferryid.effects.wording import timed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.vessel.profile import Profile

@@ -14,10 +14,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.bases import forms
 from ferryid.identify.basis import STRUCTURES, Basis, sized
 from ferryid.identify.bootstrap import FEW_BLOCKS, block_seconds, percentiles, times_drawn
+from ferryid.identify.cautions import of_logs
 from ferryid.identify.choose import Studied, choose, force_free, pieces_of
 from ferryid.identify.compared import LEVEL, Compared, Ratios, Structure, StructureSweep, over_base
 from ferryid.identify.confidence_set import confidence_set
@@ -116,14 +118,15 @@ def sweep_structures(
         by[key] = compared(
             profile, settings, bases, pieces, min(MOST_GROUPS, len(opened)) if key == "logs" else folds, key == "logs"
         )
+    told = tuple(log_json(one, log) for one, log in zip(opened, pieces["modulus"], strict=True))
     return StructureSweep(
         profile.name,
-        tuple(log_json(one, log) for one, log in zip(opened, pieces["modulus"], strict=True)),
+        told,
         settings,
         block_s,
         by,
         unusable,
-        tuple(_notes(by, settings)),
+        (*_notes(by, settings), *of_logs([(log["name"], log["warnings"]) for log in told])),
     )
 
 
@@ -325,7 +328,9 @@ def _notes(by: Mapping[str, Compared], settings: FitSettings) -> list[str]:
         if least >= 1.0:
             notes.append(f"By {BY[key]} none predicts force better than the base model does without any.")
     if blocks.blocks < FEW_BLOCKS:
-        notes.append(f"Only {blocks.blocks} independent stretches to draw from: the intervals are probably too narrow.")
+        notes.append(
+            f"Only {counted(blocks.blocks, 'independent stretch')} to draw from: the intervals are probably too narrow."
+        )
     if settings.components == "auto" and any(one.folds < 3 for one in by.values()):
         notes.append("With two folds the number of components was chosen on both: errors are a little too small.")
     if settings.residual != "measured":

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.effects.wording import listed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.archive import archive_folds
 from ferryid.identify.basis import Basis
+from ferryid.identify.cautions import of_logs
 from ferryid.identify.choose import (
     Choice,
     Studied,
@@ -48,7 +50,7 @@ class Sweep:
     what
         One of `KINDS`.
     vessel, logs
-        Name of the vessel; of each log its name, SHA-256, seconds and rows.
+        Name of the vessel; of each log its name, SHA-256, seconds, rows and warnings.
     settings
         How was fitted; its basis is the one that all logs allow.
     windows_s
@@ -151,7 +153,7 @@ def sweep(
         replace(settings, basis=functions.name),
         windows,
         by,
-        tuple(_notes(by, windows, settings)),
+        (*_notes(by, windows, settings), *of_logs([(log["name"], log["warnings"]) for log in told])),
     )
 
 
@@ -196,13 +198,14 @@ def read_logs(
 
 
 def log_json(one: Opened, log: Studied) -> dict[str, Any]:
-    """Return name, hash and length of a log."""
+    """Return name, hash, length and warnings of a log."""
     rows = int(log.test.n.sum())
     return {
         "name": one.recording.name,
         "sha256": one.recording.sha256,
         "seconds": rows / one.measured.rate_hz,
         "rows": rows,
+        "warnings": [*one.doubts, *one.left_out],
     }
 
 
@@ -218,7 +221,9 @@ def _notes(by: Mapping[str, Choice], windows_s: Sequence[float], settings: FitSe
             axes = listed([axis for axis, held in zip(AXES, one.held, strict=True) if held])
             notes.append(f"By {BY[key]} the base model's inertia was held in {axes}, as a fit does.")
         if one.curves.folds < FOLDS:
-            notes.append(f"Only {one.curves.folds} folds by {BY[key]}: their scatter, and so the choice, is rough.")
+            notes.append(
+                f"Only {counted(one.curves.folds, 'fold')} by {BY[key]}: their scatter, and so the choice, is rough."
+            )
     if len(windows_s) > 1 and blocks.window_s in (windows_s[0], windows_s[-1]):
         end = "shortest" if blocks.window_s == windows_s[0] else "longest"
         notes.append(f"The window chosen is the {end} that was tried.")
@@ -228,8 +233,7 @@ def _notes(by: Mapping[str, Choice], windows_s: Sequence[float], settings: FitSe
 
 
 def _told(choice: Choice) -> str:
-    many = "component" if choice.components == 1 else "components"
-    return f"{choice.components} {many} at a window of {choice.window_s:g} s"
+    return f"{counted(choice.components, 'component')} at a window of {choice.window_s:g} s"
 
 
 def sweep_json(found: Sweep, report: str | None = None) -> dict[str, Any]:
@@ -271,7 +275,7 @@ def render_sweep(found: Sweep) -> str:
     """Return a sweep for a terminal."""
     lines = [headline(found), ""]
     for key, choice in found.by.items():
-        title = f"by {BY[key]}, {choice.curves.folds} folds, {choice.curves.rows} rows"
+        title = f"by {BY[key]}, {counted(choice.curves.folds, 'fold')}, {counted(choice.curves.rows, 'row')}"
         lines += [title, *(_matrix(found, choice) if found.what == "both" else _table(found, choice)), ""]
     lines += [f"note: {note}" for note in found.notes]
     return "\n".join(lines).rstrip()

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.signals.align import segments
-from ferryid.signals.track import Motion
+from ferryid.signals.track import Motion, segments
 
 Floats = NDArray[np.float64]
 

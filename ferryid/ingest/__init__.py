@@ -7,15 +7,15 @@ import pkgutil
 from functools import cache
 from pathlib import Path
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest import formats
 from ferryid.ingest.log import Format, Reader, TableLayout
 from ferryid.ingest.printable_names import printable_names
 
-__all__ = ["existing_parts", "open_log", "supported_formats"]
+__all__ = ["existing_parts", "log_suffixes", "open_log", "supported_formats"]
 
 HEAD_BYTES = 64
-PART_SUFFIXES = (".bag", ".bag.active", ".mcap", ".mcap.zstd", ".db3", ".db3.zstd")
 
 
 @cache
@@ -25,6 +25,11 @@ def supported_formats() -> tuple[Format, ...]:
     modules = [importlib.import_module(f"{formats.__name__}.{name}") for name in names]
     found: list[Format] = [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
     return tuple(sorted(found, key=lambda entry: entry.order))
+
+
+def log_suffixes(*, parts: bool = False) -> tuple[str, ...]:
+    """Return how the names of logs end, in every format; with `parts`, of those whose files are parts of a recording."""
+    return tuple(suffix for entry in supported_formats() if entry.parts or not parts for suffix in entry.suffixes)
 
 
 def open_log(path: str | Path, layout: TableLayout | None = None) -> Reader:
@@ -105,11 +110,11 @@ def _open_folder(folder: Path, layout: TableLayout | None) -> Reader:
     for entry in supported_formats():
         if entry.matches(folder, b""):
             return _opened(entry, folder, layout)
-    parts = sorted(file for file in folder.iterdir() if file.is_file() and file.name.endswith(PART_SUFFIXES))
+    parts = sorted(file for file in folder.iterdir() if file.is_file() and file.name.endswith(log_suffixes(parts=True)))
     if not parts:
         inside = sorted(file.name for file in folder.iterdir())
         found = (
-            f"{len(inside)} entries ({', '.join(inside[:3])}{', …' if len(inside) > 3 else ''})"
+            f"{counted(len(inside), 'entry')} ({', '.join(inside[:3])}{', …' if len(inside) > 3 else ''})"
             if inside
             else "nothing"
         )

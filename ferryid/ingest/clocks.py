@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.ingest.log import Nanoseconds, Series
 from ferryid.ingest.stray_times import stray_times
 
@@ -232,14 +233,19 @@ def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ..
     if zeros == count and not (count > 1 and stamp.max() == 0 and stamp.min() < 0):
         return "all stamps are zero", (), stamp, _Facts()
     if zeros * 100 > count and zeros > 1:
-        return f"{zeros} of {count} stamps are zero", (), stamp, _Facts()
+        return f"{zeros} of {counted(count, 'stamp')} {verb(zeros, 'is')} zero", (), stamp, _Facts()
     notes: list[str] = []
     steps = np.diff(stamp)
     repeated = int(np.count_nonzero(steps == 0))
     if count > 2 and repeated == count - 1:
         return "all stamps are the same", (), stamp, _Facts()
     if repeated * 5 > count:
-        return f"{repeated} of {count} stamps repeat the one before", (), stamp, _Facts()
+        return (
+            f"{repeated} of {counted(count, 'stamp')} {verb(repeated, 'repeats')} the one before",
+            (),
+            stamp,
+            _Facts(),
+        )
     latency = receive - stamp
     usual = _median(latency[~unset] if zeros else latency)
     replaced = 0
@@ -248,10 +254,10 @@ def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ..
     if strange.any():
         replaced = int(np.count_nonzero(strange))
         if replaced * 100 > max(count, 200):
-            return f"{replaced} of {count} stamps make no sense", (), stamp, _Facts()
+            return f"{replaced} of {counted(count, 'stamp')} {verb(replaced, 'makes')} no sense", (), stamp, _Facts()
         stamp = np.where(strange, receive - usual, stamp)
         latency = np.where(strange, usual, latency)
-        notes.append(f"{replaced} senseless stamps replaced by receive time less the usual latency")
+        notes.append(f"{counted(replaced, 'senseless stamp')} replaced by receive time less the usual latency")
     # Receive time and stamp advance alike unless a message was held up or a clock was set.
     jumps = np.flatnonzero(np.abs(np.diff(latency)) > _STEP_NS)
     if len(jumps) * 10 > count:
@@ -267,10 +273,12 @@ def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ..
         by_sender = sum(_is_senders(receive, stamp, place) for place in sets)
         where = f"{sets[0] + 1} of {count}"
         if by_sender:
-            reason = f"the sender's clock was set {by_sender} time(s) during the recording, first at row {where}"
+            reason = (
+                f"the sender's clock was set {counted(by_sender, 'time')} during the recording, first at row {where}"
+            )
             return reason, tuple(notes), stamp, facts
         notes.append(
-            f"the recorder's clock was set {len(sets)} time(s) during the recording, first at row {where}: stamps are "
+            f"the recorder's clock was set {counted(len(sets), 'time')} during the recording, first at row {where}: stamps are "
             "used, topics without stamps may be off"
         )
         return "", tuple(notes), stamp, facts
@@ -321,7 +329,8 @@ def _ordered(
     if stray.any():
         strays = int(np.count_nonzero(stray))
         told.append(
-            f"{strays} of {count} rows left out, first row {int(np.argmax(stray)) + 1}: the time contradicts that of the "
+            f"{strays} of {counted(count, 'row')} left out, first row {int(np.argmax(stray)) + 1}: the time "
+            "contradicts that of the "
             "rows before and after"
         )
         rows, times, late = rows[~stray], times[~stray], late[~stray]
@@ -333,8 +342,8 @@ def _ordered(
             resets += backward
             far = len(times) - (stop - start)
             told.append(
-                f"time jumps back {backward} time(s), the clock was set or several runs follow one another: only the "
-                f"longest stretch of {stop - start} rows is used, {far} rows are left out"
+                f"time jumps back {counted(backward, 'time')}, the clock was set or several runs follow one another: only the "
+                f"longest stretch of {counted(stop - start, 'row')} is used, {counted(far, 'row')} {verb(far, 'is')} left out"
             )
             rows, times = rows[start:stop], times[start:stop]
             steps = np.diff(times)

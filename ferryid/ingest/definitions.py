@@ -19,6 +19,7 @@ from rosbags.typesys.base import make_typesdict
 from rosbags.typesys.idl import IDLParser
 from rosbags.typesys.peg import Success
 
+from ferryid.counts import counted
 from ferryid.ingest.layout import EMPTY_MEMBER, MAX_DEPTH, SIZES
 
 Types = dict[str, tuple[list[Any], list[Any]]]
@@ -170,7 +171,7 @@ def checked(types: Types, *, empty_bytes: int) -> Types:
         classes.add(name.replace("/", "__"))
         kept[name] = ([entry for entry in constants if _writable(entry[2])], fields)
     if len(classes) < len(types):
-        raise DefinitionError("holds two types whose names rosbags cannot tell apart")
+        raise DefinitionError("holds two types whose names rosbags cannot distinguish")
     _Extents(kept, empty_bytes).check()
     return kept
 
@@ -239,7 +240,8 @@ class _Extents:
             raise DefinitionError(f"is nested more than {MAX_DEPTH} deep")
         if whole.leaves > MAX_FIELDS or whole.text > MAX_FIELD_TEXT:
             raise DefinitionError(
-                f"has {whole.leaves} fields with {whole.text} characters, at most {MAX_FIELDS} with {MAX_FIELD_TEXT} "
+                f"has {counted(whole.leaves, 'field')} with {counted(whole.text, 'character')}, at most "
+                f"{MAX_FIELDS} with {MAX_FIELD_TEXT} "
                 "can be listed"
             )
         if whole.instances > MAX_INSTANCES:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import Loss, Reader, Series, Topic
 
@@ -49,7 +50,7 @@ class JoinedReader:
         for name in wanted:
             if name not in known:
                 raise FerryIdError(
-                    f"{where}: no topic {name}, found {len(known)} others in the parts. "
+                    f"{where}: no topic {name}, found {counted(len(known), 'other')} in the parts. "
                     f"Fix: name one of them.{did_you_mean(name, known)}"
                 )
             if len(types := known[name]) > 1:
@@ -95,7 +96,8 @@ def _refuse_copies(parts: Sequence[Reader]) -> None:
             first = seen.setdefault((topic.name, topic.count, topic.start_ns, topic.end_ns), part)
             if first is not part:
                 raise FerryIdError(
-                    f"{part.paths[0]}: holds the same {topic.count} messages of {topic.name} as {first.paths[0]}, so that "
+                    f"{part.paths[0]}: holds the same {counted(topic.count, 'message')} of {topic.name} as "
+                    f"{first.paths[0]}, so that "
                     "each would count twice. Fix: name one of them, or keep one of them in the folder"
                 )
 

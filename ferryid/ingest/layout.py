@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 
 PRIMITIVES: Mapping[str, str] = {
@@ -221,7 +222,7 @@ class Walk:
         self.count(msgtype)
         # CDR messages may carry up to three bytes of padding behind the last field.
         if not self.position <= size <= self.position + (3 if self.cdr else 0):
-            raise LayoutError(f"{size} bytes, the schema takes {self.position}")
+            raise LayoutError(f"{counted(size, 'byte')}, the schema takes {self.position}")
         if len(self.lengths) > MAX_CHECKS:
             raise LayoutError("too many lengths to check")
         return Layout(size, self.places, tuple(self.lengths), tuple(self.zeros))

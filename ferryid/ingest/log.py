@@ -188,9 +188,15 @@ class Format:
         ``open(path, layout)`` returns a Reader, or raises FerryIdError.
     order
         Formats are asked in ascending order; those that recognise content come before those that go by the name.
+    suffixes
+        How the names of its files usually end, in lower case; empty for a folder.
+    parts
+        True where files in one folder whose names end so are the parts of one recording.
     """
 
     name: str
     matches: Any
     open: Any
     order: int = 50
+    suffixes: tuple[str, ...] = ()
+    parts: bool = False

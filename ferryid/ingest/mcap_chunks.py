@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.ingest.checksum import crc32
 from ferryid.ingest.log import Loss
 from ferryid.ingest.mcap_index import (
@@ -190,7 +191,11 @@ def without_copies(buffer: Bytes, messages: Messages, surplus: bool = False) -> 
 
 def copies_lost(name: str, count: int) -> Loss:
     """Return the loss that reports copies left out."""
-    return Loss(name, f"{count} messages are in the file twice, byte for byte; the copies were left out", messages=0)
+    return Loss(
+        name,
+        f"{counted(count, 'message')} {verb(count, 'is')} in the file twice, byte for byte; the copies were left out",
+        messages=0,
+    )
 
 
 def check_covered(data: Bytes, offsets: NDArray[np.int64]) -> list[tuple[int, int, int]]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from mcap.records import Channel, Schema
 
+from ferryid.counts import counted, verb
 from ferryid.ingest.log import Loss
 from ferryid.ingest.mcap_chunks import (
     check_covered,
@@ -77,7 +78,7 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
         index.losses.append(behind)
     if reason is not None:
         found = sum(index.counts().values())
-        what = f"{reason}; the index was rebuilt by walking the whole file, which found {found} messages"
+        what = f"{reason}; the index was rebuilt by walking the whole file, which found {counted(found, 'message')}"
         index.losses.insert(0, Loss(name, what, messages=0))
     conflicts = list(dict.fromkeys(index.conflicts))
     index.losses += [Loss(name, conflict) for conflict in conflicts[:MAX_CONFLICTS]]
@@ -86,7 +87,9 @@ def read_index(file: memoryview, whole_file: Bytes, name: str) -> Index:
         index.losses.append(Loss(name, what))
     late = sum(chunk.end_ns == LATEST_NS for chunk in index.chunks)
     if late:
-        what = f"{late} chunks state times of 2**63 ns or later, which cannot be represented"
+        what = (
+            f"{counted(late, 'chunk')} {verb(late, 'states')} times of 2**63 ns or later, which cannot be represented"
+        )
         index.losses.append(Loss(name, what, messages=0))
     return index
 
@@ -111,7 +114,9 @@ def _moved_summary(file: memoryview, data_end: int, name: str) -> Index | None:
     except DamagedRecord:
         return None
     if summary is not None:
-        moved = f"{abs(start - place)} bytes {'before' if place < start else 'behind'} where the footer has it"
+        moved = (
+            f"{counted(abs(start - place), 'byte')} {'before' if place < start else 'behind'} where the footer has it"
+        )
         what = f"the summary stands {moved}: bytes of the file are missing or were added"
         summary.losses.append(Loss(name, what))
         _check_statistics(summary, len(file), name)
@@ -132,7 +137,7 @@ def _check_statistics(index: Index, size: int, name: str) -> None:
     possible = (size + expanded) // MESSAGE_HEADER
     if stated > possible or (counts and sum(counts.values()) != stated):
         what = (
-            f"the file's own statistics cannot be true ({stated} messages, {sum(counts.values())} when added up by "
+            f"the file's own statistics cannot be true ({counted(stated, 'message')}, {sum(counts.values())} when added up by "
             "channel) and were not used"
         )
         index.losses.append(Loss(name, what, messages=0))
@@ -243,7 +248,10 @@ def _check_loose(index: Index, whole_file: Bytes, name: str) -> None:
     if len(times):
         odd |= ((kept.log_ns < times.min()) | (kept.log_ns > times.max())) & (surplus | ~defined)
     if odd.any():
-        what = f"{int(odd.sum())} records that look like messages of other channels or times were left out"
+        what = (
+            f"{counted(int(odd.sum()), 'record')} that {verb(int(odd.sum()), 'looks')} like messages of "
+            f"other channels or times {verb(int(odd.sum()), 'was')} left out"
+        )
         index.losses.append(Loss(name, what))
         kept = kept.take(~odd)
     index.loose = kept

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ferryid.counts import counted, verb
 from ferryid.ingest.log import Loss
 from ferryid.ingest.mcap_index import (
     ATTACHMENT,
@@ -83,13 +84,16 @@ def scan(file: memoryview, name: str) -> Index:
         index.loose, _ = message_table(np.frombuffer(file, np.uint8), np.array(found.offsets, np.int64))
     index.losses += _gaps(index, found.gaps, len(file), name)
     if found.chunks:
-        what = f"{len(found.chunks)} chunks state two different sizes; the one that leads to the next record was taken"
+        what = (
+            f"{counted(len(found.chunks), 'chunk')} {verb(len(found.chunks), 'states')} two different "
+            "sizes; the one that leads to the next record was taken"
+        )
         index.losses.append(Loss(name, what, messages=0))
     if odd:
         size = sum(RECORD_HEADER + length for _, _, length in odd)
         kind, first, _ = min(odd, key=lambda record: record[1])
         what = (
-            f"{len(odd)} damaged, unknown or misplaced records ({size} bytes) were passed over, the first of kind "
+            f"{len(odd)} damaged, unknown or misplaced records ({counted(size, 'byte')}) were passed over, the first of kind "
             f"0x{kind:02X} at byte {first}"
         )
         index.losses.append(Loss(name, what))
@@ -144,12 +148,15 @@ def unread_behind(file: memoryview, data_end: int, name: str) -> Loss | None:
     """Report what stands behind the data and is not of their summary: another log, or messages of unknown channels."""
     closed = _MAGIC.search(file, data_end)
     if closed is not None and closed.end() < len(file):
-        what = f"{len(file) - closed.end()} bytes behind the end of the log, from byte {closed.end()} on, are not read"
+        what = (
+            f"{counted(len(file) - closed.end(), 'byte')} behind the end of the log, from byte "
+            f"{closed.end()} on, are not read"
+        )
         return Loss(name, what)
     if data_end < len(file):
         start = _next_record(file, walk(file, data_end, len(file))[2], len(file), range(1 << 16))
         if start is not None:
-            what = f"{len(file) - start} bytes behind the end of the data hold records that are not read"
+            what = f"{counted(len(file) - start, 'byte')} behind the end of the data hold records that are not read"
             return Loss(name, what)
     return None
 
@@ -309,7 +316,10 @@ def _chunks(file: memoryview, found: _Found, odd: list[Record], index: Index, na
         else:
             distinct.append((chunk, records))
     if len(distinct) < len(groups):
-        what = f"{len(groups) - len(distinct)} chunks are in the file twice, byte for byte; the copies were left out"
+        what = (
+            f"{counted(len(groups) - len(distinct), 'chunk')} {verb(len(groups) - len(distinct), 'is')} in "
+            "the file twice, byte for byte; the copies were left out"
+        )
         index.losses.append(Loss(name, what, messages=0))
     broken = {start for start, _ in found.gaps}
     return [_with_index(file, chunk, records, broken) for chunk, records in distinct]
@@ -354,13 +364,17 @@ def _gaps(index: Index, gaps: Sequence[tuple[int, int]], size: int, name: str) -
             what = "the file ends without its end record, and whatever followed is missing"
             if start < size:
                 what = (
-                    f"the file ends without its end record: its last {size - start} bytes, from byte {start} on, are damaged "
+                    f"the file ends without its end record: its last {counted(size - start, 'byte')}, from "
+                    f"byte {start} on, are damaged "
                     "or cut off, and what they held is missing"
                 )
             yield Loss(name, what, None, None, last, None)
         else:
-            what = f"{stop - start} damaged bytes from byte {start} were passed over"
+            what = f"{counted(stop - start, 'damaged byte')} from byte {start} were passed over"
             yield Loss(name, what, None, None, last, min((time for time in after if time >= 0), default=None))
     if more:
         lost = sum(stop - start for start, stop in more)
-        yield Loss(name, f"{lost} damaged bytes in {len(more)} places from byte {more[0][0]} on were passed over")
+        yield Loss(
+            name,
+            f"{counted(lost, 'damaged byte')} in {counted(len(more), 'place')} from byte {more[0][0]} on were passed over",
+        )

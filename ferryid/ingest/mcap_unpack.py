@@ -14,6 +14,7 @@ import lz4.frame
 import numpy as np
 import zstandard
 
+from ferryid.counts import counted
 from ferryid.ingest.mcap_index import Bytes, Chunk, DamagedRecord
 
 MAX_CHUNK = 256 << 20
@@ -36,7 +37,7 @@ class Unpacker:
         size = chunk.uncompressed_size
         if size > MAX_CHUNK or (size > MAX_DENSE_CHUNK and size > MAX_RATIO * chunk.compressed_size):
             raise DamagedRecord(
-                f"a chunk states {size} bytes when decompressed, from {chunk.compressed_size}: more than are read"
+                f"a chunk states {counted(size, 'byte')} when decompressed, from {chunk.compressed_size}: more than are read"
             )
         if chunk.refused:
             raise DamagedRecord(f"the chunks of the file state more than {MAX_RATIO} times its size when decompressed")

@@ -13,6 +13,7 @@ import lz4.frame
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.ingest.rosbag1_records import (
     COMPRESSIONS,
     CONNECTION,
@@ -84,7 +85,7 @@ def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool, 
     """
     stored = memoryview(data)[chunk.start : min(chunk.end, len(data))]
     cut = "it is cut off" if chunk.end > len(data) else ""
-    stated = f"its stated size of {chunk.size} bytes is wrong"
+    stated = f"its stated size of {counted(chunk.size, 'byte')} is wrong"
     if chunk.compression == "none":
         return Content(stored, cut or (stated if len(stored) != chunk.size else ""), not cut)
     if chunk.compression not in COMPRESSIONS:
@@ -102,9 +103,9 @@ def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool, 
     allowance.left -= len(content)
     if not fault and not eof:
         fault = (
-            f"it expands to more than the {limit} bytes that are allowed"
+            f"it expands to more than the {counted(limit, 'byte')} that are allowed"
             if len(content) == limit
-            else f"{len(content)} of {chunk.size} bytes decompress"
+            else f"{len(content)} of {counted(chunk.size, 'byte')} decompress"
         )
     return Content(content, cut or fault or (stated if len(content) != chunk.size else ""), eof and not cut)
 

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
+
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 # A record header holds a few names, a topic among them; anything longer is damage.
@@ -189,7 +191,7 @@ class Records:
 def connection_of(data: Any, record: Record) -> Connection:
     """Read a connection record."""
     if record.end - record.start > MAX_CONNECTION_BYTES or record.end > len(data):
-        raise RecordError(f"a connection of {record.end - record.start} bytes at byte {record.position}")
+        raise RecordError(f"a connection of {counted(record.end - record.start, 'byte')} at byte {record.position}")
     inner: dict[bytes, bytes] = {}
     cursor, stop = record.start, record.end
     while cursor + 4 <= stop:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted, verb
 from ferryid.ingest.log import Loss
 from ferryid.ingest.rosbag1_chunks import Allowance, decompressed, missing, walk_chunk
 from ferryid.ingest.rosbag1_records import (
@@ -347,7 +348,7 @@ def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss
         lost.append(Loss(file, what, None, messages, start_ns, end_ns))
 
     count = sum(chunk.count(number) for chunk in found.chunks for number in chunk.connections)
-    add(f"the index cannot be used ({error}): a walk over all records found {count} messages without it", 0)
+    add(f"the index cannot be used ({error}): a walk over all records found {counted(count, 'message')} without it", 0)
     _add_chunks(data, found, add)
     try:
         header = Records(data).at(len(MAGIC))
@@ -360,7 +361,9 @@ def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss
         add(*_estimate(data, found.chunks, announced))
     for info in found.missing:
         messages = sum(info.counts.values())
-        what = f"the chunk at byte {info.chunk} is damaged: its {messages} messages are lost"
+        what = (
+            f"the chunk at byte {info.chunk} is damaged: its {counted(messages, 'message')} {verb(messages, 'is')} lost"
+        )
         add(what, messages, info.start_ns, info.end_ns)
     reported = {info.chunk for info in found.missing}
     index = found.index if found.index is not None else size
@@ -401,10 +404,13 @@ def _add_chunks(data: Any, found: Walked, add: Callable[..., None]) -> None:
         if chunk.end > len(data):
             what = (
                 f"the file ends in the chunk at byte {chunk.position}, which has {len(data) - chunk.start} of its "
-                f"{chunk.end - chunk.start} bytes: {kept} messages of it are intact"
+                f"{counted(chunk.end - chunk.start, 'byte')}: {counted(kept, 'message')} of it {verb(kept, 'is')} intact"
             )
         else:
-            what = f"the chunk at byte {chunk.position} is damaged, {fault}: {kept} messages of it are intact"
+            what = (
+                f"the chunk at byte {chunk.position} is damaged, {fault}: {counted(kept, 'message')} of it "
+                f"{verb(kept, 'is')} intact"
+            )
         counts = chunk.counts
         lost = None if counts is None else sum(max(0, n - chunk.count(one)) for one, n in counts.items())
         add(what, lost, chunk.start_ns, chunk.end_ns)

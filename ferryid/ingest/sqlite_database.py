@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 
 Job = TypeVar("Job")
@@ -59,7 +60,7 @@ class Database:
         page = 65536 if page == 1 else page
         if len(head) < 100 or head[:16] != MAGIC or page < 512 or page & (page - 1):
             raise FerryIdError(
-                f"{name}: not a readable SQLite database, the header of its {self.bytes} bytes is damaged or cut "
+                f"{name}: not a readable SQLite database, the header of its {counted(self.bytes, 'byte')} is damaged or cut "
                 "off. Fix: give the .db3 file as rosbag2 recorded it"
             )
         self.page = page
@@ -70,7 +71,9 @@ class Database:
     def cut(self) -> str:
         """What is to be reported of a file that is shorter than its header states, or an empty string."""
         return (
-            f"the file ends after {self.bytes} bytes of {self.stated_bytes}" if self.bytes < self.stated_bytes else ""
+            f"the file ends after {counted(self.bytes, 'byte')} of {self.stated_bytes}"
+            if self.bytes < self.stated_bytes
+            else ""
         )
 
     def connect(self) -> sqlite3.Connection:
@@ -112,7 +115,8 @@ class Database:
         """
         if isinstance(error, sqlite3.OperationalError) and "interrupted" in str(error):
             raise FerryIdError(
-                f"{self.name}: reading does not end after more steps than a file of {self.bytes} bytes can take, its "
+                f"{self.name}: reading does not end after more steps than a file of "
+                f"{counted(self.bytes, 'byte')} can take, its "
                 "pages refer to each other in circles. Fix: recover it with sqlite3's .recover"
             ) from error
         return error

@@ -15,6 +15,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.ingest.sqlite_database import FAULTS, Database
 
 Integers = NDArray[np.int64]
@@ -248,7 +249,7 @@ def _compared(
             complete = database.index_entries() <= listed.size
             return Scan(rows, 0, stretches, complete, True, reason or "a page of the table is damaged")
         if extra := held.size - listed.size:
-            reason = f"the index {index} lacks {extra} of {held.size} rows"
+            reason = f"the index {index} lacks {extra} of {counted(held.size, 'row')}"
         return Scan(rows, invalid.size, (), not extra, True, reason)
     faults: list[str] = []
     if index:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, one_line
 from ferryid.ingest.arrow_columns import column_from_arrow
 from ferryid.ingest.log import Loss, Topic
@@ -137,15 +138,19 @@ def _load(sheet: TextSheet, names: tuple[str, ...]) -> Rows:
         if values.dtype.kind == "O" and name not in texts:
             values, unreadable = numbers_from_text(values, sheet.decimal, is_time=name in times)
             if unreadable:
-                what = f'{unreadable} cells of column "{name}" are not numbers and count as missing'
+                numbers = "is not a number and counts" if unreadable == 1 else "are not numbers and count"
+                what = f'{counted(unreadable, "cell")} of column "{name}" {numbers} as missing'
                 losses.append(Loss(str(sheet.path), what, sheet.topic.name))
         columns[name] = values
     losses += _wrong_rows(sheet, wrong, _cut_line(body))
     for reason, lines in body.dropped.items():
-        what = f"{len(lines)} rows with {reason} were left out (the first: {quoted(lines[0])})"
+        what = f"{counted(len(lines), 'row')} with {reason} {verb(len(lines), 'was')} left out (the first: {quoted(lines[0])})"
         losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=len(lines)))
     if body.undecodable:
-        what = f"{body.undecodable} rows hold bytes that are not {sheet.encoding} text: these characters are lost"
+        what = (
+            f"{counted(body.undecodable, 'row')} {verb(body.undecodable, 'holds')} bytes that are not "
+            f"{sheet.encoding} text: these characters are lost"
+        )
         losses.append(Loss(str(sheet.path), what, sheet.topic.name))
     return Rows(columns, tuple(losses))
 
@@ -172,7 +177,7 @@ def _wrong_rows(sheet: TextSheet, wrong: _Wrong, cut_line: str) -> list[Loss]:
         number, fields, text = wrong.first
         line = "" if number is None else f" near line {number + sheet.first_row}"
         what = (
-            f"{count} rows without {len(sheet.names)} fields were left out "
+            f"{counted(count, 'row')} without {counted(len(sheet.names), 'field')} {verb(count, 'was')} left out "
             f"(the first{line} has {fields}: {quoted(text)})"
         )
         losses.append(Loss(str(sheet.path), what, sheet.topic.name, messages=count))

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import TableLayout, Topic
 from ferryid.ingest.table_rows import TextSheet, quoted
@@ -27,7 +28,6 @@ from ferryid.ingest.tables import (
     with_stated_unit,
 )
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab", ".prn", ".log", ".out")
 _HEAD_BYTES = 1 << 16
 _LONGEST_HEAD = 1 << 22
 _HEAD_LINES = 8
@@ -35,6 +35,8 @@ _HEAD_LINES = 8
 _SAMPLE_LINES = 400
 _DAMAGED_LINES = 2
 """Lines without a number or the right number of fields that may stand between the column names and the rows."""
+_CONTROL = re.compile(rb"[\0-\x08\x0e-\x1f]")
+"""Characters that no text has; where every other line has one, a file is none."""
 _COMMA_NUMBER = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 _BEGINS_NUMBER = re.compile(r"\s*[+-]?\.?\d")
 _WORDS = {"true", "false", "nan", "inf", "-inf", "null", "none", ""}
@@ -135,7 +137,7 @@ def _decode(path: Path, head: bytes, layout: TableLayout | None) -> tuple[str, s
     wide = wanted.lower().replace("_", "-").startswith(("utf-16", "utf-32", "utf16", "utf32"))
     # Zeros at the end are what a power loss leaves of a row that was not written; they cost that row only.
     lines = head.rstrip(b"\0").splitlines()
-    if not wide and sum(b"\0" in line for line in lines) * 2 >= len(lines):
+    if not wide and sum(_CONTROL.search(line) is not None for line in lines) * 2 >= len(lines):
         raise FerryIdError(
             f"{path}: this is binary data, not a text table. Fix: pass a log in one of the known formats; for UTF-16 "
             'text without a byte-order mark set encoding = "utf-16-le" under [table] in the profile'
@@ -256,7 +258,9 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     if header < first:
         names = _split(lines[header], separator)
         if first - header > 1:
-            notes.append(f"{first - header - 1} line(s) between the column names and the first row skipped (units?)")
+            notes.append(
+                f"{counted(first - header - 1, 'line')} between the column names and the first row skipped (units?)"
+            )
     elif first > 0 and (header_names := _names_for(lines[first - 1], separator, width)) is not None:
         names, header = header_names, first - 1
     else:
@@ -264,9 +268,12 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
         notes.append("no header row: columns are named by their place")
     unread = ""
     if header == first and any(line.strip() for line in lines[:first]):
-        unread = f"{first} line(s) before the first row cannot be read: names of columns and rows may be lost with them"
+        unread = (
+            f"{counted(first, 'line')} before the first row cannot be read: names of columns and rows "
+            "may be lost with them"
+        )
     if header > 0:
-        notes.append(f"{header} line(s) before the table skipped")
+        notes.append(f"{counted(header, 'line')} before the table skipped")
     filled_rows = tuple(_rows(lines[first:], separator, width))
     shown = {"\t": "a tab", "whitespace": "white space"}.get(separator, f'"{separator}"')
     if separator != ",":
@@ -325,7 +332,11 @@ def _stated(path: Path, lines: Sequence[str], layout: TableLayout) -> _Shape:
         first += 1
     filled = [line for line in body if line.strip()]
     if not filled:
-        what = "a header and no rows" if names and not layout.columns else f"no rows after {layout.skip_rows} lines"
+        what = (
+            "a header and no rows"
+            if names and not layout.columns
+            else f"no rows after {counted(layout.skip_rows, 'line')}"
+        )
         raise FerryIdError(f"{path}: the table holds {what}. Fix: record or export the log again, or correct skip_rows")
     split = [_split(line, separator) for line in filled[:_SAMPLE_LINES]]
     width = Counter(len(fields) for fields in split).most_common(1)[0][0]
@@ -333,7 +344,7 @@ def _stated(path: Path, lines: Sequence[str], layout: TableLayout) -> _Shape:
         names = (*names, "")
     if width != len(names):
         raise FerryIdError(
-            f"{path}: {len(names)} column names but {width} fields in the rows, first {quoted(filled[0])}. "
+            f"{path}: {len(names)} column names but {counted(width, 'field')} in the rows, first {quoted(filled[0])}. "
             "Fix: correct columns, separator or skip_rows under [table] in the profile"
         )
     rows = tuple(fields for fields in split if len(fields) == width)

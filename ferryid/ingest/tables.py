@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.arrow_columns import MISSING_TIME
 from ferryid.ingest.log import Column, Loss, Series, TableLayout, Topic
@@ -131,7 +132,7 @@ def _series(sheet: Sheet, fields: tuple[str, ...]) -> tuple[Series, list[Loss], 
             if note:
                 notes.append(note)
         if (unreadable := int(np.sum(~stamped))) > 0:
-            notes.append(f"{unreadable} stamps are not readable and count as zero")
+            notes.append(f"{counted(unreadable, 'stamp')} {verb(unreadable, 'is')} not readable and count as zero")
     columns = {field: rows.columns[field] for field in fields}
     if not good.all():
         losses.append(_untimed(sheet, topic, time_ns, good))
@@ -182,7 +183,10 @@ def _untimed(sheet: Sheet, topic: str, time_ns: NDArray[np.int64], good: Mask) -
     before, after = np.flatnonzero(good[: bad[0]]), np.flatnonzero(good[bad[-1] :])
     return Loss(
         file=str(sheet.path),
-        what=f'{len(bad)} rows without a readable time in column "{sheet.time.column}" were left out',
+        what=(
+            f'{counted(len(bad), "row")} without a readable time in column "{sheet.time.column}" '
+            f"{verb(len(bad), 'was')} left out"
+        ),
         topic=topic,
         messages=len(bad),
         start_ns=int(time_ns[before[-1]]) if len(before) else None,
@@ -231,7 +235,9 @@ def with_stated_unit(plan: TimePlan, layout: TableLayout | None) -> TimePlan:
 def no_time(where: str, names: Sequence[str]) -> str:
     """Return the message for a table in which no column looks like a time."""
     likely = [name for name in names if has_time_word(name)]
-    found = f"{_listed(likely)} of {len(names)} columns, whose values do not rise" if likely else _listed(names)
+    found = (
+        f"{_listed(likely)} of {counted(len(names), 'column')}, whose values do not rise" if likely else _listed(names)
+    )
     return (
         f"{where}: no column of this table looks like a time, found {found}. "
         "Fix: name the time column as time under [table] in the profile, and its time_unit"

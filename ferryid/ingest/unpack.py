@@ -13,8 +13,9 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.files import scratch_folder
+from ferryid.files import remove_scratch, scratch_folder
 from ferryid.ingest.log import Loss
 
 PIECE_BYTES = {"zstd": 1 << 11, "lz4": 1 << 16}
@@ -140,7 +141,7 @@ def unpacked_batches(
 def working_folder(owner: object) -> Path:
     """Make a temporary folder that is removed together with its owner."""
     folder = scratch_folder()
-    weakref.finalize(owner, shutil.rmtree, folder, ignore_errors=True)
+    weakref.finalize(owner, remove_scratch, folder)
     return folder
 
 
@@ -218,7 +219,7 @@ def _unpack(path: Path, target: Path) -> tuple[Loss, ...]:
         except FAULTS as error:
             return (Loss(str(path), f"cannot be unpacked from byte {done} on ({error}): the rest is lost"),)
     if not stream.eof:
-        return (Loss(str(path), f"the compressed file is cut off after {done} bytes: the rest is lost"),)
+        return (Loss(str(path), f"the compressed file is cut off after {counted(done, 'byte')}: the rest is lost"),)
     return ()
 
 
@@ -226,13 +227,13 @@ def _check_size(path: Path, target: Path, size: int, allowed: int, unwritten: in
     """Refuse to unpack `size` bytes where they are too many; `unwritten` of them, by default all, need space on the disk."""
     if size > allowed:
         raise FerryIdError(
-            f"{path}: the compressed file is not unpacked, found that it holds {size} bytes or more, "
+            f"{path}: the compressed file is not unpacked, found that it holds {counted(size, 'byte')} or more, "
             f"at most {allowed} are taken from a file of this size. "
             "Fix: check that it is a recording, and unpack it by hand if it is"
         )
     free = shutil.disk_usage(target.parent).free - RESERVED_BYTES
     if (size if unwritten is None else unwritten) > free:
         raise FerryIdError(
-            f"{path}: the compressed file cannot be unpacked, {size} bytes or more do not fit into {target.parent}. "
+            f"{path}: the compressed file cannot be unpacked, {counted(size, 'byte')} or more do not fit into {target.parent}. "
             "Fix: free space there, or set TMPDIR to a folder on a larger disk"
         )

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MaxNLocator
 
-from ferryid.diagnose.result import HINT
+from ferryid.diagnose import HINT
 from ferryid.identify.result import AXES
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, UNITS, canvas, svg_text
 

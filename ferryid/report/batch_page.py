@@ -11,7 +11,8 @@ from pathlib import PurePath
 from typing import Any
 from urllib.parse import quote
 
-from ferryid.diagnose.result import HINT
+from ferryid.counts import counted
+from ferryid.diagnose import HINT
 from ferryid.identify.result import AXES
 from ferryid.report import batch_figures
 from ferryid.report.diagnosis_words import title
@@ -91,7 +92,7 @@ def _common(logs: Sequence[str]) -> str:
 
 
 def _headline(counts: Mapping[str, int]) -> str:
-    logs = f"{counts['logs']} log{'s' * (counts['logs'] != 1)}"
+    logs = counted(counts["logs"], "log")
     return f"{logs}, all done" if counts["logs"] == counts["done"] else f"{logs}, {counts['done']} done"
 
 
@@ -121,12 +122,27 @@ def _row(row: Mapping[str, Any]) -> dict[str, Any]:
         "effects": list(dict.fromkeys(title(one["effect"]) for one in findings)),
         "fit": "" if fit is None else "accepted" if fit["accepted"] else "not accepted",
         "fit_mse": None if fit is None else fit["normalised_mse"],
-        "warnings": len(fit["warnings"]) if fit else 0,
+        "warnings": list(dict.fromkeys(said for made in (fit, evaluation) if made for said in made["warnings"])),
+        "lost": _lost(row.get("lost")),
         "evaluated": None if evaluation is None else _mean_error(evaluation),
         "links": links,
         "bare": not (fit or evaluation or diagnosis),
         "seconds": sum(row["seconds"].values()),
         "peak": row["peak_bytes"],
+    }
+
+
+def _lost(lost: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return what a log lost, what of it is left out, both short, all sentences, and seconds of both to sort by."""
+    if lost is None:
+        return {"messages": "", "left_out": "", "says": [], "seconds": None}
+    parts = [counted(lost["messages"], "message")] if lost["messages"] else ["unknown"] if lost["unknown"] else []
+    parts += [f"{lost['seconds']:.1f} s"] if lost["seconds"] else []
+    return {
+        "messages": ", ".join(parts) + (" or more" if lost["unknown"] and lost["messages"] else ""),
+        "left_out": f"{lost['seconds_left_out']:.1f} s left out" if lost["rows_left_out"] else "",
+        "says": lost["says"],
+        "seconds": lost["seconds"] + lost["seconds_left_out"],
     }
 
 
@@ -166,7 +182,8 @@ def _findings(trends: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
             {
                 "title": f"{head}, {vessel}",
                 "svg": batch_figures.findings(every),
-                "caption": f"{head} in {len(logs)} logs, with their 95 % intervals. Hollow: a hint, less likely than not. "
+                "caption": f"{head} in {counted(len(logs), 'log')}, with their 95 % intervals. Hollow: a "
+                "hint, less likely than not. "
                 f"Grey: logs whose diagnosis did not find it.{order}",
             }
         )
@@ -192,7 +209,7 @@ def _errors(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
             {
                 "title": f"Force errors, {vessel}",
                 "svg": batch_figures.errors(own, dated),
-                "caption": f"Root-mean-square force error of {len(own)} logs. {fitted}{evaluated}",
+                "caption": f"Root-mean-square force error of {counted(len(own), 'log')}. {fitted}{evaluated}",
             }
         )
     return shown

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.effects.wording import listed
 from ferryid.identify.candidates import BASE
 from ferryid.identify.model import AXES
@@ -36,8 +37,8 @@ def about(scope: Row) -> str:
     blocks = scope["blocks"]
     length = f" of {scope['block_s']:.3g} s" if "block_s" in scope else ""
     return (
-        f"{scope['rows']} rows, {scope['seconds']:.0f} s, {blocks} block{'s' * (blocks != 1)}{length}, "
-        f"{scope['free_run']['starts']} free runs"
+        f"{counted(scope['rows'], 'row')}, {scope['seconds']:.0f} s, {counted(blocks, 'block')}{length}, "
+        f"{counted(scope['free_run']['starts'], 'free run')}"
     )
 
 
@@ -69,7 +70,7 @@ def _by_quantity(rows: Sequence[Row]) -> list[str]:
     for (kind, what), same in groups.items():
         place = f"on {what}" if kind == "force" else f"in {what}, run free for {same[0]['horizon_s']:g} s"
         others = [f"{row['second']} {number(row['ratio'])}{_span(row['low'], row['high'])}" for row in same]
-        says = "no difference is shown" if same[0]["low"] is not None else "there is too little data to tell"
+        says = "no difference is shown" if same[0]["low"] is not None else "there is too little data to decide"
         told.append(f"{place}, {same[0]['first']} errs least, but {says}: its error over that of {listed(others)}")
     return told
 
@@ -95,7 +96,7 @@ def _together(rows: Sequence[Row], labels: Sequence[str]) -> str:
         p = f", p {chance:.2f}" if chance is not None and np.isfinite(chance) else ""
         parts.append(f"{row['what']} {number(ratio)}{_span(low, high)}{p}")
     if rows[0]["low"] is None:
-        return f"too little data to tell {first} from {second}, error of the first over the second's: {listed(parts)}"
+        return f"too little data to distinguish {first} from {second}, error of the first over the second's: {listed(parts)}"
     return f"no difference shown between {first} and {second}, error of the first over the second's: {listed(parts)}"
 
 
@@ -113,7 +114,7 @@ def headline(result: Row) -> str:
     known = scopes(result)
     models = [model["label"] for model in result["models"]]
     if not known:
-        return f"{len(models)} models by their coefficients alone: no log was given to judge them on."
+        return f"{counted(len(models), 'model')} by their coefficients alone: no log was given to judge them on."
     on, title, _ = known[-1]
     groups: dict[tuple[str, str], list[str]] = {}
     for axis in AXES:
@@ -121,13 +122,13 @@ def headline(result: Row) -> str:
         best = _best(rows, rows[0])
         own = [row for row in rows if row["first"] == best]
         if any(row["ratio"] is None for row in rows):
-            sure = "as far as can be told"
+            sure = "as far as the data show"
         elif all(row["better"] for row in own):
             sure = (
                 "beyond chance" if all(row["evidence"] for row in own) else "where it was trained, which is no evidence"
             )
         else:
-            sure = "which may be chance" if own[0]["p"] is not None else "with too little data to tell"
+            sure = "which may be chance" if own[0]["p"] is not None else "with too little data to decide"
         groups.setdefault((best, sure), []).append(axis)
     told = [f"{best} on {listed(axes)}, {sure}" for (best, sure), axes in groups.items()]
     return f"Least force error, {title}: {'; '.join(told)}."

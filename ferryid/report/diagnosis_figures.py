@@ -12,8 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ferryid.diagnose.profiles import Profiled
-from ferryid.diagnose.result import AXES, Diagnosis, Finding
+from ferryid.diagnose import AXES, Diagnosis, Finding, Profiled
 from ferryid.report.figures import (
     BASE,
     MEASURED,
@@ -28,7 +27,9 @@ from ferryid.report.figures import (
     plain_log,
     svg_text,
 )
+from ferryid.report.left_out import shade_left_out
 from ferryid.report.structure import envelope
+from ferryid.signals.track import LeftOut
 
 PROFILES = 4
 """Profiles that are drawn, the most telling ones; all are in the JSON."""
@@ -80,14 +81,15 @@ def in_frequency(finding: Finding) -> str:
         return svg_text(figure)
 
 
-def in_time(finding: Finding) -> str:
+def in_time(finding: Finding, left_out: Sequence[LeftOut] = ()) -> str:
     """Draw what was left over before and after a finding against time; when it acts is shaded, its ends marked."""
     evidence = finding.evidence
     t = evidence["t"]
     with mpl.rc_context(STYLE):
-        figure, (ax,) = canvas(1, 3.2)
-        for first, last in finding.intervals:
-            ax.axvspan(first, last, color=SHADE, linewidth=0)
+        figure, (ax,) = canvas(1, 3.4, top=0.55)
+        for k, (first, last) in enumerate(finding.intervals):
+            ax.axvspan(first, last, color=SHADE, linewidth=0, label="acts" if k == 0 else None)
+        shade_left_out(ax, left_out, t[0], t[-1])
         for k, (_, time) in enumerate(finding.ends):
             ax.axvline(time, color=MEASURED, linewidth=0.9, linestyle="--", label="its ends" if k == 0 else None)
         ax.plot(*envelope(t, evidence["before"]), color=BASE, label=WITHOUT if "after" in evidence else "left over")
@@ -97,7 +99,7 @@ def in_time(finding: Finding) -> str:
             ax.plot(*envelope(t, evidence["explained"]), color=MEASURED, linewidth=1.5, label=FOUND)
         ax.set_xlabel("time [s]")
         ax.set_ylabel(finding.labels.get("residual", "left over"))
-        legend_above(figure, ax, 4)
+        legend_above(figure, ax, 3)
         return svg_text(figure)
 
 
@@ -133,6 +135,7 @@ def left_over(diagnosis: Diagnosis) -> str:
     with mpl.rc_context(STYLE):
         figure, axes = canvas(3, 5.2)
         for j, ax in enumerate(axes):
+            shade_left_out(ax, diagnosis.left_out, evidence["t"][0], evidence["t"][-1])
             for name, colour, label in (("before", BASE, "before"), ("after", NEW, "after")):
                 if name in evidence and (name == "before" or diagnosis.findings):
                     ax.plot(*envelope(evidence["t"], evidence[name][:, j]), color=colour, label=label)
@@ -142,8 +145,8 @@ def left_over(diagnosis: Diagnosis) -> str:
             ax.axhline(0.0, color="#888888", linewidth=0.7)
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")
-        if diagnosis.findings:
-            legend_above(figure, axes[0], 2)
+        if diagnosis.findings or diagnosis.left_out:
+            legend_above(figure, axes[0], 3)
         return svg_text(figure)
 
 
@@ -316,7 +319,14 @@ def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
     if not all(len(evidence.get(name, ())) > 1 for name in ("t", "before")):
         return ()
     both = " Orange: before; blue: with the findings." if diagnosis.findings else ""
-    shown = [("left-over", left_over(diagnosis), f"Force that the model leaves unexplained, over the whole log.{both}")]
+    apart = " Shaded: what is left out of the log." if diagnosis.left_out else ""
+    shown = [
+        (
+            "left-over",
+            left_over(diagnosis),
+            f"Force that the model leaves unexplained, over the whole log.{both}{apart}",
+        )
+    ]
     located = diagnosis.located
     if located is None:
         for column, label in (("heading", "heading [deg]"), ("speed", "speed [m/s]")):
@@ -327,7 +337,7 @@ def figures_of(diagnosis: Diagnosis) -> Sequence[tuple[str, str, str]]:
     for k, one in enumerate(located.profiles[:PROFILES], 1):
         caption = (
             f"Its mean square by {one.name}, over that of the noise that remains; shaded: what noise alone would give. Bins "
-            f"with too few windows to tell are left out.{both}"
+            f"with too few windows are left out.{both}"
         )
         shown.append((f"regime-{k}", in_regime(diagnosis, one), caption))
     if located.bands:

@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.result import AXES, Diagnosis, Finding
+from ferryid.counts import counted
+from ferryid.diagnose import AXES, Diagnosis, Finding, campaign_verdict
 from ferryid.identify.result import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
 from ferryid.report.figures import Floats
 from ferryid.report.html import template
+from ferryid.report.left_out import left_out_table
+from ferryid.signals.track import LeftOut
 
 MAX_LOGS = 6
 """Logs whose evidence is drawn; the page stays readable."""
@@ -31,7 +34,7 @@ def render(
     left = [one.log for one in diagnoses[MAX_LOGS:]]
     page = template("diagnosis.html").render(
         title=title,
-        verdict=diagnosis_words.overall(diagnoses),
+        verdict=campaign_verdict([one.verdict for one in diagnoses]),
         headline=diagnosis_words.summary(diagnoses),
         several=several,
         logs=logs,
@@ -116,7 +119,11 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) ->
         "vessel": diagnosis.vessel,
         "verdict": diagnosis.verdict,
         "headline": diagnosis_words.headline(diagnosis),
-        "findings": [_finding(one, f"{prefix}finding-{k}", drawn) for k, one in enumerate(diagnosis.findings, 1)],
+        "findings": [
+            _finding(one, f"{prefix}finding-{k}", drawn, diagnosis.left_out)
+            for k, one in enumerate(diagnosis.findings, 1)
+        ],
+        "left_out": left_out_table(diagnosis.left_out),
         "names": [diagnosis_words.title(one.effect, one.instance) for one in diagnosis.findings],
         "force_rows": force_rows,
         "free_run_rows": free_run_rows,
@@ -151,7 +158,7 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) ->
     }
 
 
-def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
+def _finding(finding: Finding, file: str, drawn: bool, left_out: Sequence[LeftOut]) -> dict[str, Any]:
     shown = []
     if drawn and diagnosis_figures.compared(finding):
         what = finding.labels.get("regressor", "") if "regressor" in finding.evidence else ""
@@ -169,9 +176,11 @@ def _finding(finding: Finding, file: str, drawn: bool) -> dict[str, Any]:
         )
     if drawn and diagnosis_figures.drawable(finding):
         caption = (
-            "The same over time; shaded: when it acts." if shown else "What is left over; shaded: when it acts most."
+            "The same over time; shaded: when it acts, and what is left out."
+            if shown
+            else "What is left over; shaded: when it acts most, and what is left out of the log."
         )
-        shown.append({"file": f"{file}-time", "svg": diagnosis_figures.in_time(finding), "caption": caption})
+        shown.append({"file": f"{file}-time", "svg": diagnosis_figures.in_time(finding, left_out), "caption": caption})
     if drawn and diagnosis_figures.spectral(finding):
         shown.append(
             {
@@ -207,7 +216,8 @@ def _free_run_figures(diagnosis: Diagnosis, prefix: str) -> list[dict[str, str]]
         {
             "file": f"{prefix}free-run-errors",
             "svg": figures.free_run_errors(_free_run(before), _free_run(after)),
-            "caption": f"Root-mean-square error of {before.get('starts', 0)} free runs on held-out data: each takes the "
+            "caption": f"Root-mean-square error of {counted(before.get('starts', 0), 'free run')} on "
+            "held-out data: each takes the "
             "measured state once and then only the measured actuator forces. New model: with the findings.",
         }
     ]

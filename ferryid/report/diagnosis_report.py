@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import isfinite
@@ -12,13 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from ferryid import __version__
-from ferryid.diagnose.result import AXES, SCHEMA, Diagnosis, to_json
+from ferryid.diagnose import AXES, SCHEMA, Diagnosis, DiagnosisSettings, campaign_verdict, diagnose_and_store, to_json
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
 from ferryid.identify.model import Model
 from ferryid.identify.store import load
 from ferryid.report.diagnosis_page import as_text, render
-from ferryid.report.diagnosis_words import overall
 from ferryid.vessel import load_profile, parse_profile
 from ferryid.vessel.profile import Profile
 
@@ -52,10 +51,40 @@ def patient(vessel: str | None, model: str | None, out: Path) -> tuple[Profile, 
     profile = load_profile(vessel) if vessel else own
     if profile.name != own.name:
         raise FerryIdError(
-            f"{loaded.name}@{loaded.version}: a model of {own.name} says nothing about {profile.name}. "
+            f"{loaded.name}@{loaded.version}: a model of {own.name} does not apply to {profile.name}. "
             "Fix: give a model and logs of one vessel"
         )
     return profile, loaded
+
+
+def diagnose_and_report(
+    logs: Sequence[str],
+    profile: Profile,
+    out: Path,
+    settings: DiagnosisSettings | None = None,
+    *,
+    tables: Path | None,
+    name: str = "",
+    command: Sequence[str] = (),
+    progress: Callable[[str], None],
+) -> Outcome:
+    """Diagnose logs, store the model that the findings lead to, and write the report.
+
+    Parameters
+    ----------
+    logs, profile, out, settings, tables, name, progress
+        As of `ferryid.diagnose.pipeline.diagnose_and_store`.
+    command
+        The words that the diagnosis was asked for with.
+
+    Raises
+    ------
+    FerryIdError
+        For input that cannot be used, and a folder that cannot be written.
+    """
+    diagnoses = diagnose_and_store(logs, profile, out, settings, tables=tables, name=name, progress=progress)
+    progress("writing the report")
+    return report(diagnoses, out, command)
 
 
 def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = ()) -> Outcome:
@@ -102,7 +131,7 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         "schema": SCHEMA,
         "log": None,
         "vessel": diagnoses[0].vessel,
-        "verdict": overall(diagnoses),
+        "verdict": campaign_verdict([one.verdict for one in diagnoses]),
         "findings": [{**finding, "log": one["log"]} for one in logs for finding in one["findings"]],
         "before": {"mse": _pooled(diagnoses, "before"), "free_run": {}},
         "after": {"mse": _pooled(diagnoses, "after"), "free_run": {}},

@@ -7,9 +7,10 @@ from math import exp, isfinite, log
 from pathlib import PurePath
 from typing import Any
 
-from ferryid.diagnose.result import AXES, NEAR, Diagnosis, Estimate, Finding
+from ferryid.counts import counted
+from ferryid.diagnose import AXES, CHANGED, NEAR, UNKNOWN, Diagnosis, Estimate, Finding, error_ratio, worse_axes
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, timed, titled
 
 EVERYWHERE = "all along"
@@ -19,9 +20,6 @@ SPANS = 4
 """Intervals that are told."""
 RIVALS = 3
 """Rivals that are told; the others are in the JSON."""
-SMALL = 0.02
-"""A smaller change of the squared error is not told."""
-UNKNOWN = "unknown"
 USUAL_OUT = "ferryid-out"
 """Output folder where none was given."""
 FAR = 1e6
@@ -80,15 +78,29 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "explained":
         return f"Explained: {names}{more}."
     if diagnosis.verdict == "partly_explained":
-        nameless = any(one.effect == UNKNOWN for one in diagnosis.findings)
-        rest = " More is missing, which nothing known here explains." if nameless else ""
-        return f"Partly explained: {names}{more}.{rest}"
+        return " ".join([f"Partly explained: {names}{more}.", *_rest(diagnosis)])
     if diagnosis.verdict == "unexplained":
         perhaps = f" Perhaps some of it is {doubtful}." if doubtful else ""
         return f"Unexplained: the recording differs from the {base}, and nothing known here surely accounts for it.{perhaps}"
     if diagnosis.verdict == "not_testable":
-        return f"Not testable: this log cannot show whether anything is missing from the {base}."
+        perhaps = f" Perhaps {doubtful} {'is' if len(every) == 1 else 'are'}." if doubtful else ""
+        return f"Not testable: this log cannot show whether anything is missing from the {base}.{perhaps}"
     return f"Matched: nothing that this log could show is missing from the {base}."
+
+
+def _rest(diagnosis: Diagnosis) -> list[str]:
+    """Return why a log is explained in part only, as sentences."""
+    worse, much = worse_axes(ratio_of(diagnosis)), diagnosis.remainder.much
+    parts = []
+    if any(one.effect == UNKNOWN for one in diagnosis.findings):
+        parts.append("More is missing, which nothing known here explains.")
+    if worse:
+        parts.append(f"In {listed(worse)} the findings make the force error larger.")
+    if much:
+        parts.append(f"In {listed(much)} more force is left over than is explained.")
+    if not diagnosis.remainder.testable:
+        parts.append("Whether more is missing, this log cannot show.")
+    return parts
 
 
 def fitted(diagnosis: Diagnosis) -> bool:
@@ -99,8 +111,8 @@ def fitted(diagnosis: Diagnosis) -> bool:
 
 def changed(shares: Mapping[str, float]) -> str:
     """Return by how much the squared force error falls or rises, from the share removed on each axis."""
-    falls = [f"{_percent(shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) >= SMALL]
-    rises = [f"{_percent(-shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) <= -SMALL]
+    falls = [f"{_percent(shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) >= CHANGED]
+    rises = [f"{_percent(-shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) <= -CHANGED]
     parts = [f"{word} by {listed(axes)}" for word, axes in (("falls", falls), ("rises", rises)) if axes]
     return " and ".join(parts) if parts or not shares else "stays as it was"
 
@@ -115,11 +127,7 @@ def ratio_of(diagnosis: Diagnosis) -> dict[str, Estimate]:
             if axis in given and isfinite(_number(given[axis].get("value")))
         }
     before, after = diagnosis.before.get("mse", {}), diagnosis.after.get("mse", {})
-    return {
-        axis: _bare(after[axis] / before[axis])
-        for axis in AXES
-        if _number(before.get(axis)) > 0.0 and isfinite(_number(after.get(axis)))
-    }
+    return error_ratio(before, after)
 
 
 def said(finding: Finding) -> str:
@@ -208,7 +216,7 @@ def rivals(finding: Finding) -> list[str]:
     lines = []
     if finding.unresolved_with:
         names = listed([_inline(one) for name in finding.unresolved_with for one in _meant(finding, name)], "or")
-        lines.append(f"This log cannot tell it from {names}.")
+        lines.append(f"This log cannot distinguish it from {names}.")
     shown = sorted(finding.rivals, key=lambda rival: -rival.delta_score)[:RIVALS]
     near = [one for one in shown if one.delta_score > -log(FAR)]
     far = [_inline(title(one.effect, one.instance)) for one in shown if one not in near]
@@ -220,7 +228,7 @@ def rivals(finding: Finding) -> list[str]:
         lines.append(f"{other} is less likely by a factor of more than a million: {listed(far, 'or')} would be next.")
     if finding.separating_manoeuvre:
         manoeuvre = finding.separating_manoeuvre.rstrip(".")
-        lines.append(f"To tell them apart, record this: {manoeuvre}.")
+        lines.append(f"To separate them, record this: {manoeuvre}.")
     return lines
 
 
@@ -243,16 +251,6 @@ def new_model(diagnosis: Diagnosis) -> str:
     return f"{label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
 
 
-def overall(diagnoses: Sequence[Diagnosis]) -> str:
-    """Return one verdict for several logs: the worst of those that could be tested."""
-    verdicts = {one.verdict for one in diagnoses} - {"not_testable"}
-    if not verdicts:
-        return "not_testable"
-    if verdicts & {"partly_explained", "unexplained"}:
-        return "partly_explained" if any(one.findings for one in diagnoses) else "unexplained"
-    return "explained" if "explained" in verdicts else "matched"
-
-
 def summary(diagnoses: Sequence[Diagnosis]) -> str:
     """Return the verdict in one sentence, of one log or of several."""
     if len(diagnoses) == 1:
@@ -261,9 +259,19 @@ def summary(diagnoses: Sequence[Diagnosis]) -> str:
         f"{sum(one.verdict == verdict for one in diagnoses)} {verdict.replace('_', ' ')}"
         for verdict in dict.fromkeys(one.verdict for one in diagnoses)
     ]
-    found = dict.fromkeys(_inline(title(f.effect, f.instance)) for one in diagnoses for f in one.findings)
-    left_out = f" The model left out {listed(list(found))}." if found else ""
-    return f"Of {len(diagnoses)} logs, {listed(counts)}.{left_out}"
+    every = [finding for one in diagnoses for finding in one.findings]
+    named = [one for one in every if one.effect != UNKNOWN]
+    sure = list(dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if one.sure))
+    doubtful = dict.fromkeys(_inline(title(one.effect, one.instance)) for one in named if not one.sure)
+    perhaps = [one for one in doubtful if one not in sure]
+    parts = [f"Of {counted(len(diagnoses), 'log')}, {listed(counts)}."]
+    if sure:
+        parts.append(f"The model left out {listed(sure)}.")
+    if perhaps:
+        parts.append(f"Perhaps it {'also ' if sure else ''}left out {listed(perhaps)}.")
+    if len(named) < len(every):
+        parts.append("More is missing, which nothing known here explains.")
+    return " ".join(parts)
 
 
 def force_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
@@ -304,7 +312,7 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
         lines.append(
             "The hull's coefficients were refitted too, by themselves for the errors without the findings and together with "
             f"them for the others. There, the coefficient {one.coefficient} moved farthest, from {one.before:.4g} to "
-            f"{one.value:.4g} {one.unit}: {abs(one.deviations):.2g} standard deviations of what was believed of it before"
+            f"{one.value:.4g} {one.unit}: {abs(one.deviations):.2g} prior standard deviations"
             f"{', farther than is credible' if abs(one.deviations) > INCREDIBLE else ''}."
         )
     if "window_s" in diagnosis.before:

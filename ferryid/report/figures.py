@@ -17,7 +17,9 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from ferryid.identify.result import AXES, ComponentCurve, Excitation, FreeRun, LogFit
+from ferryid.report.left_out import shade_left_out
 from ferryid.report.structure import autocorrelation, envelope, spectrum
+from ferryid.signals.track import segments
 
 Floats = NDArray[np.float64]
 
@@ -71,7 +73,16 @@ def canvas(rows: int, height: float, *, top: float = 0.35) -> tuple[Figure, list
 def legend_above(figure: Figure, ax: Axes, columns: int, title: str = "") -> None:
     """Put one legend for the whole figure along its upper edge."""
     handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper center", ncols=columns, title=title, borderaxespad=0.1)
+    figure.legend(
+        handles,
+        labels,
+        loc="upper center",
+        ncols=columns,
+        title=title,
+        borderaxespad=0.1,
+        columnspacing=1.2,
+        handlelength=1.6,
+    )
 
 
 def plain_log(ax: Axes, *, x: bool, y: bool) -> None:
@@ -93,7 +104,7 @@ def svg_text(figure: Figure) -> str:
 
 
 def forces(log: LogFit, first_s: float | None = None, last_s: float | None = None) -> str:
-    """Measured force against the estimates of base and new model over time; validation stretches are shaded."""
+    """Measured force against the estimates of both models over time; what validates and what is left out is shaded."""
     with mpl.rc_context(STYLE):
         figure, axes = canvas(3, 5.2)
         t = log.motion.t
@@ -101,7 +112,8 @@ def forces(log: LogFit, first_s: float | None = None, last_s: float | None = Non
         rows = np.flatnonzero(inside)
         shown = np.where(log.motion.valid[:, None], 1.0, np.nan)
         for j, ax in enumerate(axes):
-            shade(ax, t[rows], log.validation[rows])
+            shade(ax, t[rows], log.validation[rows], "validation")
+            shade_left_out(ax, log.motion.left_out, t[rows[0]], t[rows[-1]])
             for values, colour, label in (
                 (log.motion.tau, MEASURED, "measured"),
                 (log.tau_base, BASE, "base model"),
@@ -112,15 +124,15 @@ def forces(log: LogFit, first_s: float | None = None, last_s: float | None = Non
             _limits(ax, log, rows, j)
             ax.set_ylabel(f"{AXES[j]} {SYMBOLS[j]} [{UNITS[j]}]")
         axes[-1].set_xlabel("time [s]")
-        legend_above(figure, axes[0], 3)
+        legend_above(figure, axes[0], 5)
         return svg_text(figure)
 
 
-def shade(ax: Axes, t: Floats, marked: NDArray[np.bool_]) -> None:
-    """Shade the stretches of time that are marked."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        ax.axvspan(t[first], t[last - 1], color=SHADE, linewidth=0)
+def shade(ax: Axes, t: Floats, marked: NDArray[np.bool_], label: str | None = None) -> None:
+    """Shade the stretches of time that are marked, with one entry in the legend where there is a label."""
+    for stretch in segments(marked):
+        ax.axvspan(t[stretch.start], t[stretch.stop - 1], color=SHADE, linewidth=0, label=label)
+        label = None
 
 
 def _limits(ax: Axes, log: LogFit, rows: NDArray[np.int64], j: int) -> None:

@@ -6,18 +6,20 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, Template
 
+from ferryid.counts import counted
 from ferryid.errors import printable
 
 
 def template(name: str) -> Template:
-    """Return a template by its file name; whatever it shows is escaped."""
+    """Return a template by its file name; whatever a page of HTML shows is escaped."""
     environment = Environment(
         loader=PackageLoader("ferryid.report", "templates"),
-        autoescape=True,
+        autoescape=name.endswith(".html"),
         trim_blocks=True,
         lstrip_blocks=True,
         finalize=_visible,
     )
+    environment.globals["counted"] = counted
     return environment.get_template(name)
 
 

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.identify.excitation import RANGE_UNITS
 from ferryid.identify.inertia import effective_mass
 from ferryid.identify.result import AXES, FitResult, LogFit
 from ferryid.report import figures
 from ferryid.report.html import template
+from ferryid.report.left_out import left_out_table
 from ferryid.report.structure import remainder, worst_and_best_minute
 from ferryid.vessel import parse_profile
 from ferryid.vessel.parse_hull import rigid_mass
@@ -50,7 +52,9 @@ def headline(result: FitResult) -> str:
         word = "below" if change < 0 else "above"
         told = f"mean square force error {abs(change):.1%} {word} {base} on data it did not see"
     count = len(result.warnings)
-    trust = f" Read the {count} warnings first." if count > 1 else " Read the warning first." if count else ""
+    trust = (
+        f" Read the {counted(count, 'warning')} first." if count > 1 else " Read the warning first." if count else ""
+    )
     if result.verdict.accepted:
         return f"Accepted: {told}.{trust}"
     return f"Not accepted: {told}."
@@ -95,7 +99,7 @@ def _context(result: FitResult) -> dict[str, Any]:
                 "file": "residual-autocorrelation",
                 "svg": figures.residual_autocorrelation(drawn),
                 "caption": "Autocorrelation of the same residual. White noise would stay inside the dashed band; a slow "
-                "decay says that something with a memory was left out, and that neighbouring samples are no independent "
+                "decay shows that something with a memory was left out, and that neighbouring samples are no independent "
                 "evidence.",
             },
         ],
@@ -116,7 +120,7 @@ def _context(result: FitResult) -> dict[str, Any]:
                     frozenset(result.excitation.undetermined),
                 ),
                 "caption": "Coefficients of the correction, each over half the width of its own 95 % block-bootstrap "
-                "interval; an arrow goes on beyond the frame. Grey ones are not told apart from zero, pale orange ones "
+                "interval; an arrow goes on beyond the frame. Grey ones are not distinguishable from zero, pale orange ones "
                 "not from each other: the data do not determine them. Intervals hold the scatter at this number of "
                 "components, not the shrinkage that few components bring.",
             },
@@ -132,7 +136,7 @@ def _context(result: FitResult) -> dict[str, Any]:
                 "file": "excitation",
                 "svg": figures.excitation(result.excitation, drawn),
                 "caption": "Top left: singular values of the standardised basis; a value near zero is a combination of "
-                "terms that this trial cannot tell apart. The rest: velocities in the training rows, each pair against "
+                "terms that this trial does not identify. The rest: velocities in the training rows, each pair against "
                 "the other; a model is only as good as the cloud it saw.",
             },
             {
@@ -179,7 +183,7 @@ def _force_figures(log: LogFit) -> list[dict[str, str]]:
             "file": f"forces-{log.motion.log}",
             "svg": figures.forces(log),
             "caption": "Applied force as measured at the actuators, and as each model estimates it from the motion. "
-            "Shaded: validation, which the new model did not see.",
+            "Shaded: validation, which the new model did not see, and what is left out.",
         }
     ]
     minutes = worst_and_best_minute(log)
@@ -203,7 +207,8 @@ def _free_run_figures(result: FitResult) -> list[dict[str, str]]:
             {
                 "file": "free-run-errors",
                 "svg": figures.free_run_errors(base, new),
-                "caption": f"Root-mean-square error of {max(base.starts, new.starts)} runs on validation rows: each takes "
+                "caption": f"Root-mean-square error of {counted(max(base.starts, new.starts), 'run')} on "
+                "validation rows: each takes "
                 "the measured state once and then only the measured actuator forces.",
             }
         )
@@ -274,7 +279,8 @@ def _excitation_lines(result: FitResult) -> list[str]:
     if values.size and values[0] > 0:
         weak = int(np.sum(values < 1e-3 * values[0]))
         lines.append(
-            f"{len(values)} basis terms; the weakest combination is excited {values[-1] / values[0]:.1e} times as much "
+            f"{counted(len(values), 'basis term')}; the weakest combination is excited "
+            f"{values[-1] / values[0]:.1e} times as much "
             f"as the strongest, and {weak} are below a thousandth."
         )
     if np.isfinite(excitation.heading_coverage):
@@ -307,7 +313,8 @@ def _quality(log: LogFit) -> dict[str, Any]:
                 ],
             }
         )
-    return {"name": log.motion.log, "remarks": quality["remarks"], "streams": streams}
+    left_out = left_out_table(log.motion.left_out)
+    return {"name": log.motion.log, "remarks": quality["remarks"], "streams": streams, "left_out": left_out}
 
 
 def _provenance(result: FitResult) -> list[dict[str, str]]:
@@ -328,7 +335,7 @@ def _provenance(result: FitResult) -> list[dict[str, str]]:
         rows.append(
             (
                 f"log {log['name']}",
-                f"{', '.join(log['files'])}; {log['seconds']:.0f} s, {log['rows']} rows; {log['sha256']}",
+                f"{', '.join(log['files'])}; {log['seconds']:.0f} s, {counted(log['rows'], 'row')}; {log['sha256']}",
             )
         )
     return [{"name": name, "value": value} for name, value in rows]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ferryid.counts import counted
 from ferryid.reproduce.study import Row, Study, Table, high, low, number, percent
 
 HEAD = """# The thesis reproduced
 
 Made by `make thesis` (`ferryid reproduce thesis`): the trials of Aurlien (2021), *Multivariate Modeling and Adaptive Control of
-Autonomous Ferries*, flown again in the built-in simulator, logged, and learnt from the logs as from any recording. *Theirs* is
+Autonomous Ferries*, flown again in the built-in simulator, logged, and fitted to the logs as from any recording. *Theirs* is
 what the thesis states, one trial each; *ours* is the median of {runs} with other weather and noise, least and greatest in
 brackets. No setting was chosen to bring the two together; where they differ, the text says what was found out. What the
 thesis leaves open and we had to choose stands [at the end](#chosen).
@@ -50,7 +51,7 @@ def page(studies: Sequence[Study], seeds: Sequence[int], folder: str) -> str:
     folder
         Where the figures lie, as seen from the page.
     """
-    lines = [HEAD.format(runs=f"{len(seeds)} run" + "s" * (len(seeds) > 1)), *summary(studies)]
+    lines = [HEAD.format(runs=counted(len(seeds), "run")), *summary(studies)]
     lines += [f"- [{study.title}](#{study.name})" for study in studies]
     lines += ["- [What was chosen, and when](#chosen)"]
     for study in studies:

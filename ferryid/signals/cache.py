@@ -246,7 +246,7 @@ def load(folder: Path) -> Recording:
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise FerryIdError(
             f"{folder / _NOTE}: a part of it is missing or wrong ({type(error).__name__}: {error}). "
-            "Fix: delete its folder, the next ingest writes it anew"
+            "Fix: delete its folder, the next ingest writes it again"
         ) from error
 
 

@@ -7,12 +7,16 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.ingest.log import Loss
 from ferryid.signals.parquet import unit_of
 from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording, Stream
-from ferryid.signals.track import Motion, Track
+from ferryid.signals.track import LeftOut, Motion, Track
+
+Flags = NDArray[np.bool_]
 
 
 def data_quality(recording: Recording, track: Track | Motion | None = None) -> dict[str, Any]:
@@ -30,7 +34,8 @@ def data_quality(recording: Recording, track: Track | Motion | None = None) -> d
     dict
         For JSON: ``files``, ``sha256``, ``profile``, ``profile_sha256``, ``duration_s``, ``streams`` (topic to ``clock``
         and ``signals``), ``losses``, ``found``, ``missing``, ``left_out`` (rows that are not used: ``reason``, ``rows``,
-        ``stretches``, ``seconds``) and ``remarks`` (sentences: all of it for a person).
+        ``stretches``, ``seconds`` and ``intervals``, each with ``start_s`` and ``end_s`` from the first row that is used,
+        ``signals`` and ``reason``) and ``remarks`` (sentences: all of it for a person).
     """
     streams = {topic: stream_quality(stream) for topic, stream in recording.streams.items()}
     return {
@@ -77,20 +82,58 @@ def remarks(recording: Recording, repairs: Sequence[str] = ()) -> list[str]:
     return list(dict.fromkeys(told))
 
 
-def left_out_sentences(recording: Recording, track: Track | Motion) -> tuple[str, ...]:
-    """Return what of a log could not be read, and which rows are not used because of times, gaps or faults, as sentences."""
+def left_out_sentences(recording: Recording, left_out: Sequence[LeftOut], used: Flags) -> tuple[str, ...]:
+    """Return what of a log could not be read, and which rows are not used because of times, gaps or faults, as sentences.
+
+    `used` are flags of the rows that are, shape (n,).
+    """
     said = [*_unread(recording.losses)]
     said += grouped_notes({topic: _of_clock(stream) for topic, stream in recording.streams.items()})
-    if track.left_out:
-        reasons = "; ".join(
-            f"{one.rows} ({one.seconds:.1f} s in {one.stretches} stretch{'es' * (one.stretches > 1)}) because {one.reason}"
-            for one in track.left_out
-        )
-        rows, seconds = sum(one.rows for one in track.left_out), sum(one.seconds for one in track.left_out)
-        # Rows cut from the ends count as well.
-        total = max(track.t.size, rows + int(np.count_nonzero(track.valid)))
-        said.append(f"{rows} of {total} rows ({seconds:.1f} s) are left out: {reasons}.")
+    said += rows_left_out(left_out, max(used.size, _rows(left_out) + int(np.count_nonzero(used))))
     return tuple(said)
+
+
+def rows_left_out(left_out: Sequence[LeftOut], total: int) -> tuple[str, ...]:
+    """Return in one sentence which of `total` rows are not used and why; nothing where all are."""
+    if not left_out:
+        return ()
+    reasons = "; ".join(
+        f"{one.rows} ({one.seconds:.1f} s in {counted(one.stretches, 'stretch')}) because {one.reason}"
+        for one in left_out
+    )
+    rows, seconds = _rows(left_out), sum(one.seconds for one in left_out)
+    return (f"{rows} of {counted(total, 'row')} ({seconds:.1f} s) {verb(rows, 'is')} left out: {reasons}.",)
+
+
+def _rows(left_out: Sequence[LeftOut]) -> int:
+    """Rows cut from the ends of a track count as well."""
+    return sum(one.rows for one in left_out)
+
+
+def lost_plain(losses: Sequence[Loss], left_out: Sequence[LeftOut], total: int) -> dict[str, Any]:
+    """Return for JSON what was lost of a log, and what of the rest is not used.
+
+    Parameters
+    ----------
+    losses
+        What could not be read.
+    left_out, total
+        Rows that are not used, and how many there are.
+
+    Returns
+    -------
+    dict
+        ``messages`` and ``seconds`` that are known to be lost, ``unknown``: whether more may be, ``rows_left_out`` and
+        ``seconds_left_out``, and ``says``: all of it as sentences.
+    """
+    return {
+        "messages": sum(loss.messages or 0 for loss in losses),
+        "seconds": sum(loss.seconds or 0.0 for loss in losses),
+        "unknown": any(loss.messages is None for loss in losses),
+        "rows_left_out": _rows(left_out),
+        "seconds_left_out": float(sum(one.seconds for one in left_out)),
+        "says": [*(f"Lost: {loss_sentence(loss)}" for loss in losses), *rows_left_out(left_out, total)],
+    }
 
 
 def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
@@ -99,14 +142,12 @@ def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:
         return ()
     count, unknown = sum(loss.messages or 0 for loss in losses), any(loss.messages is None for loss in losses)
     if count:
-        what = f"{count} message{'s' * (count > 1)} could not be read" + (", and perhaps more" if unknown else "")
+        what = f"{counted(count, 'message')} could not be read" + (", and perhaps more" if unknown else "")
     else:
         what = "messages may be lost" if unknown else "no message is known to be lost"
     others = len(losses) - 1
-    return (
-        f"{what}: {loss_sentence(main_loss(losses))[:-1]}"
-        + (f"; and {others} more, see ferryid inspect." if others else "."),
-    )
+    rest = f"; and {counted(others, 'more loss')}, see ferryid inspect." if others else "."
+    return (f"{what}: {loss_sentence(main_loss(losses))[:-1]}{rest}",)
 
 
 def main_loss(losses: Sequence[Loss]) -> Loss:
@@ -114,31 +155,60 @@ def main_loss(losses: Sequence[Loss]) -> Loss:
     return max(losses, key=lambda loss: (loss.messages or 0, loss.messages is None))
 
 
+_DROPPED = (
+    ("strays", "their times contradict those of the rows around", "its time contradicts those of the rows around"),
+    ("duplicates", "they repeat the time of another", "it repeats the time of another"),
+    ("far", "they are from before or after the clock was set", "it is from before or after the clock was set"),
+)
+
+
+def dropped_rows(clocks: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """Return how many rows of some topics are left out because of their times, by the reason; only those above zero.
+
+    Parameters
+    ----------
+    clocks
+        As `ferryid.ingest.clocks.ClockReport.to_dict` gives them.
+    """
+    sums = {name: sum(int(clock[name]) for clock in clocks) for name in ("dropped", "strays", "duplicates")}
+    counts = {**sums, "far": sums["dropped"] - sums["strays"] - sums["duplicates"]}
+    return {(one if counts[name] == 1 else many): counts[name] for name, many, one in _DROPPED if counts[name] > 0}
+
+
 def _of_clock(stream: Stream) -> list[str]:
     clock = stream.clock
-    far = clock.dropped - clock.duplicates - clock.strays
-    counts = (
-        (clock.strays, "their time contradicts that of the rows around"),
-        (clock.duplicates, "they repeat the time of another"),
-        (far, "they are from before or after the clock was set"),
-    )
-    said = [f"{count} of {clock.count + clock.dropped} rows are left out: {why}" for count, why in counts if count]
+    said = [
+        f"{count} of {counted(clock.count + clock.dropped, 'row')} {verb(count, 'is')} left out: {why}"
+        for why, count in dropped_rows([clock.to_dict()]).items()
+    ]
     if clock.replaced:
-        said.append(f"{clock.replaced} of {clock.count} rows had a senseless stamp and are put at their receive time")
+        said.append(
+            f"{clock.replaced} of {counted(clock.count, 'row')} had a senseless stamp and {verb(clock.replaced, 'is')} put "
+            f"at {'its' if clock.replaced == 1 else 'their'} receive time"
+        )
     return said
 
 
 def _counted(stream: Stream) -> list[str]:
     clock = stream.clock
-    told = []
-    if clock.out_of_order:
-        told.append(f"{clock.out_of_order} rows out of order were sorted into place.")
-    if clock.duplicates:
-        told.append(f"{clock.duplicates} rows repeat the time of another and were left out.")
+    told = [f"{one}." for one in clock_notes(clock.out_of_order, clock.duplicates)]
     if clock.gaps:
         lengths = [(end - start) * 1e-9 for start, end in clock.gaps]
         told.append(
-            f"{len(lengths)} gaps in the recording, the longest {max(lengths):.2f} s, {sum(lengths):.1f} s in all."
+            f"{counted(len(lengths), 'gap')} in the recording, the longest {max(lengths):.2f} s, {sum(lengths):.1f} s in all."
+        )
+    return told
+
+
+def clock_notes(out_of_order: int, duplicates: int) -> list[str]:
+    """Return what was done with the rows of a topic that were not in order or had the time of another."""
+    told = []
+    if out_of_order:
+        told.append(f"{counted(out_of_order, 'row')} out of order {verb(out_of_order, 'was')} sorted into place")
+    if duplicates:
+        told.append(
+            f"{counted(duplicates, 'row')} {verb(duplicates, 'repeats')} the time of another and "
+            f"{verb(duplicates, 'was')} left out"
         )
     return told
 
@@ -169,7 +239,7 @@ def loss_sentence(loss: Loss) -> str:
     """Return a loss as one sentence: file, topic, what, how many messages and seconds."""
     name = loss.file.rpartition("/")[2]
     topic = f" {loss.topic}" if loss.topic else ""
-    amount = [f"{loss.messages} message{'s' * (loss.messages > 1)}" if loss.messages else "", ""]
+    amount = [counted(loss.messages, "message") if loss.messages else "", ""]
     if loss.seconds is not None:
         amount[1] = f"{loss.seconds:.3f} s"
     size = ", ".join(part for part in amount if part)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.signals import cache
 from ferryid.signals.parquet import unit_of
 from ferryid.signals.recording import data_quality, record
@@ -58,6 +59,6 @@ def render_ingest(result: dict[str, Any]) -> str:
         lines.append(f"{log['name']} -> {log['folder']}")
         for table in log["tables"]:
             columns = ", ".join(f"{name} [{unit}]" for name, unit in table["columns"].items())
-            lines.append(f"  {table['topic']:<28}{table['rows']:>9} rows  {columns}")
+            lines.append(f"  {table['topic']:<28}{counted(table['rows'], 'row'):>14}  {columns}")
         lines.extend(f"  {remark}" for remark in log["data_quality"]["remarks"])
     return "\n".join(lines)

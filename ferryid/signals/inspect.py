@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log, supported_formats
 from ferryid.ingest.clocks import ClockReport, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Reader, Series, Topic
 from ferryid.ingest.stray_times import stray_times
-from ferryid.signals.data_quality import grouped_notes, plain_loss, remarks, stream_quality
-from ferryid.signals.poses import USED, pose_faults, pose_sentences
-from ferryid.signals.quality import clean
+from ferryid.signals.data_quality import clock_notes, grouped_notes, plain_loss, rows_left_out, stream_quality
+from ferryid.signals.faults import find_faults
+from ferryid.signals.prepare import track_of
 from ferryid.signals.recording import log_name, make_recording, selected
 from ferryid.signals.render import render_inspect
-from ferryid.signals.sampling import check_sampling
-from ferryid.signals.stream import Recording
+from ferryid.signals.track import LeftOut
 from ferryid.vessel.load import bundled, load_profile
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, select, survey
@@ -60,14 +60,14 @@ def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = 
     reader = open_log(path, profile.table if profile is not None else None)
     with ThreadPoolExecutor(1) as pool:
         hashing = pool.submit(content_hash, reader.paths, verify=verify)
-        selection = survey(profile, reader.topics) if profile is not None else None
+        selection = survey(profile, reader.topics, reader.losses) if profile is not None else None
         wanted: dict[str, Sequence[str]] = {topic.name: () for topic in reader.topics if _is_small(topic)}
         wanted |= selection.wanted if selection is not None else {}
         series, problems = _read(reader, wanted, verify=verify)
         repaired = repair_all(series)
         vessel = None
         if profile is not None and selection is not None:
-            vessel = _vessel(reader, log_name(path), profile, selection, series, repaired, problems)
+            vessel = _vessel(reader, log_name(path), profile, selection, series, problems)
         sha256 = hashing.result()
     described = [_timed(topic, series, repaired) for topic in sorted(reader.topics, key=lambda one: one.name)]
     topics = [
@@ -166,10 +166,8 @@ def _notes(topic: Mapping[str, Any]) -> list[str]:
         *filter(None, topic["note"].split("; ")),
         *(clock["notes"] if clock is not None else [topic["clock_unknown"]]),
     ]
-    if clock is not None and clock["out_of_order"]:
-        told.append(f"{clock['out_of_order']} rows out of order were sorted into place")
-    if clock is not None and clock["duplicates"]:
-        told.append(f"{clock['duplicates']} rows repeat the time of another and were left out")
+    if clock is not None:
+        told += clock_notes(clock["out_of_order"], clock["duplicates"])
     return list(dict.fromkeys(told))
 
 
@@ -179,10 +177,9 @@ def _vessel(
     profile: Profile,
     selection: Selection,
     series: Mapping[str, Series],
-    repaired: Mapping[str, Any],
     problems: Mapping[str, str],
 ) -> dict[str, Any]:
-    """What the profile makes of the log: signals with their ranges, and why it would refuse the log, if it would."""
+    """What a fit with the profile makes of the log: signals with their ranges, what it leaves out, and why it refuses."""
     usable, problem = True, ""
     try:
         selected(reader, profile)
@@ -194,15 +191,21 @@ def _vessel(
     if not wanted and usable:
         unread = next((problems[topic] for topic in selection.wanted if topic in problems), "")
         usable, problem = not unread, unread
+    left_out: tuple[LeftOut, ...] = ()
     if wanted:
         try:
-            kept = replace(selection, wanted=wanted)
-            recording = make_recording(reader, name, profile, kept, series, repaired)
-            streams = {topic: stream_quality(one) for topic, one in recording.streams.items() if len(one.time_ns)}
-            told = remarks(
-                replace(recording, losses=(), notes=selection.notes, streams={}, missing={}), _pose_remarks(recording)
+            # The clocks of the mapped topics alone, as a fit has them.
+            mapped = {topic: series[topic] for topic in wanted}
+            recording = make_recording(
+                reader, name, profile, replace(selection, wanted=wanted), mapped, repair_all(mapped)
             )
-            check_sampling(recording, profile)
+            streams = {topic: stream_quality(one) for topic, one in recording.streams.items() if len(one.time_ns)}
+            faults = find_faults(recording)
+            told = [*selection.notes, *faults.taken_out]
+            opened = track_of(recording, profile, faults=faults)
+            left_out = opened.measured.left_out
+            used = int(np.count_nonzero(opened.measured.usable))
+            told += [*opened.doubts, *rows_left_out(left_out, used + sum(one.rows for one in left_out))]
         except FerryIdError as error:
             usable, problem = False, problem or str(error)
     return {
@@ -213,38 +216,33 @@ def _vessel(
         "found": dict(selection.found),
         "missing": dict(selection.missing),
         "streams": streams,
-        "remarks": told,
+        "left_out": [asdict(one) for one in left_out],
+        "remarks": list(dict.fromkeys(told)),
     }
 
 
-def _pose_remarks(recording: Recording) -> tuple[str, ...]:
-    """Return which poses cannot be true, as sentences; a fit and a diagnosis leave them out."""
-    samples = {}
-    for stream in recording.streams.values():
-        time_s = np.asarray((stream.time_ns - stream.time_ns[:1]) * 1e-9, dtype=np.float64)
-        for name in USED:
-            if name in stream.columns:
-                samples[name] = stream.time_ns, clean(name, time_s, stream.columns[name])[0]
-    return pose_sentences(pose_faults(samples))
-
-
 def _bundled_matches(path: str | Path, reader: Reader) -> list[dict[str, Any]]:
-    """How many of its signals every bundled profile finds in the log, best first, and whether it would take the log."""
+    """How many of its signals every bundled profile finds in the log, best first, and whether a fit would take the log."""
     is_table = any(topic.encoding == "table" for topic in reader.topics)
     matches = []
     for name in bundled():
         profile = load_profile(name)
+        problem, usable = "", True
         try:
             # A table is named by the profile's own layout, so that it is opened the way the profile would.
-            topics = open_log(path, profile.table).topics if is_table and profile.table is not None else reader.topics
-            found = survey(profile, topics)
-            select(profile, topics, str(path))
-            usable = True
+            own = open_log(path, profile.table) if is_table and profile.table is not None else reader
+            found = survey(profile, own.topics, own.losses)
+            select(profile, own.topics, str(path), own.losses)
         except FerryIdError:
             usable = False
-            found = survey(profile, reader.topics)
+            found = survey(profile, reader.topics, reader.losses)
+        if usable:
+            series, problems = _read(own, found.wanted, verify=False)
+            judged = _vessel(own, log_name(path), profile, found, series, problems)
+            usable, problem = judged["usable"], judged["problem"]
         of = len(profile.signals)
-        matches.append({"name": name, "usable": usable, "found": of - len(found.missing), "signals": of})
+        found_signals = of - len(found.missing)
+        matches.append({"name": name, "usable": usable, "found": found_signals, "signals": of, "problem": problem})
     return sorted(matches, key=lambda one: (not one["usable"], -int(str(one["found"])), str(one["name"])))
 
 
@@ -256,7 +254,7 @@ def _format_of(path: Path, reader: Reader) -> str:
         with first.open("rb") as file:
             head = file.read(64)
         name = next((entry.name for entry in supported_formats() if entry.matches(first, head)), "")
-    return f"{name}, {len(reader.paths)} files" if len(reader.paths) > 1 else name
+    return f"{name}, {counted(len(reader.paths), 'file')}" if len(reader.paths) > 1 else name
 
 
 def _size(path: Path) -> int:

@@ -24,9 +24,9 @@ SAYS = {
     "position": "The positions are mirrored against heading and velocity, as with north and east exchanged",
     "heading": "The heading turns the wrong way round against positions and velocity",
     "velocity": "The sway velocity has the wrong sign against positions and heading, as with y to port, or heading and "
-    "positions are both of the other hand",
+    "positions are both mirrored",
 }
-"""What is of the wrong hand, by the signal to look at first."""
+"""What is mirrored, by the signal to look at first."""
 
 
 def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, one_line
 from ferryid.ingest.checksum import crc32
 
@@ -119,7 +120,7 @@ def read_table(path: Path, checksum: int | None = None) -> tuple[dict[str, NDArr
     except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, MemoryError) as error:
         raise FerryIdError(
             f"{path}: this table of the log cache cannot be read ({one_line(str(error))}). "
-            "Fix: delete its folder, the next ingest writes it anew"
+            "Fix: delete its folder, the next ingest writes it again"
         ) from error
     return columns, metadata
 
@@ -127,7 +128,7 @@ def read_table(path: Path, checksum: int | None = None) -> tuple[dict[str, NDArr
 def _values(column: Any) -> NDArray[Any]:
     kind = {"int64": np.int64, "double": np.float64}.get(str(column.type))
     if kind is None or column.null_count:
-        raise ValueError(f"a column of {column.type}, {column.null_count} cells of it missing")
+        raise ValueError(f"a column of {column.type}, {counted(column.null_count, 'cell')} of it missing")
     dtype = np.dtype(kind)
     parts = [
         np.frombuffer(chunk.buffers()[1], dtype=dtype, count=len(chunk), offset=chunk.offset * dtype.itemsize)

@@ -51,7 +51,7 @@ class Limits:
         if interval.size == 0:
             return Limits(angle, int(start_ns), float("inf"), 0.0, most, floor, path)
         move = np.abs(difference(values[fixes], angle=angle))
-        period = _mean_interval(interval)
+        period = mean_interval(interval)
         # Over a second, noise weighs little.
         later = np.minimum(np.searchsorted(time_s, time_s + 1.0), time_s.size - 1)
         lasts = time_s[later] - time_s
@@ -117,7 +117,7 @@ class Limits:
         return away <= _BACK * jump and reach <= _BACK * jump
 
 
-def _mean_interval(interval: Floats) -> float:
+def mean_interval(interval: Floats) -> float:
     """Return the mean of the intervals [s] without the long ones."""
     period = float(interval.mean())
     for _ in range(5):

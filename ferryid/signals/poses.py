@@ -15,6 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
+from ferryid.signals.heading_steps import heading_steps
 from ferryid.signals.pose_limits import (
     STEPS_HELD,
     Complex,
@@ -29,6 +31,7 @@ from ferryid.signals.pose_limits import (
     integral,
     way_over_ground,
 )
+from ferryid.signals.track import Doubt
 from ferryid.vessel.frames import wrap
 
 MARGIN_S = 0.5
@@ -52,6 +55,8 @@ _PERIODS_HELD, _LEAST_HELD_S = 4.0, 0.5
 _CLEAR, _CANCEL, _CANCEL_S = 2.0, 0.1, 120.0
 """A jump this many times the limit, undone by the next but for this share and within this [s], leads away and back."""
 _FLIP = np.radians(20.0)
+_STEPS_SAID = 3
+"""Steps of the heading of which each has a sentence."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +70,11 @@ class PoseFault:
     kind
         ``"jump"``: a step after which the pose stays, so that the step alone is left out; ``"away"``: between a jump and the
         one back; ``"flip"``: the same of a heading, by 180°; ``"off"``, ``"turned"``: the same as these two, but from the
-        start or to the end of the log; ``"zero"``: exactly zero; ``"held"``: repeats its last value; ``"frequent"``: jumps
+        start or to the end of the log; ``"step"``: a smaller jump of a heading that stays and that its yaw rate does not have,
+        see `ferryid.signals.heading_steps`; ``"zero"``: exactly zero; ``"held"``: repeats its last value; ``"frequent"``: jumps
         so often that no sample is known to be wrong, one fault for each jump, of which none is left out.
     samples
-        Wrong samples; none in a jump.
+        Wrong samples; none in a jump or step.
     start_ns, end_ns
         Times of the last right sample before and the first right one after [ns], or of the first or last of all.
     size
@@ -105,10 +111,51 @@ def pose_faults(samples: Samples) -> tuple[PoseFault, ...]:
     turning = integral(samples, "r")
     if "psi" in samples:
         found += _faults("heading", *finite(samples["psi"][0], samples["psi"][1].astype(np.complex128)), turning)
+        found += _steps(samples, found)
     if "x" in samples and "y" in samples and samples["x"][1].size == samples["y"][1].size:
         place = samples["x"][1] + 1j * samples["y"][1]
         found += _faults("position", *finite(samples["x"][0], place), way_over_ground(samples))
     return tuple(sorted(found, key=lambda fault: (fault.start_ns, fault.signal)))
+
+
+def _steps(samples: Samples, heading: Sequence[PoseFault]) -> list[PoseFault]:
+    """Return steps of the heading away from what is wrong with it already."""
+    if any(not fault.left_out for fault in heading):
+        return []
+    time_ns, psi = samples["psi"]
+    wrong = np.zeros(time_ns.size, dtype=bool)
+    for fault in (one for one in heading if one.samples):
+        wrong |= (time_ns > fault.start_ns) & (time_ns < fault.end_ns)
+    right = {**samples, "psi": (time_ns, np.where(wrong, np.nan, psi))}
+    return [
+        PoseFault("heading", "step", 0, start_ns, end_ns, abs(size))
+        for start_ns, end_ns, size in heading_steps(right)
+        if not any(start_ns < fault.end_ns and end_ns > fault.start_ns for fault in heading)
+    ]
+
+
+def step_doubts(faults: Sequence[PoseFault], t0_ns: int) -> tuple[Doubt, ...]:
+    """Return what to mind of headings that step and stay: a sentence for each of the largest, with its time and size."""
+    steps = sorted(
+        (fault for fault in faults if fault.signal == "heading" and fault.kind in ("jump", "step")),
+        key=lambda fault: -fault.size,
+    )
+    shown = sorted(steps[:_STEPS_SAID], key=lambda fault: fault.start_ns)
+    said = [
+        f"The heading steps by {np.degrees(fault.size):.0f}° at {(fault.end_ns - t0_ns) * 1e-9:.1f} s and stays there, which "
+        "no turn of the vessel explains: on one side it is wrong by as much. Fix: check the compass, or use the parts before "
+        "and after as two logs."
+        for fault in shown
+    ]
+    if len(steps) > _STEPS_SAID:
+        said.append(f"The heading steps and stays {counted(len(steps) - _STEPS_SAID, 'more time')}, by less.")
+    return tuple(Doubt(one, False) for one in said)
+
+
+def pose_reason(fault: PoseFault) -> str:
+    """Return what is wrong with one stretch, to stand after "because"."""
+    size = f"{fault.size:.2f} m" if fault.signal == "position" else f"{np.degrees(fault.size):.0f}°"
+    return f"the {fault.signal} {_SAYS[fault.kind].rstrip(',')} ({size})"
 
 
 def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
@@ -119,12 +166,13 @@ def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
             those = [fault for fault in faults if fault.signal == signal and fault.kind == kind]
             if not those:
                 continue
-            times = "once" if len(those) == 1 else f"{len(those)} times"
+            times = "once" if len(those) == 1 else counted(len(those), "time")
             size = max(fault.size for fault in those)
             if kind == "frequent":
                 far = f"{size:.2f} m" if signal == "position" else f"{np.degrees(size):.0f}°"
                 said.append(
-                    f"The {signal} jumps {len(those)} times farther than the vessel can move, by up to {far}: too often to "
+                    f"The {signal} jumps {counted(len(those), 'time')} farther than the vessel can move, by "
+                    f"up to {far}: too often to "
                     "know which samples are wrong, so that none is left out. Check the sensor and its fields in the profile."
                 )
                 continue
@@ -132,7 +180,9 @@ def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
                 f"{size:.2f} m" if signal == "position" else f"{np.degrees(size):.0f}°"
             )
             if count := sum(fault.samples for fault in those):
-                text += f", at most for {max(fault.seconds for fault in those):.2f} s, {count} samples in all"
+                text += (
+                    f", at most for {max(fault.seconds for fault in those):.2f} s, {counted(count, 'sample')} in all"
+                )
             said.append(f"{text}; left out with {MARGIN_S:g} s on either side.")
     return tuple(said)
 
@@ -143,6 +193,7 @@ _SAYS = {
     "off": "is farther from the rest of the log than the vessel can move, at its start or end,",
     "flip": "is turned by 180° and back",
     "turned": "is turned by 180° against the longer part of the log, which is taken for right (check the sensor),",
+    "step": "steps without a turn of the yaw rate and stays,",
     "zero": "is exactly zero while the vessel is elsewhere",
     "held": "repeats its last value while the vessel moves on",
     "frequent": "",

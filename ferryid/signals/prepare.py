@@ -12,6 +12,7 @@ import numpy as np
 from ferryid.errors import FerryIdError
 from ferryid.signals.align import align
 from ferryid.signals.data_quality import left_out_sentences
+from ferryid.signals.faults import Faults
 from ferryid.signals.quality import POSE
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_sampling
@@ -36,6 +37,11 @@ class Opened:
         """Contradictions between its signals, and actuators known by their orders alone, as sentences."""
         return doubts_of(self.recording, self.track)
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Which rows are not used whatever the smoothing, and why, as sentences."""
+        return left_out_sentences(self.recording, self.measured.left_out, self.measured.usable)
+
 
 @dataclass(frozen=True)
 class Prepared:
@@ -50,7 +56,7 @@ class Prepared:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Which rows are not used and why, as sentences."""
-        return left_out_sentences(self.recording, self.motion)
+        return left_out_sentences(self.recording, self.motion.left_out, self.motion.valid)
 
 
 def doubts_of(recording: Recording, track: Track) -> tuple[str, ...]:
@@ -90,14 +96,16 @@ def open_track(path: str, profile: Profile, out: Path, *, rate_hz: float | None 
     return track_of(record(path, profile, out, verify=verify), profile, rate_hz)
 
 
-def track_of(recording: Recording, profile: Profile, rate_hz: float | None = None) -> Opened:
-    """Align a recording and reconstruct its forces; arguments and errors are those of `prepare`."""
+def track_of(
+    recording: Recording, profile: Profile, rate_hz: float | None = None, faults: Faults | None = None
+) -> Opened:
+    """Align a recording and reconstruct its forces; arguments and errors are those of `prepare` and `align`."""
     check_sampling(recording, profile)
-    track = align(recording, profile, rate_hz)
+    track = align(recording, profile, rate_hz, faults)
     for doubt in track.doubts:
         if doubt.certain:
             raise FerryIdError(
-                f"{recording.name}: signals contradict each other, so nothing can be learnt from them. {doubt.says} "
+                f"{recording.name}: signals contradict each other, so they cannot be used. {doubt.says} "
                 f"Fix: correct unit, frame or sign of the signal in the profile {profile.name}"
             )
     return Opened(recording, track, measure(track, profile))

@@ -1,4 +1,4 @@
-"""What is wrong with a signal: missing, held and wild samples, constants, and signals that contradict each other."""
+"""What is wrong with a signal by itself: missing, held and wild samples, and constants."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
-from ferryid.signals.mirror import mirrored
-from ferryid.signals.track import Doubt, Track
+from ferryid.signals.track import Track
 from ferryid.vessel.frames import wrap
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ _REPEATS_AT_MOST = 0.2
 
 # Steps that no vessel takes from one sample to the next: at any interval, and per second of interval. Generous on
 # purpose: what is removed here must be wrong on a 1 m model and on a ferry.
-_IMPLAUSIBLE: Mapping[str, tuple[float, float]] = {
+IMPLAUSIBLE: Mapping[str, tuple[float, float]] = {
     "x": (1.0, 15.0),
     "y": (1.0, 15.0),
     "psi": (0.15, 2.0),
@@ -97,32 +97,40 @@ class ColumnQuality:
     longest_held_s: float = 0.0
     constant: bool = False
 
-    def sentences(self) -> tuple[str, ...]:
-        """Return the findings as sentences with numbers; empty for a clean column."""
-        name, of = self.name, f"of {self.count} samples"
+    def taken_out(self) -> tuple[str, ...]:
+        """Return what is missing or was removed as sentences with numbers; empty for a clean column."""
+        name, of = self.name, f"of {counted(self.count, 'sample')}"
         said = []
         if self.missing:
             bridged = "the value before holds" if is_load(name) else "short ones are interpolated"
-            said.append(f"{name}: {self.missing} {of} are missing (NaN); {bridged}.")
+            said.append(f"{name}: {self.missing} {of} {verb(self.missing, 'is')} missing (NaN); {bridged}.")
         if self.through_wrap:
             said.append(
-                f"{name}: {self.through_wrap} {of} were interpolated the wrong way round between 359° and 1°; "
-                "removed and interpolated."
+                f"{name}: {self.through_wrap} {of} {verb(self.through_wrap, 'was')} interpolated the wrong way round "
+                "between 359° and 1°; removed and interpolated."
             )
         if self.spikes:
             bridged = "held over" if is_load(name) else "interpolated"
-            said.append(f"{name}: {self.spikes} {of} are single implausible spikes; removed and {bridged}.")
+            what = "is a single implausible spike" if self.spikes == 1 else "are single implausible spikes"
+            said.append(f"{name}: {self.spikes} {of} {what}; removed and {bridged}.")
+        return tuple(said)
+
+    def remarks(self) -> tuple[str, ...]:
+        """Return what was found and kept as sentences with numbers; empty for a clean column."""
+        name = self.name
+        said = []
         if self.jumps:
             kept = "" if name in POSE else " and kept"
-            said.append(f"{name}: {self.jumps} implausible steps were found{kept}.")
+            said.append(f"{name}: {counted(self.jumps, 'implausible step')} {verb(self.jumps, 'was')} found{kept}.")
         if self.held:
             share = self.held / max(1, self.count)
             which = (
-                "most samples repeat the one before: it is updated slower than it is recorded" if share > 0.5 else ""
+                "; most samples repeat the one before: it is updated slower than it is recorded" if share > 0.5 else ""
             )
             said.append(
-                f"{name}: {self.held} {of} repeat the one before, at most for {self.longest_held_s:.2f} s"
-                + (f"; {which}." if which else ".")
+                f"{name}: {self.held} of {counted(self.count, 'sample')} {verb(self.held, 'repeats')} the one "
+                "before, at most for "
+                f"{self.longest_held_s:.2f} s{which}."
             )
         if self.constant and self.count > 1:
             said.append(f"{name}: never changes.")
@@ -283,86 +291,6 @@ def require_excited(track: Track, nu: Floats, tau: Floats) -> None:
         )
 
 
-def cross_checks(track: Track) -> tuple[Doubt, ...]:
-    """Return kinematic contradictions: yaw rate against heading, velocity against position.
-
-    Changes over two seconds are compared with the integrals of the rates, so that no noisy derivative is formed.
-    Certain are those in which both follow each other closely and yet differ in sign or by the factor of a unit.
-    Nothing is corrected here.
-    """
-    columns = track.columns
-    span = max(2, round(2.0 * track.rate_hz))
-    said: list[Doubt] = []
-    if "psi" in columns and "r" in columns:
-        turned, integrated = _changes("psi", np.diff(columns["psi"]), columns["r"], track, span)
-        said += _compare("yaw rate", "heading", turned, integrated, 0.035, _YAW_RATE_GAINS)
-    if {"x", "y", "psi", "u", "v"} <= set(columns):
-        north, east = np.diff(columns["x"]), np.diff(columns["y"])
-        psi = (columns["psi"][1:] + columns["psi"][:-1]) / 2
-        c, s = np.cos(psi), np.sin(psi)
-        ahead, u = _changes("x", c * north + s * east, columns["u"], track, span)
-        aside, v = _changes("y", c * east - s * north, columns["v"], track, span)
-        speeds = _compare("surge velocity", "position", ahead, u, 0.2, _SPEED_GAINS)
-        speeds += _compare("sway velocity", "position", aside, v, 0.2, _SPEED_GAINS)
-        if speeds and not any(doubt.certain for doubt in speeds):
-            pose, velocity = (np.column_stack([columns[name] for name in names]) for names in (("x", "y", "psi"), "uv"))
-            _, says = mirrored(pose, velocity, track.valid, track.rate_hz)
-            speeds = [Doubt(says, True)] if says else speeds
-        said += speeds
-    return tuple(said)
-
-
-_CERTAIN = 0.9
-"""Correlation above which a wrong sign or unit is beyond doubt."""
-_YAW_RATE_GAINS = (
-    (np.pi / 180, "degrees per second look read as rad/s, or a heading in radians as degrees"),
-    (180 / np.pi, "rad/s look read as degrees per second, or a heading in degrees as radians"),
-)
-_SPEED_GAINS = (
-    (0.514444, "knots look read as m/s"),
-    (1 / 0.514444, "m/s look read as knots"),
-    (1 / 3.6, "km/h look read as m/s"),
-)
-
-
-def _compare(
-    rate: str, of: str, change: Floats, integral: Floats, least: float, known: tuple[tuple[float, str], ...]
-) -> list[Doubt]:
-    if change.size < 10 or np.sqrt(np.mean(change**2)) < least or not np.any(integral):
-        return []
-    both = float(change @ integral)
-    if float(integral @ integral) < 1e-200:
-        return []
-    gain = both / float(integral @ integral)
-    correlation = both / float(np.sqrt((change @ change) * (integral @ integral)))
-    numbers = f"gain {gain:.3g}, correlation {correlation:.2f}"
-    if abs(correlation) < 0.5:
-        return [Doubt(f"The {rate} does not follow the {of} ({numbers}): check topic, frame and clocks.", False)]
-    size = next((text for value, text in known if abs(abs(gain) / value - 1.0) < 0.15), "")
-    certain = abs(correlation) > _CERTAIN
-    if gain < 0:
-        says = f"The {rate} has the wrong sign against the {of} ({numbers})" + (f", and {size}." if size else ".")
-        return [Doubt(says, certain)]
-    if abs(gain - 1.0) > 0.1:
-        says = f"The {rate} does not match the {of} ({numbers})" + (f": {size}." if size else ".")
-        return [Doubt(says, certain and bool(size))]
-    return []
-
-
-def _changes(name: str, step: Floats, rate: Floats, track: Track, span: int) -> tuple[Floats, Floats]:
-    """Return changes of a signal and integrals of its rate over windows of `span` rows inside measured data."""
-    area = (rate[1:] + rate[:-1]) / (2 * track.rate_hz)
-    good = np.isfinite(step) & np.isfinite(area) & track.valid[1:] & track.valid[:-1]
-    count = (good.size // span) * span
-    whole = good[:count].reshape(-1, span).all(axis=1)
-    change = step[:count].reshape(-1, span)[whole].sum(axis=1)
-    integral = area[:count].reshape(-1, span)[whole].sum(axis=1)
-    # One jump of a position or heading would outweigh hours of agreement; jumps are counted elsewhere.
-    floor, per_second = _IMPLAUSIBLE[name]
-    possible = np.abs(change) < floor + per_second * span / track.rate_hz
-    return change[possible], integral[possible]
-
-
 def _through_wrap(times: Floats, angle: Floats) -> NDArray[np.int64]:
     """Return the samples inside a full turn that takes a few samples: 359°, 240°, 120°, 1° is a turn of 2° resampled."""
     step = np.diff(angle)
@@ -373,7 +301,7 @@ def _through_wrap(times: Floats, angle: Floats) -> NDArray[np.int64]:
     for first, last in pairwise(edges):
         turned = abs(float(angle[last] - angle[first]))
         if 2 <= last - first <= _TURN_SAMPLES and abs(turned - 2 * np.pi) < _TURN_MISSES:
-            rate = _IMPLAUSIBLE["psi"][1]
+            rate = IMPLAUSIBLE["psi"][1]
             if times[last] - times[first] < 2 * np.pi / rate:
                 inside.extend(range(int(first) + 1, int(last)))
     return np.array(inside, dtype=np.int64)
@@ -395,8 +323,8 @@ def _spikes(name: str, times: Floats, known: Floats, step: Floats) -> tuple[NDAr
     noise = 1.4826 * float(np.median(some)) if some.size else 0.0
     interval = np.diff(times)
     usual = float(np.median(interval[::stride]))
-    if name in _IMPLAUSIBLE:
-        floor, per_second = _IMPLAUSIBLE[name]
+    if name in IMPLAUSIBLE:
+        floor, per_second = IMPLAUSIBLE[name]
     else:
         low, high = np.quantile(known[::stride], [0.01, 0.99])
         floor, per_second = _IMPLAUSIBLE_SHARE * float(high - low), 0.0

@@ -8,8 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
-from ferryid.ingest import open_log
+from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Nanoseconds, Reader, Series, Topic
@@ -101,7 +102,7 @@ def selected(reader: Reader, profile: Profile) -> Selection:
             f"{name_of(reader)}: the log holds no data, found {there} in a complete file. "
             "Fix: pass a log that was recorded while the topics were published"
         )
-    return select(profile, reader.topics, name_of(reader))
+    return select(profile, reader.topics, name_of(reader), reader.losses)
 
 
 def make_recording(
@@ -161,7 +162,8 @@ def _log_notes(streams: Mapping[str, Stream], selection: Selection, topics: tupl
     received = sorted(topic for topic, stream in streams.items() if stream.clock.source == "receive")
     if stamped and received:
         notes.append(
-            f"{len(stamped)} topic(s) are on their senders' stamps and {len(received)} on receive times "
+            f"{counted(len(stamped), 'topic')} {verb(len(stamped), 'is')} on senders' stamps and "
+            f"{len(received)} on receive times "
             f"({', '.join(received)}): the latter are later by their unknown latency"
         )
     elif received and not all(topic.encoding == "table" for topic in topics):
@@ -173,7 +175,8 @@ def log_name(path: str | Path) -> str:
     """Name of a log for folders and reports: file or folder name without suffixes, parts counted."""
     text = str(path)
     first, _, more = text.partition("+") if not Path(text).exists() else (text, "", "")
-    stem = re.sub(r"\.(bag|mcap|db3|csv|parquet|txt|dat|tsv|zstd|active)$", "", Path(first).resolve().name)
+    file = Path(first).resolve()
+    stem = file.stem if file.suffix in {Path(f"_{suffix}").suffix for suffix in log_suffixes()} else file.name
     clean = re.sub(r"[^A-Za-z0-9._-]+", "_", stem).strip("._") or "log"
     return f"{clean}-and-{more.count('+') + 1}-more" if more else clean
 

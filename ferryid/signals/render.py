@@ -6,9 +6,10 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ferryid.counts import counted, verb
 from ferryid.errors import one_line
 from ferryid.ingest.log import Loss
-from ferryid.signals.data_quality import loss_sentence, named
+from ferryid.signals.data_quality import dropped_rows, loss_sentence, named
 
 _FIELDS_SHOWN = 24
 _LEGEND = {
@@ -32,13 +33,34 @@ def render_inspect(result: Mapping[str, Any], width: int = 100) -> str:
     blocks.append(textwrap.fill(legend, width))
     losses = [Loss(**{key: value for key, value in loss.items() if key != "seconds"}) for loss in result["losses"]]
     lost = [loss_sentence(loss) for loss in losses if loss.costs_messages]
-    blocks.append(_listed("Lost", lost, width) if lost else "Lost: nothing")
+    left_out = _left_out(result)
+    if lost:
+        blocks.append(_listed("Lost", [*lost, *(f"{one[:1].upper()}{one[1:]}." for one in left_out)], width))
+    elif left_out:
+        blocks.append(textwrap.fill(f"Lost: no message; {'; '.join(left_out)}.", width, subsequent_indent="      "))
+    else:
+        blocks.append("Lost: nothing")
     blocks.append(
         _listed(
             "Notes", [*(loss_sentence(loss) for loss in losses if not loss.costs_messages), *result["notes"]], width
         )
     )
     return "\n\n".join(block for block in blocks if block)
+
+
+def _left_out(result: Mapping[str, Any]) -> list[str]:
+    """Return what was read and is left out nevertheless, because of times and, with a profile, of gaps and faults."""
+    said = []
+    dropped = dropped_rows([topic["clock"] for topic in result["topics"] if topic["clock"] is not None])
+    if dropped:
+        count = sum(dropped.values())
+        why = ", ".join(f"{number} as {reason}" for reason, number in dropped.items())
+        said.append(f"{counted(count, 'row')} {verb(count, 'is')} left out for wrong times: {why}")
+    vessel = result["vessel"]
+    rows = sum(one["rows"] for one in vessel["left_out"]) if vessel is not None else 0
+    if rows:
+        said.append(f"a fit leaves out {counted(rows, 'row')} for gaps and faults, see Vessel {vessel['name']}")
+    return said
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], width: int, left: Sequence[int] = (0,)) -> str:
@@ -73,7 +95,8 @@ def _head(result: Mapping[str, Any], width: int) -> str:
     start = result["start"] or "not known (times count from it)"
     lines = [
         _cut(one_line(result["path"]), width),
-        f"  {result['format']}, {_bytes(size)}, {result['messages']} messages in {len(result['topics'])} topic(s)",
+        f"  {result['format']}, {_bytes(size)}, {counted(result['messages'], 'message')} in "
+        f"{counted(len(result['topics']), 'topic')}",
         f"  start {start}, duration {_duration(result['duration_s'])}",
         f"  {result['sha256']}",
     ]
@@ -92,7 +115,7 @@ def _topics(topics: Sequence[Mapping[str, Any]], width: int) -> str:
                 _seconds(clock["offset_s"]),
                 _drift(clock, topic["duration_s"]),
                 _seconds(clock["jitter_s"]),
-                f"{len(clock['gaps'])} ({longest:.1f} s)" if clock["gaps"] else "0",
+                f"{len(clock['gaps'])} ({_gap(longest)})" if clock["gaps"] else "0",
             ]
         kind = topic["type"].replace("/msg/", "/")
         rows.append([topic["name"], kind, str(topic["count"]), _number(topic["rate_hz"], ".2f"), *values])
@@ -120,11 +143,18 @@ def _fields(topics: Sequence[Mapping[str, Any]], width: int) -> str:
 def _matches(matches: Sequence[Mapping[str, Any]], width: int) -> str:
     usable = [match for match in matches if match["usable"]]
     lines = ["Bundled vessel profiles"]
-    lines += [f"  {one['name']}: fits, {one['found']} of {one['signals']} signals found" for one in usable]
-    if not usable:
+    lines += [f"  {one['name']}: fits, {one['found']} of {counted(one['signals'], 'signal')} found" for one in usable]
+    for one in matches:
+        if one["problem"]:
+            lines += _wrapped(
+                f"{one['name']}: {one['found']} of {counted(one['signals'], 'signal')} found, but a fit "
+                f"refuses the log: {one['problem']}",
+                width,
+            )
+    if not usable and len(lines) == 1:
         best = max(matches, key=lambda one: int(one["found"]), default=None)
         near = (
-            f" (nearest: {best['name']}, {best['found']} of {best['signals']} signals)"
+            f" (nearest: {best['name']}, {best['found']} of {counted(best['signals'], 'signal')})"
             if best and best["found"]
             else ""
         )
@@ -211,6 +241,10 @@ def _seconds(value: float | None) -> str:
     return f"{value / 3600:.2f} h" if size < 172_800 else f"{value / 86_400:.1f} d"
 
 
+def _gap(seconds: float) -> str:
+    return f"{seconds:.1f} s" if seconds < 100.0 else f"{seconds:.0f} s" if seconds < 3600.0 else _seconds(seconds)
+
+
 def _duration(seconds: float) -> str:
     if seconds < 120:
         return f"{seconds:.2f} s"
@@ -224,4 +258,4 @@ def _bytes(size: int) -> str:
     for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if size >= scale:
             return f"{size / scale:.1f} {unit}"
-    return f"{size} bytes"
+    return f"{counted(size, 'byte')}"

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, sqrt
+from pathlib import PurePath
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.signals.quality import NAVIGATION, is_actuator, is_order
 from ferryid.signals.stream import Recording, Stream
@@ -29,15 +31,10 @@ def check_sampling(recording: Recording, profile: Profile) -> None:
     Raises
     ------
     FerryIdError
-        Where all navigation or all actuator signals have fewer than two times, and where the samples of the velocity
-        (or the position) are further apart than 2 sqrt(L/g).
+        As `check_advancing`, and where the samples of the velocity (or the position) are further apart than 2 sqrt(L/g).
     """
-    streams = list(recording.streams.values())
-    navigation = [stream for stream in streams if set(stream.columns) & set(NAVIGATION)]
-    actuators = [stream for stream in streams if any(is_actuator(name) or is_order(name) for name in stream.columns)]
-    for group in (navigation, actuators):
-        if group and all(len(stream.time_ns) < 2 for stream in group):
-            raise FerryIdError(_standing(recording, group))
+    check_advancing(recording)
+    navigation = [stream for stream in recording.streams.values() if set(stream.columns) & set(NAVIGATION)]
     lead = next((one for name in _LEAD for one in navigation if name in one.columns and len(one.time_ns) > 1), None)
     if lead is None:
         return
@@ -51,6 +48,31 @@ def check_sampling(recording: Recording, profile: Profile) -> None:
         f"{period_s:.4g} s, where a vessel of {length_m:.3g} m needs at least {least_hz:.2g} Hz. "
         f"Fix: {_remedy(recording, lead, period_s)}"
     )
+
+
+def check_advancing(recording: Recording) -> None:
+    """Refuse a recording without two times in it: one row, or a clock that stands still.
+
+    Raises
+    ------
+    FerryIdError
+        Where all navigation or all actuator signals have fewer than two times.
+    """
+    streams = list(recording.streams.values())
+    navigation = [stream for stream in streams if set(stream.columns) & set(NAVIGATION)]
+    actuators = [stream for stream in streams if any(is_actuator(name) or is_order(name) for name in stream.columns)]
+    for group in (navigation, actuators):
+        if group and all(len(stream.time_ns) < 2 for stream in group):
+            raise FerryIdError(_standing(recording, group))
+
+
+def single_rows(recording: Recording) -> str:
+    """Return the message on a topic of navigation or actuators that holds one row or one time, "" where each holds more."""
+    for stream in recording.streams.values():
+        moving = any(name in NAVIGATION or is_actuator(name) or is_order(name) for name in stream.columns)
+        if moving and len(stream.time_ns) < 2:
+            return _standing(recording, [stream])
+    return ""
 
 
 def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
@@ -68,16 +90,18 @@ def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
 def _standing(recording: Recording, streams: Sequence[Stream]) -> str:
     stream = max(streams, key=lambda one: one.clock.count + one.clock.dropped)
     rows = stream.clock.count + stream.clock.dropped
+    file = _file(recording, stream.topic)
     if rows < 2:
         found = "one row only" if rows else "no row"
-        return f"{_file(recording)}: {stream.topic} holds {found}, and motion needs many. Fix: use a longer log"
-    return (
-        f"{_file(recording)}: time does not advance, found {rows} rows of {stream.topic} with the same time. "
-        "Fix: name another time column under [table] in the profile, or record the log again"
-        if any(topic.encoding == "table" for topic in recording.topics)
-        else f"{_file(recording)}: time does not advance, found {rows} messages on {stream.topic} with the same time. "
-        "Fix: record the log again with a running clock"
+        return f"{file}: {stream.topic} holds {found}, and motion needs many. Fix: use a longer log"
+    is_table = any(topic.encoding == "table" for topic in recording.topics)
+    found = f"{counted(rows, 'row')} of {stream.topic}" if is_table else f"{counted(rows, 'message')} on {stream.topic}"
+    remedy = (
+        "name another time column under [table] in the profile, or record the log again"
+        if is_table
+        else "record the log again with a running clock"
     )
+    return f"{file}: time does not advance, found {found} with the same time. Fix: {remedy}"
 
 
 def _length(profile: Profile) -> float:
@@ -86,5 +110,7 @@ def _length(profile: Profile) -> float:
     return hull.length_m if isfinite(hull.length_m) else 4.0 * sqrt(hull.inertia_z / hull.mass_kg)
 
 
-def _file(recording: Recording) -> str:
-    return recording.files[0] if recording.files else recording.name
+def _file(recording: Recording, topic: str = "") -> str:
+    """Return the file of a topic where each has its own, else the first of the log."""
+    own = (file for file in recording.files if topic and PurePath(file).with_suffix("").as_posix().endswith(topic))
+    return next(own, recording.files[0] if recording.files else recording.name)

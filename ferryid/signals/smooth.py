@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.signals.align import segments
 from ferryid.signals.kalman import fit_levels, smooth_runs
 from ferryid.signals.quality import REFERENCE, require_excited
-from ferryid.signals.track import LeftOut, Motion, Track
+from ferryid.signals.track import LeftOut, Motion, Track, segments
 from ferryid.vessel import applied_force, speed_doubts
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
@@ -116,8 +116,8 @@ def measure(track: Track, profile: Profile) -> Measured:
     usable &= np.isfinite(nu).all(axis=1) & np.isfinite(tau).all(axis=1)
     if not usable.any():
         raise FerryIdError(
-            f"{track.log}: no row has both velocity and applied force, found {np.count_nonzero(track.valid)} aligned "
-            "rows. Fix: check the actuator signals in the profile"
+            f"{track.log}: no row has both velocity and applied force, found "
+            f"{counted(int(np.count_nonzero(track.valid)), 'aligned row')}. Fix: check the actuator signals in the profile"
         )
     require_excited(track, nu, tau)
     unknown = LeftOut.of(
@@ -195,7 +195,11 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
         wind=done.get("wind"),
         current=done.get("current"),
         payload=measured.payload,
-        repairs=(*measured.repairs, said, *(f"{one.rows} rows are not used: {one.reason}." for one in beside)),
+        repairs=(
+            *measured.repairs,
+            said,
+            *(f"{counted(one.rows, 'row')} {verb(one.rows, 'is')} not used: {one.reason}." for one in beside),
+        ),
         left_out=(*measured.left_out, *beside),
     )
 
@@ -300,7 +304,7 @@ def _told(smoother: str, rows: int, window_s: float, rate_hz: float) -> str:
         return f"Smoothing: none, a window of {window_s:g} s holds one row at {rate_hz:g} Hz."
     if rows == 1:
         return "Smoothing: none (window 0)."
-    said = f"Smoothing: {smoother} window of {rows} rows, {rows / rate_hz:.3g} s at {rate_hz:g} Hz"
+    said = f"Smoothing: {smoother} window of {counted(rows, 'row')}, {rows / rate_hz:.3g} s at {rate_hz:g} Hz"
     if abs(rows / rate_hz - window_s) > 1e-9:
         said += f" (asked for {window_s:g} s; the number of rows must be odd)"
     return said + "."
@@ -381,6 +385,8 @@ def _known(
         return None
     lost = int(np.count_nonzero(usable & ~known))
     if lost:
-        repairs.append(f"{lost} rows ({lost / track.rate_hz:.1f} s) are not used: the {what} was not measured.")
+        repairs.append(
+            f"{counted(lost, 'row')} ({lost / track.rate_hz:.1f} s) {verb(lost, 'is')} not used: the {what} was not measured."
+        )
     usable &= known
     return pair

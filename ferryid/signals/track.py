@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,26 @@ class Doubt:
 
 
 @dataclass(frozen=True)
+class Interval:
+    """One unbroken stretch of rows that are not used.
+
+    Attributes
+    ----------
+    start_s, end_s
+        Times of its first row and of the first row after it [s], from the first row of the track.
+    signals
+        Canonical names of those that are wrong or were not measured; empty where that is not known of single signals.
+    reason
+        What is wrong with it, to stand after "because".
+    """
+
+    start_s: float
+    end_s: float
+    signals: tuple[str, ...]
+    reason: str
+
+
+@dataclass(frozen=True)
 class LeftOut:
     """Rows of a log that are not used, for one reason.
 
@@ -34,19 +54,54 @@ class LeftOut:
         Number of unbroken stretches of them.
     seconds
         Their length together [s].
+    intervals
+        The stretches, in order of time.
     """
 
     reason: str
     rows: int
     stretches: int
     seconds: float
+    intervals: tuple[Interval, ...] = ()
 
     @staticmethod
-    def of(reason: str, rows: Flags, rate_hz: float) -> tuple[LeftOut, ...]:
-        """Count rows that are left out; empty where there are none."""
+    def of(
+        reason: str,
+        rows: Flags,
+        rate_hz: float,
+        first_row: int = 0,
+        cause: Callable[[slice], tuple[Sequence[str], str]] | None = None,
+    ) -> tuple[LeftOut, ...]:
+        """Count rows that are left out; empty where there are none.
+
+        Parameters
+        ----------
+        reason
+            What is wrong with them.
+        rows
+            Flags of the rows, shape (n,).
+        rate_hz
+            Rows per second.
+        first_row
+            The row whose time is zero.
+        cause
+            Signals and reason of one stretch of rows, by default none and `reason`.
+        """
         count = int(np.count_nonzero(rows))
-        starts = int(np.count_nonzero(rows[1:] & ~rows[:-1])) + int(rows[:1].any())
-        return (LeftOut(reason, count, starts, count / rate_hz),) if count else ()
+        if not count:
+            return ()
+        intervals = []
+        for stretch in segments(rows):
+            signals, why = ((), reason) if cause is None else cause(stretch)
+            first, last = ((row - first_row) / rate_hz for row in (stretch.start, stretch.stop))
+            intervals.append(Interval(first, last, tuple(signals), why))
+        return (LeftOut(reason, count, len(intervals), count / rate_hz, tuple(intervals)),)
+
+
+def segments(valid: Flags) -> list[slice]:
+    """Return the unbroken stretches of True, in order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], valid, [False]]).astype(np.int8)))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from math import isnan, pi
 from typing import TYPE_CHECKING, Any
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.simulate.added_effects import AddedEffect, unfit
 from ferryid.simulate.sections import Fault, Mooring, Payload
 from ferryid.simulate.series import read_series
 from ferryid.vessel import faults
@@ -174,9 +175,10 @@ def _sea(scenario: Scenario) -> Iterator[Doubt]:
             )
 
 
-def _lasting(scenario: Scenario) -> Iterator[tuple[KeyPath, Mooring | Payload | Fault]]:
+def _lasting(scenario: Scenario) -> Iterator[tuple[KeyPath, AddedEffect | Mooring | Payload | Fault]]:
     """Yield everything that has a beginning and an end, with its place in the file."""
     yield ("environment", "mooring"), scenario.mooring
+    yield from ((("effects", index), entry) for index, entry in enumerate(scenario.effects))
     yield from ((("payload", index), entry) for index, entry in enumerate(scenario.payload))
     yield from ((("thrusters", "faults", index), entry) for index, entry in enumerate(scenario.thrusters.faults))
 
@@ -214,6 +216,7 @@ def _lacking(scenario: Scenario, profile: Profile) -> Iterator[Doubt]:
                 f'{profile.name} has no thruster "{fault.thruster}", found {", ".join(names)}.'
                 f"{did_you_mean(fault.thruster, names)} Fix: name one of these",
             )
+    yield from unfit(scenario, profile)
     waves = scenario.waves.significant_height_m > 0.0
     if (waves or any(wake.height_m > 0.0 for wake in scenario.wakes)) and (isnan(hull.length_m) or isnan(hull.beam_m)):
         yield (

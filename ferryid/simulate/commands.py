@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.identify.store import load_file
 from ferryid.simulate.logs import write_log
-from ferryid.simulate.places import check_output
+from ferryid.simulate.output_paths import check_output, log_path
 from ferryid.simulate.scenario import Scenario, check_seed, list_scenarios, load_scenario
 from ferryid.simulate.trial import Simulation, simulate
 from ferryid.simulate.vessel_model import sailed_by
@@ -26,6 +27,7 @@ def run_scenario(
     scenario: str,
     out: Path,
     *,
+    log: Path | None = None,
     storage: str = "sqlite3",
     truth: Path | None = None,
     seed: int | None = None,
@@ -41,7 +43,11 @@ def run_scenario(
     ----------
     scenario
         Name of a bundled scenario, or the path of a TOML file.
-    out, truth, storage, overwrite
+    out
+        Folder for the log, which is an MCAP file named after the scenario where `log` says nothing else.
+    log
+        ``*.mcap``, ``*.bag`` (ROS1), or a name without suffix for a ROS2 folder.
+    truth, storage, overwrite
         As for `ferryid.simulate.write_log`.
     seed
         Takes the place of the scenario's own.
@@ -66,11 +72,12 @@ def run_scenario(
     if seed is not None:
         check_seed(seed)
     inputs = asked.inputs if asked.folder is None else (Path(scenario), *asked.inputs)
-    check_output(out, truth, storage=storage, overwrite=overwrite, json=json, inputs=inputs)
+    log = log_path(asked.name, out, log)
+    check_output(log, truth, storage=storage, overwrite=overwrite, json=json, inputs=inputs)
     progress("simulating (the first run after an installation compiles the simulator, some 20 s)")
     simulation = simulate(asked, seed, vessel=None if sailing is None else sailing.vessel)
     progress("writing the log")
-    write_log(simulation, out, truth, storage=storage, overwrite=overwrite)
+    write_log(simulation, log, truth, storage=storage, overwrite=overwrite)
     progress("")
     control = simulation.control
     position_m, heading_deg = _tracking(simulation)
@@ -81,7 +88,7 @@ def run_scenario(
         "vessel": simulation.profile.name,
         "seed": simulation.seed,
         "duration_s": float(len(control.t) / asked.sensors.navigation_rate_hz),
-        "log": str(out),
+        "log": str(log),
         "truth": None if truth is None else str(truth),
         "topics": {stream.topic: len(stream.stamp_ns) for stream in simulation.streams},
         "tracking_rms": {
@@ -139,7 +146,7 @@ def render_simulation(result: Mapping[str, Any]) -> str:
     if result["truth"] is not None:
         lines.append(f"true states: {result['truth']}")
     width = max(len(topic) for topic in result["topics"])
-    lines += [f"  {topic:<{width}}  {count:>7} messages" for topic, count in result["topics"].items()]
+    lines += [f"  {topic:<{width}}  {counted(count, 'message'):>16}" for topic, count in result["topics"].items()]
     rms = result["tracking_rms"]
     if rms["position_m"] is not None:
         lines.append(

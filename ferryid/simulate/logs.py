@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from ferryid import __version__
 from ferryid.files import replacing
-from ferryid.simulate.places import check_output
+from ferryid.simulate.output_paths import check_output
 from ferryid.simulate.recorders import write_mcap, write_ros1, write_ros2
 from ferryid.simulate.trial import Simulation
 

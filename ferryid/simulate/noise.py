@@ -1,20 +1,19 @@
-"""Random numbers that are the same everywhere, and noise made of them: coloured, gusts, dropouts.
+"""Random numbers that a seed gives with every version of NumPy, and noise made of them: coloured, gusts, dropouts.
 
-NumPy promises the integers of a seeded PCG64 for good, but not what its distributions make of them, and their
-logarithms differ in the last bit between processors. Only the integers are taken from it.
+NumPy promises the integers of a seeded PCG64 for good, but not what its distributions make of them: a scenario's noise is
+made of the integers.
 """
 
 from __future__ import annotations
 
 import zlib
-from math import ceil, pi, radians, sqrt
+from math import ceil, cos, exp, pi, radians, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
-from ferryid.simulate.elementary import cos, exp, log, sin
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Noise
 
@@ -49,9 +48,9 @@ class Random:
 
     def standard_normal(self, n: int) -> Floats:
         """Return n numbers of the standard normal distribution, by the method of Box and Muller."""
-        values = self.random(n + n % 2)
-        _box_muller(values)
-        return values[:n]
+        uniform = self.random(n + n % 2).reshape(-1, 2)
+        radius, angle = np.sqrt(-2.0 * np.log(uniform[:, 0])), 2.0 * pi * uniform[:, 1]
+        return np.column_stack((radius * np.cos(angle), radius * np.sin(angle))).ravel()[:n]
 
     def normal_columns(self, n: int, columns: int) -> Floats:
         """Return independent normal numbers, shape (n, columns); the first rows do not depend on how many follow."""
@@ -59,9 +58,7 @@ class Random:
 
     def standard_exponential(self, n: int) -> Floats:
         """Return n numbers of the exponential distribution of mean 1."""
-        values = self.random(n)
-        _exponential(values)
-        return values
+        return -np.log(self.random(n))
 
     def bytes(self, n: int) -> bytes:
         """Return n random bytes."""
@@ -71,21 +68,6 @@ class Random:
 def generator(seed: int, channel: str) -> Random:
     """Return the random stream of one channel, which no other channel can shift."""
     return Random(seed, channel)
-
-
-@compiled
-def _box_muller(values: Floats) -> None:
-    """Turn uniform numbers into normal ones, in place and in pairs."""
-    for i in range(0, len(values), 2):
-        radius = sqrt(-2.0 * log(values[i]))
-        angle = 2.0 * pi * values[i + 1]
-        values[i], values[i + 1] = radius * cos(angle), radius * sin(angle)
-
-
-@compiled
-def _exponential(values: Floats) -> None:
-    for i in range(len(values)):
-        values[i] = -log(values[i])
 
 
 def smooth_noise(random: Random, n: int, step_s: float, std: float, rate_std: float) -> Floats:
@@ -185,7 +167,7 @@ def gaps(random: Random, t: Floats, per_min: float, length_s: float) -> Flags:
 
 
 def sample_times(end_s: float, rate_hz: float, phase_s: float) -> Floats:
-    """Return when a sensor takes its samples, from `phase_s` up to `end_s` [s]; not `numpy.arange`, which may fuse + and *."""
+    """Return when a sensor takes its samples, from `phase_s` up to `end_s` [s]."""
     n = max(ceil((end_s - phase_s) * rate_hz - 1e-9), 0)
     return np.asarray(np.arange(n, dtype=np.float64) / rate_hz + phase_s)
 
@@ -205,24 +187,7 @@ def interpolated(t: Floats, grid: Floats, values: Floats) -> Floats:
     Floats
         Shape (n, k).
     """
-    out = np.empty((len(t), values.shape[1]))
-    _interpolate(t, grid, values, out)
-    return out
-
-
-@compiled
-def _interpolate(t: Floats, grid: Floats, values: Floats, out: Floats) -> None:
-    low, last = 0, len(grid) - 1
-    for i in range(len(t)):
-        while low < last and grid[low + 1] <= t[i]:
-            low += 1
-        share = 0.0
-        if low < last:
-            share = (t[i] - grid[low]) / (grid[low + 1] - grid[low])
-        for j in range(values.shape[1]):
-            out[i, j] = values[low, j]
-            if share > 0.0:
-                out[i, j] += share * (values[low + 1, j] - values[low, j])
+    return np.column_stack([np.interp(t, grid, column) for column in values.T])
 
 
 def navigation_noise(noise: Noise, seed: int, n: int, step_s: float) -> Floats:

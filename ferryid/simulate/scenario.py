@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.simulate.added_effects import AddedEffect, read_effects
 from ferryid.simulate.check_scenario import check_against, disagreements, raise_first
 from ferryid.simulate.paths import PATHS, Pose, SetPoints, set_points
 from ferryid.simulate.read_section import read_section, section
@@ -85,6 +86,8 @@ class Scenario:
         Orders straight to the actuators; its `kind` is empty where there is a path.
     guidance, controller, wind, current, waves, wakes, shallow, mooring, payload, fouling, thrusters, sensors
         The sections of the file, see `ferryid.simulate.sections`.
+    effects
+        The entries of ``[[effects]]``.
     true_hull
         Factors on the true vessel's coefficients (``{"X_u": 1.2}``), which the profile does not know.
     text
@@ -113,6 +116,7 @@ class Scenario:
     fouling: Fouling = field(default_factory=Fouling)
     thrusters: Thrusters = field(default_factory=Thrusters)
     sensors: Sensors = field(default_factory=Sensors)
+    effects: tuple[AddedEffect, ...] = ()
     true_hull: Mapping[str, float] = field(default_factory=dict)
     text: str = ""
     folder: Path | None = None
@@ -270,6 +274,7 @@ def _read(top: TableReader, name: str, text: str, folder: Path | None) -> Scenar
         seed=seed,
         manoeuvre=manoeuvre,
         guidance=guidance,
+        effects=read_effects(top),
         true_hull=_true_hull(top),
         text=text,
         folder=folder,

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.simulate.elementary import directions, sines_cosines
+from ferryid.simulate.environment import CURRENT, PAYLOAD, WIND, Link, current_samples, payload_samples
 from ferryid.simulate.noise import gaps, generator, interpolated, sample_times
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.states import Control, Truth
-from ferryid.simulate.surroundings import CURRENT, PAYLOAD, WIND, Link, current_samples, payload_samples
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
@@ -113,15 +112,15 @@ def apparent_wind(wind: Floats, psi: Floats, nu: Floats) -> tuple[Floats, Floats
     speed, direction
         Shape (n,); the direction is positive to starboard and lies in (-pi, pi].
     """
-    s, c = sines_cosines(psi)
+    s, c = np.sin(psi), np.cos(psi)
     u_rw = nu[:, 0] - (c * wind[:, 0] + s * wind[:, 1])
     v_rw = nu[:, 1] - (c * wind[:, 1] - s * wind[:, 0])
-    return np.sqrt(u_rw * u_rw + v_rw * v_rw), directions(v_rw, u_rw)
+    return np.hypot(u_rw, v_rw), np.arctan2(v_rw, u_rw)
 
 
 def quaternion(roll: Floats, pitch: Floats, yaw: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Return x, y, z and w of the turn from NED to body by yaw, pitch and roll [rad], in this order, shape (n,) each."""
-    (s1, c1), (s2, c2), (s3, c3) = (sines_cosines(0.5 * angle) for angle in (roll, pitch, yaw))
+    (s1, c1), (s2, c2), (s3, c3) = ((np.sin(0.5 * angle), np.cos(0.5 * angle)) for angle in (roll, pitch, yaw))
     return (
         s1 * c2 * c3 - c1 * s2 * s3,
         c1 * s2 * c3 + s1 * c2 * s3,
@@ -318,7 +317,7 @@ def _imu(scenario: Scenario, seed: int, truth: Truth) -> Stream:
     psi, u, v, r, u_dot, v_dot, roll, pitch, roll_dot, pitch_dot = _at(
         truth, t, truth.eta[:, 2], truth.nu, truth.nu_dot[:, :2], truth.attitude, rolling
     )
-    (s1, c1), (s2, c2) = sines_cosines(roll), sines_cosines(pitch)
+    s1, c1, s2, c2 = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
     q = quaternion(roll, pitch, _wrapped(psi))
     rates = (roll_dot - r * s2, pitch_dot * c1 + r * c2 * s1, r * c2 * c1 - pitch_dot * s1)
     force = (u_dot - r * v + GRAVITY * s2, v_dot + r * u - GRAVITY * c2 * s1, -GRAVITY * c2 * c1)

@@ -16,6 +16,7 @@ from ferryid.simulate.control.guidance import build_guidance
 from ferryid.simulate.control.manoeuvres import build_helm
 from ferryid.simulate.control.pid import build_pid
 from ferryid.simulate.control.reference import build_reference
+from ferryid.simulate.environment import controller_weather
 from ferryid.simulate.loop import RECORD, ROW, Loop, Measured, Memory, run
 from ferryid.simulate.noise import navigation_errors, navigation_noise, navigation_sent
 from ferryid.simulate.plant.motion import build, payload_aboard, resting, roll_pitch
@@ -23,7 +24,6 @@ from ferryid.simulate.scenario import Scenario, check_against
 from ferryid.simulate.sensors import Stream, sense
 from ferryid.simulate.size import check_size, steps_per_cycle
 from ferryid.simulate.states import Control, Truth
-from ferryid.simulate.surroundings import controller_weather
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:

@@ -77,6 +77,8 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
     chosen = _conditions(model, conditions) if conditions else None
     data = tomllib.loads(scenario.text)
     aside = [place for place in VESSEL_KEYS if _taken(data, place)]
+    data, dropped = _without_vessel_effects(data)
+    aside += [("effects",)] if dropped else []
     sha256 = "" if chosen is None else chosen.sha256
     stored = (*model.vessel_effects, *(() if chosen is None else chosen.effects))
     for one in stored:
@@ -125,6 +127,13 @@ def _taken(data: dict[str, Any], place: Sequence[str]) -> bool:
     for name in place[:-1]:
         data = data.get(name, {})
     return data.pop(place[-1], None) is not None
+
+
+def _without_vessel_effects(data: dict[str, Any]) -> tuple[dict[str, Any], bool]:
+    """Return tables without entries of ``[[effects]]`` that are properties of the vessel; tell whether there were any."""
+    given = data.get("effects", [])
+    kept = [one for one in given if not effects()[one["effect"]].vessel]
+    return {**data, "effects": kept}, len(kept) < len(given)
 
 
 def _merged(data: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.errors import did_you_mean, one_line
 from ferryid.vessel.toml_lines import KeyPath, line_of
 
@@ -114,7 +115,7 @@ class TableReader:
             self.fault(f'"{key}" must be an array of strings, found {_kind(value)}. Fix: {key} = ["a", "b"]', key)
             return ()
         if count is not None and len(value) != count:
-            self.fault(f'"{key}" must name {count} fields, found {len(value)}. Fix: name {count}', key)
+            self.fault(f'"{key}" must name {counted(count, "field")}, found {len(value)}. Fix: name {count}', key)
             return ()
         return tuple(value)
 
@@ -162,7 +163,7 @@ class TableReader:
             )
             return ()
         if count is not None and len(value) != count:
-            self.fault(f'"{key}" must hold {count} numbers, found {len(value)}. Fix: give {count}', key)
+            self.fault(f'"{key}" must hold {counted(count, "number")}, found {len(value)}. Fix: give {count}', key)
             return ()
         if not all(self._is_plausible(key, entry, within) for entry in value):
             return ()

@@ -8,6 +8,7 @@ import tomllib
 from importlib import resources
 from pathlib import Path
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import TableLayout
 from ferryid.vessel.faults import Fault, TableReader
@@ -52,7 +53,7 @@ def parse_profile(text: str, where: str) -> Profile:
     if profile is None or errors:
         first = errors[0]
         more = len(errors) - 1
-        others = f" ({more} more fault{'s' * (more > 1)}: see ferryid vessel check {where})" if more else ""
+        others = f" ({counted(more, 'more fault')}: see ferryid vessel check {where})" if more else ""
         raise FerryIdError(f"{where}:{first.line}: {first.message}{others}")
     return profile
 

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.vessel.faults import TableReader
 from ferryid.vessel.parse_hull import MOST_AREA_M2, MOST_LENGTH_M, MOST_RATIO
 from ferryid.vessel.profile import Actuator, Hull, ThrustCurve
@@ -189,7 +190,7 @@ def _table_curve(reader: TableReader, unit: str, valid: tuple[float, float] | No
         return None
     if len(speeds) != len(forces) or len(speeds) < 2:
         reader.fault(
-            f'"speed" has {len(speeds)} entries and "force" {len(forces)}. Fix: give as many, at least two',
+            f'"speed" has {counted(len(speeds), "entry")} and "force" {len(forces)}. Fix: give as many, at least two',
             "force",
         )
         return None

@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.ingest.log import Series, Topic
+from ferryid.ingest.log import Loss, Series, Topic
 from ferryid.vessel.frames import heading_from_enu, local_north_east, yaw_of_quaternion
 from ferryid.vessel.profile import Floats, Profile, Signal
 from ferryid.vessel.thrusters import ROLE_PREFIX, needed_roles, order_note
@@ -78,14 +79,17 @@ def canonical_columns(signal: Signal) -> tuple[str, ...]:
     return (f"{prefix}_cmd_{name}" if rest.endswith(".command") else f"{prefix}_{name}",)
 
 
-def survey(profile: Profile, topics: Sequence[Topic]) -> Selection:
-    """Look for every signal of the profile in the topics of a log; nothing is raised for one that is missing."""
+def survey(profile: Profile, topics: Sequence[Topic], losses: Sequence[Loss] = ()) -> Selection:
+    """Look for every signal of the profile in the topics of a log; nothing is raised for one that is missing.
+
+    `losses` say why a topic is not there, where its file could not be read.
+    """
     wanted: dict[str, list[str]] = {}
     found: dict[str, str] = {}
     missing: dict[str, str] = {}
     for signal in profile.signals:
         topic = _topic(signal.topic, topics)
-        reason = _fault(signal, topic, topics)
+        reason = _fault(signal, topic, topics, losses)
         if topic is None or reason:
             missing[signal.quantity] = reason
             continue
@@ -98,7 +102,7 @@ def survey(profile: Profile, topics: Sequence[Topic]) -> Selection:
     return Selection({name: tuple(paths) for name, paths in wanted.items()}, found, missing, notes)
 
 
-def select(profile: Profile, topics: Sequence[Topic], where: str) -> Selection:
+def select(profile: Profile, topics: Sequence[Topic], where: str, losses: Sequence[Loss] = ()) -> Selection:
     """Find the profile's signals in a log.
 
     Parameters
@@ -109,13 +113,15 @@ def select(profile: Profile, topics: Sequence[Topic], where: str) -> Selection:
         Topics of the log.
     where
         The log's name for messages.
+    losses
+        What could not be read of the log.
 
     Raises
     ------
     FerryIdError
         For a required signal that the log does not have. Feedback may be missing where the order is there.
     """
-    selection = survey(profile, topics)
+    selection = survey(profile, topics, losses)
     lacking = [
         signal
         for signal in profile.signals
@@ -133,7 +139,14 @@ def select(profile: Profile, topics: Sequence[Topic], where: str) -> Selection:
     if lacking:
         signal = lacking[0]
         others = len(lacking) - 1
-        more = f" ({others} more required signal{'s are' if others > 1 else ' is'} missing)" if others else ""
+        more = f" ({counted(others, 'more required signal')} {verb(others, 'is')} missing)" if others else ""
+        unread = _unread(signal, losses) if _topic(signal.topic, topics) is None else None
+        if unread is not None:
+            what, _, remedy = unread.what.partition(" Fix: ")
+            raise FerryIdError(
+                f"{unread.file}: {signal.quantity} is needed by the profile {profile.name}, and its file cannot be used: "
+                f"{what.rstrip('.')}{more}. Fix: {remedy or 'copy it from the recorder again'}"
+            )
         reason = selection.missing[signal.quantity].removesuffix(".")
         if _topic(signal.topic, topics) is None:
             there = _some([topic.name for topic in topics]) or "no topic"
@@ -231,7 +244,8 @@ def _check_turns(profile: Profile, signal: Signal, values: list[Floats]) -> None
         return
     raise FerryIdError(
         f"{profile.path}:{signal.line}: {signal.quantity} is declared in {unit}, found a field {path} in {signal.topic} that "
-        f"stays within {turn:.4g} and jumps by as much {jumps} times, as {other} do at a full turn. Fix: correct the unit"
+        f"stays within {turn:.4g} and jumps by as much {counted(jumps, 'time')}, as {other} do at a full "
+        "turn. Fix: correct the unit"
     )
 
 
@@ -297,8 +311,16 @@ def _topic(name: str, topics: Sequence[Topic]) -> Topic | None:
     return None
 
 
-def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic]) -> str:
+def _unread(signal: Signal, losses: Sequence[Loss]) -> Loss | None:
+    """Return the loss of a signal's whole topic."""
+    return next((loss for loss in losses if loss.topic and _bare(loss.topic) == _bare(signal.topic)), None)
+
+
+def _fault(signal: Signal, topic: Topic | None, topics: Sequence[Topic], losses: Sequence[Loss]) -> str:
     """Say why a signal cannot be read, or return an empty string."""
+    if topic is None and (unread := _unread(signal, losses)) is not None:
+        what = unread.what.partition(" Fix: ")[0].rstrip(".")
+        return f"its file {unread.file.rpartition('/')[2]} cannot be used: {what}."
     if topic is None:
         hint = did_you_mean(signal.topic, [candidate.name for candidate in topics])
         return f'found no topic "{signal.topic}".{hint}'

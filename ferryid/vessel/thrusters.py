@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Actuator, Floats, Profile, ThrustCurve
 from ferryid.vessel.rudder import inflow_speed, rudder_force
@@ -274,6 +275,6 @@ def _strength(profile: Profile, actuator: Actuator, signals: Mapping[str, Floats
         return force, ""
     low, high = curve.valid
     return force, (
-        f"{actuator.name}: {count} of {force.size} rows lie outside the thrust curve's {low:g} to {high:g} "
+        f"{actuator.name}: {count} of {counted(force.size, 'row')} lie outside the thrust curve's {low:g} to {high:g} "
         f"{curve.input_unit} and were clipped."
     )

@@ -15,6 +15,7 @@ from tests.attack.case import draw, formats
 from tests.attack.check import examine, reported_undamaged, write
 from tests.attack.page import grouped, listed, page, table
 from tests.attack.run import Result, attack, warm_up
+from tests.evidence import stamp
 
 REPORT = Path(__file__).resolve().parents[2] / "reports" / "attack.md"
 NOT_COVERED = Path(__file__).with_name("not_covered.md")
@@ -68,6 +69,7 @@ def main() -> int:
             f"{name}: {base.name}, {base.count} messages" for name, (each, _) in formats().items() for base in each
         ]
         options.out.write_text(page(runs, bases, NOT_COVERED.read_text(encoding="utf-8")), encoding="utf-8")
+        stamp(options.out)
         print(f"written to {options.out}")
     return 1 if failed else 0
 

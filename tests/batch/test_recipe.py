@@ -12,7 +12,7 @@ from ferryid.batch.recipe import Recipe, load_recipe
 from ferryid.errors import FerryIdError
 from ferryid.identify.settings import FitSettings
 
-README = Path(__file__).resolve().parents[2] / "README.md"
+GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide.md"
 
 
 def loaded(folder: Path, text: str) -> Recipe:
@@ -28,7 +28,7 @@ def test_an_empty_one_is_the_default(tmp_path: Path) -> None:
 
 def test_the_default_in_the_documentation_is_the_default(tmp_path: Path) -> None:
     (text,) = (
-        block for block in re.findall(r"```toml\n(.*?)```", README.read_text("utf-8"), re.DOTALL) if "steps" in block
+        block for block in re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL) if "steps" in block
     )
     assert loaded(tmp_path, text) == Recipe()
     assert {one.name for one in fields(FitSettings) if one.name in text} == {one.name for one in fields(FitSettings)}

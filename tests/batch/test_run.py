@@ -483,7 +483,7 @@ def test_a_name_of_bytes_that_are_no_characters(tmp_path: Path) -> None:
 def test_nothing_says_whose_log_it_is(tmp_path: Path) -> None:
     logs = archive(tmp_path, 1)
     recipe(tmp_path)
-    with pytest.raises(FerryIdError, match=r"nothing says whose log .* Fix: give --vessel"):
+    with pytest.raises(FerryIdError, match=r"no vessel is given for the log .* Fix: give --vessel"):
         run(tmp_path, logs / "*.mcap", vessel=None)
     assert not results(tmp_path).exists()
 

@@ -110,9 +110,9 @@ def _batches(logs: int) -> list[Row]:
 
 def _season(out: Path, logs: int) -> None:
     """Write what is kept of `logs` logs of two hours, all made of one simulated trial."""
-    trial = out / "trial.mcap"
-    write_log(simulate(load_scenario("twelve-corner"), 1), trial)
-    open_track(str(trial), PROFILE, out)
+    problem = out / "trial.mcap"
+    write_log(simulate(load_scenario("twelve-corner"), 1), problem)
+    open_track(str(problem), PROFILE, out)
     settings = FitSettings(delta=0.4, sigma=0.4)
     (folder, note), *_ = recordings(out).items()
     one = kept(folder, PROFILE, settings, (settings.window_s,))

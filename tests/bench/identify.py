@@ -79,7 +79,7 @@ def fits(n: int, repeats: int) -> Iterator[Row]:
 
 
 def sweeps(n: int, repeats: int) -> Iterator[Row]:
-    nu, tau = trial(n)
+    nu, tau = problem(n)
     function = basis("thesis")
     X, Y = regression(n)
 
@@ -196,9 +196,9 @@ def once(
     """Row for a rival so slow that a part of it is timed and multiplied; ours runs before and after it."""
     mine, theirs, ratios = [], [], []
     for _ in range(repeats):
-        before = statistics.median(timed(ours) for _ in range(3))
-        slow = timed(rival) * times
-        after = statistics.median(timed(ours) for _ in range(3))
+        before = statistics.median(refit_spans(ours) for _ in range(3))
+        slow = refit_spans(rival) * times
+        after = statistics.median(refit_spans(ours) for _ in range(3))
         mine += [before, after]
         theirs.append(slow)
         ratios.append(slow / ((before + after) / 2.0))
@@ -209,7 +209,7 @@ def once(
     return Row(what, took, name, rival_took, ratio, f"≥ {goal:g}", ratio >= goal)
 
 
-def timed(work: Callable[[], object]) -> float:
+def refit_spans(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
@@ -221,7 +221,7 @@ def regression(n: int) -> tuple[Floats, Floats]:
     return X, X @ random.standard_normal((MOST, 3)) + random.standard_normal((n, 3))
 
 
-def trial(n: int) -> tuple[Floats, Floats]:
+def problem(n: int) -> tuple[Floats, Floats]:
     """Velocities and forces of a boat that wanders, shape (n, 3) each."""
     random = np.random.default_rng(0)
     t = np.arange(n) / RATE_HZ

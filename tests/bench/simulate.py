@@ -96,7 +96,7 @@ def process(plain: Scenario) -> Callable[[], object]:
         str(folder / "bench.toml"),
     ]
     return lambda: subprocess.run(
-        [*command, "--out", str(folder / "t.mcap"), "--overwrite"], check=True, capture_output=True
+        [*command, "--log", str(folder / "t.mcap"), "--overwrite"], check=True, capture_output=True
     )
 
 

@@ -26,7 +26,7 @@ factor = 0.6
 def test_from_a_diagnosis_to_a_simulation(ferryid, tmp_path: Path) -> None:
     out, scenario, log = tmp_path / "out", tmp_path / "trial.toml", tmp_path / "trial.mcap"
     scenario.write_text(BROKEN, encoding="utf-8")
-    assert ferryid("simulate", scenario, "--out", log).code == 0
+    assert ferryid("simulate", scenario, "--log", log).code == 0
 
     refused = ferryid("diagnose", log, "--vessel", "milliampere", "--name", "../a", "--out", out)
     assert refused.code == 2
@@ -68,14 +68,14 @@ def test_from_a_diagnosis_to_a_simulation(ferryid, tmp_path: Path) -> None:
     assert pair["mse"]["yaw"]["low"] > 1.0
 
     sailed = ferryid(
-        "simulate", scenario, "--model", "ferry@1", "--models", out, "--conditions", "trial", "--out", tmp_path / "a.bag",
+        "simulate", scenario, "--model", "ferry@1", "--models", out, "--conditions", "trial", "--log", tmp_path / "a.bag",
         "--json", "-",
     )  # fmt: skip
     assert sailed.code == 0, sailed.err
     told = conforms(sailed.out)
     assert (told["model"], told["conditions"]) == ("ferry@1", "trial")
     assert told["warnings"] == ["the scenario's [thrusters.faults] is set aside: the vessel is ferry@1"]
-    alone = ferryid("simulate", scenario, "--conditions", "trial", "--out", tmp_path / "b.bag")
+    alone = ferryid("simulate", scenario, "--conditions", "trial", "--log", tmp_path / "b.bag")
     assert alone.code == 2
     assert "found no --model" in alone.err
 
@@ -83,8 +83,7 @@ def test_from_a_diagnosis_to_a_simulation(ferryid, tmp_path: Path) -> None:
     data["vessel_effects"][0]["effect"] = "sea_monster"
     path.write_text(json.dumps(data), encoding="utf-8")
     for command in (("evaluate", "ferry", log), ("simulate", scenario, "--model", path)):
-        where = ("--out", tmp_path / "c.bag") if command[0] == "simulate" else ("--out", out)
-        unknown = ferryid(*command, *where)
+        unknown = ferryid(*command, "--out", out)
         assert unknown.code == 2
         assert '"sea_monster", which this version of ferryid does not know' in unknown.err
         assert unknown.err.count("\n") == 1

@@ -39,7 +39,7 @@ def test_has_help_and_is_documented(ferryid, command: str) -> None:
     run = ferryid(command, "--help")
     assert run.code == 0
     assert len(run.out.split("\n\n")[0]) > 20
-    assert f"ferryid {command}" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"ferryid {command}" in (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
 
 
 def test_shell_completion_knows_commands_and_options(ferryid, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,9 +229,16 @@ def test_two_fits_of_one_log_are_the_same_file(ferryid, fixtures: Path, tmp_path
 
 def test_simulate_and_list(ferryid, tmp_path: Path) -> None:
     scenario = ROOT / "fixtures" / "short.toml"
-    run = ferryid("simulate", scenario, "--out", tmp_path / "t.bag", "--json", "-")
+    run = ferryid("simulate", scenario, "--out", tmp_path, "--json", "-")
     assert run.code == 0, run.err
-    conforms(run.out)
+    assert conforms(run.out)["log"] == str(tmp_path / "short.mcap")
+    assert (tmp_path / "short.mcap").read_bytes().startswith(b"\x89MCAP")
+    assert ferryid("simulate", scenario, "--log", tmp_path / "t.bag").code == 0
+    assert (tmp_path / "t.bag").read_bytes().startswith(b"#ROSBAG")
+    old = ferryid("simulate", scenario, "--out", tmp_path / "old.bag")
+    assert old.code == 2
+    assert old.err.endswith(f"Fix: use --log {tmp_path / 'old.bag'}\n")
+    assert not (tmp_path / "old.bag").exists()
     assert "twelve-corner" in ferryid("simulate", "--list").out
     scenarios = conforms(ferryid("simulate", "--list", "--json", "-").out)["scenarios"]
     assert "twelve-corner" in {one["name"] for one in scenarios}
@@ -273,7 +280,7 @@ def test_vessel_check_show_and_list(ferryid, tmp_path: Path) -> None:
 def test_require_accept_exits_with_3(ferryid, tmp_path: Path) -> None:
     # Where nothing but noise comes on top of it, the true model cannot be improved by 5 %.
     log = tmp_path / "calm.mcap"
-    assert ferryid("simulate", "twelve-corner-calm", "--out", log).code == 0
+    assert ferryid("simulate", "twelve-corner-calm", "--log", log).code == 0
     run = ferryid("fit", log, "--vessel", "milliampere", "--out", tmp_path, "--require-accept")
     assert run.code == 3
     assert "Not accepted" in run.out

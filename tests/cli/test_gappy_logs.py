@@ -43,6 +43,14 @@ def counted(text: str) -> bool:
     return "rows" in joined and "are left out" in joined and "actuator was not measured" in joined
 
 
+def shown(page: str) -> None:
+    """Check that a page lists the longest stretches, counts the others, and shades all beside what validates."""
+    assert counted(page)
+    assert "left out from [s]" in page
+    assert page.count('<td class="text">not measured</td>') == 9 or "shorter stretch" in page
+    assert ">left out</text>" in page
+
+
 def test_inspect_and_ingest_count_the_gaps(ferryid: Command, place: Path) -> None:
     clocks = {
         topic["name"]: topic["clock"]
@@ -63,7 +71,13 @@ def test_fit_evaluate_compare_and_export_leave_the_rows_out_and_count_them(ferry
     assert measured["seconds"] == pytest.approx(LOST, abs=2.0)
     assert measured["stretches"] == 9
     assert beside["rows"] == 9 * 22
-    assert counted(Path(fitted["report"]).read_text(encoding="utf-8"))
+    assert sum(one["end_s"] - one["start_s"] for one in measured["intervals"]) == pytest.approx(measured["seconds"])
+    assert any(
+        one["start_s"] == pytest.approx(300.0, abs=0.5) and "n_thruster1" in one["signals"]
+        for one in measured["intervals"]
+    )
+    shown(Path(fitted["report"]).read_text(encoding="utf-8"))
+    assert ">validation</text>" in Path(fitted["report"]).read_text(encoding="utf-8")
     used = result(ferryid("models", "milliampere@1", *out, "--json", "-"))["training"][0]["rows"]
     assert used < 20 * (600 - LOST)
 
@@ -82,8 +96,27 @@ def test_fit_evaluate_compare_and_export_leave_the_rows_out_and_count_them(ferry
     "what", [("components",), ("window", "--windows", "0.5,1"), ("both", "--windows", "0.5,1"), ("basis",)]
 )
 def test_sweeps(ferryid: Command, place: Path, what: tuple[str, ...]) -> None:
-    run = ferryid("sweep", what[0], place / "gaps.mcap", *VESSEL, *what[1:], "--out", place / "out")
+    options = (*VESSEL, *what[1:], "--out", place / "out", "--json", place / "sweep.json")
+    run = ferryid("sweep", what[0], place / "gaps.mcap", *options)
     assert run.code == 0, run.err
+    assert counted(run.out)
+    (log,) = json.loads((place / "sweep.json").read_text(encoding="utf-8"))["logs"]
+    assert counted(" ".join(log["warnings"]))
+
+
+def test_fit_and_sweep_of_an_archive(ferryid: Command, place: Path) -> None:
+    out = (*VESSEL, "--out", place / "archive")
+    assert ferryid("ingest", place / "gaps.mcap", place / "whole.mcap", *out).code == 0
+    for command in (("fit", "--components", "3"), ("fit", "--components", "3"), ("sweep", "components")):
+        run = ferryid(*command, "--archive", *out, "--json", place / "archive.json")
+        assert run.code == 0, run.err
+        assert counted(run.out)
+        assert "gaps: " in run.out
+        assert "whole: " not in run.out
+        told = json.loads((place / "archive.json").read_text(encoding="utf-8"))
+        gaps, whole = told["archive"] if command[0] == "fit" else told["logs"]
+        assert counted(" ".join(gaps["warnings"]))
+        assert whole["warnings"] == []
 
 
 def test_diagnoses(ferryid: Command, place: Path) -> None:
@@ -91,6 +124,10 @@ def test_diagnoses(ferryid: Command, place: Path) -> None:
     found = result(ferryid("diagnose", log, place / "whole.mcap", "--together", *VESSEL, *out))
     assert any(counted(note) for note in found["logs"][0]["notes"])
     assert not any(counted(note) for note in found["logs"][1]["notes"])
+    gaps = [stretch for one in found["logs"][0]["left_out"] for stretch in one["intervals"]]
+    assert any(one["start_s"] == pytest.approx(100.0, abs=0.5) and {"u", "v", "r"} <= {*one["signals"]} for one in gaps)
+    assert found["logs"][1]["left_out"] == []
+    shown(Path(found["report"]).read_text(encoding="utf-8"))
 
 
 def test_diagnosis_against_a_simulation(ferryid: Command, place: Path) -> None:
@@ -105,6 +142,11 @@ def test_batch(ferryid: Command, place: Path) -> None:
     options = (*VESSEL, "--recipe", recipe, "--processes", "1", "--out", place / "batch")
     (row,) = result(ferryid("batch", place / "gaps.mcap", *options, "--json", "-"))["rows"]
     assert row["status"] == "done", row
+    assert row["lost"]["seconds_left_out"] == pytest.approx(LOST, abs=2.0)
+    assert row["lost"]["rows_left_out"] == pytest.approx(20 * LOST, abs=40)
+    assert row["lost"]["messages"] == 0
+    assert counted(" ".join(row["lost"]["says"]))
+    assert counted((place / "batch" / "batch" / "index.html").read_text(encoding="utf-8"))
 
 
 def test_a_stray_time_is_counted_on_the_terminal_of_a_fit(ferryid: Command, place: Path) -> None:

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import examine
-from ferryid.diagnose.diagnose import diagnose
-from ferryid.diagnose.scene import scene_of
-from ferryid.diagnose.shared_evidence import MIRRORED, placebos
-from ferryid.diagnose.shared_hull import INDUCED, SharedHull, fit_together
-from ferryid.diagnose.together import together
+from ferryid.diagnose.data.measurements import read_measurements
+from ferryid.diagnose.inference.campaign import fit_campaign
+from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, fit_campaign_hull
+from ferryid.diagnose.judging.campaign_evidence import MIRRORED, placebos
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.vessel import load_profile
+from tests.diagnose.trials import averaged
 
 Locate = Callable[[str], Path]
 ENVIRONMENT = {"wind", "current", "gusts", "waves", "mooring", "shallow_water"}
@@ -46,7 +47,7 @@ def test_no_environment_is_named_in_a_towing_tank(run: str, shared_data: Locate)
 
 def test_zigzags_of_one_tanker_show_one_law_and_no_log_has_its_own(shared_data: Locate) -> None:
     logs = [str(shared_data(f"kvlcc2/HSVA_CPMC_KVLCC2_Z_{run}.dat")) for run in ("10_05", "20_10_S", "30_05", "35_05")]
-    every = diagnose(logs, load_profile("kvlcc2-model"), None, shared=True, progress=quiet)
+    every = diagnose(logs, load_profile("kvlcc2-model"), None, DiagnosisSettings(together=True), progress=quiet)
     laws = {tuple((term.on, term.quantity) for term in one.law) for made in every for one in made.findings if one.sure}
     # Nothing with a name is sure; the law is the same wherever it is told.
     assert len(laws) == 1
@@ -58,24 +59,24 @@ def test_zigzags_of_one_tanker_show_one_law_and_no_log_has_its_own(shared_data: 
     ("bag", "seconds"), [("exp52_v_2016-02-11-11-14-28", 30.0), ("exp39_1_2016-02-11-10-47-10", 4.0)]
 )
 def test_a_boat_driven_past_its_recorded_orders_is_noticed(bag: str, seconds: float, shared_data: Locate) -> None:
-    scene, _ = scene_of(str(shared_data(f"vtec_usv/{bag}.bag")), load_profile("vtec-usv"), None)
+    scene, _ = read_measurements(str(shared_data(f"vtec_usv/{bag}.bag")), load_profile("vtec-usv"), None)
     found = {finding.effect: finding for finding in examine(scene)[0]}
     assert found["unrecorded_force"].parameters["duration"].value == pytest.approx(seconds, abs=1.0)
 
 
 @pytest.mark.parametrize("bag", ["48000_2016-02-11-10-52-07", "52000_2016-02-11-10-40-10"])
 def test_a_position_on_a_grid_is_not_held(bag: str, shared_data: Locate) -> None:
-    scene, _ = scene_of(str(shared_data(f"vtec_usv/{bag}.bag")), load_profile("vtec-usv"), None)
+    scene, _ = read_measurements(str(shared_data(f"vtec_usv/{bag}.bag")), load_profile("vtec-usv"), None)
     assert "held_samples" not in {finding.effect for finding in examine(scene)[0]}
 
 
 def test_equal_readings_in_gunnerus_interpolated_table_are_not_held(shared_data: Locate) -> None:
-    scene, _ = scene_of(str(shared_data("gunnerus/RVG_ManeuveringTests.csv")), load_profile("gunnerus"), None)
+    scene, _ = read_measurements(str(shared_data("gunnerus/RVG_ManeuveringTests.csv")), load_profile("gunnerus"), None)
     assert "held_samples" not in {finding.effect for finding in examine(scene)[0]}
 
 
 def test_the_receiver_of_milliampere_is_late(shared_data: Locate) -> None:
-    scene, _ = scene_of(str(shared_data("milliampere1")), load_profile("milliampere-2025"), None)
+    scene, _ = read_measurements(str(shared_data("milliampere1")), load_profile("milliampere-2025"), None)
     found = {finding.effect: finding for finding in examine(scene)[0]}
     # Cross-correlation of the slope of the position with the velocity, on the raw rows: 0.25 to 0.30 s.
     late = found["clock_offset"].parameters["seconds"]
@@ -85,17 +86,17 @@ def test_the_receiver_of_milliampere_is_late(shared_data: Locate) -> None:
 def test_a_common_hull_points_to_the_hidden_wind_and_a_mirrored_one_does_not(shared_data: Locate) -> None:
     vessel = load_profile("esso-osaka")
     logs = sorted(str(path) for path in shared_data("esso_osaka/random").glob("*.csv"))
-    joint = together(logs, vessel, None, withhold=("wind",), progress=quiet)
-    hidden = [scene_of(log, vessel, None)[0].wind for log in logs]
+    joint = fit_campaign(averaged(logs, vessel, withhold=("wind",)), vessel, quiet)
+    hidden = [read_measurements(log, vessel, None)[0].wind for log in logs]
     true = np.array([wind.mean(axis=0) for wind in hidden if wind is not None])
     mirrored = placebos(joint.members)[MIRRORED]
     spread, lift = np.split(joint.hull.spread, [-len(INDUCED)])
     found = np.median(off(joint.hull, true))
     assert found < 25.0
-    assert np.median(off(fit_together(mirrored, spread, lift), true)) > 40.0
+    assert np.median(off(fit_campaign_hull(mirrored, spread, lift), true)) > 40.0
 
 
-def off(hull: SharedHull, true: np.ndarray) -> np.ndarray:
+def off(hull: CampaignHull, true: np.ndarray) -> np.ndarray:
     """Return how far the winds of all logs point away from the true ones [deg]."""
     found = np.array([values[0] for values in hull.values])
     apart = np.degrees(np.arctan2(found[:, 1], found[:, 0]) - np.arctan2(true[:, 1], true[:, 0]))

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import ferryid.diagnose.search as search_module
-from ferryid.diagnose.evidence import HEADING, evidence
-from ferryid.diagnose.hypothesis import Fit, Suspect, Trial, fit, imagined
-from ferryid.diagnose.search import search, suspects_of
-from ferryid.effects.picture import COEFFICIENTS, Scene
+import ferryid.diagnose.inference.search as search_module
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, fitted_force_model
+from ferryid.diagnose.inference.search import list_candidates, search
+from ferryid.diagnose.judging.held_out import HEADING, held_out_evidence
+from ferryid.effects.force_model import COEFFICIENTS, Measurements
 from tests.diagnose.trials import FERRY, OFF, sailed, trial_on
 
 BASE = """
@@ -23,35 +23,35 @@ sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 """
 
 
-def suspect(trial: Trial, name: str, instance: str | None = None) -> Suspect:
-    return next(one for one in suspects_of(trial.plain.scene)[0] if one.key == (name, instance))
+def candidate(problem: EstimationProblem, name: str, instance: str | None = None) -> Candidate:
+    return next(one for one in list_candidates(problem.plain.scene)[0] if one.key == (name, instance))
 
 
-def gain(trial: Trial, made: Fit) -> float:
-    return made.evidence - fit(trial, ()).evidence
+def gain(problem: EstimationProblem, made: Fit) -> float:
+    return made.evidence - fit(problem, ()).evidence
 
 
 @pytest.fixture(scope="module")
-def raw(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+def raw(tmp_path_factory: pytest.TempPathFactory) -> Measurements:
     """A closed-loop trial with coloured navigation noise, in which nothing acts but a hull that is ten per cent off."""
     return sailed(tmp_path_factory.mktemp("clean"), "clean", BASE, 3)
 
 
 @pytest.fixture(scope="module")
-def clean(raw: Scene) -> Trial:
+def clean(raw: Measurements) -> EstimationProblem:
     """The same, ready for hypotheses."""
     return trial_on(raw)
 
 
 @pytest.fixture(scope="module")
-def inflow(tmp_path_factory: pytest.TempPathFactory) -> Trial:
+def inflow(tmp_path_factory: pytest.TempPathFactory) -> EstimationProblem:
     """The same with thrusters that lose force to their inflow, which damping resembles."""
     return trial_on(
         sailed(tmp_path_factory.mktemp("inflow"), "inflow", f"{BASE}thrusters = {{ inflow_loss_per_mps = 0.3 }}\n", 4)
     )
 
 
-def test_trap_1_noise_in_the_acceleration_is_not_less_mass(clean: Trial, raw: Scene) -> None:
+def test_trap_1_noise_in_the_acceleration_is_not_less_mass(clean: EstimationProblem, raw: Measurements) -> None:
     # The trap: force on the differentiated velocity by least squares.
     u_dot = np.gradient(raw.nu_raw[:, 0], raw.step_s)
     u, v, r = raw.nu.T
@@ -70,66 +70,68 @@ def test_trap_1_noise_in_the_acceleration_is_not_less_mass(clean: Trial, raw: Sc
 
 
 @pytest.mark.parametrize("name", ["thruster_lag", "time_delay"])
-def test_trap_2_a_controller_that_answers_noise_is_no_lag(clean: Trial, name: str) -> None:
-    made = fit(clean, [suspect(clean, name)])
+def test_trap_2_a_controller_that_answers_noise_is_no_lag(clean: EstimationProblem, name: str) -> None:
+    made = fit(clean, [candidate(clean, name)])
     assert gain(clean, made) < 0.0
     assert abs(made.values[0][0]) < 0.05
 
 
-def test_trap_3_what_hides_in_a_product_is_found_and_sized(inflow: Trial) -> None:
+def test_trap_3_what_hides_in_a_product_is_found_and_sized(inflow: EstimationProblem) -> None:
     # Every effect among all the others: tests/effects/test_every_effect.py.
-    made = fit(inflow, [suspect(inflow, "thrust_inflow_loss")])
+    made = fit(inflow, [candidate(inflow, "thrust_inflow_loss")])
     assert made.values[0][0] == pytest.approx(0.3, abs=0.05)
     assert gain(inflow, made) > 5.0 * search_module.ODDS
 
 
-def test_trap_4_gains_and_hull_free_at_once_do_not_shrink(clean: Trial) -> None:
-    both = [suspect(clean, "thruster_gain", name) for name in clean.plain.scene.names]
+def test_trap_4_gains_and_hull_free_at_once_do_not_shrink(clean: EstimationProblem) -> None:
+    both = [candidate(clean, "thruster_gain", name) for name in clean.plain.scene.names]
     made = fit(clean, both)
     np.testing.assert_allclose(np.concatenate(made.values), 1.0, atol=0.06)
     assert gain(clean, made) < 0.0
 
 
-def test_trap_4_a_mass_that_would_cancel_the_acceleration_explains_nothing(clean: Trial) -> None:
-    one = suspect(clean, "payload")
+def test_trap_4_a_mass_that_would_cancel_the_acceleration_explains_nothing(clean: EstimationProblem) -> None:
+    one = candidate(clean, "payload")
     assert gain(clean, fit(clean, [one])) < search_module.ODDS
     # The more mass, the less acceleration does the picture have; what was measured stays.
     left = [float(np.sum(clean.white(one.act(clean.plain, np.array([mass, 0.0]))) ** 2)) for mass in (0.0, 2e3, 2e4)]
     assert left[0] < left[1] < left[2]
 
 
-def test_trap_5_a_hull_that_is_off_is_refitted_beside_every_candidate(inflow: Trial) -> None:
-    one = suspect(inflow, "thrust_inflow_loss")
+def test_trap_5_a_hull_that_is_off_is_refitted_beside_every_candidate(inflow: EstimationProblem) -> None:
+    one = candidate(inflow, "thrust_inflow_loss")
     # The trap: regress what an old fit of the hull left on the candidate; the hull has swallowed the effect by then.
-    old = imagined(inflow.plain, fit(inflow, ()))
+    old = fitted_force_model(inflow.plain, fit(inflow, ()))
     left = inflow.white(old)
     slope = (inflow.white(one.act(old, np.array([0.05]))) - left) / 0.05
     assert abs(float(slope @ left) / float(slope @ slope)) < 0.4 * 0.3
     assert fit(inflow, [one]).values[0][0] == pytest.approx(0.3, abs=0.05)
 
 
-def test_trap_6_what_is_certain_but_void_is_no_finding(clean: Trial, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trap_6_what_is_certain_but_void_is_no_finding(
+    clean: EstimationProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # A force of the size of an integrator's error, in a log calm enough to make it significant.
-    wind = suspect(clean, "wind")
+    wind = candidate(clean, "wind")
     little = wind.act(clean.plain, np.array([-0.24, 0.16]))
     calm = replace(clean, plain=replace(clean.plain, external=2.0 * clean.plain.external - little.external))
     result = search(calm, lambda stage: None, known=[wind])
-    assert result.rounds[0].candidates[0].gain > search_module.ODDS
-    assert result.fit.suspects == ()
+    assert result.rounds[0].ranked[0].gain > search_module.ODDS
+    assert result.fit.candidates == ()
     monkeypatch.setattr(search_module, "VOID", 0.0)
-    assert [one.key for one in search(calm, lambda stage: None, known=[wind]).fit.suspects] == [wind.key]
+    assert [one.key for one in search(calm, lambda stage: None, known=[wind]).fit.candidates] == [wind.key]
 
 
-def test_trap_7_a_gain_that_a_reversed_heading_matches_names_nothing(clean: Trial) -> None:
+def test_trap_7_a_gain_that_a_reversed_heading_matches_names_nothing(clean: EstimationProblem) -> None:
     # Half a wind on the vessel as it turned, half one on a vessel that turned the other way: either explains as much.
-    wind, plain = suspect(clean, "wind"), clean.plain
+    wind, plain = candidate(clean, "wind"), clean.plain
     scene = plain.scene
     turned = replace(plain, scene=replace(scene, eta=scene.eta * [1.0, 1.0, -1.0]))
     blown = [wind.act(one, np.array([-2.0, 1.4])).external - one.external for one in (plain, turned)]
     pushed = replace(clean, plain=replace(plain, external=plain.external + sum(blown)))
     made = fit(pushed, [wind])
     pushed = pushed.with_noise_of(made)
-    told = evidence(pushed, fit(pushed, [wind]))
+    told = held_out_evidence(pushed, fit(pushed, [wind]))
     assert told is not None
     (proof,) = told.proofs
     assert proof.improvement.score_low > 0.0

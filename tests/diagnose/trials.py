@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ferryid.diagnose.hypothesis import Trial, trial_of
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
-from ferryid.diagnose.weak import windows
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.checks.screening import screen_sensors
+from ferryid.diagnose.data.measurements import measure_log, read_measurements, window_lengths
+from ferryid.diagnose.inference.estimation import EstimationProblem, estimation_problem
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.stages import AveragedLog, average
+from ferryid.diagnose.inference.weak_form import windows
+from ferryid.effects.force_model import Measurements
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Profile
 
 FERRY = load_profile("milliampere")
 OFF = {
@@ -27,14 +32,26 @@ OFF = {
 """What the true hull is off the profile's."""
 
 
-def sailed(folder: Path, name: str, scenario: str, seed: int) -> Scene:
+def sailed(folder: Path, name: str, scenario: str, seed: int) -> Measurements:
     """Simulate a scenario, TOML without a true hull, and return the scene that its log shows."""
     log = folder / f"{name}.mcap"
     write_log(simulate(replace(parse_scenario(scenario, name), true_hull=OFF), seed), log)
-    return scene_of(str(log), FERRY, None)[0]
+    return read_measurements(str(log), FERRY, None)[0]
 
 
-def trial_on(scene: Scene) -> Trial:
+def averaged(paths: Sequence[str], vessel: Profile, withhold: Sequence[str] = ()) -> list[AveragedLog]:
+    """Return logs as the first stages of a diagnosis leave them."""
+
+    def quiet(_stage: str) -> None:
+        pass
+
+    return [
+        average(screen_sensors(measure_log(path, vessel, None, withhold=withhold, progress=quiet), quiet))
+        for path in paths
+    ]
+
+
+def trial_on(scene: Measurements) -> EstimationProblem:
     """Return a scene ready for hypotheses."""
     seen = windows(scene, *window_lengths(FERRY))
-    return trial_of(seen, *plain_picture(seen.scene, FERRY))
+    return estimation_problem(seen, *prior_force_model(seen.scene, FERRY))

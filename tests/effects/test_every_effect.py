@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import trial_of
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
-from ferryid.diagnose.search import Search, search
-from ferryid.diagnose.weak import windows
+from ferryid.diagnose.data.measurements import read_measurements as scene_of
+from ferryid.diagnose.data.measurements import window_lengths
+from ferryid.diagnose.inference.estimation import estimation_problem as trial_of
+from ferryid.diagnose.inference.prior import prior_force_model as plain_picture
+from ferryid.diagnose.inference.search import Search, search
+from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS
+from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 
@@ -85,7 +87,7 @@ def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
     parameters = effect.parameters_of(FERRY)
     truth = moderate(name)
     result = found_in(effect.scenario(truth, instance), 3, tmp_path)
-    assert [(one.effect.id, one.instance) for one in result.fit.suspects[:1]] == [(name, instance)]
+    assert [(one.effect.id, one.instance) for one in result.fit.candidates[:1]] == [(name, instance)]
     assert effect.says(truth, instance)
     for one, value, error in zip(parameters, result.fit.values[0], result.fit.errors(0), strict=True):
         assert abs(value - truth[one.name]) < max(4.0 * error, 0.15 * one.size), one.name
@@ -96,7 +98,7 @@ def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
 def test_related_effects_are_not_mistaken_for_each_other(name: str, seed: int, tmp_path: Path) -> None:
     instance = effects()[name].instances(FERRY)[0]
     result = found_in(effects()[name].scenario(moderate(name), instance), seed, tmp_path)
-    assert [(one.effect.id, one.instance) for one in result.fit.suspects] == [(name, instance)]
+    assert [(one.effect.id, one.instance) for one in result.fit.candidates] == [(name, instance)]
 
 
 def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
@@ -106,9 +108,9 @@ def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
     seen = windows(scene, *window_lengths(FERRY))
     plain, spread = plain_picture(seen.scene, FERRY)
     result = search(trial_of(seen, replace(plain, hull=0.4 * plain.hull), 0.4 * spread), lambda stage: None)
-    assert [one.effect.id for one in result.fit.suspects] == ["hull_parameters"]
+    assert [one.effect.id for one in result.fit.candidates] == ["hull_parameters"]
     value, error = result.fit.values[0], result.fit.errors(0)
-    certain = np.abs(value - 1.0) - 2.0 * error > result.fit.suspects[0].effect.least
+    certain = np.abs(value - 1.0) - 2.0 * error > result.fit.candidates[0].effect.least
     assert np.count_nonzero(certain) >= 5
     assert (np.abs(value - 2.5) < 4.0 * error)[certain].all()
 
@@ -116,5 +118,5 @@ def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_nothing_is_found_where_nothing_acts(seed: int, tmp_path: Path) -> None:
     result = found_in({}, seed, tmp_path)
-    assert result.fit.suspects == ()
+    assert result.fit.candidates == ()
     assert result.rounds[0].none > 0.9

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from ferryid.effects import effects
-from ferryid.effects.picture import Picture, hull_of
-from tests.diagnose.test_unknown import FERRY, sailed
+from ferryid.effects.force_model import ForceModel, hull_of
+from tests.diagnose.judging.test_unexplained import FERRY, sailed
 
 PAYLOAD = effects()["payload"]
 
 
-def picture(draught_m: float) -> Picture:
+def picture(draught_m: float) -> ForceModel:
     profile = replace(FERRY, hull=replace(FERRY.hull, draught_m=draught_m))
     scene = replace(sailed(0), profile=profile)
-    return Picture(scene, hull_of(profile), scene.parts, scene.angles, np.zeros((len(scene.t), 3)))
+    return ForceModel(scene, hull_of(profile), scene.parts, scene.angles, np.zeros((len(scene.t), 3)))
 
 
 def test_a_box_sinks_by_its_load_over_its_waterplane() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ferryid.effects import effects
-from ferryid.effects.picture import Picture, Scene, acceleration, hull_of
+from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
 from ferryid.effects.shallow_water import EDGE_M, HEAVIER, SIDES
 from ferryid.vessel import load_profile
 
@@ -19,14 +19,14 @@ FACTOR = 1.8
 OUTWARD = dict(zip(SIDES, (-1.0, 1.0, -1.0, 1.0), strict=True))
 
 
-def sailed() -> Picture:
+def sailed() -> ForceModel:
     """Return the picture of a vessel that goes over waters from 0 to 100 m north and 0 to 40 m east."""
     rng = np.random.default_rng(3)
     eta = np.column_stack([rng.uniform(0.0, 100.0, N), rng.uniform(0.0, 40.0, N), rng.uniform(-3.0, 3.0, N)])
     nu = rng.normal(size=(N, 3)) * [1.0, 0.5, 0.2]
     rest = np.zeros((N, 2, 3))
-    scene = Scene(FERRY, 0.2 * np.arange(N), eta, nu, nu, rest, np.zeros((N, 2)), np.ones(N, dtype=bool))
-    return Picture(scene, hull_of(FERRY), rest, scene.angles, np.zeros((N, 3)))
+    scene = Measurements(FERRY, 0.2 * np.arange(N), eta, nu, nu, rest, np.zeros((N, 2)), np.ones(N, dtype=bool))
+    return ForceModel(scene, hull_of(FERRY), rest, scene.angles, np.zeros((N, 3)))
 
 
 def values(**sides: float) -> np.ndarray:

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.hypothesis import Suspect, fit, settled, trial_of
+from ferryid.diagnose.inference.estimation import Candidate as Suspect
+from ferryid.diagnose.inference.estimation import choose_parameters as settled
+from ferryid.diagnose.inference.estimation import estimation_problem as trial_of
+from ferryid.diagnose.inference.estimation import fit
 from ferryid.effects import effects
 from ferryid.effects.wind import SPEEDS_MPS
-from tests.diagnose.test_unknown import FERRY, pushes, trial_with
+from tests.diagnose.judging.test_unexplained import FERRY, pushes, trial_with
 
 WIND = effects()["wind"]
 BREEZE = Suspect(WIND, None, WIND.parameters_of(FERRY))

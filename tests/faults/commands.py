@@ -64,14 +64,14 @@ def archived(folder: Path, out: Path) -> None:
 
 
 def diagnose(folder: Path, out: Path) -> None:
-    from ferryid.diagnose.diagnose import diagnose
-    from ferryid.diagnose.remodel import keep
+    from ferryid.diagnose.judging.model_update import store_updated_model
+    from ferryid.diagnose.pipeline import diagnose
     from ferryid.report.diagnosis_report import report
     from ferryid.vessel import load_profile
 
     profile = load_profile("milliampere")
     found = diagnose([str(LOG)], profile, out, progress=_quiet)
-    report(keep(found, profile, None, out), out, ["ferryid", "diagnose"])
+    report(store_updated_model(found, profile, None, out), out, ["ferryid", "diagnose"])
 
 
 def batch(folder: Path, out: Path) -> None:

@@ -90,8 +90,8 @@ def test_a_file_is_a_basis() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_readme_tells_what_it_is(name: str) -> None:
-    assert f"| `{name}` |" in (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_guide_says_what_it_is(name: str) -> None:
+    assert f"| `{name}` |" in (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from ferryid.effects import effects
-from ferryid.effects.picture import COEFFICIENTS, UNITS, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
 from ferryid.identify.estimate import estimator, hull_values

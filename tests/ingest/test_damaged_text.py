@@ -67,7 +67,7 @@ def test_bytes_that_are_not_text_cost_their_cell_only(tmp_path: Path) -> None:
     np.testing.assert_array_equal(series.columns["a"][3:6], [3.5, np.nan, 4.5])
     assert series.columns["mode"][-1] == "au\ufffdto"
     assert any("2 rows hold bytes that are not utf-8 text" in loss.what for loss in reader.losses)
-    assert any('1 cells of column "a" are not numbers' in loss.what for loss in reader.losses)
+    assert any('1 cell of column "a" is not a number' in loss.what for loss in reader.losses)
 
 
 def test_one_damaged_byte_in_the_head_does_not_make_utf8_text_cp1252(tmp_path: Path) -> None:
@@ -237,7 +237,7 @@ def test_lines_before_the_first_row_that_hold_numbers_but_no_names_are_a_loss(tm
     path.write_text("time,a;0,1;1,2\n2,3;3,4\n" + "".join(f"{n},{n * 2}\n" for n in range(4, 40)), encoding="utf-8")
     reader = open_log(path)
     reader.read({"table": ()})
-    assert any("lines" in loss.what or "line(s) before" in loss.what for loss in reader.losses)
+    assert any("lines" in loss.what or "lines before" in loss.what for loss in reader.losses)
 
 
 def test_a_line_of_units_below_the_names_is_no_row(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_blank_separated_text_with_lines_to_skip(tmp_path: Path) -> None:
         assert series.columns["y"].tolist() == [-0.25, -0.5, 3.0]
     guessed, reader = read_all(path)
     assert guessed.columns["column 3"].tolist() == [-0.25, -0.5, 3.0]
-    assert "3 line(s) before the table skipped" in reader.topics[0].note
+    assert "3 lines before the table skipped" in reader.topics[0].note
 
 
 def test_repeated_and_missing_names_are_numbered(tmp_path: Path) -> None:
@@ -131,7 +131,7 @@ def test_unreadable_stamps_count_as_zero_and_are_told(tmp_path: Path) -> None:
     series, reader = read_all(write(tmp_path, "log.csv", text))
     assert series.stamp_ns is not None
     assert series.stamp_ns.tolist() == [5_000_000_100, 0, 7_000_000_000, 8_000_000_000]
-    assert "1 stamps are not readable" in reader.topics[0].note
+    assert "1 stamp is not readable" in reader.topics[0].note
 
 
 def test_folder_is_one_topic_per_file(tmp_path: Path) -> None:

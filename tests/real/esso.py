@@ -10,17 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.checks import examine
-from ferryid.diagnose.hypothesis import Suspect
-from ferryid.diagnose.scene import plain_picture, scene_of, window_lengths
-from ferryid.diagnose.shared_evidence import Gains, held_out_gains, on_heading, placebos
-from ferryid.diagnose.shared_hull import Member, SharedHull, fit_together, induced_spread
-from ferryid.diagnose.together import together
-from ferryid.diagnose.weak import windows
+from ferryid.diagnose.data.measurements import read_measurements, window_lengths
+from ferryid.diagnose.inference.campaign import fit_campaign
+from ferryid.diagnose.inference.campaign_hull import CampaignHull, Member, fit_campaign_hull, induced_spread
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.weak_form import windows
+from ferryid.diagnose.judging.campaign_evidence import Gains, held_out_gains, placebos, turn_heading
 from ferryid.effects.effect import Parameter
-from ferryid.effects.picture import COEFFICIENTS, Picture
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.signals.smooth import moving_mean
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
+from tests.diagnose.trials import averaged
 from tests.real.places import DATA
 
 Floats = NDArray[np.float64]
@@ -93,7 +95,7 @@ class Course:
 def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]]:
     """Fit runs together with the wind hidden, and with controls in its place; hold out where `judged`."""
     paths = logs(kind)
-    joint = together(paths, ESSO, None, withhold=("wind",), progress=lambda stage: None)
+    joint = fit_campaign(averaged(paths, ESSO, withhold=("wind",)), ESSO, lambda stage: None)
     kept = sorted(joint.place, key=lambda path: joint.place[path])
     members = list(joint.members)
     hidden = [hidden_wind(path, member) for path, member in zip(kept, members, strict=True)]
@@ -101,10 +103,10 @@ def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]
     spread, induced_size = np.split(joint.hull.spread, [len(COEFFICIENTS)])
     controls = placebos(members)
     winds = {FOUND: winds_of(joint.hull)}
-    winds |= {name: winds_of(fit_together(group, spread, induced_size)) for name, group in controls.items()}
+    winds |= {name: winds_of(fit_campaign_hull(group, spread, induced_size)) for name, group in controls.items()}
     gains: dict[str, Gains] = {}
     if judged:
-        bare = [replace(member, suspects=()) for member in members]
+        bare = [replace(member, candidates=()) for member in members]
         variants: dict[str, Sequence[Member]] = {FOUND: members, **controls}
         variants[MEASURED] = [blown(member, wind) for member, wind in zip(bare, hidden, strict=True)]
         variants[MEAN] = [
@@ -125,7 +127,7 @@ def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]
 
 def hidden_wind(path: str, member: Member) -> Floats:
     """Return the wind that a run measured, on the rows of its windows' scene, shape (n, 2)."""
-    scene, _ = scene_of(path, ESSO, None)
+    scene, _ = read_measurements(path, ESSO, None)
     corrected = windows(replace(examine(replace(scene, wind=None))[1], wind=scene.wind), *window_lengths(ESSO)).scene
     assert corrected.wind is not None
     assert np.allclose(corrected.t, member.windows.scene.t)
@@ -138,7 +140,7 @@ def blown(member: Member, wind: Floats) -> Member:
     return replace(member, plain=replace(member.plain, external=wind_force(AREAS, wind, scene.psi, scene.nu)))
 
 
-def winds_of(hull: SharedHull) -> Winds:
+def winds_of(hull: CampaignHull) -> Winds:
     """Return the winds of all runs."""
     return Winds(np.array([one[0] for one in hull.values]), np.array([one[0] for one in hull.errors]))
 
@@ -147,10 +149,10 @@ def courses(members: Sequence[Member], hidden: Sequence[Floats], spread: Floats,
     """Fit all runs together with a wind that changes in the course of time, on true or mirrored headings."""
     varying, series = zip(*(changing(member) for member in members), strict=True)
     group = [
-        replace(member, suspects=(on_heading(one, -member.windows.scene.psi) if mirrored else one,))
+        replace(member, candidates=(turn_heading(one, -member.windows.scene.psi) if mirrored else one,))
         for member, one in zip(members, varying, strict=True)
     ]
-    made = fit_together(group, *np.split(spread, [len(COEFFICIENTS)]))
+    made = fit_campaign_hull(group, *np.split(spread, [len(COEFFICIENTS)]))
     told = []
     for member, wind, values, of in zip(members, hidden, made.values, series, strict=True):
         scene = member.windows.scene
@@ -172,7 +174,7 @@ def _both(told: Sequence[Course]) -> tuple[list[Floats], list[Floats]]:
     return [one.found for one in told], [one.hidden for one in told]
 
 
-def changing(member: Member) -> tuple[Suspect, Floats]:
+def changing(member: Member) -> tuple[Candidate, Floats]:
     """Return a wind that changes as a first-order process does, and the matrix from its parameters to its course.
 
     Parameters are the mean and independent numbers of unit variance, north first; the matrix is (rows, parameters / 2).
@@ -183,13 +185,13 @@ def changing(member: Member) -> tuple[Suspect, Floats]:
     root = np.linalg.cholesky(covariance + 1e-9 * np.eye(len(nodes)))
     between = np.column_stack([np.interp(t, nodes, column) for column in root.T])
     series = np.column_stack([np.ones(len(t)), between])
-    wind = member.suspects[0]
+    wind = member.candidates[0]
     mean = wind.parameters
     parameters = []
     for parameter in mean:
         parameters += [parameter, *(Parameter(f"{parameter.name} {k}", "-", 1.0, -9.0, 9.0) for k in range(len(nodes)))]
 
-    def apply(picture: Picture, p: Floats, instance: str | None) -> Picture:
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         scene = picture.scene
         air = series @ p.reshape(2, -1).T
         still = wind_force(AREAS, np.zeros_like(air), scene.psi, scene.nu)
@@ -205,5 +207,5 @@ def bearing(wind: Floats) -> Floats:
 
 def spread_of(members: Sequence[Member]) -> Floats:
     """Return what is believed of the hull of these runs before them, induced drag included, shape (h,)."""
-    coefficients = np.max([plain_picture(one.windows.scene, ESSO)[1] for one in members], axis=0)
+    coefficients = np.max([prior_force_model(one.windows.scene, ESSO)[1] for one in members], axis=0)
     return np.concatenate([coefficients, induced_spread(ESSO.hull.length_m, ESSO.hull.draught_m)])

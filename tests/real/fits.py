@@ -15,6 +15,7 @@ from ferryid.report import figures
 from ferryid.report.page import headline
 from ferryid.report.structure import worst_and_best_minute
 from ferryid.vessel import load_profile
+from tests.evidence import stamp
 from tests.real.places import DATA, FOLDER, REPORTS
 
 
@@ -83,6 +84,7 @@ def write() -> None:
             )
             sections.append(section(case, result, FOLDER))
     (REPORTS / "real.md").write_text("\n".join(sections), encoding="utf-8")
+    stamp(REPORTS / "real.md")
 
 
 HEAD = """# Fits on recordings of real vessels

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.report.figures import STYLE
 from tests.real.esso import FOUND, Course, Study, bearing
 from tests.real.witnesses import Lag
@@ -68,7 +68,7 @@ def lag(found: Sequence[Lag], names: Sequence[str]) -> str:
         return _svg(figure)
 
 
-def driven(scene: Scene) -> str:
+def driven(scene: Measurements) -> str:
     """Draw recorded force and surge velocity."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 3.6), layout="constrained")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import csd, savgol_filter, welch
 from scipy.spatial.transform import Rotation
 
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class Lag:
     correlations: Floats
 
 
-def velocity_lag(scene: Scene, reach_s: float = 2.0) -> Lag:
+def velocity_lag(scene: Measurements, reach_s: float = 2.0) -> Lag:
     """Correlate the slope of positions with velocities turned north and east, shifted row by row."""
     rate = 1.0 / scene.step_s
     rows = 2 * round(0.5 * SLOPE_S * rate) + 1
@@ -53,7 +53,7 @@ def velocity_lag(scene: Scene, reach_s: float = 2.0) -> Lag:
     return Lag(float((shifts[best] + between) * scene.step_s), float(top), shifts * scene.step_s, np.array(found))
 
 
-def slow_gain(scene: Scene, below_hz: float = 0.06) -> Floats:
+def slow_gain(scene: Measurements, below_hz: float = 0.06) -> Floats:
     """Return velocity over slope of position where both are slow, north and east: there the position is exact."""
     c, s = np.cos(scene.psi), np.sin(scene.psi)
     u, v = scene.nu_raw[:, :2].T
@@ -105,7 +105,7 @@ def encoder_offsets(folder: Path) -> Floats:
     return np.array(found)
 
 
-def sectors(scene: Scene) -> Floats:
+def sectors(scene: Measurements) -> Floats:
     """Return the range of angles that each azimuth thruster used while it pushed [deg], shape (k, 2)."""
     used = []
     for k in range(scene.parts.shape[1]):
@@ -133,7 +133,7 @@ def position_pace(table: pd.DataFrame, rows: int) -> Floats:
     return np.quantile(ways[0] / ways[1], [0.05, 0.25, 0.5, 0.75, 0.95])
 
 
-def idle(scene: Scene, least_s: float = 3.0) -> tuple[float, float, float] | None:
+def idle(scene: Measurements, least_s: float = 3.0) -> tuple[float, float, float] | None:
     """Return the longest time without any recorded force [s], and the surge speeds at its slowest and fastest after [m/s]."""
     still = np.abs(scene.parts).sum(axis=(1, 2)) == 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8))).reshape(-1, 2)

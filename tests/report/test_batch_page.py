@@ -167,3 +167,27 @@ def test_counts_memory_and_time() -> None:
     free = hostile()
     free["memory"]["bounded"] = False
     assert "holds no process to a bound" in render(free)
+
+
+def test_what_was_lost_and_every_warning_stands_on_the_page() -> None:
+    lost = {
+        "messages": 12,
+        "seconds": 3.25,
+        "unknown": True,
+        "rows_left_out": 399,
+        "seconds_left_out": 19.95,
+        "says": [f"Lost: a.mcap: {EVIL} (12 messages).", "399 of 11999 rows (19.9 s) are left out: x."],
+    }
+    page = render(result(row("a.mcap", lost=lost), row("b.mcap", 2), row("c.mcap", 3, lost={**lost, "messages": 0})))
+    table = Table(page)
+    assert table.heads.index("lost") == list(table.rows[0]["cells"]).index("lost")
+    a, b, c = (one["cells"] for one in table.rows)
+    assert a["lost"].startswith("12 messages, 3.2 s or more19.9 s left out")
+    assert "399 of 11999 rows" in a["lost"]
+    assert f"Lost: a.mcap: {EVIL}" in a["lost"]
+    assert b["lost"] == ""
+    assert c["lost"].startswith("unknown, 3.2 s")
+    assert a["warnings"] == "1one"
+    assert page.count("<details>") == 5
+    assert "<script>alert" not in page
+    assert 'data-key="lost" data-sort="23.200"' in page

@@ -12,12 +12,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+import ferryid
 from ferryid.errors import FerryIdError
 from ferryid.ingest.clocks import ClockReport
-from ferryid.signals.align import align, segments
+from ferryid.signals.align import align
 from ferryid.signals.recording import record
 from ferryid.signals.stream import Recording, Stream
-from ferryid.signals.track import Track
+from ferryid.signals.track import Track, segments
 from ferryid.vessel import load_profile
 
 Floats = NDArray[np.float64]
@@ -199,7 +200,7 @@ def test_a_single_spike_is_taken_out_and_counted_and_the_callers_data_stay() -> 
     track = align(recording(navigation(t, u=wild), thrusters(t)), PROFILE)
     assert np.abs(track.columns["u"]).max() < 0.11
     assert track.valid.all()
-    assert any(said.startswith("u: 1 of 600 samples are single implausible spikes") for said in track.repairs)
+    assert any(said.startswith("u: 1 of 600 samples is a single implausible spike") for said in track.repairs)
     np.testing.assert_array_equal(wild, kept)
 
 
@@ -259,13 +260,19 @@ def test_a_log_without_actuators_or_navigation_is_refused() -> None:
 
 def test_one_row_and_a_time_that_stands_still_are_called_that() -> None:
     one = np.array([3.0])
-    with pytest.raises(
-        FerryIdError, match=r"needs measurements over time, found one row in each of /navigation, /thrusters"
-    ):
+    with pytest.raises(FerryIdError, match=r"trial: /navigation holds one row only, .* Fix: use a longer log"):
         align(recording(navigation(one), thrusters(one)), PROFILE)
-    still = replace(navigation(one), clock=replace(navigation(one).clock, duplicates=99))
-    with pytest.raises(FerryIdError, match=r"time does not advance, found the same time on 100 rows"):
+    still = replace(navigation(one), clock=replace(navigation(one).clock, dropped=99, duplicates=99))
+    with pytest.raises(
+        FerryIdError, match=r"time does not advance, found 100 messages on /navigation with the same time"
+    ):
         align(recording(still, thrusters(one)), PROFILE)
+
+
+def test_only_one_module_says_that_time_does_not_advance() -> None:
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in Path(ferryid.__path__[0]).rglob("*.py")}
+    assert [name for name, text in texts.items() if "does not advance" in text] == ["sampling"]
+    assert all(len(text.splitlines()) < 400 for name, text in texts.items() if name in ("align", "source", "grid"))
 
 
 def test_alternating_gaps_leave_nothing_and_are_refused() -> None:

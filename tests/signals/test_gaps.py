@@ -17,13 +17,18 @@ from ferryid.simulate.trial import Simulation
 from ferryid.vessel import load_profile
 from tests.damage import (
     NAVIGATION,
+    SURGE,
+    SWAY,
     THRUSTER,
+    YAW_RATE,
     changed,
     moved,
     repeated,
     silent,
+    stuck,
     ten_minutes,
     turned,
+    turned_by,
     without_heading,
     written,
     zeros,
@@ -75,10 +80,18 @@ def test_rows_in_and_beside_a_gap_are_left_out_and_counted(
     (said,) = prepared.left_out
     assert said.startswith(f"{lost.size + MEETS} of 11999 rows (")
     assert f"left out: {lost.size} (" in said
-    assert prepared.quality["left_out"] == [
-        {"reason": one.reason, "rows": one.rows, "stretches": one.stretches, "seconds": one.seconds}
-        for one in beside.left_out
+    told = prepared.quality["left_out"]
+    assert [(one["reason"], one["rows"], one["stretches"]) for one in told] == [
+        (one.reason, one.rows, one.stretches) for one in beside.left_out
     ]
+    for one in told:
+        lengths = [stretch["end_s"] - stretch["start_s"] for stretch in one["intervals"]]
+        assert len(lengths) == one["stretches"]
+        assert sum(lengths) == pytest.approx(one["seconds"])
+    (gap,) = told[0]["intervals"]
+    assert gap["start_s"] == pytest.approx(lost[0] / 20.0)
+    assert gap["reason"] == "not measured"
+    assert set(gap["signals"]) >= ({"n_thruster1"} if where is in_one_thruster else {"psi"})
     assert any("are not used" in remark for remark in prepared.quality["remarks"])
 
 
@@ -114,6 +127,41 @@ def test_poses_that_cannot_be_true_are_left_out_and_counted(tmp_path: Path, edit
     assert np.isnan(opened.track.columns["psi"][~opened.track.valid]).all()
     assert any(repair.startswith(said) for repair in opened.track.repairs)
     assert "because the pose cannot be true" in smoothed(opened, 1.0).left_out[0]
+
+
+@pytest.mark.parametrize(
+    ("names", "value", "signals"),
+    [
+        ((SURGE,), 0.0, ("u",)),
+        ((SWAY,), 0.0, ("v",)),
+        ((SURGE, SWAY, YAW_RATE), 0.0, ("u", "v", "r")),
+        ((SURGE, SWAY, YAW_RATE), 0.4, ("u", "v", "r")),
+    ],
+)
+def test_velocities_that_stay_while_the_pose_moves_are_left_out_and_counted(
+    tmp_path: Path, names: tuple[str, ...], value: float, signals: tuple[str, ...]
+) -> None:
+    made = changed(ten_minutes(), [(60.0, 200.0)], stuck(names, value))
+    opened = open_track(str(written(made, tmp_path / "stuck.mcap")), FERRY, None)
+    (left,) = opened.track.left_out
+    assert left.rows == pytest.approx(4000, abs=2)
+    (stretch,) = left.intervals
+    assert (stretch.start_s, stretch.end_s) == (pytest.approx(60.0, abs=0.1), pytest.approx(260.0, abs=0.1))
+    assert set(stretch.signals) == set(signals)
+    assert f"stays at {value:g} m/s while the position moves" in stretch.reason
+    (said, *_) = (one for one in smoothed(opened, 1.0).left_out if "stays at one while the pose moves" in one)
+    assert f"{signals[0]} {left.rows}" in said
+    assert any(one.startswith(f"{signals[0]}: the ") and "left out" in one for one in opened.track.repairs)
+
+
+def test_a_heading_that_steps_and_stays_is_a_warning(tmp_path: Path) -> None:
+    made = changed(ten_minutes(), [(300.0, 1000.0)], turned_by(10.0))
+    opened = open_track(str(written(made, tmp_path / "step.mcap")), FERRY, None)
+    assert opened.doubts[0].startswith("The heading steps by 10° at 300.0 s and stays there")
+    ((stretch,),) = (one.intervals for one in opened.track.left_out)
+    assert (stretch.start_s, stretch.end_s) == (pytest.approx(299.5, abs=0.1), pytest.approx(300.6, abs=0.1))
+    assert stretch.signals == ("psi",)
+    assert stretch.reason == "the heading steps without a turn of the yaw rate and stays (10°)"
 
 
 def test_nothing_is_left_out_of_a_clean_trial(tmp_path: Path) -> None:

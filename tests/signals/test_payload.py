@@ -126,7 +126,7 @@ def test_boarding_is_no_implausible_step_but_a_wild_sample_is() -> None:
     at = np.searchsorted(absolute(track), 40.5)
     assert track.columns["payload_kg"][at] == mass[39]
     assert any(
-        s == "payload_kg: 1 of 60 samples are single implausible spikes; removed and held over." for s in track.repairs
+        s == "payload_kg: 1 of 60 samples is a single implausible spike; removed and held over." for s in track.repairs
     )
     assert not any("steps were found" in said for said in aligned(t, mass).repairs)
 

@@ -121,7 +121,7 @@ def test_a_table_becomes_si_signals_in_order(log: Path, boat: Profile) -> None:
     assert clock.gaps == ((5_900_000_000, 10_000_000_000),)
     assert recording.name == "trial"
     assert recording.found["F_main"] == "table: F"
-    assert any("not numbers" in loss.what for loss in recording.losses)
+    assert any("not a number" in loss.what for loss in recording.losses)
 
 
 def test_quality_tells_all_of_it(log: Path, boat: Profile) -> None:
@@ -130,7 +130,7 @@ def test_quality_tells_all_of_it(log: Path, boat: Profile) -> None:
     assert quality["streams"]["table"]["signals"]["F_main"]["missing"] == 1
     assert quality["streams"]["table"]["signals"]["v"]["constant"]
     text = "\n".join(quality["remarks"])
-    for told in ("not numbers", "out of order", "repeat the time", "1 gaps", "4.10 s"):
+    for told in ("not a number", "out of order", "repeats the time", "1 gap in", "4.10 s"):
         assert told in text
 
 
@@ -175,7 +175,7 @@ def test_parquet_carries_units_and_provenance(tmp_path: Path, log: Path, boat: P
     assert metadata["log_sha256"] == recording.sha256
     assert metadata["profile_sha256"] == boat.sha256
     assert metadata["clock"]["duplicates"] == 1
-    assert any("not numbers" in loss["what"] for loss in metadata["losses"])
+    assert any("not a number" in loss["what"] for loss in metadata["losses"])
 
 
 def test_a_changed_log_is_seen(tmp_path: Path, log: Path, boat: Profile) -> None:

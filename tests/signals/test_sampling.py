@@ -83,6 +83,43 @@ def test_a_wrong_time_column_is_explained_by_fit_and_inspect(
     assert vessel["problem"]
 
 
+FOLDER = TOML.replace('topic = "table"\nfields', 'topic = "/nav"\nfields')
+for field in "rF":
+    FOLDER = FOLDER.replace(f'topic = "table"\nfield = "{field}"', f'topic = "/navy_{field}"\nfield = "{field}"')
+
+
+@pytest.mark.parametrize("layout", ['[table]\ntime = "t"', ""])
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (
+            b"",
+            r"nav\.csv: velocity is needed by the profile boat, and its file cannot be used: the file is empty \(0 bytes\)",
+        ),
+        (b"t,u,v\n", r"nav\.csv: velocity is needed .* a header and no rows\. Fix: record or export the log again"),
+        (b"t,u,v\n0.0,1.0,2.0\n", r"nav\.csv: /nav holds one row only, and motion needs many\. Fix: use a longer log"),
+        (bytes(range(256)) * 40, r"nav\.csv: velocity is needed .*: this is binary data, not a text table\. Fix: "),
+    ],
+)
+def test_a_file_of_a_folder_that_cannot_be_used_is_named_and_not_the_profile(
+    tmp_path: Path, layout: str, content: bytes, told: str
+) -> None:
+    profile = parse_profile(FOLDER.replace('[table]\ntime = "t"', layout), "boat.toml")
+    folder = tmp_path / "run"
+    folder.mkdir()
+    n = np.arange(600)
+    for name in "rF":
+        rows = "\n".join(f"{0.1 * k:.1f},{value:.6f}" for k, value in zip(n, np.sin(n / 7), strict=True))
+        (folder / f"navy_{name}.csv").write_text(f"t,{name}\n{rows}\n", encoding="utf-8")
+    (folder / "nav.csv").write_bytes(content)
+    with pytest.raises(FerryIdError, match=told) as error:
+        prepare(str(folder), profile, tmp_path / "out", window_s=1.0)
+    assert "Did you mean" not in str(error.value)
+    assert "boat.toml" not in str(error.value)
+    vessel = inspect(folder, profile)["vessel"]
+    assert (vessel["usable"], vessel["problem"]) == (False, str(error.value))
+
+
 def test_a_log_of_one_sample_per_second_is_taken(tmp_path: Path, boat: Profile) -> None:
     prepared = prepare(table(tmp_path, [str(n) for n in range(300)]), boat, tmp_path / "out", window_s=1.0)
     assert "Smoothing: none, a window of 1 s holds one row at 1 Hz." in prepared.motion.repairs

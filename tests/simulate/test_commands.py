@@ -36,8 +36,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 def run(folder: Path, **asked: Any) -> dict[str, Any]:
-    asked = {"out": folder / "log.mcap", **asked}
-    return run_scenario(str(folder / "mine.toml"), **asked, progress=lambda stage: None)
+    asked = {"log": folder / "log.mcap", **asked}
+    return run_scenario(str(folder / "mine.toml"), folder, **asked, progress=lambda stage: None)
 
 
 @pytest.fixture

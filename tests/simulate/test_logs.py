@@ -210,7 +210,9 @@ def test_truth_is_a_file_of_its_own_and_only_when_asked(trial, tmp_path):
 def test_run_scenario_says_what_it_wrote(tmp_path):
     scenario = (FIXTURES / "short.toml").read_text().replace("duration_s = 90", "duration_s = 10")
     (tmp_path / "mine.toml").write_text(scenario)
-    result = run_scenario(str(tmp_path / "mine.toml"), tmp_path / "mine.bag", seed=3, progress=print)
+    result = run_scenario(str(tmp_path / "mine.toml"), tmp_path, seed=3, progress=print)
+    assert result["log"] == str(tmp_path / "mine.mcap")
+    assert (tmp_path / "mine.mcap").is_file()
     assert result["schema"] == "ferryid.simulate/1"
     assert (result["scenario"], result["seed"], result["duration_s"]) == ("mine", 3, 10.0)
     assert result["topics"]["/navigation/odometry"] == 100

@@ -9,14 +9,16 @@ from typing import Any, get_args, get_type_hints
 
 import pytest
 
+from ferryid.effects import effects
 from ferryid.errors import FerryIdError
+from ferryid.simulate.added_effects import simulated
 from ferryid.simulate.paths import PATHS
 from ferryid.simulate.read_section import FLATTENED
 from ferryid.simulate.scenario import MASS, Environment, Scenario, check_against, parse_scenario
 from ferryid.simulate.sections import ALWAYS_S, Gains
 from ferryid.vessel import load_profile
 
-PAGE = (Path(__file__).parents[2] / "SCENARIOS.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text(encoding="utf-8")
 EXAMPLE = "\n".join(re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL))
 UNITS = {
     "_degpmin": "°/min",
@@ -98,6 +100,16 @@ def test_every_key_stands_there_with_default_unit_and_limits(heading: str, kind:
         if "high" in entry.metadata:
             low, least, high = (_number(entry.metadata[key]) for key in ("low", "least", "high"))
             assert limits == (f"{low} to {high}" if low == least else f"{low}, or {least} to {high}")
+
+
+def test_every_effect_that_can_be_added_stands_there_with_its_parameters() -> None:
+    rows = _rows("`[[effects]]`")
+    assert [name for name in simulated() if f"`{name}`" not in rows["effect"][3]] == []
+    parameters = {
+        one.name: one.unit for name in simulated() for one in effects()[name].parameters_of(load_profile("milliampere"))
+    }
+    assert set(rows) == {"effect", "thruster", "from_s", "until_s", *parameters}
+    assert {name: rows[name][2] for name in parameters} == parameters
 
 
 def test_every_path_and_factor_is_named() -> None:

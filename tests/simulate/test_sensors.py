@@ -10,11 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ferryid.simulate import load_scenario
+from ferryid.simulate.environment import controller_weather, wind_series
 from ferryid.simulate.noise import measure, navigation_errors, navigation_sent
 from ferryid.simulate.sections import Manoeuvre, Navigation, Noise, Wind
 from ferryid.simulate.sensors import quaternion, sense
 from ferryid.simulate.states import Control, Truth
-from ferryid.simulate.surroundings import controller_weather, wind_series
 from ferryid.vessel.load import load_profile
 
 RADIUS_M, RATE_RADPS, SPEED_MPS = 20.0, 0.08, 1.6

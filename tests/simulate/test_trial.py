@@ -10,10 +10,10 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.simulate import list_scenarios, load_scenario, simulate
+from ferryid.simulate.environment import Link
 from ferryid.simulate.sections import Control as Controller
 from ferryid.simulate.sections import Noise, Thrusters
 from ferryid.simulate.sensors import _times, apparent_wind
-from ferryid.simulate.surroundings import Link
 from ferryid.simulate.trial import sail
 from ferryid.vessel.hull import inverse_dynamics
 from ferryid.vessel.load import load_profile

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.effects.picture import COEFFICIENTS, UNITS, hull_of
+from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.errors import FerryIdError
 from ferryid.identify.model import Model
 from ferryid.identify.stored_effect import Conditions, Quantity

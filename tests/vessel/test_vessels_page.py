@@ -14,7 +14,7 @@ from ferryid.vessel.parse_hull import DAMPING_TERMS
 from ferryid.vessel.parse_signals import ROLE_KINDS, VESSEL_QUANTITIES
 from ferryid.vessel.units import KINDS as UNIT_KINDS
 
-PAGE = (Path(__file__).parents[2] / "VESSELS.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "vessels.md").read_text(encoding="utf-8")
 EXAMPLE = "\n".join(re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL))
 
 

@@ -33,7 +33,7 @@ def wavy(folder: Path, rounds: int = 2) -> dict[str, Any]:
         text = text.replace("rounds = 2", f"rounds = {rounds}")
         scenario.write_text(text + TRUE_HULL, encoding="utf-8")
         logs[name] = folder / f"{name}.mcap"
-        _ferryid("simulate", str(scenario), "--out", str(logs[name]), "--seed", str(seed), "--overwrite")
+        _ferryid("simulate", str(scenario), "--log", str(logs[name]), "--seed", str(seed), "--overwrite")
     out, told = folder / "out", {}
     for command, name in (("fit", "corrected"), ("diagnose", "diagnosed")):
         _ferryid(command, str(logs["waves"]), "--vessel", "milliampere", "--name", name, "--out", str(out))

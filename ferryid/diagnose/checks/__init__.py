@@ -17,8 +17,8 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.contradiction import opposed
-from ferryid.diagnose.velocity import MEAN_S, steadied
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
+from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.smooth import odd_rows, steady_mean
@@ -26,7 +26,7 @@ from ferryid.signals.smooth import odd_rows, steady_mean
 SPOILS = frozenset({"held_samples", "heading_wrap", "heading_bias", "velocity_scale", "yaw_rate_scale"})
 """Errors that spoil the velocity in products, which is made of position, heading and velocity; small shifts in time do not."""
 
-__all__ = ["Check", "SensorFinding", "checks", "examine", "resteadied"]
+__all__ = ["Check", "SensorFinding", "checks", "examine", "refilter_velocity"]
 
 
 @cache
@@ -37,7 +37,7 @@ def checks() -> tuple[Check, ...]:
     return tuple(sorted(found, key=lambda check: (check.place, check.id)))
 
 
-def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
+def examine(scene: Measurements) -> tuple[tuple[SensorFinding, ...], Measurements]:
     """Return what is wrong with the sensors of a scene, and the scene without it.
 
     Raises
@@ -58,7 +58,7 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
             findings.append(finding)
             scene = finding.correct(scene)
     if SPOILS & {finding.effect for finding in findings}:
-        scene = resteadied(scene)
+        scene = refilter_velocity(scene)
     if says := opposed(scene):
         raise FerryIdError(
             f"{scene.profile.path}: force and motion contradict each other, so nothing can be learnt from them. {says} "
@@ -67,8 +67,10 @@ def examine(scene: Scene) -> tuple[tuple[SensorFinding, ...], Scene]:
     return tuple(findings), scene
 
 
-def resteadied(scene: Scene) -> Scene:
+def refilter_velocity(scene: Measurements) -> Measurements:
     """Return a scene whose velocity that enters products is made anew, of what is corrected now."""
     rate = 1.0 / scene.step_s
     eta = np.where(scene.usable[:, None], scene.eta, np.nan)
-    return replace(scene, nu=steadied(steady_mean(scene.nu_raw, odd_rows(MEAN_S, rate)), scene.nu_raw, eta, rate))
+    return replace(
+        scene, nu=complementary_filter(steady_mean(scene.nu_raw, odd_rows(MEAN_S, rate)), scene.nu_raw, eta, rate)
+    )

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.result import Estimate
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 LEAST = 0.02
@@ -83,7 +83,7 @@ def restored(angle: Floats, step_deg: float, step_s: float) -> Floats:
     return np.asarray((1.0 - back) * straight + back * level)
 
 
-def corrected(scene: Scene, steps_deg: Sequence[float]) -> Scene:
+def corrected(scene: Measurements, steps_deg: Sequence[float]) -> Measurements:
     """Return a scene whose angles, and the directions of the forces, are what rounded ones most likely stand for.
 
     Parameters
@@ -112,7 +112,7 @@ def error_of(step: float) -> float:
     return float(np.radians(step) / np.sqrt(12.0))
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return the step of the coarsest azimuth angle, where it matters to the direction of the force."""
     steps = [step_of(angle) for angle in scene.angles.T]
     step = max(steps, default=0.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from ferryid.diagnose.result import Estimate
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 
@@ -31,7 +31,7 @@ class SensorFinding:
     effect: str
     parameters: Mapping[str, Estimate]
     says: str
-    correct: Callable[[Scene], Scene]
+    correct: Callable[[Measurements], Measurements]
     evidence: Mapping[str, Floats] = field(default_factory=dict)
 
 
@@ -51,5 +51,5 @@ class Check:
 
     id: str
     title: str
-    find: Callable[[Scene], SensorFinding | None]
+    find: Callable[[Measurements], SensorFinding | None]
     place: int

@@ -11,14 +11,14 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import LATE, kinematics
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_body, to_world
 from ferryid.vessel.profile import Floats
 
 LEAST_S = 0.1
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return how late the positions are."""
     found = kinematics(scene)
     if found is None or not found.found(LATE, LEAST_S):
@@ -26,7 +26,7 @@ def find(scene: Scene) -> SensorFinding | None:
     late = found.solution.estimate(LATE, "s")
     word = "later" if late.value > 0.0 else "earlier"
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         when = seen.t + abs(late.value)
         inside = np.interp(when, seen.t, seen.usable.astype(np.float64), left=0.0, right=0.0) >= 1.0
         usable = seen.usable & inside
@@ -44,12 +44,12 @@ def find(scene: Scene) -> SensorFinding | None:
     )
 
 
-def _at(when: Floats, seen: Scene, values: Floats) -> Floats:
+def _at(when: Floats, seen: Measurements, values: Floats) -> Floats:
     known = seen.usable
     return np.column_stack([np.interp(when, seen.t[known], column[known]) for column in values.T])
 
 
-def _earlier(when: Floats, seen: Scene, nu: Floats) -> Floats:
+def _earlier(when: Floats, seen: Measurements, nu: Floats) -> Floats:
     """Return velocities, yaw rate excepted, of a later row; what is late is the velocity over ground."""
     over_ground = _at(when, seen, np.column_stack(to_world(nu[:, 0], nu[:, 1], seen.psi)))
     return np.column_stack([*to_body(over_ground[:, 0], over_ground[:, 1], seen.psi), nu[:, 2]])

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 
 SPAN_S = 4.0
 """Length of a window: long against noise, short against manoeuvres."""
@@ -38,7 +38,7 @@ NOTHING = 1e-6
 """Share of a push below which drag and lift have taken all of it."""
 
 
-def opposed(scene: Scene) -> str:
+def opposed(scene: Measurements) -> str:
     """Return a sentence on what is certainly the wrong way round between force and motion, empty where nothing is.
 
     Parameters
@@ -73,7 +73,7 @@ def opposed(scene: Scene) -> str:
     return f"The vessel moves {says} (that explains {100.0 * (1.0 - best):.0f} % of its accelerations; as declared {not_so})."
 
 
-def _apart(scene: Scene, force: NDArray[np.complexfloating[Any, Any]]) -> tuple[float, float] | None:
+def _apart(scene: Measurements, force: NDArray[np.complexfloating[Any, Any]]) -> tuple[float, float] | None:
     """Return what is left if force and motion are shifted in time, and by how much [s]; None where that is no offset of clocks.
 
     A force that answers a swell fits at many shifts, and one that lags at several; clocks are apart by one time.
@@ -95,11 +95,11 @@ def _inside(count: int, rows: int) -> NDArray[np.bool_]:
     return np.asarray((place >= 0) & (place < count))
 
 
-def _listed(scene: Scene, chosen: NDArray[np.bool_]) -> str:
+def _listed(scene: Measurements, chosen: NDArray[np.bool_]) -> str:
     return " and ".join(name for name, one in zip(scene.names, chosen.tolist(), strict=True) if one)
 
 
-def _left(scene: Scene, push: NDArray[np.complexfloating[Any, Any]]) -> float:
+def _left(scene: Measurements, push: NDArray[np.complexfloating[Any, Any]]) -> float:
     """Return the share of the accelerations that a push along the body leaves unexplained; 1 if it does not push that way.
 
     Shares are of what drag, a steady push and the lift of a turning hull leave: that lift is against a stern thruster's force.

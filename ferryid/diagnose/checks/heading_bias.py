@@ -13,12 +13,12 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import ANGLE, kinematics
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 
 LEAST_DEG = 1.0
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return the heading's bias against the velocity's axes, positive where the heading measured is too large."""
     found = kinematics(scene)
     if found is None or not found.found(ANGLE, np.radians(LEAST_DEG)):
@@ -27,7 +27,7 @@ def find(scene: Scene) -> SensorFinding | None:
     side = "clockwise" if angle.value > 0.0 else "anticlockwise"
     bias = float(found.solution.values[ANGLE])
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         return replace(seen, eta=seen.eta - np.array([0.0, 0.0, bias]))
 
     return SensorFinding(

@@ -8,9 +8,10 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted, verb
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.result import Estimate
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import wrap
 from ferryid.vessel.profile import Floats
 
@@ -20,26 +21,27 @@ NEAR_RAD = 0.5
 """How near a heading is to the wrap before and after, and to what the yaw rate makes of it."""
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return how many samples lie within a turn of heading that the yaw rate knows nothing of."""
     inside, psi = repaired(scene)
     count = float(inside.sum())
     if count == 0.0:
         return None
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         return replace(seen, eta=np.column_stack([seen.eta[:, :2], psi]))
 
     return SensorFinding(
         "heading_wrap",
         {"samples": Estimate(count, count, count, "-")},
-        f"The heading was interpolated the long way round at the wrap: {count:.0f} samples in between are false.",
+        f"The heading was interpolated the long way round at the wrap: {counted(int(count), 'sample')} in "
+        f"between {verb(count, 'is')} false.",
         correct,
         {"time_s": scene.t[inside], "heading_rad": scene.psi[inside], "repaired_rad": psi[inside]},
     )
 
 
-def repaired(scene: Scene) -> tuple[NDArray[np.bool_], Floats]:
+def repaired(scene: Measurements) -> tuple[NDArray[np.bool_], Floats]:
     """Return which headings are false, and all headings with these interpolated the short way."""
     psi, dt = scene.psi.copy(), scene.step_s
     rate = np.where(np.isfinite(scene.nu_raw[:, 2]), scene.nu_raw[:, 2], 0.0)

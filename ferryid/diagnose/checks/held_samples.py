@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.result import Estimate
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.effects.force_model import Measurements
 from ferryid.identify.pictured import bridged
 from ferryid.vessel.profile import Floats
 
@@ -31,7 +32,7 @@ LEAST_SHARE, LEAST_S, LEAST_OF_LONG = 0.005, 2.0, 0.001
 """Holds that are neither this share of the log nor one as long as this, with the other share, do no harm."""
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return the share of the log in which some channel is held, and the longest time of it."""
     columns = np.column_stack([scene.eta, scene.nu_raw])
     held = np.column_stack([held_rows(column, scene.usable, scene.step_s) for column in columns.T])
@@ -46,7 +47,7 @@ def find(scene: Scene) -> SensorFinding | None:
     names = [name for name, column in zip(NAMES, held.T, strict=True) if column.any()]
     percent = 100.0 * share
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         # What was held is bridged: the jump at its end is no motion, and means reach over it.
         both = ((seen.eta, held[:, :3]), (seen.nu_raw, held[:, 3:]))
         eta, nu_raw = (bridged(np.where(gone, np.nan, now), seen.usable) for now, gone in both)
@@ -55,7 +56,7 @@ def find(scene: Scene) -> SensorFinding | None:
     return SensorFinding(
         "held_samples",
         {"share": Estimate(percent, percent, percent, "%"), "longest": Estimate(longest, longest, longest, "s")},
-        f"Old samples were repeated {len(edges)} times, for up to {longest:.1f} s, "
+        f"Old samples were repeated {counted(len(edges), 'time')}, for up to {longest:.1f} s, "
         f"{percent:.1f} % of the log ({', '.join(names)}).",
         correct,
         {"first_s": scene.t[edges[:, 0]], "last_s": scene.t[edges[:, 1] - 1]},

@@ -23,7 +23,7 @@ from scipy.signal import savgol_filter
 
 from ferryid.diagnose.checks.regression import Solution, step
 from ferryid.diagnose.checks.spans import Spans, spans
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_body, to_world
 from ferryid.vessel.profile import Floats
 
@@ -92,7 +92,7 @@ class Kinematics:
 class _Data:
     """Windows with what is compared in them: pose, body velocity measured, and velocity over ground that positions give."""
 
-    trial: Spans
+    problem: Spans
     eta: Floats
     velocity: Floats
     pulled: Floats
@@ -105,10 +105,10 @@ class _Data:
         over_ground = np.column_stack(to_world(u, v, heading)) / p[SCALE]
         if p[LATE] != 0.0:
             row = np.arange(len(heading), dtype=np.float64)
-            late = p[LATE] / self.trial.step_s
+            late = p[LATE] / self.problem.step_s
             over_ground = np.column_stack([np.interp(row - late, row, one) for one in over_ground.T])
-        moved = self.trial.rate(self.eta[:, :2] - lever)
-        return np.asarray(moved - self.trial.mean(over_ground) - p[NORTH:])
+        moved = self.problem.rate(self.eta[:, :2] - lever)
+        return np.asarray(moved - self.problem.mean(over_ground) - p[NORTH:])
 
     def derivatives(self, p: Floats, velocity: Floats | None = None) -> Floats:
         """Return the residual's derivatives by the parameters, shape (J, 2, 7)."""
@@ -129,7 +129,7 @@ class _Data:
 class _Same:
     """A scene that equals itself only, as several checks ask for the kinematics of the same one."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Measurements) -> None:
         self.scene = scene
 
     def __eq__(self, other: object) -> bool:
@@ -139,7 +139,7 @@ class _Same:
         return id(self.scene)
 
 
-def kinematics(scene: Scene, told: tuple[int, ...] = ()) -> Kinematics | None:
+def kinematics(scene: Measurements, told: tuple[int, ...] = ()) -> Kinematics | None:
     """Compare positions and velocities; None where the scene has too little of them.
 
     Parameters
@@ -155,22 +155,22 @@ def kinematics(scene: Scene, told: tuple[int, ...] = ()) -> Kinematics | None:
 @lru_cache(maxsize=1)
 def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
     scene = same.scene
-    trial, both = spans(scene, np.hstack([scene.eta, scene.nu_raw[:, :2]]))
-    if len(trial.starts) < 8:
+    problem, both = spans(scene, np.hstack([scene.eta, scene.nu_raw[:, :2]]))
+    if len(problem.starts) < 8:
         return None
     eta, velocity = both[:, :3], both[:, 3:]
-    if np.sqrt(2.0 * np.mean(trial.rate(eta[:, :2]) ** 2)) < SLOW_MPS:
+    if np.sqrt(2.0 * np.mean(problem.rate(eta[:, :2]) ** 2)) < SLOW_MPS:
         return None
-    m = 2 * max(2, round(0.5 * DERIVATIVE_S / trial.step_s)) + 1
-    pulled = np.asarray(savgol_filter(eta[:, :2], m, 2, deriv=1, delta=trial.step_s, axis=0))
-    data = _Data(trial, eta, velocity, pulled)
+    m = 2 * max(2, round(0.5 * DERIVATIVE_S / problem.step_s)) + 1
+    pulled = np.asarray(savgol_filter(eta[:, :2], m, 2, deriv=1, delta=problem.step_s, axis=0))
+    data = _Data(problem, eta, velocity, pulled)
     p, active = _start(data)
     active[list(told)] = True
     searched = _search(data, p, active)
     if searched is None:
         return None
     size = np.abs(data.residual(searched[0])).max(axis=1)
-    data = _Data(trial.only(size <= OUTLIER * max(float(np.median(size)), 1e-9)), eta, velocity, pulled)
+    data = _Data(problem.only(size <= OUTLIER * max(float(np.median(size)), 1e-9)), eta, velocity, pulled)
     searched = _search(data, p, active)
     if searched is None:
         return None
@@ -178,14 +178,14 @@ def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
     rival = _solve(data, p, active, own=True)
     if rival is None:
         return None
-    return Kinematics(active, solution, rival[0], data.trial.middle_s, data.derivatives(p), data.residual(p))
+    return Kinematics(active, solution, rival[0], data.problem.middle_s, data.derivatives(p), data.residual(p))
 
 
 def _start(data: _Data) -> tuple[Floats, NDArray[np.bool_]]:
     """Return parameters to begin with and those let in: one factor and one rotation where they are gross, and the drift."""
-    pulled = data.trial.rate(data.eta[:, :2])
+    pulled = data.problem.rate(data.eta[:, :2])
     u, v = data.velocity.T
-    pushed = data.trial.mean(np.column_stack(to_world(u, v, data.eta[:, 2])))
+    pushed = data.problem.mean(np.column_stack(to_world(u, v, data.eta[:, 2])))
     a, b = pulled[:, 0] + 1j * pulled[:, 1], pushed[:, 0] + 1j * pushed[:, 1]
     product, power = complex(np.vdot(a, b)), float(np.vdot(a, a).real)
     start, active = NEUTRAL.copy(), np.zeros(7, dtype=np.bool_)
@@ -222,7 +222,7 @@ def _search(data: _Data, start: Floats, active: NDArray[np.bool_]) -> tuple[Floa
 def _step(data: _Data, p: Floats, active: NDArray[np.bool_], e: Floats, J: Floats, Z: Floats) -> Solution | None:
     """Return the change of the parameters that were let in, zero for the others."""
     Z, J = Z[:, :, active], J[:, :, active]
-    change = step(Z, J, e, data.trial.place, SIZE[active], (p - NEUTRAL)[active])
+    change = step(Z, J, e, data.problem.place, SIZE[active], (p - NEUTRAL)[active])
     if change is None:
         return None
     values, errors = np.zeros(7), np.zeros(7)

@@ -12,20 +12,20 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import X, Y, kinematics
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_world
 
 LEAST_M = 0.15
 LEAST_OF_LENGTH = 0.02
 
 
-def least_m(scene: Scene) -> float:
+def least_m(scene: Measurements) -> float:
     """Return the least lever arm along an axis that is worth a name [m]."""
     length = scene.profile.hull.length_m
     return max(LEAST_M, LEAST_OF_LENGTH * length) if np.isfinite(length) else LEAST_M
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return where positions were measured, seen from where velocities were."""
     found = kinematics(scene)
     if found is None:
@@ -36,7 +36,7 @@ def find(scene: Scene) -> SensorFinding | None:
     x, y = found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
     at = np.array([x.value, y.value])
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         one = np.ones(len(seen.t))
         arm = np.column_stack([*to_world(at[0] * one, at[1] * one, seen.psi), 0.0 * one])
         return replace(seen, eta=seen.eta - arm)

@@ -1,4 +1,4 @@
-"""Windows for the checks; `ferryid.diagnose.weak` has those for forces."""
+"""Windows for the checks; `ferryid.diagnose.inference.weak_form` has those for forces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 LENGTH_S, STRIDE_S = 8.0, 2.0
@@ -68,7 +68,7 @@ class Spans:
         return np.asarray(rows @ weight) * self.step_s
 
 
-def spans(scene: Scene, needed: Floats) -> tuple[Spans, Floats]:
+def spans(scene: Measurements, needed: Floats) -> tuple[Spans, Floats]:
     """Return the windows in which all of some measurements are finite and usable, and these at `RATE_HZ`.
 
     Parameters

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.result import Estimate
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.effects.force_model import Measurements
 from ferryid.signals.smooth import moving_mean, odd_rows
 
 SHORTEST_S = 3.0
@@ -28,7 +28,7 @@ IDLE = 1e-3
 """An actuator is idle below this share of the largest force."""
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return for how long the vessel was driven by what was not recorded, and how hard."""
     size = np.abs(scene.parts).sum(axis=1)[:, :2].max(axis=1)
     ahead = np.abs(scene.parts.sum(axis=1)[:, 0])
@@ -51,7 +51,7 @@ def find(scene: Scene) -> SensorFinding | None:
     seconds = float(rows.sum()) * scene.step_s
     share = 100.0 * hardest / largest
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         return replace(seen, usable=seen.usable & ~rows)
 
     return SensorFinding(
@@ -69,7 +69,7 @@ def _stretches(idle: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(end)) for first, end in edges]
 
 
-def _speeding(scene: Scene, first: int, end: int) -> tuple[float, float]:
+def _speeding(scene: Measurements, first: int, end: int) -> tuple[float, float]:
     """Return how fast the bow's speed grows at most [m/s²], astern or ahead, and by how much in all [m/s]."""
     width = odd_rows(STEADY_S, 1.0 / scene.step_s)
     if (end - first) * scene.step_s < SHORTEST_S or end - first < 3 * width:

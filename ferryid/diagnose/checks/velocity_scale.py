@@ -8,7 +8,7 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import SCALE, kinematics
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 
 LEAST = 0.03
 NARROW = 0.25
@@ -22,7 +22,7 @@ UNITS = {
 """Factors of mistaken units, measured over true."""
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return the factor, measured over true, where speed over ground is not what positions give."""
     found = kinematics(scene)
     if found is None or not found.found(SCALE, LEAST):
@@ -33,7 +33,7 @@ def find(scene: Scene) -> SensorFinding | None:
     right = unit[0][0] if unit else factor.value
     scale = np.array([right, right, 1.0])
 
-    def correct(seen: Scene) -> Scene:
+    def correct(seen: Measurements) -> Measurements:
         return replace(seen, nu_raw=seen.nu_raw / scale, nu=seen.nu / scale)
 
     return SensorFinding(

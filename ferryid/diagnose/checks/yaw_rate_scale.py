@@ -15,7 +15,7 @@ from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import OUTLIER
 from ferryid.diagnose.checks.regression import MEMORY, Solution, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
 LEAST = 0.02
@@ -59,40 +59,40 @@ class Rates:
         return min(abs(one), abs(other)) if one * other > 0.0 else 0.0
 
 
-def compared(scene: Scene) -> Rates | None:
+def compared(scene: Measurements) -> Rates | None:
     """Compare the rates of heading and gyro; None where the scene has too little of them.
 
     A bias and a delay of the gyro are solved for along with the factor. Noise of the heading makes the factor of a regression
     on the heading too small, noise of the rate that of the other regression too large: the truth lies between.
     """
-    trial, both = spans(scene, np.column_stack([scene.psi, scene.nu_raw[:, 2]]))
-    if len(trial.starts) < 8:
+    problem, both = spans(scene, np.column_stack([scene.psi, scene.nu_raw[:, 2]]))
+    if len(problem.starts) < 8:
         return None
-    rate, bend, measured = trial.rate(both[:, 0]), trial.curvature(both[:, 0]), trial.mean(both[:, 1])
+    rate, bend, measured = problem.rate(both[:, 0]), problem.curvature(both[:, 0]), problem.mean(both[:, 1])
     if np.std(rate) < SLOW_RADPS:
         return None
     J = -np.column_stack([rate, np.ones_like(rate), -bend])
-    first = _step(J, J, measured, trial)
+    first = _step(J, J, measured, problem)
     if first is None:
         return None
     left = np.abs(measured + J @ first.values)
     kept = left <= OUTLIER * max(float(np.median(left)), 1e-9)
-    trial, J, rate, measured = trial.only(kept), J[kept], rate[kept], measured[kept]
-    solved = _step(J, J, measured, trial)
+    problem, J, rate, measured = problem.only(kept), J[kept], rate[kept], measured[kept]
+    solved = _step(J, J, measured, problem)
     Z = np.column_stack([-measured, J[:, 1:]])
-    other = _step(Z, J, measured, trial)
+    other = _step(Z, J, measured, problem)
     if solved is None or other is None:
         return None
-    return Rates(solved, float(other.values[0]), trial.middle_s, rate, measured)
+    return Rates(solved, float(other.values[0]), problem.middle_s, rate, measured)
 
 
-def corrected(scene: Scene, factor: float) -> Scene:
+def corrected(scene: Measurements, factor: float) -> Measurements:
     """Return a scene whose yaw rate is divided by a factor."""
     scale = np.array([1.0, 1.0, factor])
     return replace(scene, nu_raw=scene.nu_raw / scale, nu=scene.nu / scale)
 
 
-def find(scene: Scene) -> SensorFinding | None:
+def find(scene: Measurements) -> SensorFinding | None:
     """Return the factor of the yaw rate, measured over true."""
     rates = compared(scene)
     if rates is None or rates.off < LEAST or not rates.solution.certain(0, 1.0):
@@ -108,14 +108,14 @@ def find(scene: Scene) -> SensorFinding | None:
     )
 
 
-def _step(Z: Floats, J: Floats, measured: Floats, trial: Spans) -> Solution | None:
+def _step(Z: Floats, J: Floats, measured: Floats, problem: Spans) -> Solution | None:
     """Return factor, bias and delay by regression with instruments, with errors for noise that grows with the rate."""
-    solved = step(Z[:, None, :], J[:, None, :], measured[:, None], trial.place, SIZE, -NEUTRAL)
+    solved = step(Z[:, None, :], J[:, None, :], measured[:, None], problem.place, SIZE, -NEUTRAL)
     if solved is None:
         return None
     left = measured + J @ solved.values
     size = np.sqrt(_growing(left**2, J[:, 0] ** 2, OVERLAP))
-    row = trial.place - trial.place[0]
+    row = problem.place - problem.place[0]
     known, even, weighed = (np.zeros((int(row[-1]) + 1, k)) for k in (1, 1, 3))
     known[row], even[row, 0], weighed[row] = 1.0, left / size, Z * size[:, None]
     middle = np.zeros((3, 3))

@@ -125,7 +125,7 @@ def _needs(one: Exported, lines: Physics) -> Iterator[str]:
     needed = [what for what, needs in (("wind", one.needs_wind), ("current", one.needs_current)) if needs]
     if needed:
         yield f"    if ({' || '.join(f'!{what}' for what in needed)}) {{\n"
-        yield "        /* The model has terms of it: without it, it says nothing. */\n"
+        yield "        /* The model has terms of it: without it, the result is undefined. */\n"
         yield "        tau[0] = tau[1] = tau[2] = NAN;\n        return;\n    }\n"
 
 

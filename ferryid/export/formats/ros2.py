@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from math import isfinite
 
-from ferryid.effects.picture import COEFFICIENTS, UNITS
+from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.export.exported import Exported
 from ferryid.export.format import Format
 from ferryid.export.names import legal, number, plain

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ferryid.errors import FerryIdError
+from ferryid.files import remove_scratch
 from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
 from ferryid.ingest.unpack import codec_of, unpack_file, working_folder
 
-_SUFFIXES = (".zstd", ".zst", ".lz4")
+SUFFIXES = (".zstd", ".zst", ".lz4")
 
 
 class UnpackedLog:
@@ -36,7 +36,7 @@ class UnpackedLog:
                 raise FerryIdError(self._told(str(error))) from error
         except BaseException:
             # An exception keeps this object, and with it the folder, for as long as it is kept itself.
-            shutil.rmtree(folder, ignore_errors=True)
+            remove_scratch(folder)
             raise
         self.topics: tuple[Topic, ...] = self._inner.topics
 
@@ -65,8 +65,8 @@ class UnpackedLog:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return codec_of(head) is not None and path.name.endswith(_SUFFIXES)
+    return codec_of(head) is not None and path.name.endswith(SUFFIXES)
 
 
 # After SQLite, which unpacks its own files.
-FORMAT = Format(name="log compressed by zstd or lz4", matches=_matches, open=UnpackedLog, order=60)
+FORMAT = Format(name="log compressed by zstd or lz4", matches=_matches, open=UnpackedLog, order=60, suffixes=SUFFIXES)

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
+from ferryid.ingest import log_suffixes
 from ferryid.ingest.log import Format, Loss, TableLayout
 from ferryid.ingest.table_rows import TextSheet
 from ferryid.ingest.table_text import open_text
 from ferryid.ingest.tables import TableReader
-
-_BAG_SUFFIXES = (".bag", ".bag.active", ".mcap", ".mcap.zstd", ".db3", ".db3.zstd")
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -22,7 +22,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    if not path.is_dir() or any(name.endswith(_BAG_SUFFIXES) for name in (file.name for file in path.iterdir())):
+    if not path.is_dir() or any(file.name.endswith(log_suffixes(parts=True)) for file in path.iterdir()):
         return False  # notes in a CSV beside bags do not make the bags a table
     return next(_files(path), None) is not None
 
@@ -39,11 +39,13 @@ def _open(path: Path, layout: TableLayout | None) -> TableReader:
             losses.append(Loss(file=str(file), what=str(error).removeprefix(f"{file}: "), topic=topic))
     if not sheets:
         raise FerryIdError(
-            f"{path}: none of the {len(losses)} CSV files in this folder is a table with a time column; "
+            f"{path}: none of the {counted(len(losses), 'CSV file')} in this folder is a table with a time column; "
             f"{losses[0].file}: {losses[0].what}"
         )
     if len(sheets) > 1 and len({sheet.names for sheet in sheets}) == 1 and _are_relative(sheets):
-        note = f"{len(sheets)} files with the same columns: if they are separate runs, pass each file by itself"
+        note = (
+            f"{counted(len(sheets), 'file')} with the same columns: if they are separate runs, pass each file by itself"
+        )
         sheets = [
             replace(s, topic=replace(s.topic, note="; ".join(filter(None, (s.topic.note, note))))) for s in sheets
         ]

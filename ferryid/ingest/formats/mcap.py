@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from mcap.records import Channel, Schema
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest import mcap_types
 from ferryid.ingest.bulk import Decoder
@@ -21,6 +22,8 @@ from ferryid.ingest.mcap_chunks import Loaded
 from ferryid.ingest.mcap_index import DATA_END, MAGIC, RECORD_HEADER, Messages, record_header
 from ferryid.ingest.mcap_recovery import read_index
 from ferryid.ingest.mcap_spans import spans
+
+SUFFIX = ".mcap"
 
 
 @dataclass(frozen=True)
@@ -258,10 +261,10 @@ class McapLog:
             reported[None] = reported.get(None, 0) - explained
             missing -= explained
             if missing > 0:
-                what = f"the file's own statistics count {missing} messages more than are in it"
+                what = f"the file's own statistics count {counted(missing, 'message')} more than are in it"
                 short.append(Loss(self._name, what, topic, missing if damaged else None))
             elif difference < 0:
-                what = f"the file's own statistics count {-difference} messages fewer than are in it"
+                what = f"the file's own statistics count {counted(-difference, 'message')} fewer than are in it"
                 short.append(Loss(self._name, what, topic, 0))
         return short
 
@@ -359,4 +362,6 @@ FORMAT = Format(
     matches=lambda path, head: head.startswith(MAGIC),
     open=open_mcap,
     order=10,
+    suffixes=(SUFFIX, f"{SUFFIX}.zstd"),
+    parts=True,
 )

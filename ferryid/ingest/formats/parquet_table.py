@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, one_line
 from ferryid.ingest.arrow_columns import column_from_arrow
 from ferryid.ingest.log import Column, Format, Loss, TableLayout, Topic
@@ -24,6 +25,7 @@ from ferryid.ingest.tables import (
     with_stated_unit,
 )
 
+SUFFIXES = (".parquet", ".pq")
 _LARGE_BYTES = 1 << 30
 _MOST_TIMES_LARGER = 100
 """Columns of more than `_LARGE_BYTES` in memory that need this many times the size of their file are not read."""
@@ -82,7 +84,8 @@ def _read(
     needed = max(8 * rows * len(places), _claimed_bytes(path, file))
     if rows < 0 or needed > max(_LARGE_BYTES, _MOST_TIMES_LARGER * size):
         raise FerryIdError(
-            f"{path}: the Parquet file claims {rows} rows that need {needed / 1e6:.0f} MB, found {size} bytes, which "
+            f"{path}: the Parquet file claims {counted(rows, 'row')} that need {needed / 1e6:.0f} MB, found "
+            f"{counted(size, 'byte')}, which "
             "cannot hold them. Fix: export or copy the table again"
         )
     try:
@@ -127,7 +130,8 @@ def _read_groups(
     # The count of a group may be what is damaged; that of the file is another.
     lost = max(lost, file.metadata.num_rows - sum(len(next(iter(part.values()), ())) for part in parts))
     what = (
-        f"{lost} rows in {groups} of {file.num_row_groups} row groups are damaged and were left out ({_reason(first)})"
+        f"{counted(lost, 'row')} in {groups} of {file.num_row_groups} row groups are damaged and were left "
+        f"out ({_reason(first)})"
     )
     return joined, (Loss(str(path), what, "table", messages=lost),)
 
@@ -147,7 +151,7 @@ def _columns(table: Any, places: Mapping[str, tuple[str, int]], times: set[str])
 def _check_count(columns: Mapping[str, Column], rows: int) -> None:
     wrong = next((len(values) for values in columns.values() if len(values) != rows), None)
     if wrong is not None:
-        raise ValueError(f"{wrong} rows where the file's footer counts {rows}")
+        raise ValueError(f"{counted(wrong, 'row')} where the file's footer counts {rows}")
 
 
 def _flat(table: Any) -> Any:
@@ -171,7 +175,7 @@ def _damaged(path: Path, error: Exception) -> FerryIdError:
 
 
 def _matches(path: Path, head: bytes) -> bool:
-    return path.is_file() and (head[:4] in (b"PAR1", b"PARE") or path.suffix.lower() in (".parquet", ".pq"))
+    return path.is_file() and (head[:4] in (b"PAR1", b"PARE") or path.suffix.lower() in SUFFIXES)
 
 
 def _open(path: Path, layout: TableLayout | None) -> TableReader:
@@ -268,4 +272,4 @@ def _first_rows(path: Path, file: Any, places: Mapping[str, tuple[str, int]], ti
     raise _damaged(path, first) from first
 
 
-FORMAT = Format(name="Parquet table", matches=_matches, open=_open, order=20)
+FORMAT = Format(name="Parquet table", matches=_matches, open=_open, order=20, suffixes=SUFFIXES)

@@ -18,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.base import TypesysError
 from rosbags.typesys.msg import normalize_msgtype
 
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.bulk import Decoder, decoder_for, leaf_fields
 from ferryid.ingest.definitions import DefinitionError, md5sum, parse_definition
@@ -69,7 +70,7 @@ def open_bag(path: Path, layout: TableLayout | None) -> Rosbag1Reader:
     return Rosbag1Reader(path)
 
 
-FORMAT = Format(name="ROS1 bag (.bag)", matches=matches, open=open_bag, order=20)
+FORMAT = Format(name="ROS1 bag (.bag)", matches=matches, open=open_bag, order=20, suffixes=SUFFIXES, parts=True)
 
 
 @dataclass
@@ -166,7 +167,7 @@ class Rosbag1Reader:
         strangers = [(chunk, number) for chunk in self._chunks for number in chunk.connections - known]
         if strangers:
             count = sum(chunk.count(number) for chunk, number in strangers)
-            what = f"{count} messages belong to a connection whose topic and type are lost"
+            what = f"{counted(count, 'message')} {verb(count, 'belongs')} to a connection whose topic and type are lost"
             self._opening.append(Loss(str(self.paths[0]), what, None, count))
 
     def _topic(self, name: str) -> Topic:
@@ -273,7 +274,7 @@ class Rosbag1Reader:
         file = self.paths[0]
         if name not in self._by_topic:
             raise FerryIdError(
-                f"{file}: no topic {name}, found {len(self._by_topic)} others. "
+                f"{file}: no topic {name}, found {counted(len(self._by_topic), 'other')}. "
                 f"Fix: name a topic of the bag.{did_you_mean(name, self._by_topic)}"
             )
         topic = described[name]

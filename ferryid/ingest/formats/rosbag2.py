@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import mmap
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.files import scratch_folder
+from ferryid.files import remove_scratch, scratch_folder
+from ferryid.ingest.formats.mcap import SUFFIX as MCAP
 from ferryid.ingest.formats.mcap import McapLog
+from ferryid.ingest.formats.sqlite3_bag import SUFFIX as SQLITE
 from ferryid.ingest.formats.sqlite3_bag import Sqlite3Log, Storage, refuse_foreign
 from ferryid.ingest.formats.sqlite3_bag import matches as is_sqlite
 from ferryid.ingest.join import join
@@ -20,7 +22,7 @@ from ferryid.ingest.message_compression import UnpackingDecoder
 from ferryid.ingest.rosbag2_metadata import KEY, NAME, File, Metadata, read_metadata
 from ferryid.ingest.unpack import FORMATS, unpack_file
 
-ENDINGS = tuple(end + packed for end in (".db3", ".mcap") for packed in ("", *FORMATS.values()))
+ENDINGS = tuple(end + packed for end in (SQLITE, MCAP) for packed in ("", *FORMATS.values()))
 
 
 class FolderLog:
@@ -62,7 +64,7 @@ class FolderLog:
                 losses.append(_loss(path, about, f"the file cannot be read: {_cause(error, path)}"))
         if not parts:
             raise FerryIdError(
-                f"{folder}: none of the recording's {len(files)} files can be read; {losses[-1].file}: "
+                f"{folder}: none of the recording's {counted(len(files), 'file')} can be read; {losses[-1].file}: "
                 f"{losses[-1].what}. Fix: copy the folder from the recorder again"
             )
         self._joined = join(parts)
@@ -142,7 +144,7 @@ class FolderLog:
                 # The mapping keeps the bytes after the file's name is gone.
                 content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         finally:
-            shutil.rmtree(folder)
+            remove_scratch(folder)
         return _McapLog(path, content, codec, losses)
 
     def _described(self) -> tuple[Topic, ...]:
@@ -153,7 +155,7 @@ class FolderLog:
             about = stated.pop(topic.name, None)
             notes = [topic.note] if topic.note else []
             if about is not None and about.count < topic.count:
-                notes.append(f"metadata.yaml counts {about.count} messages, the files hold {topic.count}")
+                notes.append(f"metadata.yaml counts {counted(about.count, 'message')}, the files hold {topic.count}")
             if about is not None and about.type != topic.type:
                 notes.append(f"metadata.yaml gives the type {about.type}")
             topics.append(replace(topic, note="; ".join(notes)))

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.bulk import Decoder, decoder_for
 from ferryid.ingest.log import Format, Loss, Series, TableLayout, Topic
@@ -24,6 +25,7 @@ from ferryid.ingest.sqlite_rows import Rows, Scan, Stretch, scan_rows
 from ferryid.ingest.stray_times import stray_times
 from ferryid.ingest.unpack import FORMATS, unpack_file, working_folder
 
+SUFFIX = ".db3"
 DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
 # More lost stretches than these are reported as one.
 MAX_STRETCHES = 50
@@ -127,7 +129,9 @@ class Sqlite3Log:
             return path, (Loss(str(path), what),)
         left = sum(_wal_frames(log) for log in logs if log.name.endswith("-wal")) - max(applied, 0)
         if left > 0:
-            what = f"{left} pages in {names} are of unfinished or damaged transactions: their messages are lost"
+            what = (
+                f"{counted(left, 'page')} in {names} are of unfinished or damaged transactions: their messages are lost"
+            )
             losses = (Loss(str(path), what),)
         return copy, losses
 
@@ -154,7 +158,7 @@ class Sqlite3Log:
         lost_ns = None
         if len(stretches) > MAX_STRETCHES:
             count = None if any(stretch.count is None for stretch in stretches) else known
-            cause = f"{cause}, in {len(stretches)} places"
+            cause = f"{cause}, in {counted(len(stretches), 'place')}"
             lost_ns = _length_ns(rows, stretches)
             stretches = (Stretch(stretches[0].low, stretches[-1].high, count),)
         for stretch in stretches:
@@ -244,7 +248,7 @@ class Sqlite3Log:
             topic = known.get(name)
             if topic is None:
                 raise FerryIdError(
-                    f"{path}: no topic {name}, found {len(known)} others. "
+                    f"{path}: no topic {name}, found {counted(len(known), 'other')}. "
                     f"Fix: name one of them.{did_you_mean(name, known)}"
                 )
             definition = self._definitions[name]
@@ -333,7 +337,7 @@ def _wal_frames(log: Path) -> int:
 def matches(path: Path, head: bytes) -> bool:
     """Take SQLite files by their first bytes, and compressed or damaged ones by their name."""
     name = path.name.removesuffix(".zstd").removesuffix(".lz4")
-    return head.startswith(MAGIC) or (bool(head) and name.endswith(".db3"))
+    return head.startswith(MAGIC) or (bool(head) and name.endswith(SUFFIX))
 
 
 def open_file(path: Path, layout: TableLayout | None = None) -> Sqlite3Log:
@@ -354,9 +358,11 @@ def refuse_foreign(path: Path, topics: Sequence[Topic]) -> None:
     found = {topic.encoding for topic in topics}
     if found and found.isdisjoint(DECODABLE):
         raise FerryIdError(
-            f"{path}: none of its {len(topics)} topics can be decoded, found them serialised as "
+            f"{path}: none of its {counted(len(topics), 'topic')} can be decoded, found them serialised as "
             f"{', '.join(sorted(found))}. Fix: record with a middleware that uses CDR, as all of ROS2's own do"
         )
 
 
-FORMAT = Format("ROS2 SQLite file (.db3)", matches, open_file, order=30)
+FORMAT = Format(
+    "ROS2 SQLite file (.db3)", matches, open_file, order=30, suffixes=(SUFFIX, f"{SUFFIX}.zstd"), parts=True
+)

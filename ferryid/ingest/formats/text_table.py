@@ -5,18 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 
 from ferryid.ingest.log import Format, TableLayout
-from ferryid.ingest.table_text import SUFFIXES, looks_like_text, open_text
+from ferryid.ingest.table_text import looks_like_text, open_text
 from ferryid.ingest.tables import TableReader
+
+CERTAIN = (".csv", ".tsv")
+"""Suffixes of nothing else than tables: a damaged byte does not make such a file something else."""
+SUFFIXES = (*CERTAIN, ".txt", ".dat", ".asc", ".tab", ".prn", ".log", ".out")
 
 
 def _matches(path: Path, head: bytes) -> bool:
     suffix = path.suffix.lower()
-    # A damaged byte does not make a CSV file something else.
-    return path.is_file() and (suffix in (".csv", ".tsv") or (suffix in SUFFIXES and looks_like_text(head)))
+    return path.is_file() and (suffix in CERTAIN or (suffix in SUFFIXES and looks_like_text(head)))
 
 
 def _open(path: Path, layout: TableLayout | None) -> TableReader:
     return TableReader([open_text(path, layout)])
 
 
-FORMAT = Format(name="CSV or text table", matches=_matches, open=_open, order=80)
+FORMAT = Format(name="CSV or text table", matches=_matches, open=_open, order=80, suffixes=SUFFIXES)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.judge import force_mse
 from ferryid.identify.model import AXES, Model
 from ferryid.identify.settings import FitSettings
@@ -227,7 +228,7 @@ def _tables(outcomes: list[Outcome]) -> tuple[Table, ...]:
             "Round by round; round 1 has the base model; median (least to greatest).", ("", *numbers), tuple(by_round)
         ),
         Table(
-            "Force MSE of Model 1 over the true hull's (on a log that neither learnt from, window 1.0 s), with true signals "
+            "Force MSE of Model 1 over the true hull's (on a log that neither was fitted to, window 1.0 s), with true signals "
             "put in place of what round 1 measured; by window of training.",
             ("made true", *header),
             tuple(causes),
@@ -242,7 +243,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         values = [change(one[0, k], one[0, k - 1]) for one in ise]
         told.append(
             f"The {word} update changes ISE by {spread(values, '%', signed=True)}; "
-            f"it falls in {sum(value < 0 for value in values)} of {len(values)} runs."
+            f"it falls in {sum(value < 0 for value in values)} of {counted(len(values), 'run')}."
         )
     lot = np.std(ise[:, 2], axis=1, ddof=1) / np.mean(ise[:, 2], axis=1)
     told.append(
@@ -273,7 +274,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
     told.append(
         f"Without any noise (one run) ISE goes {_series(silent[:ROUNDS])} m² s from round 1 to round 4. With the true hull "
         f"as feedforward it is {number(float(silent[ROUNDS]))}, and {number(float(silent[ROUNDS + 1]))} where the thrusters "
-        "follow at once: what the true hull leaves is the thrusters' lag, of which it knows nothing and a learnt model may."
+        "follow at once: what the true hull leaves is the thrusters' lag, of which it knows nothing and a fitted model may."
     )
     return told
 

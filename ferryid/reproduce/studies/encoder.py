@@ -91,7 +91,7 @@ def study(lab: Lab) -> Study:
         (
             against(
                 "encoder-steps",
-                "Test MSE of the model over that learnt from floats: median and range over the seeds.",
+                "Test MSE of the model over that was fitted to floats: median and range over the seeds.",
                 "encoder step [deg]",
                 tuple(f"{axis}, ratio" for axis in AXES),
                 STEPS_DEG,
@@ -135,7 +135,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         + ", ".join(f"{percent(100 * (ratio - 1))} % in {axis}" for ratio, axis in zip(worse, AXES, strict=True))
         + (
             ": in these runs too little to make or break the method. Whole degrees are our guess at what the thesis's "
-            "integers were, and its encoders may have had other faults that the update mended."
+            "integers were, and its encoders may have had other faults that the update corrected."
             if max(worse) < 1.05
             else ": the update is worth having."
         )

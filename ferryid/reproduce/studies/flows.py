@@ -151,7 +151,7 @@ def study(lab: Lab) -> Study:
             "left out likewise. All components are used. The thesis has no such trial: it expects improvement.",
             "Then rounds 1 and 2 of Experiment 1 are flown with a vane of 10 Hz, and round 3 with each of four feedforwards: "
             "of a model that knows no wind; of one whose base model has the areas of the simulated vessel, and of two that "
-            "have learnt the wind by either basis instead, these three with the measured wind.",
+            "have fitted the wind by either basis instead, these three with the measured wind.",
         ),
         rows,
         tables,

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.judge import force_mse
 from ferryid.identify.model import AXES
 from ferryid.identify.residual import FORMS
@@ -124,11 +125,12 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         told.append(
             f"{LABELS[form]}: the force MSE is {number(force)} times that with τ_mes (mean of the axes), and the "
             f"next round's ISE "
-            f"{spread(ise)} times; it is lower in {better} of {len(ise)} runs."
+            f"{spread(ise)} times; it is lower in {better} of {counted(len(ise), 'run')}."
         )
     lower = sum(one.ise[1] < one.ise[0] for one in outcomes)
     told.append(
-        f"Jervan's advice to use τ_d for better tracking shows in {lower} of {len(outcomes)} runs here, Aurlien's doubt in "
+        f"Jervan's advice to use τ_d for better tracking shows in {lower} of {counted(len(outcomes), 'run')} "
+        "here, Aurlien's doubt in "
         f"{len(outcomes) - lower}: the sign of so small a difference is not settled by these."
         if 0 < lower < len(outcomes)
         else f"τ_d brings {'better' if lower else 'worse'} tracking in all of these runs."

@@ -99,7 +99,7 @@ def study(lab: Lab) -> Study:
     return Study(
         "rounds",
         "Adaptive rounds in wind (Experiment 1)",
-        "Does the model learnt from a round make the next one more precise and cheaper, and is it better than "
+        "Does the model fitted to a round make the next one more precise and cheaper, and is it better than "
         "the Master Model?",
         (
             "12-corner rounds of 12 minutes in a wind from NW of 5 m/s with gusts of 1.67 m/s per component, not measured; "

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.estimate import Estimator, estimator
 from ferryid.identify.judge import force_mse
 from ferryid.identify.simpls import simpls, sse
@@ -345,7 +346,7 @@ def _findings(outcomes: Sequence[Outcome], scaled: Floats, unscaled: Floats, whi
         told.append(
             f"Judged on {test}, the best window is "
             + ", ".join(f"{window:g} s in {count}" for window, count in best)
-            + f" of {len(outcomes)} runs; 1.0 s is {_loss(windows, 1.0):.1f} % from the best and 0.25 s "
+            + f" of {counted(len(outcomes), 'run')}; 1.0 s is {_loss(windows, 1.0):.1f} % from the best and 0.25 s "
             f"{_loss(windows, 0.25):.1f} % (medians)."
         )
     told.append(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.adapt import fit_motions, update_axes
 from ferryid.identify.combine import geometric_weights, mean_of_last, weighted
 from ferryid.identify.judge import force_mse, judge
@@ -177,7 +178,7 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
         told.append(
             f"{WAYS[k][0].upper()}{WAYS[k][1:]} is better than the old model on both in the median, by "
             f"{percent(100 * (1 - half[k]), '')} % and {percent(100 * (1 - twelve[k]), '')} %, and in {both} of "
-            f"{len(outcomes)} runs on its own. Flown, it changes ISE by {percent(flown[0])} % (crossing) and "
+            f"{counted(len(outcomes), 'run')} on its own. Flown, it changes ISE by {percent(flown[0])} % (crossing) and "
             f"{percent(flown[1])} % (12-corner). How much it helps, these runs leave open."
         )
     if not safe:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.counts import counted
 from ferryid.identify.estimate import estimator
 from ferryid.identify.fit import fit
 from ferryid.identify.judge import force_mse
@@ -117,7 +118,7 @@ def study(lab: Lab) -> Study:
     return Study(
         "waves",
         "Waves break the model (Experiment 2)",
-        "How much worse is a model that learnt in waves, and does this tool notice?",
+        "How much worse is a model that was fitted in waves, and does this tool notice?",
         (
             "Rounds 4 to 7 are adaptive in a breeze of 3 m/s from NE, waves of 0.1 m (significant, peak period 2 "
             "s) and two boats "
@@ -281,7 +282,7 @@ def _states(flight: Flight) -> Drawing:
     truth = flight.simulation.truth
     return Drawing(
         "5-15-states",
-        "True velocities, and roll as a witness of the waves, in round 8, as in figure 5.15.",
+        "True velocities, and roll as an indicator of the waves, in round 8, as in figure 5.15.",
         "time [s]",
         (
             Panel("u [m/s]", (Line("true", truth.t, truth.nu[:, 0]),)),
@@ -381,7 +382,8 @@ def _findings(outcomes: list[Outcome]) -> list[str]:
     worst = [median([one.told[k].calm for one in outcomes]) for k in range(len(BREEZY))]
     count = len(outcomes)
     told.append(
-        f"`ferryid fit` accepts its model of the log without breeze and waves in {accepted[0]} of {count} runs, with the "
+        f"`ferryid fit` accepts its model of the log without breeze and waves in {accepted[0]} of "
+        f"{counted(count, 'run')}, with the "
         f"breeze alone in {accepted[1]}, and with breeze and waves in "
         + ", ".join(f"{accepted[k + 1]} ({HEIGHTS_M[k]:g} m)" for k in range(1, len(HEIGHTS_M)))
         + f". Judged in calm weather these models have {', '.join(number(value) for value in worst)} times the base "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import atan2, cos, sin, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
 from ferryid.simulate.control.angle import shorter_way
-from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.thrust import Curves, largest_force, speed_for
 from ferryid.vessel.profile import Actuator, Profile
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isnan, sqrt
+from math import atan2, cos, isnan, sin, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ from ferryid.identify.residual import scaled
 from ferryid.identify.store import load_file
 from ferryid.identify.strips import LEAST
 from ferryid.identify.term import DIMENSIONS
-from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.hull import Hydrodynamics, hydrodynamics, required_force
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
 from ferryid.vessel.parse_hull import rigid_mass

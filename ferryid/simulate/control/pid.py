@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,7 +12,6 @@ from ferryid.compiled import borrowing
 from ferryid.simulate.control.angle import shorter_way
 from ferryid.simulate.control.feedforward import Feedforward, ahead_of
 from ferryid.simulate.control.reference import body_reference
-from ferryid.simulate.elementary import cos, sin
 
 if TYPE_CHECKING:
     from ferryid.simulate.scenario import Scenario

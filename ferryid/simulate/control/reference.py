@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from math import ceil
+from math import ceil, cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
-from ferryid.simulate.elementary import cos, sin
 
 if TYPE_CHECKING:
     from ferryid.simulate.scenario import Scenario

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import cos, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
-from ferryid.simulate.elementary import cos, sin
 from ferryid.simulate.sections import Current
 
 Floats = NDArray[np.float64]

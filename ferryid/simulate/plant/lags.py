@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from math import exp
+
 from ferryid.compiled import borrowing
-from ferryid.simulate.elementary import exp
 
 Weights = tuple[float, float, float, float]
 """What is kept of the old value, then the weights of the input at start, middle and end of a step."""

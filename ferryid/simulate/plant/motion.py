@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,8 +10,10 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.simulate.elementary import cos, sin
+from ferryid.simulate.added_effects import acting
+from ferryid.simulate.environment import wind_series
 from ferryid.simulate.plant import rolling
+from ferryid.simulate.plant.added import Added, added_load, build_added
 from ferryid.simulate.plant.current import current_series, turn_rate
 from ferryid.simulate.plant.hull import (
     Force,
@@ -22,13 +25,11 @@ from ferryid.simulate.plant.hull import (
     hydrodynamics,
     perturbed,
 )
-from ferryid.simulate.plant.mooring import Spring, mooring_load
 from ferryid.simulate.plant.phases import Phases, phases_of
 from ferryid.simulate.plant.shallow import Patch, damping_factor, patch_of
 from ferryid.simulate.plant.thrusters import Gear, gear_of, move, thrust_load
 from ferryid.simulate.plant.waves import Sea, sea_of, wave_load
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
-from ferryid.simulate.surroundings import wind_series
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ Floats = NDArray[np.float64]
 
 
 class Plant(NamedTuple):
-    """All that the vessel's motion depends on. One run at a time: `gear.acting` and `sea.terms` are written to.
+    """All that the vessel's motion depends on. One run at a time: `gear.acting`, `sea.terms` and `added` are written to.
 
     `wind` and `current` (2 steps + 1, 2) are velocities over ground,
     north and east [m/s], every half step.
@@ -52,7 +53,7 @@ class Plant(NamedTuple):
     phases: Phases
     gear: Gear
     sea: Sea
-    spring: Spring
+    added: Added
     shallow: Patch
 
 
@@ -73,7 +74,8 @@ def build(scenario: Scenario, profile: Profile, seed: int, h: float, steps: int)
     p = hydrodynamics(hull)
     m, I_z = float(hull.mass_kg), float(hull.inertia_z)
     n = 2 * steps + 1
-    current, mooring = scenario.current, scenario.mooring
+    current, effects = scenario.current, acting(scenario)
+    added = build_added(effects, profile)
     turn_radps = turn_rate(current)
     return Plant(
         p=p,
@@ -81,15 +83,10 @@ def build(scenario: Scenario, profile: Profile, seed: int, h: float, steps: int)
         wind=np.column_stack(wind_series(scenario, seed, n, 0.5 * h)),
         current=current_series(float(current.north_mps), float(current.east_mps), turn_radps, n, 0.5 * h),
         turn_radps=turn_radps,
-        phases=phases_of(p, profile, scenario.payload, mooring, scenario.thrusters.faults, h, steps),
-        gear=gear_of(profile, scenario.thrusters, h),
+        phases=phases_of(p, profile, scenario.payload, effects, scenario.thrusters.faults, h, steps),
+        gear=gear_of(profile, scenario.thrusters, h, added),
         sea=sea_of(profile, scenario.waves, scenario.wakes, seed, (p[0] - m, p[1] - m, p[4] - I_z)),
-        spring=Spring(
-            float(mooring.north_m),
-            float(mooring.east_m),
-            float(mooring.stiffness_north_Npm),
-            float(mooring.stiffness_east_Npm),
-        ),
+        added=added,
         shallow=patch_of(scenario.shallow),
     )
 
@@ -151,9 +148,8 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     X = tau[0] + wave[0] + blown[0] - C[0] - factor * D[0]
     Y = tau[1] + wave[1] + blown[1] - C[1] - factor * D[1]
     N = tau[2] + wave[2] + blown[2] - C[2] - factor * D[2]
-    if plant.phases.moored[phase] > 0.0:
-        held = mooring_load(plant.spring, x, y, c, s)
-        X, Y = X + held[0], Y + held[1]
+    more = added_load(plant.added, t, x, y, psi, u, v, r, u_r, v_r)
+    X, Y, N = X + more[0], Y + more[1], N + more[2]
     # nu_c_dot: [r v_c, -r u_c, 0], and R^T dV/dt of a current that turns clockwise, the current itself a quarter turn on.
     turn = r - plant.turn_radps
     inv = plant.phases.inverse[phase]
@@ -211,6 +207,8 @@ def advance(plant: Plant, i: int, h: float, state: State, thrusters: Floats, ord
     step = i // 2
     phase = phases.of_step[step]
     t, d = step * h, 0.5 * h
+    for k in range(len(plant.added.acts)):
+        plant.added.acts[k] = phases.acts[phase, k]
     move(plant.gear, thrusters, orders, phases.factor[phase], phases.offset[phase], h)
     at = state
     k1 = k2 = k3 = k4 = state

@@ -1,4 +1,4 @@
-"""What changes at once during a trial: payload, mooring and faults. Between two changes lies a phase.
+"""What changes at once during a trial: payload, faults and other effects. Between two changes lies a phase.
 
 Changes are put on the nearest step of the integrator, so that no Runge-Kutta step runs across one.
 """
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.simulate.plant.hull import Hydrodynamics
 from ferryid.simulate.plant.payload import boarding, inverse, loaded, together
-from ferryid.simulate.sections import Fault, Mooring, Payload
+from ferryid.simulate.sections import Fault, Payload
 from ferryid.vessel.profile import Profile
 
 Floats = NDArray[np.float64]
@@ -25,8 +25,9 @@ class Phases(NamedTuple):
     """S phases; `of_step` (steps + 1) says which one each step belongs to.
 
     `mass` (S, 3) holds m11, m22 and the mean of m23 and m32, `inverse` (S, 5) the inverse of M, `boarding` (S, 5) what turns
-    the velocities before the phase into those at its start, `payload` (S, 2) mass [kg] and place [m], `moored` (S,) 0 or
-    1, `factor` and `offset` (S, k) every thruster's factor on its force and how far its true angle is ahead [rad].
+    the velocities before the phase into those at its start, `payload` (S, 2) mass [kg] and place [m], `acts` (S, Q) 1 where an
+    added effect acts and else 0, `factor` and `offset` (S, k) every thruster's factor on its force and how far its true angle
+    is ahead [rad].
     """
 
     of_step: NDArray[np.int64]
@@ -34,7 +35,7 @@ class Phases(NamedTuple):
     inverse: Floats
     boarding: Floats
     payload: Floats
-    moored: Floats
+    acts: Floats
     factor: Floats
     offset: Floats
 
@@ -52,7 +53,7 @@ def phases_of(
     p: Hydrodynamics,
     profile: Profile,
     payload: Sequence[Payload],
-    mooring: Mooring,
+    added: Sequence[Lasting],
     faults: Sequence[Fault],
     h: float,
     steps: int,
@@ -71,7 +72,7 @@ def phases_of(
                 f"{profile.name}: a fault is asked for in a thruster that the vessel has not, found "
                 f'"{fault.thruster}".{did_you_mean(fault.thruster, names)} Fix: use one of {", ".join(names)}'
             )
-    lasting: tuple[Lasting, ...] = (*payload, mooring, *faults)
+    lasting: tuple[Lasting, ...] = (*payload, *added, *faults)
     ends = {step_at(time_s, h) for one in lasting for time_s in (one.from_s, one.until_s)}
     starts = [0, *sorted(start for start in ends if 0 < start <= steps)]
     of_step = np.zeros(steps + 1, dtype=np.int64)
@@ -84,7 +85,7 @@ def phases_of(
         inverse=np.zeros((S, 5)),
         boarding=np.zeros((S, 5)),
         payload=np.zeros((S, 2)),
-        moored=np.zeros(S),
+        acts=np.zeros((S, len(added))),
         factor=np.ones((S, len(names))),
         offset=np.zeros((S, len(names))),
     )
@@ -96,7 +97,7 @@ def phases_of(
         phases.inverse[s] = inverse(M)
         phases.boarding[s] = boarding(kept, M) if kept != M else (1.0, 1.0, 0.0, 0.0, 1.0)
         phases.payload[s] = together(aboard)
-        phases.moored[s] = 1.0 if _on(mooring, start, h) else 0.0
+        phases.acts[s] = [1.0 if _on(one, start, h) else 0.0 for one in added]
         for fault in faults:
             if _on(fault, start, h):
                 phases.factor[s, names.index(fault.thruster)] *= fault.factor

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, exp, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
-from ferryid.simulate.elementary import cos, exp, sin
 from ferryid.simulate.plant.waves import GRAVITY, Sea, slopes
 
 Floats = NDArray[np.float64]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import atan2, cos, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
-from ferryid.simulate.elementary import atan2, cos, sin
 from ferryid.simulate.plant.hull import Force
 from ferryid.vessel.profile import Actuator
 from ferryid.vessel.thrusters import FRESH_WATER

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import exp, log, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing, compiled
-from ferryid.simulate.elementary import exp, log
 
 Floats = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Actuator, Profile, ThrustCurve
-from ferryid.vessel.thrusters import FRESH_WATER
+from ferryid.vessel.thrusters import FRESH_WATER, thrust
 
 Floats = NDArray[np.float64]
 Wholes = NDArray[np.int64]
@@ -56,45 +56,13 @@ def curves_of(profile: Profile) -> Curves:
         rpm = 60.0 if curve.input_unit == "rps" else 1.0
         low[i], high[i] = rpm * curve.valid[0], rpm * curve.valid[1]
         share = actuator.count * (1.0 - actuator.inflow.get("thrust_deduction", 0.0))
-        for side, end in enumerate((curve.valid[1], curve.valid[0])):
-            sign = 1.0 - 2.0 * side
-            largest = 0.0
-            for node in range(NODES):
-                force = share * bollard_force(actuator, curve, end * node / (NODES - 1))
-                largest = max(largest, sign * force)
-                forces[i, side, node], reach[i, side, node] = force, largest
+        diameter_m = actuator.inflow.get("diameter_m", nan)
+        density = actuator.inflow.get("water_density", FRESH_WATER)
+        for side, end in enumerate((high[i], low[i])):
+            speeds = end * np.arange(NODES) / (NODES - 1)
+            forces[i, side] = share * thrust(curve, speeds, diameter_m=diameter_m, water_density=density)[0]
+            reach[i, side] = np.maximum.accumulate(np.maximum((1.0 - 2.0 * side) * forces[i, side], 0.0))
     return Curves(direct, low, high, forces, reach)
-
-
-def bollard_force(actuator: Actuator, curve: ThrustCurve, speed: float) -> float:
-    """Return the thrust of one unit at rest in the water [N] at a speed in the curve's own unit, within its range.
-
-    In plain arithmetic and therefore with the same bits everywhere, which `ferryid.vessel.thrusters.thrust` does not promise.
-    """
-    if curve.kind == "polynomial":
-        force = 0.0
-        for coefficient in reversed(curve.coefficients):
-            force = (force + coefficient) * speed
-        return force
-    if curve.kind == "table":
-        return _between(curve.table, speed)
-    if curve.kind == "quadratic":
-        return (curve.ahead if speed >= 0.0 else curve.astern) * speed * abs(speed)
-    D = actuator.inflow["diameter_m"]
-    k_t = _between(curve.table, 0.0) if speed >= 0.0 else -curve.astern
-    return actuator.inflow.get("water_density", FRESH_WATER) * D * D * D * D * speed * speed * k_t
-
-
-def _between(table: tuple[tuple[float, ...], tuple[float, ...]], x: float) -> float:
-    """Interpolate linearly in a table and hold its ends."""
-    places, values = table
-    if x <= places[0]:
-        return values[0]
-    for i in range(1, len(places)):
-        if x < places[i]:
-            share = (x - places[i - 1]) / (places[i] - places[i - 1])
-            return values[i - 1] + share * (values[i] - values[i - 1])
-    return values[-1]
 
 
 def _curve(profile: Profile, actuator: Actuator) -> ThrustCurve:

@@ -6,14 +6,14 @@ to the force follows the state of each Runge-Kutta stage.
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import cos, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
-from ferryid.simulate.elementary import cos, sin
+from ferryid.simulate.plant.added import Added, added_thrust, build_added
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.lags import Weights, decay_of, follow, lag_weights
 from ferryid.simulate.plant.rudder import COLUMNS, rudder_load, rudder_row
@@ -38,7 +38,8 @@ class Gear(NamedTuple):
 
     `unit` is the share of one propeller, before thrust deduction, in the force on the hull. `advance` and `k_t` (k, m) are
     the open-water tables, `points` their lengths (0 for other curves), `open_water` (k, 2) ``rho D^4`` of all units after
-    deduction and K_T astern. `acting` (3, k, 8) is written anew in every step, for its start, middle and end.
+    deduction and K_T astern. `acting` (3, k, 8) is written anew in every step, for its start, middle and end. `added` changes
+    what the curves give.
     """
 
     curves: Curves
@@ -67,10 +68,11 @@ class Gear(NamedTuple):
     open_water: Floats
     rudder: Floats
     acting: Floats
+    added: Added
 
 
-def gear_of(profile: Profile, dynamics: Thrusters, h: float) -> Gear:
-    """Return the actuators of a profile with the dynamics of a scenario, for steps of `h` seconds.
+def gear_of(profile: Profile, dynamics: Thrusters, h: float, added: Added | None = None) -> Gear:
+    """Return the actuators of a profile with the dynamics of a scenario and its added effects, for steps of `h` seconds.
 
     Raises
     ------
@@ -115,6 +117,7 @@ def gear_of(profile: Profile, dynamics: Thrusters, h: float) -> Gear:
         open_water=np.zeros((k, 2)),
         rudder=np.zeros((k, COLUMNS)),
         acting=np.zeros((3, k, KEEP + 1)),
+        added=build_added((), profile) if added is None else added,
     )
     for i, actuator in enumerate(actuators):
         deduction = 1.0 - actuator.inflow.get("thrust_deduction", 0.0)
@@ -161,9 +164,9 @@ def move(gear: Gear, thrusters: Floats, orders: Floats, factor: Floats, offset: 
         if gear.steers[k] != FIXED:
             a1 = follow(a0, orders[k, 1], gear.angle_lag[k], gear.angle_rate[k], d, gear.angle_decay[k])
             a2 = follow(a1, orders[k, 1], gear.angle_lag[k], gear.angle_rate[k], d, gear.angle_decay[k])
-        F0 = force_at(gear.curves, k, n0)
-        F1 = force_at(gear.curves, k, n1)
-        F2 = force_at(gear.curves, k, n2)
+        F0 = added_thrust(gear.added, k, n0, force_at(gear.curves, k, n0))
+        F1 = added_thrust(gear.added, k, n1, force_at(gear.curves, k, n1))
+        F2 = added_thrust(gear.added, k, n2, force_at(gear.curves, k, n2))
         f0, f1, f2 = F0, F1, F2
         if gear.force_lag[k] > 0.0:
             f0 = thrusters[k, 2]
@@ -250,7 +253,8 @@ def thrust_load(gear: Gear, node: int, u: float, v: float, r: float) -> Force:
         F, c, s = acting[FORCE], acting[COS], acting[SIN]
         u_p = u * (1.0 - gear.wake_fraction[k]) if u > 0.0 else u
         if gear.points[k] > 0:
-            F = acting[FACTOR] * (_open_water(gear, k, acting[RPS], u_p) + acting[DEFICIT])
+            F = added_thrust(gear.added, k, 60.0 * acting[RPS], _open_water(gear, k, acting[RPS], u_p))
+            F = acting[FACTOR] * (F + acting[DEFICIT])
         elif gear.inflow_loss > 0.0:
             along = c * (u - r * gear.y[k]) + s * (v + r * gear.x[k])
             share = gear.inflow_loss * (along if F >= 0.0 else -along)

@@ -15,7 +15,7 @@ mass; and the orbital velocity in the damping, which acts on the velocity agains
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isnan, pi
+from math import cos, exp, isnan, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing, compiled
 from ferryid.errors import FerryIdError
-from ferryid.simulate.elementary import cos, exp, sin
 from ferryid.simulate.noise import generator
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.spectrum import components, deep_water
@@ -39,8 +38,6 @@ HEADINGS = 1440
 """Headings at which the force of every component is tabulated; linear in between."""
 ENVELOPE = 8.0
 """Standard deviations from its middle at which a wake is over."""
-NEAREST = 6755399441055744.0
-"""1.5 * 2^52: adding it and taking it off again rounds to a whole number."""
 
 
 class Sea(NamedTuple):
@@ -205,23 +202,9 @@ def first_order(sea: Sea, t: float, x: float, y: float, psi: float) -> Force:
     node = int(node) % HEADINGS
     low, high = sea.table[node], sea.table[node + 1]
     frequency, north, east, phase, terms = sea.frequency, sea.north, sea.east, sea.phase, sea.terms
-    # Sine and cosine by their series in plain arithmetic, to 1e-15, so that the loop becomes vector instructions. The
-    # half of the angle lies within a quarter turn.
     for j in range(count):
-        p = frequency[j] * t - north[j] * x - east[j] * y + phase[j]
-        p -= (p + NEAREST) - NEAREST
-        q = p * p
-        s = 7.952054001475513e-07 + q * -2.2948428997269873e-08
-        s = 0.00046630280576761255 + q * (-2.1915353447830217e-05 + q * s)
-        s = 0.08214588661112823 + q * (-0.0073704309457143504 + q * s)
-        s = 2.5501640398773455 + q * (-0.5992645293207921 + q * s)
-        s = p * (3.141592653589793 + q * (-5.16771278004997 + q * s))
-        c = -1.3878952462213771e-07 + q * 3.604730797462501e-09
-        c = -0.0001046381049248457 + q * (4.303069587032947e-06 + q * c)
-        c = -0.02580689139001406 + q * (0.0019295743094039231 + q * c)
-        c = -1.3352627688545895 + q * (0.2353306303588932 + q * c)
-        c = 1.0 + q * (-4.934802200544679 + q * (4.0587121264167685 + q * c))
-        sine, cosine = 2.0 * s * c, 1.0 - 2.0 * s * s
+        turns = frequency[j] * t - north[j] * x - east[j] * y + phase[j]
+        sine, cosine = sin(2.0 * pi * turns), cos(2.0 * pi * turns)
         terms[0, j] = (low[0, j] + share * (high[0, j] - low[0, j])) * sine
         terms[1, j] = (low[1, j] + share * (high[1, j] - low[1, j])) * sine
         terms[2, j] = (low[2, j] + share * (high[2, j] - low[2, j])) * cosine

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import atan2, pi, sqrt
 from typing import NamedTuple
 
 from ferryid.compiled import borrowing
-from ferryid.simulate.elementary import atan2
 from ferryid.simulate.plant.hull import Force
 from ferryid.vessel.profile import WindAreas
 

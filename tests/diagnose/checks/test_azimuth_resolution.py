@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks.azimuth_resolution import find, restored, step_of
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.simulate import load_scenario
 from ferryid.simulate.trial import sail
 from ferryid.vessel.load import load_profile
@@ -29,14 +29,14 @@ def read(angle: Floats, step_deg: float) -> Floats:
     return np.asarray(step * np.round(angle / step))
 
 
-def scene(angle: Floats, step_deg: float) -> Scene:
+def scene(angle: Floats, step_deg: float) -> Measurements:
     n = len(angle)
     seen = read(angle, step_deg)
     force = 100.0 * np.stack([np.cos(seen), np.sin(seen), 1.8 * np.sin(seen)], axis=1)
     parts = np.stack([force, np.zeros((n, 3))], axis=1)
     still = np.zeros((n, 3))
     angles = np.column_stack([seen, np.zeros(n)])
-    return Scene(PROFILE, 0.05 * np.arange(n), still, still, still, parts, angles, np.ones(n, dtype=np.bool_))
+    return Measurements(PROFILE, 0.05 * np.arange(n), still, still, still, parts, angles, np.ones(n, dtype=np.bool_))
 
 
 @pytest.mark.parametrize("step_deg", [1.0, 5.0, 10.0, 22.5])

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import SensorFinding, checks, examine
-from ferryid.diagnose.velocity import steadied
-from ferryid.effects.picture import Scene
+from ferryid.diagnose.data.complementary_filter import complementary_filter
+from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
 from ferryid.signals.mirror import mirrored
 from ferryid.simulate import load_scenario
@@ -33,7 +33,7 @@ def sailed(
     navigation: Navigation | None = None,
     wind: Wind | None = None,
     noise: float = 1.0,
-) -> Scene:
+) -> Measurements:
     scenario = load_scenario("twelve-corner-calm")
     sensors = replace(scenario.sensors, navigation=navigation or Navigation())
     loud = sensors.noise
@@ -50,15 +50,15 @@ def sailed(
     control = sail(scenario, PROFILE, seed)[1]
     n, nu = len(control.t), control.measured[:, 3:]
     forces, angles = np.zeros((n, 2, 3)), np.zeros((n, 2))
-    return Scene(PROFILE, control.t, control.measured[:, :3], nu, nu, forces, angles, np.ones(n, dtype=np.bool_))
+    return Measurements(PROFILE, control.t, control.measured[:, :3], nu, nu, forces, angles, np.ones(n, dtype=np.bool_))
 
 
 @cache
-def quiet(seed: int) -> Scene:
+def quiet(seed: int) -> Measurements:
     return sailed(seed, noise=QUIET)
 
 
-def alone(scene: Scene, effect: str) -> SensorFinding:
+def alone(scene: Measurements, effect: str) -> SensorFinding:
     findings, _ = examine(scene)
     assert [finding.effect for finding in findings] == [effect]
     assert findings[0].says.endswith(".")
@@ -71,25 +71,25 @@ def holds(finding: SensorFinding, **truth: float) -> None:
         assert found.low <= value <= found.high, (name, found)
 
 
-def turned(scene: Scene, degrees: float) -> Scene:
+def turned(scene: Measurements, degrees: float) -> Measurements:
     return replace(scene, eta=scene.eta + np.array([0.0, 0.0, np.radians(degrees)]))
 
 
-def armed(scene: Scene, x: float, y: float) -> Scene:
+def armed(scene: Measurements, x: float, y: float) -> Measurements:
     one = np.ones(len(scene.t))
     return replace(scene, eta=scene.eta + np.column_stack([*to_world(x * one, y * one, scene.psi), 0.0 * one]))
 
 
-def late(scene: Scene, seconds: float) -> Scene:
+def late(scene: Measurements, seconds: float) -> Measurements:
     places = [np.interp(scene.t - seconds, scene.t, scene.eta[:, k]) for k in (0, 1)]
     return replace(scene, eta=np.column_stack([*places, scene.psi]))
 
 
-def scaled(scene: Scene, *factors: float) -> Scene:
+def scaled(scene: Measurements, *factors: float) -> Measurements:
     return replace(scene, nu_raw=scene.nu_raw * np.array(factors), nu=scene.nu * np.array(factors))
 
 
-def interpolated_heading(scene: Scene, every: int) -> Scene:
+def interpolated_heading(scene: Measurements, every: int) -> Measurements:
     """Return the heading logged wrapped at every so many rows, and interpolated as if it were no angle."""
     n = len(scene.t)
     logged = np.interp(np.arange(n), np.arange(0, n, every), wrap(scene.psi[::every] + 3.0))
@@ -144,7 +144,7 @@ def test_a_gyro_of_the_wrong_sign() -> None:
     ids=["turned", "backwards", "antenna", "late positions", "late velocities", "scale", "gyro"],
 )
 def test_an_error_is_found_alone_and_its_intervals_hold_the_truth(
-    spoil: Callable[[Scene], Scene], effect: str, truth: dict[str, float]
+    spoil: Callable[[Measurements], Measurements], effect: str, truth: dict[str, float]
 ) -> None:
     within = dict.fromkeys(truth, 0)
     for seed in TRIALS:
@@ -236,7 +236,7 @@ def test_the_velocity_in_products_is_made_anew_of_what_was_corrected(error: str)
     else:
         eta[2000:4000, :2] = eta[2000, :2]
     wrong = replace(right, eta=eta)
-    steady, made = (steadied(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
+    steady, made = (complementary_filter(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
     findings, corrected = examine(replace(wrong, nu=made))
     assert [one.effect for one in findings] == ["heading_bias" if error == "heading" else "held_samples"]
     rows = corrected.usable
@@ -248,7 +248,7 @@ def test_the_velocity_in_products_is_made_anew_of_what_was_corrected(error: str)
 def test_the_velocity_in_products_has_the_scale_that_was_found(along: float, turning: float) -> None:
     right = quiet(2)
     wrong = scaled(right, along, along, turning)
-    steady, made = (steadied(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
+    steady, made = (complementary_filter(one.nu, one.nu_raw, one.eta, 1.0 / one.step_s) for one in (right, wrong))
     findings, corrected = examine(replace(wrong, nu=made))
     assert [one.effect for one in findings] == ["velocity_scale" if along != 1.0 else "yaw_rate_scale"]
     rows = corrected.usable
@@ -277,6 +277,6 @@ def test_an_antenna_far_from_the_velocity_sensor_is_no_frame_of_the_wrong_hand()
         ("velocity", lambda one: replace(one, nu_raw=one.nu_raw * [1.0, -1.0, -1.0])),
     ],
 )
-def test_frames_of_the_wrong_hand_are_refused(signal: str, hand: Callable[[Scene], Scene]) -> None:
+def test_frames_of_the_wrong_hand_are_refused(signal: str, hand: Callable[[Measurements], Measurements]) -> None:
     with pytest.raises(FerryIdError, match=rf"milliampere.*Fix: correct the frame of \[signals\.{signal}\]"):
         examine(hand(quiet(1)))

@@ -11,7 +11,7 @@ import pytest
 
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.checks.contradiction import opposed
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
 from ferryid.vessel import load_profile
 
@@ -20,7 +20,7 @@ STEP_S = 0.2
 
 
 @cache
-def pushed() -> Scene:
+def pushed() -> Measurements:
     """A body that turns slowly while two azimuths push it about, with drag, wind and noise."""
     random = np.random.default_rng(3)
     t = np.arange(0.0, 600.0, STEP_S)
@@ -36,10 +36,10 @@ def pushed() -> Scene:
     nu = np.column_stack([body.real, body.imag, np.gradient(psi, STEP_S)])
     parts = np.stack([force.real, force.imag, force.imag * [1.8, -1.8]], axis=-1)
     usable = np.ones(len(t), dtype=np.bool_)
-    return Scene(PROFILE, t, np.column_stack([way.real, way.imag, psi]), nu, nu, parts, np.angle(force), usable)
+    return Measurements(PROFILE, t, np.column_stack([way.real, way.imag, psi]), nu, nu, parts, np.angle(force), usable)
 
 
-WRONG: dict[str, tuple[Callable[[Scene], Scene], str]] = {
+WRONG: dict[str, tuple[Callable[[Measurements], Measurements], str]] = {
     "both reversed": (lambda one: replace(one, parts=-one.parts), "against the force of thruster1 and thruster2 "),
     "one reversed": (lambda one: replace(one, parts=one.parts * [[[-1.0], [1.0]]]), "against the force of thruster1 "),
     "angles to port": (lambda one: replace(one, parts=one.parts * [1.0, -1.0, -1.0]), "counted the other way round "),
@@ -55,7 +55,7 @@ def test_force_and_motion_that_contradict_each_other_are_refused(name: str) -> N
         examine(wrong(pushed()))
 
 
-RIGHT: dict[str, Callable[[Scene], Scene]] = {
+RIGHT: dict[str, Callable[[Measurements], Measurements]] = {
     "as it is": lambda one: one,
     "one weak": lambda one: replace(one, parts=one.parts * [[[0.5], [1.0]]]),
     "one dead": lambda one: replace(one, parts=one.parts * [[[0.0], [1.0]]]),
@@ -66,7 +66,7 @@ RIGHT: dict[str, Callable[[Scene], Scene]] = {
 }
 
 
-def swung(t: np.ndarray, force: np.ndarray, r: np.ndarray, *, push: float) -> Scene:
+def swung(t: np.ndarray, force: np.ndarray, r: np.ndarray, *, push: float) -> Measurements:
     """Return a ship on a given turn: the stern pushes outward, and the hull's lift inward three times as hard."""
     u, v = np.full(len(t), 5.0), np.zeros(len(t))
     for k in range(len(t) - 1):
@@ -81,7 +81,7 @@ def swung(t: np.ndarray, force: np.ndarray, r: np.ndarray, *, push: float) -> Sc
     parts[:, 0, 1] = mass * push * force
     parts[:, 1, 0] = 0.1 * mass
     usable = np.ones(len(t), dtype=np.bool_)
-    return Scene(PROFILE, t, np.column_stack([way.real, way.imag, psi]), nu, nu, parts, parts[:, :, 0], usable)
+    return Measurements(PROFILE, t, np.column_stack([way.real, way.imag, psi]), nu, nu, parts, parts[:, :, 0], usable)
 
 
 @pytest.mark.parametrize("turn_s", [60.0, 90.0, 150.0])
@@ -113,7 +113,7 @@ def test_a_controller_in_a_swell_is_no_clock_that_is_late(period_s: float) -> No
     nu = np.column_stack([over.real, over.imag, 0.0 * t])
     parts = np.stack([np.stack([force.real, force.imag, 0.0 * t], axis=-1), np.zeros((n, 3))], axis=1)
     eta = np.column_stack([place.real, place.imag, 0.0 * t])
-    assert opposed(Scene(PROFILE, t, eta, nu, nu, parts, parts[:, :, 0], np.ones(n, dtype=np.bool_))) == ""
+    assert opposed(Measurements(PROFILE, t, eta, nu, nu, parts, parts[:, :, 0], np.ones(n, dtype=np.bool_))) == ""
 
 
 @pytest.mark.parametrize("name", RIGHT)

@@ -9,7 +9,7 @@ import pytest
 
 from ferryid.diagnose.checks.held_samples import find as held
 from ferryid.diagnose.checks.unrecorded_force import find as unrecorded
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Floats
 from tests.diagnose.checks.test_checks import sailed
@@ -17,14 +17,14 @@ from tests.diagnose.checks.test_checks import sailed
 FERRY = load_profile("milliampere")
 
 
-def straight(surge: Floats, pushed: Floats, step_s: float = 0.1) -> Scene:
+def straight(surge: Floats, pushed: Floats, step_s: float = 0.1) -> Measurements:
     """Return a scene in which the vessel goes north with a surge velocity, shape (n,), under a force ahead [N], shape (n,)."""
     n = len(surge)
     zero = np.zeros(n)
     nu = np.column_stack([surge, zero, zero])
     parts = np.zeros((n, 2, 3))
     parts[:, :, 0] = 0.5 * pushed[:, None]
-    return Scene(
+    return Measurements(
         profile=FERRY,
         t=step_s * np.arange(n),
         eta=np.column_stack([np.cumsum(surge) * step_s, zero, zero]),
@@ -36,7 +36,7 @@ def straight(surge: Floats, pushed: Floats, step_s: float = 0.1) -> Scene:
     )
 
 
-def run(idle: Floats) -> Scene:
+def run(idle: Floats) -> Measurements:
     """Return a minute under 400 N at 1 m/s, and half a minute without force in which the surge velocity is as given."""
     driven = np.full(600, 1.0)
     return straight(np.concatenate([driven, idle]), np.concatenate([np.full(600, 400.0), np.zeros(len(idle))]))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks.yaw_rate_scale import find
-from ferryid.effects.picture import Scene
+from ferryid.effects.force_model import Measurements
 from ferryid.simulate import load_scenario
 from ferryid.simulate.sections import Navigation
 from ferryid.simulate.trial import sail
@@ -17,13 +17,13 @@ from ferryid.vessel.load import load_profile
 PROFILE = load_profile("milliampere")
 
 
-def sailed(seed: int, factor: float) -> Scene:
+def sailed(seed: int, factor: float) -> Measurements:
     scenario = load_scenario("twelve-corner-calm")
     sensors = replace(scenario.sensors, navigation=Navigation(yaw_rate_factor=factor))
     control = sail(replace(scenario, duration_s=600.0, sensors=sensors), PROFILE, seed)[1]
     n, nu = len(control.t), control.measured[:, 3:]
     forces, angles = np.zeros((n, 2, 3)), np.zeros((n, 2))
-    return Scene(PROFILE, control.t, control.measured[:, :3], nu, nu, forces, angles, np.ones(n, dtype=np.bool_))
+    return Measurements(PROFILE, control.t, control.measured[:, :3], nu, nu, forces, angles, np.ones(n, dtype=np.bool_))
 
 
 @pytest.mark.parametrize("seed", range(6))

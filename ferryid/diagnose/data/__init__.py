@@ -1,0 +1,22 @@
+"""What is measured from a log."""
+
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.measurements import (
+    MeasuredLog,
+    Survey,
+    check_withheld,
+    measure_log,
+    read_measurements,
+    window_lengths,
+)
+
+__all__ = [
+    "AXES",
+    "Estimate",
+    "MeasuredLog",
+    "Survey",
+    "check_withheld",
+    "measure_log",
+    "read_measurements",
+    "window_lengths",
+]

@@ -1,0 +1,238 @@
+"""From a log to what it measures: the first stage of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
+from ferryid.effects.force_model import Measurements
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.pictured import bridged, pushes
+from ferryid.signals.align import align
+from ferryid.signals.data_quality import left_out_sentences
+from ferryid.signals.prepare import doubts_of
+from ferryid.signals.recording import Recording, data_quality, record
+from ferryid.signals.sampling import check_sampling
+from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
+from ferryid.signals.track import LeftOut, Motion, Track
+from ferryid.vessel.hull import current_in_body
+from ferryid.vessel.profile import Floats, Profile
+
+Flags = NDArray[np.bool_]
+
+WITHHELD = {
+    "wind": ("wind_N", "wind_E"),
+    "current": ("current_N", "current_E"),
+    "payload": ("payload_kg", "payload_x"),
+}
+"""What may be kept from the diagnosis, to be compared with what it finds, and the columns of it."""
+WINDOW_S, WINDOW_LENGTH_M = 8.0, 5.0
+"""Length of the weak form's windows for a vessel of this length; slower for longer ones, by Froude's law of time."""
+STRIDES = 4
+_POSITION_SHARE = 0.8
+WATER_DENSITY = 1000.0
+BLOCK_COEFFICIENT = 0.7
+"""Usual part of the box around a hull that it fills."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What is known of a log besides its scene.
+
+    Attributes
+    ----------
+    recording
+        The log's signals.
+    motion
+        Smoothed as for a fit: for free runs and figures.
+    quality, doubts
+        As in `ferryid.signals.prepare.Prepared`; here no doubt stops anything.
+    hidden
+        What was withheld, by name: shape (n, 2), NaN where it was not measured.
+    left_out
+        Which rows are not used and why, as sentences.
+    t0_ns
+        Absolute time of the scene's first row [ns].
+    """
+
+    recording: Recording
+    motion: Motion
+    quality: Mapping[str, Any]
+    doubts: tuple[str, ...]
+    hidden: Mapping[str, Floats]
+    t0_ns: int
+    left_out: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class MeasuredLog:
+    """A log as it was measured: the first stage of a diagnosis."""
+
+    path: str
+    scene: Measurements
+    survey: Survey
+
+
+def measure_log(
+    path: str,
+    profile: Profile,
+    out: Path | None,
+    *,
+    withhold: Sequence[str] = (),
+    verify: bool = False,
+    progress: Callable[[str], None],
+) -> MeasuredLog:
+    """Read and align a log; parameters and errors as of `read_measurements`."""
+    return MeasuredLog(
+        path, *read_measurements(path, profile, out, withhold=withhold, verify=verify, progress=progress)
+    )
+
+
+def quiet(_stage: str) -> None:
+    """Show no progress."""
+
+
+def read_measurements(
+    path: str,
+    profile: Profile,
+    out: Path | None,
+    *,
+    withhold: Sequence[str] = (),
+    window_s: float = MEAN_S,
+    verify: bool = False,
+    progress: Callable[[str], None] = quiet,
+) -> tuple[Measurements, Survey]:
+    """Return the scene that a log shows, and what else is known of the log.
+
+    Positions, heading and `nu_raw` are as measured; `nu`, wind and current pass through a moving mean, as they enter
+    products. Across gaps all signals are bridged so that filters can run on, but no row there is `usable`.
+
+    Parameters
+    ----------
+    path
+        A file or folder; parts of one recording joined by ``+``.
+    profile
+        The vessel.
+    out
+        Output folder, whose ``logs`` keep the ingested tables; None keeps none.
+    withhold
+        Signals to hide, of `WITHHELD`.
+    window_s
+        Moving mean [s].
+    verify
+        Check every checksum.
+    progress
+        Called with the name of each stage.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be used, one without actuators or heading, and a signal to withhold that it does not have.
+    """
+    check_withheld(withhold)
+    if not profile.actuators:
+        raise FerryIdError(
+            f"{profile.path}: a diagnosis weighs motion against the actuators' force, found no actuator in the profile. "
+            "Fix: describe them in [[actuator]] and map their signals"
+        )
+    progress(f"reading {Path(path).name}")
+    recording = record(path, profile, out, verify=verify)
+    check_sampling(recording, profile)
+    track = align(recording, profile)
+    track, hidden = _without(track, withhold)
+    measured = measure(track, profile)
+    motion = smooth_measured(measured, window_s)
+    scene = _scene(track, measured, profile, window_s)
+    doubts = doubts_of(recording, track)
+    # Windows of a diagnosis end at a gap, so that smoothing loses nothing beside it; but they need the pose.
+    placeless = LeftOut.of("the position or heading was not measured", measured.usable & ~scene.usable, track.rate_hz)
+    motion = replace(motion, left_out=(*measured.left_out, *placeless))
+    said = left_out_sentences(recording, motion.left_out, scene.usable)
+    survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns, said)
+    return scene, survey
+
+
+def window_lengths(profile: Profile) -> tuple[float, float]:
+    """Return length and stride [s] of the weak form's windows for a vessel."""
+    length_s = WINDOW_S * sqrt(dimensions(profile)[0] / WINDOW_LENGTH_M)
+    return length_s, length_s / STRIDES
+
+
+def dimensions(profile: Profile) -> tuple[float, float, float]:
+    """Return length, beam and draught [m], from mass and inertia where the profile does not state them."""
+    hull = profile.hull
+    # The radius of gyration is about a quarter of the length.
+    length = hull.length_m if isfinite(hull.length_m) else 4.0 * sqrt(hull.inertia_z / hull.mass_kg)
+    beam = hull.beam_m if isfinite(hull.beam_m) else 0.4 * length
+    draught = (
+        hull.draught_m
+        if isfinite(hull.draught_m)
+        else hull.mass_kg / (BLOCK_COEFFICIENT * WATER_DENSITY * length * beam)
+    )
+    return length, beam, draught
+
+
+def check_withheld(withhold: Collection[str]) -> None:
+    """Refuse the name of what is no signal that can be withheld."""
+    for name in withhold:
+        if name not in WITHHELD:
+            raise FerryIdError(
+                f'--withhold: "{name}" is not a signal that can be withheld.{did_you_mean(name, WITHHELD)} '
+                f"Fix: choose one of {', '.join(WITHHELD)}"
+            )
+
+
+def _without(track: Track, withhold: Sequence[str]) -> tuple[Track, dict[str, Floats]]:
+    columns, hidden = dict(track.columns), {}
+    for name in withhold:
+        pair = [columns.pop(column, None) for column in WITHHELD[name]]
+        first, second = pair
+        if first is None or second is None or not np.any(np.isfinite(first + second)):
+            raise FerryIdError(
+                f"{track.log}: the {name} cannot be withheld, found none in the log. Fix: leave out --withhold {name}"
+            )
+        hidden[name] = np.column_stack([first, second])
+    return replace(track, columns=columns), hidden
+
+
+def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) -> Measurements:
+    rows = odd_rows(window_s, track.rate_hz)
+    usable = measured.usable & np.isfinite(measured.eta[:, 2])
+    if not usable.any():
+        raise FerryIdError(
+            f"{track.log}: a diagnosis needs the heading, to tell the world's forces from the vessel's, found none while "
+            "velocities and actuators were measured. Fix: map [signals.heading] in the profile, or use a log that has it"
+        )
+    eta = measured.eta
+    placed: Flags = np.asarray(np.isfinite(eta[:, :2]).all(axis=1))
+    if float(np.mean(placed[usable])) >= _POSITION_SHARE:
+        usable &= placed
+    else:
+        eta = np.column_stack([np.full((len(eta), 2), np.nan), eta[:, 2]])
+    current = None if measured.current is None else bridged(measured.current, usable)
+    eta = np.column_stack([bridged(column[:, None], usable) for column in eta.T])
+    through_water = (
+        measured.nu if measured.current is None else measured.nu - current_in_body(measured.current, eta[:, 2])
+    )
+    parts, angles = pushes(profile, track.columns, through_water, usable)
+    nu_raw = bridged(measured.nu, usable)
+    return Measurements(
+        profile=profile,
+        t=measured.t,
+        eta=eta,
+        nu_raw=nu_raw,
+        nu=complementary_filter(steady_mean(nu_raw, rows), nu_raw, eta, track.rate_hz),
+        parts=parts,
+        angles=angles,
+        usable=usable,
+        wind=None if measured.wind is None else steady_mean(bridged(measured.wind, usable), rows),
+        current=None if current is None else steady_mean(current, rows),
+        payload=None if measured.payload is None else bridged(measured.payload, usable, held=True),
+    )

@@ -1,0 +1,86 @@
+"""The paths of a recording and of a simulation of the same manoeuvre."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ferryid.effects.force_model import Measurements
+from ferryid.vessel.frames import wrap
+from ferryid.vessel.profile import Floats
+
+RATE_HZ = 2.0
+MOST_SHIFT_S = 60.0
+SAME_LENGTH = 0.2
+"""Logs whose lengths differ by more than this share are not of the same manoeuvre."""
+SAME_PATH = 0.5
+"""Nor are paths whose distance is more than this part of their own extent, as root mean squares."""
+
+
+@dataclass(frozen=True)
+class PathComparison:
+    """Two logs of one manoeuvre, row by row.
+
+    Attributes
+    ----------
+    shift_s
+        What is added to the simulation's time so that its path fits best.
+    t
+        Time of the recording [s], shape (n,).
+    position_m, heading_rad, speed_mps
+        Recording less simulation: distance of the positions, heading, and speed over ground, shape (n,).
+    """
+
+    shift_s: float
+    t: Floats
+    position_m: Floats
+    heading_rad: Floats
+    speed_mps: Floats
+
+
+def compare_paths(simulated: Measurements, recorded: Measurements) -> PathComparison | str:
+    """Compare the paths of a simulation and a recording of one manoeuvre.
+
+    The simulation's clock may have started up to `MOST_SHIFT_S` earlier or later.
+
+    Returns
+    -------
+    Paths or str
+        The reason, where they are not of the same manoeuvre, or there is no position.
+    """
+    scenes = (simulated, recorded)
+    if not all(np.isfinite(one.eta[one.usable, :2]).all() for one in scenes):
+        return "a log has no positions"
+    lengths = [float(one.t[one.usable][-1] - one.t[one.usable][0]) for one in scenes]
+    if abs(lengths[0] - lengths[1]) > SAME_LENGTH * max(lengths):
+        return f"the simulation lasts {lengths[0]:.0f} s, the recording {lengths[1]:.0f} s"
+    step = 1.0 / RATE_HZ
+    t = np.arange(recorded.t[0], recorded.t[-1], step)
+    own, other = _sampled(recorded, t), None
+    best, shift = np.inf, 0.0
+    for tried in np.arange(-MOST_SHIFT_S, MOST_SHIFT_S + step, step):
+        moved = _sampled(simulated, t - tried)
+        away = np.hypot(*(own[:, :2] - moved[:, :2]).T)
+        if np.isfinite(away).mean() < 1.0 - 2.0 * SAME_LENGTH:
+            continue
+        distance = float(np.sqrt(np.nanmean(away**2)))
+        if distance < best:
+            best, shift, other = distance, float(tried), moved
+    place = own[:, :2]
+    extent = float(np.sqrt(np.nansum(np.nanvar(place, axis=0))))
+    if other is None or best > SAME_PATH * extent:
+        return f"the paths are {best:.1f} m apart, on a manoeuvre with an extent of {extent:.1f} m"
+    both = np.isfinite(own).all(axis=1) & np.isfinite(other).all(axis=1)
+    own, other, t = own[both], other[both], t[both]
+    away = own - other
+    return PathComparison(shift, t, np.hypot(away[:, 0], away[:, 1]), wrap(away[:, 2]), away[:, 3])
+
+
+def _sampled(scene: Measurements, t: Floats) -> Floats:
+    """Return north, east, heading and speed at some times, NaN outside of what was measured, shape (n, 4)."""
+    columns = np.column_stack([scene.eta, np.hypot(scene.nu[:, 0], scene.nu[:, 1])])
+    known = scene.usable
+    inside = np.interp(t, scene.t, known.astype(np.float64), left=0.0, right=0.0) > 0.5
+    found = np.column_stack([np.interp(t, scene.t[known], column[known]) for column in columns.T])
+    return np.where(inside[:, None], found, np.nan)

@@ -1,0 +1,40 @@
+"""What a log speaks for: the weak form, whitening, likelihood, search and evidence."""
+
+from ferryid.diagnose.inference.estimation import (
+    Candidate,
+    EstimationProblem,
+    Fit,
+    choose_parameters,
+    estimation_problem,
+    fit,
+    fitted_force_model,
+)
+from ferryid.diagnose.inference.noise_model import NoiseModel, fit_noise_with, likelihood
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.profile_likelihood import intervals
+from ferryid.diagnose.inference.search import is_negligible
+from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
+from ferryid.diagnose.inference.stochastic_disturbance import BANDS, STRENGTHS, DisturbanceState
+from ferryid.diagnose.inference.weak_form import Windows, windows
+
+__all__ = [
+    "BANDS",
+    "FEWEST_WINDOWS",
+    "STRENGTHS",
+    "Candidate",
+    "DisturbanceState",
+    "EstimationProblem",
+    "Fit",
+    "NoiseModel",
+    "Windows",
+    "choose_parameters",
+    "estimation_problem",
+    "fit",
+    "fit_noise_with",
+    "fitted_force_model",
+    "intervals",
+    "is_negligible",
+    "likelihood",
+    "prior_force_model",
+    "windows",
+]

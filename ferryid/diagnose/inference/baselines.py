@@ -1,0 +1,111 @@
+"""What recordings are compared with: see `ferryid.diagnose.inference.stages.Baseline`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.path_comparison import PathComparison, compare_paths
+from ferryid.diagnose.inference.campaign import Campaign
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.search import list_candidates
+from ferryid.diagnose.inference.simulation_baseline import (
+    Simulation,
+    difference_notes,
+    differing_candidates,
+    simulated_force_model,
+    simulation_as_json,
+)
+from ferryid.diagnose.inference.stages import AveragedLog, Expectation
+from ferryid.identify.model import Model
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True)
+class HullBaseline:
+    """The profile's hull, or a fitted model."""
+
+    profile: Profile
+    model: Model | None = None
+    joint: bool = False
+    updates_model: bool = True
+
+    @property
+    def hull_known(self) -> bool:
+        """True where the profile has a hull model, or there is a fitted one."""
+        return self.model is not None or self.profile.hull.has_model
+
+    @property
+    def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
+        """None."""
+        return {}
+
+    def expect(self, log: AveragedLog) -> Expectation:
+        """Return the forces of the hull, in still air and water where none was measured."""
+        seen = log.windows
+        sha256 = log.screened.measured.survey.recording.sha256
+        return Expectation(*prior_force_model(seen.scene, self.profile, self.model, sha256), _library(log))
+
+
+@dataclass(frozen=True)
+class SimulationBaseline:
+    """A simulation of the same trial, with what was learnt from its log."""
+
+    simulated: Simulation
+    joint: bool = False
+    updates_model: bool = False
+
+    @property
+    def hull_known(self) -> bool:
+        """True where the profile has a hull model."""
+        return self.simulated.scene.profile.hull.has_model
+
+    @property
+    def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
+        """Errors of the simulated sensors."""
+        return {one.effect: one.parameters for one in self.simulated.sensors}
+
+    def expect(self, log: AveragedLog) -> Expectation:
+        """Return the simulation's forces, with its own conditions as neutral values of the candidates."""
+        scene, seen = log.screened.scene, log.windows
+        path_errors = compare_paths(self.simulated.scene, scene)
+        shift_s = path_errors.shift_s if isinstance(path_errors, PathComparison) else 0.0
+        comparison = simulation_as_json(self.simulated, path_errors)
+        return Expectation(
+            *simulated_force_model(self.simulated, seen.scene, shift_s),
+            tuple(differing_candidates(self.simulated, seen.scene, shift_s)),
+            (comparison["says"], *difference_notes(self.simulated, scene)),
+            comparison,
+        )
+
+
+@dataclass(frozen=True)
+class CampaignBaseline:
+    """One hull for all logs of a campaign; each is compared with what the others say of it."""
+
+    profile: Profile
+    campaign: Campaign
+    joint: bool = True
+    updates_model: bool = False  # The lift of a common hull is in no model file.
+
+    @property
+    def hull_known(self) -> bool:
+        """True where the profile has a hull model."""
+        return self.profile.hull.has_model
+
+    @property
+    def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
+        """None."""
+        return {}
+
+    def expect(self, log: AveragedLog) -> Expectation:
+        """Return the forces of the hull that the other logs speak for."""
+        plain, _ = prior_force_model(log.windows.scene, self.profile)
+        picture, spread = self.campaign.picture(log.path, plain)
+        return Expectation(picture, spread, _library(log), (self.campaign.says(log.path),))
+
+
+def _library(log: AveragedLog) -> tuple[Candidate, ...]:
+    return tuple(list_candidates(log.windows.scene)[0])

@@ -1,0 +1,388 @@
+"""One hypothesis: some effects at once, their parameters and the hull's fitted together, and the evidence for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, isfinite, log
+
+import numpy as np
+
+from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
+from ferryid.diagnose.inference.noise_model import (
+    NoiseModel,
+    WhiteningFilter,
+    excerpt,
+    fit_noise,
+    make_whitening_filter,
+)
+from ferryid.diagnose.inference.weak_form import Windows, steps_of
+from ferryid.effects.effect import HELD, Effect, Parameter
+from ferryid.effects.force_model import ForceModel
+from ferryid.effects.wording import titled
+from ferryid.vessel.profile import Floats
+
+HULL_SPREAD = 0.12
+"""Standard deviation of what is believed of each of the hull's coefficients, as a share of it."""
+WIDER = 1.5
+"""Factor on standard deviations of the posterior, which takes the measured velocity and heading for true where they enter
+products. Chosen in view of simulated logs; `make proof` tells how often intervals hold in others."""
+STEPS = 24
+ANEW = 4
+"""Steps after which the derivatives by the hull's coefficients are taken anew."""
+ENOUGH = 1e-2
+"""Gain in cost of a step that is worth another."""
+MOVED = 0.1
+"""Move of a coefficient of the hull by which a slope is found, in its spread."""
+DAMPINGS = (0.0, 0.3, 3.0, 30.0, 300.0)
+NUDGE = 1e-2
+"""Move of an effect's parameter, in its size, by which a slope is found."""
+TRUST = 4.0
+"""Longest Gauss-Newton step, in sizes of a parameter."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect in one instance; `doubt` as in `ferryid.effects.effect.Choice`.
+
+    It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end).
+    """
+
+    effect: Effect
+    instance: str | None
+    parameters: tuple[Parameter, ...]
+    onset_s: float = 0.0
+    offset_s: float = inf
+    doubt: float = 0.0
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """Which of the two ends of its span lie within the log."""
+        return (*(("onset_s",) if self.onset_s > 0.0 else ()), *(("offset_s",) if isfinite(self.offset_s) else ()))
+
+    def moved(self, end: str, time_s: float) -> Candidate:
+        """Return the candidate with one of its `times` elsewhere."""
+        return replace(self, onset_s=time_s) if end == "onset_s" else replace(self, offset_s=time_s)
+
+    @property
+    def key(self) -> tuple[str, str | None]:
+        """Effect and instance."""
+        return self.effect.id, self.instance
+
+    @property
+    def title(self) -> str:
+        """The effect's title, with the thruster that it is one of."""
+        return titled(self.effect.title, self.instance)
+
+    @property
+    def start(self) -> Floats:
+        """Parameters with which a search begins."""
+        return np.array([one.neutral if one.start is None else one.start for one in self.parameters])
+
+    def act(self, picture: ForceModel, p: Floats) -> ForceModel:
+        """Return the picture with the effect in it."""
+        return self.effect.act(picture, p, self.instance, self.onset_s, self.offset_s)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted hypothesis.
+
+    Attributes
+    ----------
+    candidates
+        What it holds responsible.
+    values
+        Parameters of each candidate, in its own units.
+    spread
+        Covariance of all of them together, in their own units, in the same order, shape (q, q).
+    hull
+        The hull's coefficients, shape (26,).
+    evidence
+        Logarithm of the evidence (Laplace) over that of a hypothesis whose parameters are all zero wide, less that of how many
+        windows each onset and offset was chosen from.
+    """
+
+    candidates: tuple[Candidate, ...]
+    values: tuple[Floats, ...]
+    spread: Floats
+    hull: Floats
+    evidence: float
+
+    @property
+    def keys(self) -> frozenset[tuple[str, str | None]]:
+        """Effects and instances."""
+        return frozenset(candidate.key for candidate in self.candidates)
+
+    def errors(self, index: int) -> Floats:
+        """Return the posterior's standard deviations of one candidate's parameters."""
+        first = sum(len(values) for values in self.values[:index])
+        return np.sqrt(np.diag(self.spread)[first : first + len(self.values[index])])
+
+    def reported_errors(self, index: int) -> Floats:
+        """Return the standard deviations that are told: `WIDER`, and with what no log tells of an effect's size.
+
+        That is its formula (``form``), and what hull or instruments may be off anyway (``idle``, about a 95 % interval). A
+        place has no size.
+        """
+        candidate, values = self.candidates[index], self.values[index]
+        sized = np.array([one.unit == candidate.parameters[0].unit for one in candidate.parameters])
+        away = values - np.array([one.neutral for one in candidate.parameters])
+        beyond = np.where(sized, np.hypot(candidate.effect.form * away, 0.5 * candidate.effect.idle), 0.0)
+        return np.hypot(WIDER * self.errors(index), beyond)
+
+
+@dataclass(frozen=True)
+class EstimationProblem:
+    """All that hypotheses about one log share.
+
+    Attributes
+    ----------
+    windows
+        For judging and showing what is left over.
+    plain
+        The picture without effects.
+    noise
+        Of the windows.
+    hull_spread
+        Standard deviations of what is believed of the hull's coefficients, shape (26,).
+    filter
+        Of the steps, in which hypotheses are fitted.
+    """
+
+    windows: Windows
+    plain: ForceModel
+    noise: AutoregressiveNoise
+    hull_spread: Floats
+    filter: NoiseModel
+
+    @cached_property
+    def steps(self) -> Windows:
+        """The steps of the filter, over the same rows as the windows."""
+        return steps_of(self.windows)
+
+    @cached_property
+    def excerpt(self) -> Windows:
+        """Those of the steps from which noise is learnt."""
+        return excerpt(self.steps)
+
+    @cached_property
+    def whitening_filter(self) -> WhiteningFilter:
+        """The filter, ready for the steps."""
+        return make_whitening_filter(self.filter, self.steps)
+
+    @cached_property
+    def by_hull(self) -> Floats:
+        """`hull_slopes` of the plain picture."""
+        return self.hull_slopes(self.plain)
+
+    def hull_slopes(self, picture: ForceModel) -> Floats:
+        """Return derivatives of the prediction errors by the hull's coefficients, in their spreads, shape (w, 26).
+
+        Coefficients that cannot move have none.
+        """
+        free = np.flatnonzero(self.hull_spread)
+        every = np.zeros((self.steps.measured[:, self.steps.channels].size, len(self.hull_spread)))
+        if free.size:
+            moves = MOVED * self.hull_spread[free]
+            every[:, free] = self.whitening_filter.white(self.steps.hull_changes(picture, free, moves) / MOVED)
+        return every
+
+    def white(self, picture: ForceModel) -> Floats:
+        """Return the whitened prediction errors of a picture, flat."""
+        return self.whitening_filter.white(self.steps.gap(picture))
+
+    def with_noise_of(self, made: Fit) -> EstimationProblem:
+        """Return the trial with the noise that a fit leaves; a filter that has shared disturbances stays as it is."""
+        picture = fitted_force_model(self.plain, made)
+        own = self.filter if self.filter.processes else fit_noise(self.excerpt, self.excerpt.gap(picture), self.filter)
+        return replace(self, noise=fit_autoregression(self.windows.gap(picture), self.windows.runs), filter=own)
+
+    def part(self, windows: Windows) -> EstimationProblem:
+        """Return the trial of some of its windows, with the same noise."""
+        return replace(self, windows=windows)
+
+
+@dataclass(frozen=True)
+class StartingPoint:
+    """A hull to begin with, shape (26,), and the prediction errors' derivatives by it (`EstimationProblem.hull_slopes`)."""
+
+    hull: Floats
+    by_hull: Floats
+
+
+def starting_point(problem: EstimationProblem, made: Fit) -> StartingPoint:
+    """Return where to begin a fit that is not far from another."""
+    return StartingPoint(made.hull, problem.hull_slopes(fitted_force_model(problem.plain, made)))
+
+
+def fit(
+    problem: EstimationProblem,
+    candidates: Sequence[Candidate],
+    start: Sequence[Floats] | None = None,
+    *,
+    steps: int = STEPS,
+    begin: StartingPoint | None = None,
+) -> Fit:
+    """Fit a hypothesis by Gauss-Newton steps on the posterior.
+
+    Every parameter is believed to be about its neutral value, give or take its size, and the hull's coefficients to be
+    about the profile's; the scale of the forces is that of the thrust curves, which nothing here may change freely.
+
+    Parameters
+    ----------
+    problem
+        From `estimation_problem`.
+    candidates
+        Effects, in the order in which they act.
+    start
+        Parameters to begin with; the candidates' own where None.
+    steps
+        Most Gauss-Newton steps; with 0 the spread is that at the start.
+    begin
+        The hull to begin with; the profile's where None.
+    """
+    every = [parameter for candidate in candidates for parameter in candidate.parameters]
+    size = np.array([parameter.size for parameter in every])
+    neutral = np.array([parameter.neutral for parameter in every])
+    low = (np.array([parameter.low for parameter in every]) - neutral) / size if every else np.empty(0)
+    high = (np.array([parameter.high for parameter in every]) - neutral) / size if every else np.empty(0)
+    cuts = np.cumsum([len(candidate.parameters) for candidate in candidates])[:-1].tolist()
+    q, h = len(every), len(problem.hull_spread)
+    # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
+    bends = any(candidate.effect.bends_hull for candidate in candidates)
+
+    def picture_of(z: Floats) -> ForceModel:
+        picture = replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])
+        return apply_candidates(picture, candidates, np.split(neutral + size * z[h:], cuts)) if every else picture
+
+    def white(z: Floats) -> Floats:
+        return problem.white(picture_of(z))
+
+    z = np.zeros(h + q)
+    if every:
+        z[h:] = (np.concatenate([one.start for one in candidates] if start is None else start) - neutral) / size
+    if begin is not None:
+        moves = problem.hull_spread > 0.0
+        z[:h][moves] = (begin.hull - problem.plain.hull)[moves] / problem.hull_spread[moves]
+    w = white(z)
+    cost = float(w @ w + z @ z)
+    A = np.eye(h + q)
+    # The hull's derivatives cost most: they are taken anew only now and then, and before the fit ends.
+    by_hull, fresh = (problem.by_hull if begin is None else begin.by_hull), False
+    for count in range(max(steps, 1)):
+        if count > 0 and (bends or count % ANEW == 0):
+            by_hull, fresh = problem.hull_slopes(picture_of(z)), True
+        J = np.zeros((len(w), h + q))
+        J[:, :h] = by_hull
+        free = np.flatnonzero(size > HELD)
+        if free.size:
+            d = np.where(z[h + free] + NUDGE <= high[free], NUDGE, -NUDGE)
+            moved = np.repeat(z[None], len(free), axis=0)
+            moved[np.arange(len(free)), h + free] += d
+            gaps = np.stack([problem.steps.gap(picture_of(one)) for one in moved], axis=2)
+            J[:, h + free] = (problem.whitening_filter.white(gaps) - w[:, None]) / d
+        A = J.T @ J + np.eye(h + q)
+        if count == steps:
+            break
+        least = np.concatenate([np.full(h, -np.inf), low - z[h:]])
+        most = np.concatenate([np.full(h, np.inf), high - z[h:]])
+        slope, gained = J.T @ w + z, 0.0
+        for damping in DAMPINGS:
+            # Levenberg's and Marquardt's way, where the whole step leads astray.
+            step = _step(A + damping * np.diag(np.diag(A)), slope, least, most)
+            step *= min(1.0, TRUST / max(float(np.abs(step).max()), 1e-12))
+            new = z + step
+            new[h:] = np.clip(new[h:], low, high)
+            w_new = white(new)
+            new_cost = float(w_new @ w_new + new @ new)
+            if new_cost < cost:
+                gained = cost - new_cost
+                z, w, cost = new, w_new, new_cost
+                break
+        if gained < ENOUGH:
+            if fresh or steps <= ANEW:
+                break
+            by_hull, fresh = problem.hull_slopes(picture_of(z)), True
+    covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
+    evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - problem.whitening_filter.log_scale
+    evidence -= sum(
+        candidate.doubt + len(candidate.times) * log(len(problem.windows.starts)) for candidate in candidates
+    )
+    values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
+    hull = problem.plain.hull + problem.hull_spread * z[:h]
+    return Fit(tuple(candidates), values, covariance, hull, evidence)
+
+
+def effect_slopes(problem: EstimationProblem, kept: Fit) -> Floats:
+    """Return derivatives of the prediction errors by the parameters of a fit's effects, in their sizes, shape (w, q)."""
+    left = problem.white(fitted_force_model(problem.plain, kept))
+    columns = []
+    for i, candidate in enumerate(kept.candidates):
+        for k, one in enumerate(candidate.parameters):
+            d = NUDGE if kept.values[i][k] + NUDGE * one.size <= one.high else -NUDGE
+            moved = kept.values[i].copy()
+            moved[k] += d * one.size
+            changed = (*kept.values[:i], moved, *kept.values[i + 1 :])
+            columns.append((problem.white(fitted_force_model(problem.plain, replace(kept, values=changed))) - left) / d)
+    return np.stack(columns, axis=1) if columns else np.empty((len(left), 0))
+
+
+def without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
+    """Return the fit of a hypothesis that lacks one of its candidates."""
+    rest = [k for k in range(len(made.candidates)) if k != index]
+    return fit(problem, [made.candidates[k] for k in rest], [made.values[k] for k in rest])
+
+
+def _step(A: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
+    """Return the Gauss-Newton step; what would go beyond its limit goes there, and the others as well as they can then."""
+    step, free = np.zeros(len(slope)), np.ones(len(slope), dtype=np.bool_)
+    while free.any():
+        step[free] = -np.linalg.solve(A[np.ix_(free, free)], slope[free] + A[np.ix_(free, ~free)] @ step[~free])
+        beyond = free & ((step < low) | (step > high))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(step, low, high)[beyond]
+        free &= ~beyond
+    return step
+
+
+def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candidate) -> Candidate:
+    """Return a candidate with the parameters that its effect chooses beside a fit; the same one where there is no choice."""
+    if candidate.effect.choose is None:
+        return candidate
+    believed = fitted_force_model(problem.plain, replace(beside, hull=problem.plain.hull)).hull
+    made = candidate.effect.choose(fitted_force_model(problem.plain, beside), believed, problem.white)
+    return replace(candidate, parameters=made.parameters, doubt=made.doubt)
+
+
+def fitted_force_model(plain: ForceModel, made: Fit) -> ForceModel:
+    """Return the picture that a fit has of the log."""
+    return apply_candidates(replace(plain, hull=made.hull), made.candidates, made.values)
+
+
+def apply_candidates(picture: ForceModel, candidates: Sequence[Candidate], values: Sequence[Floats]) -> ForceModel:
+    """Return the picture with some candidates in it, each in its turn."""
+    for candidate, p in sorted(zip(candidates, values, strict=True), key=lambda one: one[0].effect.turn):
+        picture = candidate.act(picture, p)
+    return picture
+
+
+def estimation_problem(windows: Windows, plain: ForceModel, hull_spread: Floats) -> EstimationProblem:
+    """Return the trial with the noise that is left when the hull alone is refitted.
+
+    What an effect leaves in the gaps is in that noise too, until a hypothesis that holds takes it out: see
+    `ferryid.diagnose.inference.search`.
+    """
+    first = excerpt(steps_of(windows))
+    problem = EstimationProblem(
+        windows,
+        plain,
+        fit_autoregression(windows.gap(plain), windows.runs),
+        hull_spread,
+        fit_noise(first, first.gap(plain)),
+    )
+    for _ in range(2):
+        problem = problem.with_noise_of(fit(problem, ()))
+    return problem

@@ -1,0 +1,108 @@
+"""Blocks of a log, who is judged with whom, and what is drawn from them again and again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.diagnose.inference.autoregression import ORDER
+from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.vessel.profile import Floats
+
+Ints = NDArray[np.int64]
+
+FOLDS = 3
+BLOCK_WINDOWS = 5.0
+"""Length of a block in lengths of a window: 40 s for windows of 8 s, a manoeuvre or two."""
+FEWEST_BLOCKS = 2 * FOLDS
+GUARD = 0.25
+"""Purged between training and held-out windows, in lengths of a window, so that slow disturbances are not shared either."""
+DRAWS = 1000
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Blocks of a log's windows and who is judged with whom.
+
+    Attributes
+    ----------
+    block
+        Block of every window, shape (J,).
+    fold
+        Fold of every window, shape (J,).
+    training
+        The windows to fit on, for every fold.
+    """
+
+    block: Ints
+    fold: Ints
+    training: tuple[Windows, ...]
+
+
+def block_s(windows: Windows) -> float:
+    """Return how long a block is that is held out [s], in a log that is long enough."""
+    return BLOCK_WINDOWS * len(windows.weight) * windows.scene.step_s
+
+
+def folds_of(windows: Windows) -> Folds | None:
+    """Cut windows into blocks and deal them to folds; None where there are fewer than `FEWEST_BLOCKS`.
+
+    A block lasts `BLOCK_WINDOWS` windows' lengths, less in a short log, and is never shorter than two.
+    """
+    if len(windows.starts) == 0:
+        return None
+    scene = windows.scene
+    width_s = len(windows.weight) * scene.step_s
+    stride_s = float(np.median(np.diff(windows.starts))) * scene.step_s if len(windows.starts) > 1 else width_s
+    seconds = len(windows.starts) * stride_s
+    number = round(seconds / (BLOCK_WINDOWS * width_s))
+    if number < FEWEST_BLOCKS:
+        number = FEWEST_BLOCKS
+    if seconds / number < 2.0 * width_s:
+        return None
+    block = np.arange(len(windows.starts)) * number // len(windows.starts)
+    fold = block % FOLDS
+    purge = round(GUARD * len(windows.weight)) + len(windows.weight)
+    training = []
+    for k in range(FOLDS):
+        held = np.sort(windows.starts[fold == k])
+        place = np.searchsorted(held, windows.starts)
+        after = np.abs(windows.starts - held[np.minimum(place, len(held) - 1)])
+        before = np.abs(windows.starts - held[np.maximum(place - 1, 0)])
+        training.append(subset(windows, (fold != k) & (np.minimum(after, before) >= purge)))
+    if any(_learning(one) < 2 * ORDER for one in training):
+        return None
+    return Folds(block, fold, tuple(training))
+
+
+def subset(windows: Windows, chosen: NDArray[np.bool_]) -> Windows:
+    """Return some of the windows, shape (J,); a series is broken where one is left out."""
+    runs, count = [], 0
+    for first, end in windows.runs:
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen[first:end], [False]]).astype(np.int8)))
+        for a, b in edges.reshape(-1, 2):
+            runs.append((count, count + int(b - a)))
+            count += int(b - a)
+    return replace(windows, starts=windows.starts[chosen], runs=tuple(runs), measured=windows.measured[chosen])
+
+
+def _learning(windows: Windows) -> int:
+    """Return how many windows are left to learn from when each series has started."""
+    return sum(max(0, end - first - ORDER) for first, end in windows.runs)
+
+
+def by_block(values: Floats, block: Ints) -> Floats:
+    sums = np.zeros((int(block.max()) + 1, values.shape[1]))
+    np.add.at(sums, block, values)
+    return sums
+
+
+def draws(block: Ints) -> Floats:
+    """Return how often each block is drawn, shape (DRAWS, blocks)."""
+    number = int(block.max()) + 1
+    drawn = np.random.default_rng(0).integers(0, number, size=(DRAWS, number))
+    counts = np.zeros((DRAWS, number))
+    np.add.at(counts, (np.arange(DRAWS)[:, None], drawn), 1.0)
+    return counts

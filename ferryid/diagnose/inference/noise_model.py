@@ -1,0 +1,368 @@
+"""The noise of what a hypothesis leaves, and the filter that whitens it.
+
+What is left of the accelerations in every step is summed up to what is left of the positions (or velocities): there the error
+of the measurement is plain, and a disturbance is what pushes. A Kalman filter that knows the sizes and time constants of both
+gives prediction errors that are white and depend on nothing but the past. So a controller that answers a disturbance, or the
+error of a measurement, does not bias what is estimated (Ljung 1999, section 13.4); and gusts and waves, which nobody measured,
+are states of the filter instead of being forced into the hull's coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import cos, exp, pi, sin
+
+import numpy as np
+from scipy.optimize import minimize
+
+from ferryid.diagnose.inference.kalman import DIFFUSE, costs_alone, errors, errors_alone, gains
+from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.parallel import over
+from ferryid.effects.effect import Process
+from ferryid.effects.force_model import ForceModel
+from ferryid.vessel.profile import Floats
+
+GROUPS = (0, 0, 1)
+"""Channels that share a noise: north and east (or surge and sway), and the turn."""
+STARTS = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5))
+"""Where the search for a channel's noise begins: white error, as a share of all; time constant of the coloured, in steps; and
+disturbance, as a share of the acceleration left over."""
+GLIMPSE, SIGHT = 12, 12.0
+"""Steps of the search for a disturbance after which it is given up if the likelihood is farther than this from being enough."""
+SMALL = 1e-4
+"""Move of a parameter's logarithm by which a slope is found."""
+EXCERPT, PIECES = 3600, 8
+"""Steps from which noise is learnt, of longer logs from so many stretches: with more its sizes are hardly known better."""
+LONGEST = 500.0
+"""Longest time constant, in steps."""
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """The noise of the steps of a trial.
+
+    Attributes
+    ----------
+    channels
+        As `ferryid.diagnose.inference.kalman.gains` takes it, shape (c, 5).
+    processes
+        Shared disturbances.
+    picture
+        In which these push.
+    """
+
+    channels: Floats
+    processes: tuple[Process, ...] = ()
+    picture: ForceModel | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """Channels that are filtered together: which, their noise, shared states, and the gains of every series."""
+
+    channels: tuple[int, ...]
+    noise: Floats
+    blocks: Floats
+    columns: Floats
+    gains: tuple[tuple[Floats, Floats], ...] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class WhiteningFilter:
+    """A filter with its gains for the steps of one trial; see `make_whitening_filter`."""
+
+    steps: Windows
+    parts: tuple[Part, ...]
+
+    def white(self, gaps: Floats) -> Floats:
+        """Return whitened prediction errors of gaps, shape (J, c) flat, or (J, c, q) with q columns.
+
+        The first steps of every series only tell where it starts, and are zero.
+        """
+        left = np.empty((*gaps.shape[:2], 1 if gaps.ndim == 2 else gaps.shape[2]))
+        integrals, h = integrals_of(self.steps), stride_s(self.steps)
+        for part in self.parts:
+            own = list(part.channels)
+            for (first, end), (K, spread) in zip(self.steps.runs, part.gains, strict=True):
+                series = summed(gaps[first:end][:, own].reshape(end - first, len(own), -1), self.steps)
+                if not part.blocks.size:
+                    errors_ = errors_alone(K, spread, part.noise, integrals, h, series[:, 0])[:, None]
+                else:
+                    columns = part.columns[first:end]
+                    errors_ = errors(K, spread, part.noise, integrals, part.blocks, columns, h, series)
+                errors_[:DIFFUSE] = 0.0
+                left[first:end, own] = errors_
+        return np.ascontiguousarray(left.reshape(-1) if gaps.ndim == 2 else left.reshape(-1, gaps.shape[2]))
+
+    @property
+    def log_scale(self) -> float:
+        """Sum of the logarithms of the standard deviations of all predictions."""
+        return sum(float(np.log(spread[DIFFUSE:]).sum()) for part in self.parts for _, spread in part.gains)
+
+
+def make_whitening_filter(noise: NoiseModel, steps: Windows, pushes: Floats | None = None) -> WhiteningFilter:
+    """Return a filter with its gains for some steps. Channels that share no disturbance are filtered by themselves.
+
+    `pushes` are those of `disturbance_columns`, for whoever knows them already.
+    """
+    h, integrals = stride_s(steps), integrals_of(steps)
+    scale = _scales(steps)
+    if noise.processes and noise.picture is not None:
+        columns = disturbance_columns(noise, steps) if pushes is None else pushes
+        blocks, drive = _blocks(noise.processes, h)
+        by_run = tuple(
+            gains(scale, noise.channels, integrals, blocks, drive, np.ascontiguousarray(columns[a:b]), h)
+            for a, b in steps.runs
+        )
+        return WhiteningFilter(
+            steps, (Part(tuple(range(len(noise.channels))), noise.channels, blocks, columns, by_run),)
+        )
+    parts = []
+    for j in range(len(noise.channels)):
+        own = noise.channels[j : j + 1]
+        by_run = tuple(_alone(scale[j : j + 1], own, integrals, b - a, h) for a, b in steps.runs)
+        parts.append(Part((j,), own, np.empty((0, 0)), _no_columns(len(steps.starts)), by_run))
+    return WhiteningFilter(steps, tuple(parts))
+
+
+def disturbance_columns(noise: NoiseModel, steps: Windows) -> Floats:
+    """Return the acceleration of every channel by a unit of every state of the shared disturbances, shape (J, c, states)."""
+    assert noise.picture is not None
+    columns = []
+    for process in noise.processes:
+        pushed = replace(noise.picture, external=noise.picture.external + process.force)
+        column = (steps.gap(pushed) - steps.gap(noise.picture))[:, :, None]
+        columns.append(column)
+        if process.frequency_hz > 0.0:
+            columns.append(np.zeros_like(column))
+    return np.concatenate(columns, axis=2)
+
+
+def fit_noise(steps: Windows, gaps: Floats, near: NoiseModel | None = None) -> NoiseModel:
+    """Return the noise that gaps have if each channel has its own, by maximum likelihood.
+
+    Parameters
+    ----------
+    steps, gaps
+        The trial's, and what a hypothesis leaves.
+    near
+        A filter to begin with; else the search begins at several places.
+    """
+    h, integrals = stride_s(steps), integrals_of(steps)
+    scale = _scales(steps)
+    channels = np.empty((gaps.shape[1], 5))
+    for group in sorted(set(GROUPS)):
+        own = [j for j, g in enumerate(GROUPS) if g == group]
+        series = [summed(gaps[a:b][:, own], steps) for a, b in steps.runs]
+        size = scale[own].mean(keepdims=True)
+
+        def costs(z: Floats, series: list[Floats] = series, size: Floats = size) -> Floats:
+            every = [costs_alone(size, np.exp(z), integrals, h, part) for part in series]
+            return np.asarray(np.sum(every, axis=0))
+
+        rough = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
+        # The second difference of a position has six times the variance of its errors, the first of a velocity's twice.
+        error = rough * h**integrals / (2.4 if integrals == 2 else 1.4)
+        # The likelihood has several tops: the same roughness may be of short errors, of long ones or of pushes.
+        begin = [
+            np.log([white * error, error, error_s * h, pushed * rough, 10.0 * h])
+            for white, error_s, pushed in STARTS[: 1 if near else None]
+        ]
+        begin += [np.log(near.channels[own[0]])] if near else []
+
+        def searched(start: Floats, h: float = h, costs: Callable[[Floats], Floats] = costs) -> Floats:
+            return _least(costs, start, _bounds(start, h))
+
+        ends = np.array(over(searched, begin))
+        channels[own] = np.exp(ends[np.argmin(costs(ends))])
+    return NoiseModel(channels)
+
+
+def fit_noise_with(
+    steps: Windows,
+    gaps: Floats,
+    alone: NoiseModel,
+    made: Callable[[Floats], tuple[Process, ...]],
+    start: Floats,
+    picture: ForceModel,
+    worth: float = -np.inf,
+) -> tuple[NoiseModel, Floats, Floats, float]:
+    """Return the noise that gaps have if disturbances push beside each channel's own noise.
+
+    Parameters
+    ----------
+    steps, gaps
+        The trial's, and what a hypothesis leaves.
+    alone
+        The noise to begin with; its processes stay as they are.
+    made
+        The further processes, from positive parameters.
+    start
+        These to begin with, shape (k,).
+    picture
+        In which all push.
+    worth
+        Logarithm of the likelihood that has to come into sight before the search goes on to its end.
+
+    Returns
+    -------
+    NoiseModel
+        With the processes.
+    ndarray
+        The parameters, shape (k,).
+    ndarray
+        Standard deviations of their logarithms, shape (k,).
+    float
+        Logarithm of the likelihood.
+    """
+    h = stride_s(steps)
+    first = [GROUPS.index(group) for group in sorted(set(GROUPS))]
+
+    def noise(z: Floats) -> NoiseModel:
+        own, rest = np.exp(z[: 5 * len(first)].reshape(-1, 5)), np.exp(z[5 * len(first) :])
+        return NoiseModel(own[list(GROUPS)], (*alone.processes, *made(rest)), picture)
+
+    # How a disturbance pushes does not depend on its parameters.
+    pushes = disturbance_columns(NoiseModel(alone.channels, (*alone.processes, *made(start)), picture), steps)
+
+    def cost(z: Floats) -> float:
+        return -likelihood(noise(z), steps, gaps, pushes)
+
+    def costs(every: Floats) -> Floats:
+        return np.array(over(cost, every))
+
+    channels = np.log(alone.channels[first])
+    begin = np.concatenate([channels.ravel(), np.log(start)])
+    bounds = [pair for row in channels for pair in _bounds(row, h)]
+    bounds += [(float(one) - 5.0, float(one) + 4.0) for one in np.log(start)]
+    # What gives way to a disturbance first is the size of each channel's own coloured error and push.
+    some = [5 * group + size for group in range(len(first)) for size in (1, 3)]
+    some += range(len(begin) - len(start), len(begin))
+
+    def costs_of_some(every: Floats) -> Floats:
+        full = np.repeat(begin[None], len(every), axis=0)
+        full[:, some] = every
+        return costs(full)
+
+    z = begin.copy()
+    z[some] = _least(costs_of_some, begin[some], [bounds[k] for k in some], most=GLIMPSE)
+    if -cost(z) > worth - SIGHT:
+        z = _least(costs, z, bounds)
+    best = cost(z)
+    # What is not worth it need not be known.
+    width = _widths(cost, z, len(start), best) if -best > worth else np.full(len(start), np.inf)
+    return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
+
+
+def excerpt(steps: Windows) -> Windows:
+    """Return the steps from which noise is learnt: all of a short log, evenly spread stretches of a long one."""
+    n = len(steps.starts)
+    if n <= EXCERPT:
+        return steps
+    length = EXCERPT // PIECES
+    runs: list[tuple[int, int]] = []
+    rows: list[int] = []
+    for middle in np.linspace(0.0, n, 2 * PIECES + 1)[1::2]:
+        first, end = int(middle) - length // 2, int(middle) + length // 2
+        for a, b in steps.runs:
+            own = range(max(a, first), min(b, end))
+            if len(own) > DIFFUSE:
+                runs.append((len(rows), len(rows) + len(own)))
+                rows += own
+    at = np.array(rows, dtype=np.int64)
+    return replace(steps, starts=steps.starts[at], measured=steps.measured[at], runs=tuple(runs))
+
+
+def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> Floats:
+    """Return standard deviations of the last k of the parameters, with the rest as they are; infinite where a cost is flat."""
+    d = 0.05
+    moves = np.eye(len(z))[len(z) - k :] * d
+    bend = np.empty((k, k))
+    for i in range(k):
+        bend[i, i] = (cost(z + moves[i]) + cost(z - moves[i]) - 2.0 * best) / d**2
+    for i in range(k):
+        for j in range(i):
+            corner = cost(z + moves[i] + moves[j]) + cost(z - moves[i] - moves[j]) - 2.0 * best
+            bend[i, j] = bend[j, i] = 0.5 * (corner / d**2 - bend[i, i] - bend[j, j])
+    known = np.flatnonzero(np.diag(bend) > 0.0)
+    inverse = np.linalg.pinv(bend[np.ix_(known, known)], hermitian=True)
+    width = np.full(k, np.inf)
+    width[known] = np.sqrt(np.maximum(np.diag(inverse), 1.0 / np.diag(bend)[known]))
+    return width
+
+
+def likelihood(noise: NoiseModel, steps: Windows, gaps: Floats, pushes: Floats | None = None) -> float:
+    """Return the logarithm of the likelihood of gaps, but for a constant; `pushes` as in `make_whitening_filter`."""
+    ready = make_whitening_filter(noise, steps, pushes)
+    return -0.5 * float(np.sum(ready.white(gaps) ** 2)) - ready.log_scale
+
+
+def integrals_of(steps: Windows) -> int:
+    """Return 2 for steps of positions, 1 for those of velocities."""
+    return 2 if steps.channels[0] else 1
+
+
+def stride_s(steps: Windows) -> float:
+    """Return the time between two steps [s]; a position's weight is two of them long, a velocity's one."""
+    return (len(steps.weight) - 1) // integrals_of(steps) * steps.scene.step_s
+
+
+def summed(gaps: Floats, steps: Windows) -> Floats:
+    """Return the gaps of one series, shape (J, ...), as what they sum up to in position or velocity."""
+    h = stride_s(steps)
+    total = np.cumsum(gaps, axis=0) * h
+    return np.ascontiguousarray(np.cumsum(total, axis=0) * h if integrals_of(steps) == 2 else total)
+
+
+def _least(
+    costs: Callable[[Floats], Floats], start: Floats, bounds: list[tuple[float, float]], most: int = 60
+) -> Floats:
+    """Return the parameters, shape (k,), of least cost nearby; `costs` are those of several at once, of shape (p, k)."""
+
+    def with_slope(z: Floats) -> tuple[float, Floats]:
+        here, *moved = costs(z + SMALL * np.eye(len(z) + 1, len(z), -1)).tolist()
+        return here, (np.array(moved) - here) / SMALL
+
+    best = minimize(
+        with_slope, start, method="L-BFGS-B", jac=True, bounds=bounds, options={"maxiter": most, "ftol": 1e-8}
+    )
+    return np.asarray(best.x, dtype=np.float64)
+
+
+def _bounds(start: Floats, h: float) -> list[tuple[float, float]]:
+    times = (float(np.log(0.5 * h)), float(np.log(LONGEST * h)))
+    return [(one - 12.0, one + 6.0) if k not in (2, 4) else times for k, one in enumerate(start.tolist())]
+
+
+def _scales(steps: Windows) -> Floats:
+    """Return the size of what is measured in every channel, shape (c,)."""
+    measured = steps.measured[:, steps.channels]
+    size = np.sqrt(np.mean(measured**2, axis=0)) * stride_s(steps) ** integrals_of(steps)
+    return np.asarray(np.maximum(size, 1e-9))
+
+
+def _no_columns(n: int) -> Floats:
+    return np.empty((n, 1, 0))
+
+
+def _alone(scale: Floats, noise: Floats, integrals: int, n: int, h: float) -> tuple[Floats, Floats]:
+    return gains(scale, noise, integrals, np.empty((0, 0)), np.empty((2, 0, 0)), _no_columns(n), h)
+
+
+def _blocks(processes: tuple[Process, ...], h: float) -> tuple[Floats, Floats]:
+    """Return transition, and covariances of what enters and of the start, of all processes' states."""
+    sizes = [1 if one.frequency_hz == 0.0 else 2 for one in processes]
+    F, entering, first = (np.zeros((sum(sizes), sum(sizes))) for _ in range(3))
+    at = 0
+    for one, size in zip(processes, sizes, strict=True):
+        rows = slice(at, at + size)
+        keep, turn = exp(-h / one.time_constant_s), 2.0 * pi * one.frequency_hz * h
+        if size == 1:
+            F[rows, rows] = keep
+        else:
+            F[rows, rows] = keep * np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
+        first[rows, rows] = one.std**2 * np.eye(size)
+        entering[rows, rows] = (1.0 - keep**2) * one.std**2 * np.eye(size)
+        at += size
+    return F, np.stack([entering, first])

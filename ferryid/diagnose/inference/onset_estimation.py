@@ -1,0 +1,228 @@
+"""When an effect acts: all beginnings and ends at once, in one linearisation, and the best of them sharpened by fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf, log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.diagnose.inference.estimation import (
+    NUDGE,
+    Candidate,
+    EstimationProblem,
+    Fit,
+    StartingPoint,
+    effect_slopes,
+    fit,
+    fitted_force_model,
+    starting_point,
+    without,
+)
+from ferryid.diagnose.inference.folds import block_s
+from ferryid.diagnose.inference.noise_model import stride_s
+from ferryid.effects.force_model import ForceModel, as_measured
+from ferryid.vessel.profile import Floats
+
+Ints = NDArray[np.int64]
+
+PART_S, FEWEST_PARTS = 8.0, 24
+"""Length of the parts into which a log is cut [s], and how many there are at least: an effect begins and ends between two of
+them. In a calm log seconds matter: what acts too long or too short by them leaves a push that nothing explains."""
+MOST_NUMBERS = 1e7
+"""Numbers that a scan holds at once; parts are longer in long logs."""
+LEAST_BLOCKS = 2.0
+"""Length of the shortest span that a name can be judged by, in blocks that are held out: a fit that is judged on one part of it
+must have seen another."""
+PROMISING = 3
+"""Spans that are handed on to be fitted."""
+NEARBY_S, FINEST_S = 8.0, 0.2
+"""Steps [s] with which a time is searched for nearby, from the first down to the last."""
+GLANCE = 3
+"""Steps of a fit by which spans are compared."""
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """A fit, linearised.
+
+    Attributes
+    ----------
+    picture
+        That the fit has of the log.
+    left
+        What it leaves, whitened, shape (w,).
+    slopes
+        Its derivatives by hull and effects, shape (w, k).
+    inverse
+        Of their cross-products and the prior, shape (k, k).
+    """
+
+    picture: ForceModel
+    left: Floats
+    slopes: Floats
+    inverse: Floats
+
+
+def linearise(problem: EstimationProblem, made: Fit, begin: StartingPoint) -> Linearisation:
+    """Return a fit linearised; `begin` is `ferryid.diagnose.inference.estimation.starting_point` of it."""
+    picture = fitted_force_model(problem.plain, made)
+    slopes = np.column_stack([begin.by_hull, effect_slopes(problem, made)])
+    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
+    return Linearisation(picture, problem.white(picture), slopes, np.asarray(inverse, dtype=np.float64))
+
+
+def promising_spans(problem: EstimationProblem, ground: Linearisation, candidate: Candidate) -> list[Candidate]:
+    """Return a candidate in the few spans, other than the whole log, in which it promises most beside a fit.
+
+    Short ones are among them that can name nothing (see `brief`): left out, what came and went within seconds would be taken
+    for something that lasts.
+
+    The log is cut into parts; what a candidate adds in a part is linear in its parameters there, and what it adds in a span is
+    the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
+    """
+    edges = _edges(problem, candidate)
+    parts = len(edges) - 1
+    G, g = _cross_products(problem, ground, candidate, edges)
+    a, b = np.triu_indices(parts + 1, 1)
+    part = (a > 0) | (b < parts)
+    a, b = a[part], b[part]
+    gain = _gains(G, g, a, b, candidate)
+    gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(problem.windows.starts))
+    found: list[tuple[int, int]] = []
+    for k in np.argsort(-gain).tolist():
+        if gain[k] <= 0.0 or len(found) == PROMISING:
+            break
+        # A neighbour tells nothing new.
+        if all(max(abs(int(a[k]) - i), abs(int(b[k]) - j)) > 1 for i, j in found):
+            found.append((int(a[k]), int(b[k])))
+    return [
+        replace(candidate, onset_s=float(edges[i]) if i > 0 else 0.0, offset_s=float(edges[j]) if j < parts else inf)
+        for i, j in found
+    ]
+
+
+def part_s(problem: EstimationProblem, candidate: Candidate) -> float:
+    """Return how long a part of the log is [s]."""
+    return float(np.median(np.diff(_edges(problem, candidate))))
+
+
+def brief(problem: EstimationProblem, candidate: Candidate) -> bool:
+    """Tell whether a candidate acts for so short a time that it cannot be judged: it stands in for whatever came just then."""
+    return bool(candidate.times) and lasts_s(problem, candidate) < LEAST_BLOCKS * block_s(problem.windows)
+
+
+def lasts_s(problem: EstimationProblem, candidate: Candidate) -> float:
+    """Return for how many seconds of data a candidate acts."""
+    times = problem.steps.middle_s
+    return float(np.count_nonzero((times >= candidate.onset_s) & (times < candidate.offset_s))) * stride_s(
+        problem.steps
+    )
+
+
+def _edges(problem: EstimationProblem, candidate: Candidate) -> Floats:
+    """Return where the log is cut [s], into parts of as many steps each: in a gap nothing begins or ends."""
+    times = problem.steps.middle_s
+    most = MOST_NUMBERS / (len(times) * problem.steps.channels.sum() * len(candidate.parameters))
+    parts = max(FEWEST_PARTS, int(min(len(times) * stride_s(problem.steps) / PART_S, most)))
+    return np.interp(np.linspace(0.0, len(times) - 1.0, parts + 1), np.arange(len(times)), times)
+
+
+def _cross_products(
+    problem: EstimationProblem, ground: Linearisation, candidate: Candidate, edges: Floats
+) -> tuple[Floats, Floats]:
+    """Return cross-products of what a candidate adds in every part, shape (parts, p, parts, p), and of it with what is left."""
+    steps, start = problem.steps, candidate.start
+    part = np.clip(np.searchsorted(edges, steps.middle_s, side="right") - 1, 0, len(edges) - 2)
+    own = part[:, None, None] == np.arange(len(edges) - 1)
+    there = as_measured(candidate.effect.apply(ground.picture, start, candidate.instance))
+    columns = []
+    for k, one in enumerate(candidate.parameters):
+        moved = start.copy()
+        moved[k] += NUDGE * one.size
+        change = as_measured(candidate.effect.apply(ground.picture, moved, candidate.instance)) - there
+        columns.append(steps.mean(steps.along(change))[:, :, None] / NUDGE * own)
+    p = len(columns)
+    C = problem.whitening_filter.white(np.stack(columns, axis=3).reshape(len(steps.starts), -1, (len(edges) - 1) * p))
+    shared = ground.slopes.T @ C
+    G = C.T @ C - shared.T @ ground.inverse @ shared
+    return G.reshape(len(edges) - 1, p, len(edges) - 1, p), (C.T @ ground.left).reshape(-1, p)
+
+
+def _gains(G: Floats, g: Floats, a: Ints, b: Ints, candidate: Candidate) -> Floats:
+    """Return the gain in evidence of a candidate in the parts from a up to b, shape (spans,)."""
+    parts, p = g.shape
+    sums = np.zeros((parts + 1, p, parts + 1, p))
+    sums[1:, :, 1:] = G.cumsum(axis=0).cumsum(axis=2)
+    A = sums[b, :, b] - sums[a, :, b] - sums[b, :, a] + sums[a, :, a] + np.eye(p)
+    total = np.concatenate([np.zeros((1, p)), g.cumsum(axis=0)])
+    slope = total[b] - total[a]
+    low, high = (
+        np.array([(end - one.neutral) / one.size for one, end in zip(candidate.parameters, ends, strict=True)])
+        for ends in ([one.low for one in candidate.parameters], [one.high for one in candidate.parameters])
+    )
+    z = np.clip(-np.linalg.solve(A, slope[:, :, None])[:, :, 0], low, high)
+    gained = -np.sum(slope * z, axis=1) - 0.5 * np.einsum("si,sij,sj->s", z, A, z)
+    return np.asarray(gained - 0.5 * np.linalg.slogdet(A)[1])
+
+
+def refine_span(
+    problem: EstimationProblem, made: Fit, index: int, begin: StartingPoint, step_s: float, finest_s: float = FINEST_S
+) -> Fit:
+    """Return a fit with the ends of one candidate's span where they are likeliest nearby.
+
+    Parameters
+    ----------
+    problem
+        The log.
+    made
+        Fit of it.
+    index
+        Of the candidate; its span stays as long as `PART_S` at least.
+    begin
+        Where each fit begins.
+    step_s, finest_s
+        First step [s], which is halved where neither side is better, and the one to stop at.
+    """
+    times = problem.windows.middle_s
+    best, step = made, step_s
+    while step > finest_s:
+        before = best.candidates[index]
+        for end in before.times:
+            middle = getattr(best.candidates[index], end)
+            for time in (middle - step, middle + step):
+                moved = best.candidates[index].moved(end, time)
+                if lasts_s(problem, moved) < PART_S or not times[0] < time < times[-1]:
+                    continue
+                tried = fit(
+                    problem, replace_candidate(best.candidates, index, moved), best.values, steps=GLANCE, begin=begin
+                )
+                best = max(best, tried, key=lambda one: one.evidence)
+        step *= 0.5 if best.candidates[index] == before else 1.0
+    return best
+
+
+def refit_spans(problem: EstimationProblem, made: Fit) -> Fit:
+    """Return a fit with every span where it is likeliest: noise that is less now may show it better, and elsewhere."""
+    for i, candidate in enumerate(made.candidates):
+        if not candidate.times:
+            continue
+        bare, begin = without(problem, made, i), starting_point(problem, made)
+        ground = linearise(problem, bare, starting_point(problem, bare))
+        spans = [candidate, *promising_spans(problem, ground, candidate)]
+        tried = [
+            fit(problem, replace_candidate(made.candidates, i, one), made.values, steps=GLANCE, begin=begin)
+            for one in spans
+        ]
+        best = max(tried, key=lambda one: one.evidence)
+        step = max(NEARBY_S, 0.5 * part_s(problem, candidate))
+        sharp = refine_span(problem, best, i, begin, step)
+        made = fit(problem, sharp.candidates, sharp.values, begin=begin)
+    return made
+
+
+def replace_candidate(candidates: Sequence[Candidate], index: int, other: Candidate) -> list[Candidate]:
+    """Return the candidates with another in the place of one."""
+    return [other if k == index else one for k, one in enumerate(candidates)]

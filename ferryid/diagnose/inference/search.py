@@ -1,0 +1,286 @@
+"""Which effects a log speaks for: selection by evidence, one after the other, with every rival kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import exp
+
+import numpy as np
+
+from ferryid.diagnose.inference.estimation import (
+    Candidate,
+    EstimationProblem,
+    Fit,
+    StartingPoint,
+    choose_parameters,
+    fit,
+    fitted_force_model,
+    starting_point,
+    without,
+)
+from ferryid.diagnose.inference.onset_estimation import (
+    GLANCE,
+    NEARBY_S,
+    Linearisation,
+    linearise,
+    part_s,
+    promising_spans,
+    refine_span,
+    refit_spans,
+)
+from ferryid.diagnose.inference.stochastic_disturbance import WORTH, DisturbanceState, fit_disturbances
+from ferryid.diagnose.parallel import over
+from ferryid.effects import effects
+from ferryid.effects.force_model import Measurements
+from ferryid.vessel.profile import Floats
+
+ODDS = 8.0
+"""Logarithm of the evidence that an effect must show over none before it is as likely as none."""
+FAR = 8
+"""Steps of a fit by which candidates are sorted from afar, `GLANCE` from nearby; the best are then fitted to the end."""
+REJUDGED = 5
+"""Candidates whose evidence is weighed under the noise that each leaves itself."""
+MOST = 4
+"""Effects looked for at once."""
+CLEAR = 100.0
+"""Logarithm of the evidence as of which an effect is taken before gusts and waves are looked for: they look like nothing so
+clear."""
+VOID = 0.02
+"""An effect whose acceleration is less than this share of the measured one, by every channel's root mean square, is void."""
+
+
+@dataclass(frozen=True)
+class ScoredCandidate:
+    """A candidate with its fit beside what is selected already, and its evidence over that."""
+
+    candidate: Candidate
+    fit: Fit
+    gain: float
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of selection: every candidate, the best first, and the probability of each."""
+
+    ranked: tuple[ScoredCandidate, ...]
+    probabilities: tuple[float, ...]
+    none: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """What the log speaks for.
+
+    Attributes
+    ----------
+    problem
+        With the noise that the selected effects leave.
+    base, fit
+        Fits without and with the selected effects.
+    rounds
+        One per selected effect, and the last, in which none was good enough.
+    untested
+        Effect (and instance) to why it could not be tested.
+    states
+        Disturbances that came and went by chance.
+    """
+
+    problem: EstimationProblem
+    base: Fit
+    fit: Fit
+    rounds: tuple[Round, ...]
+    untested: dict[str, str]
+    states: tuple[DisturbanceState, ...] = ()
+
+
+def list_candidates(scene: Measurements) -> tuple[list[Candidate], dict[str, str]]:
+    """Return every effect that the scene can show, and why it cannot show the others."""
+    candidates, untested = [], {}
+    for effect in effects().values():
+        reason = effect.cannot(scene)
+        if reason:
+            untested[effect.id] = reason
+            continue
+        parameters = effect.parameters_of(scene.profile)
+        candidates += [Candidate(effect, instance, parameters) for instance in effect.instances(scene.profile)]
+    return candidates, untested
+
+
+def search(
+    problem: EstimationProblem, progress: Callable[[str], None], *, known: Sequence[Candidate] | None = None
+) -> Search:
+    """Select effects as long as one is more likely than none, then drop those that the others have made idle.
+
+    Parameters
+    ----------
+    problem
+        From `ferryid.diagnose.inference.estimation.estimation_problem`.
+    progress
+        Called with the name of each stage.
+    known
+        The candidates; the whole library where None.
+    """
+    candidates, untested = list_candidates(problem.plain.scene)
+    if known is not None:
+        candidates = list(known)
+    steady = [candidate for candidate in candidates if candidate.effect.unsteady is None]
+    shaken = [candidate for candidate in candidates if candidate.effect.unsteady is not None]
+    calm = problem.plain
+    chosen, rounds = fit(problem, ()), list[Round]()
+    states: tuple[DisturbanceState, ...] = ()
+    stood: frozenset[tuple[str, str | None]] | None = None
+    calm_beside: frozenset[tuple[str, str | None]] | None = None
+    while True:
+        taken = {candidate.key for candidate in chosen.candidates}
+        left = [candidate for candidate in steady if candidate.key not in taken]
+        progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
+        found = _weighed(problem, chosen, left)
+        rounds.append(_round(found))
+        good = [one for one in found if one.gain > ODDS and not is_negligible(problem, one.fit)]
+        best = good[0] if good and len(taken) < MOST else None
+        if best is None:
+            chosen = prune(problem, chosen)
+        beside, gain = _beside(problem, chosen, found, shaken)
+        clear = best is not None and best.gain > CLEAR
+        if shaken and not states and not clear and beside.keys != calm_beside:
+            progress("looking for gusts and waves")
+            # What explains more is taken first.
+            least = max(WORTH, (0.0 if best is None else best.gain) - gain)
+            rough, found_states = fit_disturbances(problem, beside, shaken, calm, least)
+            # What would stand in for them falls, and what they hid may show.
+            kept = prune(rough, fit(rough, beside.candidates, beside.values)) if found_states else chosen
+            if found_states and _has_what_they_shake(kept, found_states):
+                stood = beside.keys
+                problem, chosen, states = rough, kept, found_states
+                continue
+            calm_beside = beside.keys if least <= WORTH else calm_beside
+        if best is None:
+            break
+        problem = problem.with_noise_of(best.fit)
+        chosen = refit_spans(problem, fit(problem, best.fit.candidates, best.fit.values))
+    if states and chosen.keys != stood:
+        problem, states = fit_disturbances(problem, chosen, shaken, calm, near=states)
+        chosen = prune(problem, fit(problem, chosen.candidates, chosen.values))
+    if states:
+        chosen = refit_spans(problem, chosen)
+    return Search(problem, fit(problem, ()), chosen, tuple(rounds), untested, states)
+
+
+def refit_with_own_noise(problem: EstimationProblem, made: Fit) -> Fit:
+    """Return a fit with the evidence that it has under the noise that it leaves itself: with that two are fairly compared."""
+    fair = problem.with_noise_of(made)
+    return fit(fair, made.candidates, made.values, begin=starting_point(fair, made))
+
+
+def _has_what_they_shake(made: Fit, states: Sequence[DisturbanceState]) -> bool:
+    there = {"", *(candidate.effect.id for candidate in made.candidates)}
+    return all(state.candidate.effect.about in there for state in states)
+
+
+def _beside(
+    problem: EstimationProblem, chosen: Fit, found: Sequence[ScoredCandidate], shaken: Sequence[Candidate]
+) -> tuple[Fit, float]:
+    """Return the fit beside which disturbances are looked for, and its evidence over what is chosen.
+
+    What one of them comes and goes about, a wind's gusts, hides it and is hidden by it: the two are judged together.
+    """
+    about = {candidate.effect.about for candidate in shaken}
+    for one in found:
+        if one.candidate.effect.id in about:
+            return fit(problem, one.fit.candidates, one.fit.values), one.gain
+    return chosen, 0.0
+
+
+def _weighed(problem: EstimationProblem, chosen: Fit, candidates: Sequence[Candidate]) -> list[ScoredCandidate]:
+    """Return what each candidate adds to those chosen already, the best first."""
+    current = fit(problem, chosen.candidates, chosen.values)
+    begin = starting_point(problem, current)
+    ground = linearise(problem, current, begin)
+    found = over(partial(_best, problem, current, begin, ground), candidates)
+    found.sort(key=lambda one: -one.gain)
+    fair = over(partial(_fairly, problem), found[:REJUDGED])
+    return sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
+
+
+def _fairly(problem: EstimationProblem, one: ScoredCandidate) -> ScoredCandidate:
+    made = refit_with_own_noise(problem, fit(problem, one.fit.candidates, one.fit.values))
+    return replace(one, fit=made, gain=max(one.gain, one.gain + made.evidence - one.fit.evidence))
+
+
+def _best(
+    problem: EstimationProblem, current: Fit, begin: StartingPoint, ground: Linearisation, candidate: Candidate
+) -> ScoredCandidate:
+    """Return a candidate's best fit beside the current ones, over all spans where it can begin or end."""
+
+    def scored(made: Fit) -> ScoredCandidate:
+        gain = made.evidence - current.evidence
+        return ScoredCandidate(made.candidates[-1], made, gain)
+
+    def tried(one: Candidate, values: Floats | None = None) -> ScoredCandidate:
+        start = (*current.values, one.start if values is None else values)
+        # Where the hull has strained to stand in for an effect that multiplies it, the way to both leads from the profile's.
+        afar = one.effect.bends_hull and not one.times
+        made = fit(
+            problem, (*current.candidates, one), start, steps=FAR if afar else GLANCE, begin=None if afar else begin
+        )
+        return scored(made)
+
+    candidate = choose_parameters(problem, current, candidate)
+    whole = tried(candidate)
+    if not candidate.effect.onset:
+        return whole
+    # The kick of an onset shows within seconds of it only; what is changed from then on leads there.
+    smooth = replace(candidate, effect=replace(candidate.effect, kick=None))
+    spans = [tried(one) for one in promising_spans(problem, ground, smooth)]
+    index, step = len(current.candidates), 0.5 * part_s(problem, candidate)
+
+    def refined(one: ScoredCandidate) -> ScoredCandidate:
+        coarse = refine_span(problem, one.fit, index, begin, step, NEARBY_S)
+        kicked = tried(replace(coarse.candidates[-1], effect=candidate.effect), coarse.values[-1])
+        return scored(refine_span(problem, kicked.fit, index, begin, min(step, NEARBY_S)))
+
+    # Seconds matter: which of them is best shows when each has its own.
+    good = [one for one in spans if one.gain > max(whole.gain, 0.5 * ODDS)]
+    return max([whole, *(refined(one) for one in good)], key=lambda one: one.gain)
+
+
+def _round(found: Sequence[ScoredCandidate]) -> Round:
+    top = max([ODDS, *(one.gain for one in found)])
+    weights = [exp(one.gain - top) for one in found]
+    none = exp(ODDS - top)
+    total = sum(weights) + none
+    return Round(tuple(found), tuple(weight / total for weight in weights), none / total)
+
+
+def is_negligible(problem: EstimationProblem, made: Fit, index: int = -1) -> bool:
+    """Tell whether an effect of a fit, the last one if not another, moves the vessel too little to matter to anybody."""
+    candidate, seen = made.candidates[index], problem.windows
+    named = zip(made.values[index].tolist(), candidate.parameters, strict=True)
+    untold = candidate.effect.untold(problem.plain.scene, made.values[index])
+    away = [
+        abs(value - one.neutral)
+        for value, one in named
+        if one.unit == candidate.parameters[0].unit and one.name not in untold
+    ]
+    if max(away) < candidate.effect.idle:
+        return True
+    others = [k for k in range(len(made.candidates)) if k != index % len(made.candidates)]
+    before = replace(
+        made, candidates=tuple(made.candidates[k] for k in others), values=tuple(made.values[k] for k in others)
+    )
+    moved = seen.gap(fitted_force_model(problem.plain, made)) - seen.gap(fitted_force_model(problem.plain, before))
+    size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
+    return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
+
+
+def prune(problem: EstimationProblem, chosen: Fit) -> Fit:
+    """Drop one by one what the others explain as well without it."""
+    while chosen.candidates:
+        fewer = over(partial(without, problem, chosen), range(len(chosen.candidates)))
+        best = max(over(partial(refit_with_own_noise, problem), fewer), key=lambda one: one.evidence)
+        if max(chosen.evidence, refit_with_own_noise(problem, chosen).evidence) - best.evidence >= ODDS:
+            break
+        chosen = best
+    return chosen

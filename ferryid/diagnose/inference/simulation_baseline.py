@@ -1,0 +1,342 @@
+"""A recording against a simulation of it: the simulation's picture of the trial, learnt from its log, is the base.
+
+The simulated log is data like any other, of a world that is the simulator's. What its hull and its conditions are is found in
+the weak form as it would be for a recording, and put into the picture of the recording: what the diagnosis then finds is
+the difference. An effect that the simulation has already has the simulation's values for its neutral ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.diagnose.checks import examine
+from ferryid.diagnose.checks.check import SensorFinding
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.measurements import read_measurements, window_lengths
+from ferryid.diagnose.data.path_comparison import PathComparison
+from ferryid.diagnose.data.payload import aboard
+from ferryid.diagnose.inference.estimation import HULL_SPREAD, Candidate, estimation_problem, fitted_force_model
+from ferryid.diagnose.inference.prior import prior_force_model
+from ferryid.diagnose.inference.search import list_candidates, search
+from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
+from ferryid.diagnose.inference.weak_form import windows
+from ferryid.effects import effects
+from ferryid.effects.effect import Values
+from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.errors import FerryIdError
+from ferryid.vessel.profile import Floats, Profile
+
+FREER = 2.5
+"""A simulator's hull may be this much further from the profile's than a vessel's."""
+FOREIGN = 0.35
+"""A log is of another vessel if this share of its mean square acceleration follows neither from hull, force nor any effect."""
+SHOWN_ROWS = 400
+
+
+@dataclass(frozen=True)
+class Condition:
+    """An effect that the simulation has, with its values and their standard deviations.
+
+    `in_hull` where it is one of the hull's coefficients alone, so that it is in `Simulation.hull` already.
+    """
+
+    candidate: Candidate
+    values: Floats
+    errors: Floats
+    in_hull: bool = False
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What was learnt from a simulated log.
+
+    Attributes
+    ----------
+    log
+        Its name.
+    scene
+        What it holds, at its full rate.
+    hull, spread
+        Coefficients of its hull, shape (26,), and how far off they may be.
+    conditions
+        Effects that it has, in the order in which they act.
+    sensors
+        What is wrong with its sensors.
+    """
+
+    log: str
+    scene: Measurements
+    hull: Floats
+    spread: Floats
+    conditions: tuple[Condition, ...]
+    sensors: tuple[SensorFinding, ...]
+
+
+def learn_simulation(
+    path: str, profile: Profile, out: Path | None, *, verify: bool = False, progress: Callable[[str], None]
+) -> Simulation:
+    """Return the picture that a simulated log shows.
+
+    Parameters
+    ----------
+    path
+        The log, recorded with the same signals as the vessel's own.
+    profile
+        The vessel that it simulates.
+    out, verify, progress
+        As in `ferryid.diagnose.pipeline.diagnose`.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be used, is too short, or moves like no vessel of this profile.
+    """
+    scene, survey = read_measurements(path, profile, out, verify=verify, progress=progress)
+    sensors, scene = examine(scene)
+    name = survey.motion.log
+    seen = windows(scene, *window_lengths(profile))
+    if len(seen.starts) < FEWEST_WINDOWS:
+        raise FerryIdError(
+            f"{name}: --against needs a simulation long enough to learn its model from, found "
+            f"{counted(len(seen.starts), 'stretch')} of "
+            f"{window_lengths(profile)[0]:.0f} s without a gap where {FEWEST_WINDOWS} are needed. "
+            "Fix: simulate and record the whole trial"
+        )
+    plain, spread = prior_force_model(seen.scene, profile)
+    wide = FREER * spread if profile.hull.has_model else spread
+    progress(f"learning what {name} simulates")
+    result = search(estimation_problem(seen, plain, wide), progress)
+    made = result.fit
+    left = float(np.mean((seen.gap(fitted_force_model(plain, made)) / _size(seen.measured[:, seen.channels])) ** 2))
+    if left > FOREIGN:
+        raise FerryIdError(
+            f"{name}: --against needs a simulation of {profile.name}, found a motion of which its hull and the actuators' "
+            f"force explain no more than {100.0 * max(0.0, 1.0 - left):.0f} %. Fix: give a simulation of this vessel that "
+            "moves, with signals as the profile maps them"
+        )
+    conditions = [
+        Condition(candidate, values, made.errors(k), _in_hull(candidate, values, plain))
+        for k, (candidate, values) in enumerate(zip(made.candidates, made.values, strict=True))
+    ]
+    hull = made.hull
+    for one in conditions:
+        if one.in_hull:
+            hull = one.candidate.act(replace(plain, hull=hull), one.values).hull
+    posterior = np.sqrt(np.diag(np.linalg.inv(result.problem.by_hull.T @ result.problem.by_hull + np.eye(len(wide)))))
+    return Simulation(
+        name,
+        scene,
+        hull,
+        np.hypot(HULL_SPREAD * hull, posterior * wide),
+        (*_measured(scene), *conditions),
+        sensors,
+    )
+
+
+def _in_hull(candidate: Candidate, values: Floats, plain: ForceModel) -> bool:
+    after = candidate.act(plain, values)
+    same = all(
+        getattr(after, field.name) is getattr(plain, field.name) for field in fields(plain) if field.name != "hull"
+    )
+    return same and bool((after.hull != plain.hull).any())
+
+
+def _size(measured: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
+
+
+def _measured(scene: Measurements) -> tuple[Condition, ...]:
+    """Return the conditions that a simulation records, by their means, for a recording that lacks their sensors.
+
+    Of a payload it is the mean while it was aboard.
+    """
+    found = []
+    for name, values in (("wind", scene.wind), ("current", scene.current), ("payload", scene.payload)):
+        if values is None:
+            continue
+        effect = effects()[name]
+        candidate, rows = Candidate(effect, None, effect.parameters_of(scene.profile)), scene.usable
+        if name == "payload":
+            rows, ends = aboard(scene.t, values, rows)
+            candidate = replace(candidate, onset_s=ends.get("onset", 0.0), offset_s=ends.get("offset", inf))
+        mean = np.asarray(values[rows].mean(axis=0))
+        found.append(Condition(candidate, mean, np.zeros_like(mean)))
+    return tuple(found)
+
+
+def simulated_force_model(
+    simulated: Simulation, scene: Measurements, shift_s: float = 0.0
+) -> tuple[ForceModel, Floats]:
+    """Return the simulation's picture of what a recording shows, and how far its hull's coefficients may be off.
+
+    What the recording measured itself (wind, current, payload) is the recording's.
+
+    Parameters
+    ----------
+    simulated
+        From `learn`.
+    scene
+        The recording's.
+    shift_s
+        What is added to the simulation's times, of onsets and offsets.
+    """
+    plain, _ = prior_force_model(scene, scene.profile)
+    picture = replace(plain, hull=simulated.hull)
+    for one in _carried(simulated, scene, shift_s):
+        picture = one.candidate.act(picture, one.values)
+    return picture, simulated.spread
+
+
+def _carried(simulated: Simulation, scene: Measurements, shift_s: float) -> list[Condition]:
+    return [
+        replace(one, candidate=_later(one.candidate, shift_s))
+        for one in simulated.conditions
+        if not one.in_hull and not one.candidate.effect.cannot(scene)
+    ]
+
+
+def _later(candidate: Candidate, shift_s: float) -> Candidate:
+    for end in candidate.times:
+        candidate = candidate.moved(end, max(getattr(candidate, end) + shift_s, 0.0))
+    return candidate
+
+
+def differing_candidates(simulated: Simulation, scene: Measurements, shift_s: float = 0.0) -> list[Candidate]:
+    """Return every candidate of a recording, those that the simulation has already as differences to it."""
+    plain, _ = prior_force_model(scene, scene.profile)
+    bare = replace(plain, hull=simulated.hull)
+    carried = _carried(simulated, scene, shift_s)
+    known = {one.candidate.key: k for k, one in enumerate(carried)}
+    candidates, _ = list_candidates(scene)
+    return [_relative(one, carried, known[one.key], bare) if one.key in known else one for one in candidates]
+
+
+def difference_notes(simulated: Simulation, scene: Measurements) -> list[str]:
+    """Return the errors of the simulation's sensors, and conditions that differ by what was measured, in sentences."""
+    told = [f"The simulation's log: {one.says}" for one in simulated.sensors]
+    return told + [
+        f"The {one.candidate.effect.id} differs by what was measured, and is no finding: "
+        f"{_described(one, simulated.scene)} in the simulation; the recording's own is part of its picture."
+        for one in simulated.conditions
+        if one.candidate.effect.cannot(scene) and not one.in_hull
+    ]
+
+
+def _described(one: Condition, scene: Measurements) -> str:
+    untold = one.candidate.effect.untold(scene, one.values)
+    return ", ".join(
+        f"{parameter.name} {_told(value, parameter.unit)}"
+        for parameter, value in zip(one.candidate.parameters, one.values.tolist(), strict=True)
+        if parameter.name not in untold
+    )
+
+
+def _relative(candidate: Candidate, carried: Sequence[Condition], index: int, bare: ForceModel) -> Candidate:
+    """Return an effect that takes the simulation's values for neutral, and changes a picture from these to its own."""
+    own = carried[index]
+    neutral = dict(zip((one.name for one in candidate.parameters), own.values.tolist(), strict=True))
+
+    def pictured(hull: Floats, p: Floats) -> ForceModel:
+        picture = replace(bare, hull=hull)
+        for k, one in enumerate(carried):
+            picture = one.candidate.act(picture, p if k == index else one.values)
+        return picture
+
+    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        return _changed(picture, pictured(picture.hull, own.values), pictured(picture.hull, p))
+
+    def says(values: Values, instance: str | None) -> str:
+        name = candidate.effect.title + (f" ({instance})" if instance else "")
+        parts = [
+            f"{one.name.replace('_', ' ')} {_told(neutral[one.name], one.unit)} in the simulation, "
+            f"{_told(values[one.name], one.unit)} in the recording"
+            for one in candidate.parameters
+            if one.name in values
+        ]
+        return f"{name} differs: {'; '.join(parts)}."
+
+    def kick(picture: ForceModel, p: Floats) -> Floats:
+        # What the simulation has aboard already gives none.
+        assert candidate.effect.kick is not None
+        return candidate.effect.kick(picture, p) - candidate.effect.kick(picture, own.values)
+
+    # Where the simulation has it for a while, no other span of it can be told, and its own has its own kick.
+    kicks = candidate.effect.kick is not None and not own.candidate.times
+    effect = replace(candidate.effect, apply=apply, says=says, kick=kick if kicks else None)
+    parameters = tuple(replace(one, neutral=neutral[one.name]) for one in candidate.parameters)
+    return Candidate(effect, candidate.instance, parameters)
+
+
+def _told(value: float, unit: str) -> str:
+    return f"{value:.2f}" + ("" if unit == "-" else f" {unit}")
+
+
+def _changed(picture: ForceModel, old: ForceModel, new: ForceModel) -> ForceModel:
+    """Return a picture changed as `old` becomes `new`: hull and factors by the ratio, all else by the difference."""
+    scene = picture.scene
+    if new.scene is not old.scene:
+        scene = replace(scene, eta=scene.eta + new.scene.eta - old.scene.eta, nu=scene.nu + new.scene.nu - old.scene.nu)
+    changed: dict[str, Any] = {"scene": scene}
+    for field in fields(picture):
+        own, before, after = (getattr(one, field.name) for one in (picture, old, new))
+        if field.name == "scene" or before is after:
+            continue
+        if field.name in ("hull", "damping_factor"):
+            upper, lower = (np.ones(1) if one is None else one for one in (after, before))
+            # What was zero stays so, whatever it is multiplied by.
+            ratio = np.divide(upper, lower, out=np.ones(np.broadcast(upper, lower).shape), where=lower != 0.0)
+            changed[field.name] = ratio if own is None else own * ratio
+        else:
+            change = (0.0 if after is None else after) - (0.0 if before is None else before)
+            changed[field.name] = change if own is None else own + change
+    return replace(picture, **changed)
+
+
+def simulation_as_json(simulated: Simulation, compared: PathComparison | str) -> dict[str, Any]:
+    """Return the simulation and its path against the recording's as plain values, for JSON."""
+    conditions = [
+        {
+            "effect": one.candidate.effect.id,
+            "instance": one.candidate.instance,
+            "onset": one.candidate.onset_s if one.candidate.onset_s > 0.0 else None,
+            "offset": one.candidate.offset_s if isfinite(one.candidate.offset_s) else None,
+            "parameters": {
+                parameter.name: vars(Estimate(value, value - 1.96 * error, value + 1.96 * error, parameter.unit))
+                for parameter, value, error in zip(
+                    one.candidate.parameters, one.values.tolist(), one.errors.tolist(), strict=True
+                )
+                if parameter.name not in one.candidate.effect.untold(simulated.scene, one.values)
+            },
+        }
+        for one in simulated.conditions
+    ]
+    made: dict[str, Any] = {"log": simulated.log, "conditions": conditions, "paths": None}
+    if isinstance(compared, str):
+        return {**made, "says": f"The paths are not compared: {compared}."}
+    every = max(1, -(-len(compared.t) // SHOWN_ROWS))
+    columns: Mapping[str, Floats] = {
+        "t_s": compared.t,
+        "position_m": compared.position_m,
+        "heading_rad": compared.heading_rad,
+        "speed_mps": compared.speed_mps,
+    }
+    rms = {name: float(np.sqrt(np.mean(column**2))) for name, column in columns.items() if name != "t_s"}
+    worst = int(np.argmax(compared.position_m))
+    made["paths"] = {
+        "shift_s": compared.shift_s,
+        "rms": rms,
+        **{name: column[::every].tolist() for name, column in columns.items()},
+    }
+    made["says"] = (
+        f"The recording's path is {rms['position_m']:.2f} m, {np.degrees(rms['heading_rad']):.1f} deg and "
+        f"{rms['speed_mps']:.2f} m/s from the simulation's (root mean square), most at {compared.t[worst]:.0f} s: "
+        f"{compared.position_m[worst]:.2f} m."
+    )
+    return made

@@ -1,0 +1,222 @@
+"""The weak form: equations of motion averaged over windows, so that no noisy signal is ever differentiated.
+
+A window's weight w and its first derivatives vanish at both ends, so that integration by parts moves every derivative
+onto w: ``∫ w p'' = ∫ w'' p`` for a position, ``∫ w nu' = -∫ w' nu`` for a velocity. Either is compared with the
+acceleration that a picture of the forces gives, averaged with the same weight. Where positions were measured they alone
+are used: what they leave is steadier over the seconds in which forces act. Long windows show and judge what is left over;
+hypotheses are fitted in short steps, by the filter of `ferryid.diagnose.inference.noise_model`.
+
+References
+----------
+Shinbrot (1957); Messenger and Bortz (2021), Weak SINDy, for the choice of test functions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.compiled import compiled
+from ferryid.effects.equations_of_motion import Places, to_ground
+from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes
+from ferryid.vessel.profile import Floats
+
+CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
+"""Where the measured acceleration comes from: second derivative of the first three, first of the others."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows of a scene.
+
+    Attributes
+    ----------
+    scene
+        What was measured, at the rate of the forces.
+    starts
+        First row of every window, shape (J,); every window lies in measured data.
+    runs
+        Windows of an unbroken series, as (first, end) of `starts`.
+    weight
+        w [1/s] on the rows of a window, shape (m,).
+    measured
+        Measured accelerations in the order of `CHANNELS`, shape (J, 6).
+    channels
+        Which of them are used: those of position and heading, or the others where there is no position, shape (6,).
+    """
+
+    scene: Measurements
+    starts: NDArray[np.int64]
+    runs: tuple[tuple[int, int], ...]
+    weight: Floats
+    measured: Floats
+    channels: NDArray[np.bool_]
+
+    @property
+    def middle_s(self) -> Floats:
+        """Time of the middle of every window [s], shape (J,)."""
+        return self.scene.t[self.starts] + 0.5 * (len(self.weight) - 1) * self.scene.step_s
+
+    def mean(self, values: Floats) -> Floats:
+        """Return ``∫ w f dt`` in every window, shape (J,) or (J, c), of values with n rows."""
+        return _means(values, self.weight, self.starts, self.scene.step_s)
+
+    def gap(self, picture: ForceModel) -> Floats:
+        """Return the picture's acceleration less the measured one in every window, shape (J, channels)."""
+        rates = as_measured(picture)
+        if self.channels[0]:
+            rates = rates + self.scene.turning
+        return self.mean(self.along(rates)) - self.measured[:, self.channels]
+
+    def along(self, rates: Floats) -> Floats:
+        """Return accelerations along the vessel's axes as those along the channels, shape (n, 3) each."""
+        if not self.channels[0]:
+            return rates
+        turned = rates[:, :, None].copy()
+        to_ground(turned, *self.scene.pointing)
+        return turned[:, :, 0]
+
+    def hull_changes(self, picture: ForceModel, places: Places, moves: Floats) -> Floats:
+        """Return by how much `gap` changes if coefficients of the hull move one by one, shape (J, channels, q).
+
+        `places` and `moves` as in `ferryid.effects.force_model.hull_changes`.
+        """
+        changes = hull_changes(picture, places, moves)
+        if self.channels[0]:
+            to_ground(changes, *self.scene.pointing)
+        return self.mean(changes)
+
+
+STEPS_A_WINDOW = 20
+FEWEST_STEPS = 10
+"""Steps below which a stretch tells nothing."""
+FORCES_HZ = 5.0
+"""Rate at which forces are averaged over windows; they change slowly against it, and hypotheses cost a quarter."""
+
+
+def windows(scene: Measurements, length_s: float, stride_s: float) -> Windows:
+    """Return windows of `length_s` every `stride_s` seconds, as many as lie wholly in measured data.
+
+    The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full
+    rate, and the scene for the forces is thinned to `FORCES_HZ`.
+    """
+    every = max(1, round(1.0 / (FORCES_HZ * scene.step_s)))
+    thin = _thinned(scene, every)
+    m = max(8, round(length_s / thin.step_s))
+    stride = max(1, round(stride_s / thin.step_s))
+    starts: list[int] = []
+    runs: list[tuple[int, int]] = []
+    for first, end in _stretches(thin.usable):
+        before = len(starts)
+        starts += range(first, end - m + 1, stride)
+        if len(starts) > before:
+            runs.append((before, len(starts)))
+    rows = np.array(starts, dtype=np.int64)
+    known = bool(np.isfinite(scene.eta[scene.usable, :2]).all())
+    # A controller answers the errors of the velocity with thrust within a window, so that they and the force belong
+    # together and a delay is seen where none is; those of the position are shorter and hardly felt.
+    channels = np.repeat([known, not known], 3)
+    eta = np.where(np.isfinite(scene.eta), scene.eta, 0.0)
+    nu = np.where(np.isfinite(scene.nu_raw), scene.nu_raw, 0.0)
+    _, slope, bend = _weights(m * every, scene.step_s)
+    measured = np.hstack(
+        [_means(eta, bend, rows * every, scene.step_s), -_means(nu, slope, rows * every, scene.step_s)]
+    )
+    return Windows(thin, rows, tuple(runs), _weights(m, thin.step_s)[0], measured, channels)
+
+
+def steps_of(seen: Windows) -> Windows:
+    """Return short windows without overlap in what they measure, over the rows that windows cover: the steps of a filter.
+
+    With a triangle as its weight, ``∫ w p''`` is the second difference of a position; with a box, ``∫ w nu'`` is the first of
+    a velocity. A step is a `STEPS_A_WINDOW`-th of a window.
+    """
+    scene = seen.scene
+    covered = np.zeros(len(scene.t), dtype=np.bool_)
+    for start in seen.starts:
+        covered[start : start + len(seen.weight)] = True
+    m = max(1, round(len(seen.weight) / STEPS_A_WINDOW))
+    placed = bool(seen.channels[0])
+    span = 2 * m if placed else m
+    starts: list[int] = []
+    runs: list[tuple[int, int]] = []
+    for first, end in _stretches(covered):
+        rows = range(first, end - span, m)
+        if len(rows) > FEWEST_STEPS:
+            runs.append((len(starts), len(starts) + len(rows)))
+            starts += rows
+    at = np.array(starts, dtype=np.int64)
+    h = m * scene.step_s
+    if placed:
+        weight = np.concatenate([np.arange(m + 1), np.arange(m)[::-1]]).astype(np.float64)
+        differences = scene.eta[at + 2 * m] - 2.0 * scene.eta[at + m] + scene.eta[at]
+    else:
+        weight = np.concatenate([[0.5], np.ones(m - 1), [0.5]])
+        differences = scene.nu_raw[at + m] - scene.nu_raw[at]
+    differences = np.where(np.isfinite(differences), differences, 0.0) / h ** (2 if placed else 1)
+    measured = np.hstack([differences, differences])
+    return Windows(scene, at, tuple(runs), weight / (weight.sum() * scene.step_s), measured, seen.channels)
+
+
+def _weights(m: int, step_s: float) -> tuple[Floats, Floats, Floats]:
+    """Return w, w' and w'' in the middle of m rows that share a window evenly, shape (m,) each."""
+    x = (np.arange(m) + 0.5) / m
+    T = m * step_s
+    sine, cosine = np.sin(pi * x), np.cos(pi * x)
+    weight = sine**4
+    scale = 1.0 / (weight.sum() * step_s)
+    slope = 4.0 * sine**3 * cosine * (pi / T)
+    bend = (12.0 * sine**2 * cosine**2 - 4.0 * sine**4) * (pi / T) ** 2
+    return scale * weight, scale * slope, scale * bend
+
+
+def _means(values: Floats, weight: Floats, starts: NDArray[np.int64], step_s: float) -> Floats:
+    flat = np.ascontiguousarray(values, dtype=np.float64).reshape(len(values), -1)
+    return weighed(flat, weight * step_s, starts).reshape(len(starts), *values.shape[1:])
+
+
+@compiled
+def weighed(values: Floats, weight: Floats, starts: Places) -> Floats:
+    """Return the sum of m rows times a weight, shape (m,), from every start on: shape (J, c), of values with c columns."""
+    out = np.zeros((starts.shape[0], values.shape[1]))
+    for j in range(starts.shape[0]):
+        for i in range(weight.shape[0]):
+            if weight[i] != 0.0:
+                for q in range(values.shape[1]):
+                    out[j, q] += weight[i] * values[starts[j] + i, q]
+    return out
+
+
+def _thinned(scene: Measurements, every: int) -> Measurements:
+    """Return the scene with every so many rows replaced by their mean; a row is usable where all of them are."""
+    if every == 1:
+        return scene
+    n = len(scene.t) // every
+
+    def mean(values: Floats) -> Floats:
+        return np.asarray(values[: n * every].reshape(n, every, *values.shape[1:]).mean(axis=1))
+
+    def some(values: Floats | None) -> Floats | None:
+        return None if values is None else mean(values)
+
+    return replace(
+        scene,
+        t=mean(scene.t),
+        eta=mean(scene.eta),
+        nu_raw=mean(scene.nu_raw),
+        nu=mean(scene.nu),
+        parts=mean(scene.parts),
+        angles=mean(scene.angles),
+        usable=np.asarray(scene.usable[: n * every].reshape(n, every).all(axis=1)),
+        wind=some(scene.wind),
+        current=some(scene.current),
+        payload=some(scene.payload),
+    )
+
+
+def _stretches(usable: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], usable, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,0 +1,116 @@
+"""Whether what was selected stands: on held-out data, against its placebos, its rivals, and laws without a name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, without
+from ferryid.diagnose.inference.search import is_negligible, prune
+from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
+from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
+from ferryid.diagnose.judging.rivals import RivalComparison, compare_rivals
+from ferryid.diagnose.judging.unexplained import find_displaced
+from ferryid.effects.wording import listed
+
+SWAPS = 6
+"""Times that a rival takes a place: physics without a name here may send one effect after the other to stand in for it."""
+
+PLACEBO = (
+    "a placebo (the same force at other times, or on mirrored headings) does as well on stretches kept from the fit"
+)
+TORN = "on an axis where it would have to act, most of it is missing"
+LAW = "an empirical law of the motion explains more in that place, and leaves nothing to explain"
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """What is left of a selection.
+
+    Attributes
+    ----------
+    fit
+        Of it.
+    proof
+        Held-out evidence; None where nothing is left, or the log is too short to hold anything out.
+    standings
+        Of every candidate among its rivals.
+    told
+        What was dropped, and why.
+    """
+
+    fit: Fit
+    proof: HeldOutEvidence | None
+    standings: tuple[RivalComparison, ...]
+    told: tuple[str, ...]
+
+
+def eliminate_backward(
+    problem: EstimationProblem, found: Fit, library: Sequence[Candidate], progress: Callable[[str], None]
+) -> Elimination:
+    """Drop what does not stand, one after the other, as the others are to be judged without it.
+
+    Parameters
+    ----------
+    problem
+        With the noise that the selection leaves.
+    found
+        The selection.
+    library
+        Every candidate, for rivals.
+    progress
+        Called with the name of each stage.
+    """
+    fallen_by_reason: dict[str, list[str]] = {}
+    tried = {found.keys}
+    kept, swaps = found, 0
+    while kept.candidates:
+        progress("weighing rivals")
+        standings = tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
+        better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
+        better = [one for one in better if one.fit.keys not in tried]
+        if better and swaps < SWAPS:
+            # What was selected first may be less likely beside what was selected later than another in its place.
+            best = max(better, key=lambda one: one.gain)
+            tried.add(best.fit.keys)
+            swaps += 1
+            kept = prune(problem, best.fit)
+            continue
+        progress("judging on held-out stretches")
+        proof = held_out_evidence(problem, kept)
+        fallen, why = _fallen(problem, kept, proof)
+        if fallen is None:
+            return Elimination(kept, proof, standings, _told(fallen_by_reason))
+        if why:
+            fallen_by_reason.setdefault(why, []).append(kept.candidates[fallen].title)
+        kept = prune(problem, without(problem, kept, fallen))
+        tried.add(kept.keys)
+    return Elimination(kept, None, (), _told(fallen_by_reason))
+
+
+def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """Return a sentence for every reason; what is dropped twice for it, on the way, is named once."""
+    said = []
+    for why, titles in fallen_by_reason.items():
+        names = list(dict.fromkeys(titles))
+        said.append(f"{listed(names)} {'were' if len(names) > 1 else 'was'} suspected, but dropped: {why}.")
+    return tuple(said)
+
+
+def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None) -> tuple[int | None, str]:
+    """Return the candidate that stands least, and why it falls, if that is worth telling; None where all stand."""
+    if proof is not None:
+        fallen = [i for i, one in enumerate(proof.proofs) if not one.holds]
+        if fallen:
+            worst = min(fallen, key=lambda i: proof.proofs[i].beaten)
+            return worst, PLACEBO
+    # Beside what was found later, it may be hardly anything: nothing to tell, and no sign of another cause.
+    idle = [i for i in range(len(kept.candidates)) if is_negligible(problem, kept, i)]
+    if idle:
+        return idle[0], ""
+    inconsistent = [i for i in range(len(kept.candidates)) if check_axis_consistency(problem, kept, i).inconsistent]
+    if inconsistent:
+        return inconsistent[0], TORN
+    # Physics without a name here may look a little like an effect.
+    imitated = find_displaced(problem, kept)
+    return (imitated[0], LAW) if imitated else (None, "")

@@ -1,0 +1,102 @@
+"""Findings before the confidence rules: claims, each with what was measured of it, and what was measured of the log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+from typing import Literal
+
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.finding import Finding
+
+Key = tuple[str, str | None]
+"""Effect and instance."""
+Kind = Literal["sensor", "force", "disturbance", "law", "unsteady", "bursts"]
+"""What shows a finding: kinematics, the force balance, the noise model's states, or what is left without a name: an empirical
+law, something unsteady, or bursts."""
+
+
+@dataclass(frozen=True)
+class OtherLogs:
+    """How many other logs a campaign has, how many of them could show a law, and in how many it holds."""
+
+    count: int
+    able: int
+    holding: int
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What was measured of one finding, for the rules to weigh; what does not apply is left at its default.
+
+    Attributes
+    ----------
+    kind
+        What shows it.
+    score
+        Gain in held-out log-likelihood, None where nothing could be held out.
+    force_low, free_run_low
+        Lower end of the 95 % interval of the share of the held-out squared force error, and of the free-run error, that it
+        removes, by axis; the greatest over horizons.
+    removed
+        Share of the held-out squared force error that it removes while it acts, by axis; empty where nothing was held out.
+    lasts_s, block_s
+        For how many seconds of data it acts, infinite for what acts throughout, and the length of a held-out block [s].
+    once
+        True where the vessel was only once in the place in which it acts.
+    passes
+        Of what begins and ends within the log, its size over the one that hull and formulas may be off by.
+    power_in_velocities
+        Share of a disturbance's power that the velocities show, about its peak.
+    other_logs
+        What the other logs of a campaign say of a law; None where there are none.
+    """
+
+    kind: Kind
+    score: float | None = None
+    force_low: Mapping[str, float] = field(default_factory=dict)
+    free_run_low: Mapping[str, float] = field(default_factory=dict)
+    removed: Mapping[str, float] = field(default_factory=dict)
+    lasts_s: float = inf
+    block_s: float = 0.0
+    once: bool = False
+    passes: float = inf
+    power_in_velocities: float = inf
+    other_logs: OtherLogs | None = None
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A finding with what was measured of it."""
+
+    finding: Finding
+    figures: Figures
+
+
+@dataclass(frozen=True)
+class LogFigures:
+    """What was measured of a log as a whole.
+
+    Attributes
+    ----------
+    hull_known
+        True where the hull comes from a profile or a model, not from the logs that are diagnosed.
+    joint
+        True where the hull was fitted to all logs of a campaign.
+    velocity_noise
+        Noise of the velocity, times damping, over what moves the vessel, by axis.
+    unsteady
+        True where something unsteady that nobody measured was found or left over.
+    campaign
+        Lasting properties of the vessel that each log of the campaign shows, this log's among them.
+    baseline_sensors
+        Sensor errors that the simulation has which the log is compared with: parameters by effect.
+    """
+
+    hull_known: bool = True
+    joint: bool = False
+    velocity_noise: Mapping[str, float] = field(default_factory=dict)
+    unsteady: bool = False
+    campaign: tuple[frozenset[Key], ...] = ()
+    baseline_sensors: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)

@@ -1,0 +1,217 @@
+"""The conclusion: confidence rules applied, a verdict derived, and all that was found of a log put together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.diagnose.checks.screening import ScreenedLog
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.force_errors import force_errors, mass_of
+from ferryid.diagnose.inference.stages import AveragedLog, Baseline
+from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
+from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes
+from ferryid.diagnose.judging.detection_power import (
+    detection_powers,
+    is_testable,
+    recording_advice,
+    unexcited_axes,
+    untested_notes,
+)
+from ferryid.diagnose.judging.diagnosis import Diagnosis, HullChange
+from ferryid.diagnose.judging.free_runs import FreeRuns
+from ferryid.diagnose.judging.held_out import HeldOutEvidence, Improvement
+from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
+from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
+from ferryid.diagnose.judging.locate import locate
+from ferryid.diagnose.judging.posterior import posterior_of
+from ferryid.diagnose.judging.verdict import Remainder, verdict_of
+from ferryid.effects.force_model import COEFFICIENTS, UNITS
+from ferryid.vessel.profile import Floats
+
+
+def conclude(logs: Sequence[AveragedLog], judged: Sequence[JudgedLog], baseline: Baseline) -> tuple[Diagnosis, ...]:
+    """Return the diagnoses of the logs of a campaign.
+
+    Parameters
+    ----------
+    logs
+        All of them, in the order in which they were given.
+    judged
+        Those that are long enough.
+    baseline
+        What they are compared with.
+    """
+    by_path = {one.selected.path: one for one in judged}
+    claims = {
+        one.path: by_path[one.path].claims if one.path in by_path else sensor_claims(one.screened.sensors)
+        for one in logs
+    }
+    campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
+    return tuple(
+        _concluded(by_path[one.path], campaign) if one.path in by_path else _too_short(one, baseline, campaign)
+        for one in logs
+    )
+
+
+def _lasting(claims: Sequence[Claim]) -> frozenset[Key]:
+    return frozenset(one.finding.key for one in claims if one.finding.parameters and lasting(one.finding))
+
+
+def _too_short(log: AveragedLog, baseline: Baseline, campaign: tuple[frozenset[Key], ...]) -> Diagnosis:
+    screened = log.screened
+    figures = LogFigures(joint=baseline.joint, campaign=campaign, baseline_sensors=baseline.sensors)
+    findings, notes = apply_rules(sensor_claims(screened.sensors), figures)
+    profile, window_s = screened.scene.profile, _window_s(log.windows.weight, log.windows.scene.step_s)
+    short = (
+        f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion. "
+        "Record at least ten minutes that excite every axis."
+    )
+    remainder = Remainder(testable=False)
+    return Diagnosis(
+        screened.measured.survey.motion.log,
+        profile.name,
+        verdict_of(findings, remainder),
+        findings,
+        {},
+        {},
+        (*survey_notes(screened), short, *notes),
+        duration_s=_duration_s(screened),
+        left_out=screened.measured.survey.motion.left_out,
+        remainder=remainder,
+    )
+
+
+def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosis:
+    selected, stands = log.selected, log.stands
+    estimated = selected.estimated
+    screened, problem, kept = estimated.averaged.screened, selected.search.problem, stands.fit
+    scene, survey = screened.scene, screened.measured.survey
+    figures = replace(log.figures, campaign=campaign)
+    findings, rule_notes = apply_rules(log.claims, figures)
+    chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
+    before, after = _scores(problem, log.base, kept, stands.proof)
+    ratio = {axis: Estimate(unit="-", **one) for axis, one in after.get("ratio", {}).items()}
+    left = {axis: share for axis, share in _left_shares(problem, after["mse"]).items() if axis not in still}
+    remainder = Remainder(is_testable(chances, still), bool(stands.told), ratio, left)
+    notes = (
+        *survey_notes(screened),
+        *estimated.expectation.notes,
+        *stands.told,
+        *rule_notes,
+        *log_notes(figures),
+        *untested_notes(selected.search.untested),
+        *recording_advice(chances, still),
+    )
+    updates = estimated.baseline.updates_model
+    return Diagnosis(
+        survey.motion.log,
+        scene.profile.name,
+        verdict_of(findings, remainder),
+        findings,
+        before,
+        after,
+        notes,
+        evidence=_leftover(problem, log.base, kept),
+        located=locate(problem, log.base, kept, scene) if kept.candidates else log.unknown.left,
+        withheld=compare_hidden_signals(survey.hidden, scene, findings),
+        against=estimated.expectation.comparison,
+        moved=_moved(problem, kept) if kept.candidates else None,
+        duration_s=_duration_s(screened),
+        left_out=survey.motion.left_out,
+        posterior=posterior_of(problem, kept, selected.search.states, findings, survey) if updates else None,
+        remainder=remainder,
+    )
+
+
+def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
+    """Return what was noted of a log as it was read: doubts, rows left out, and actuators that leave their thrust curves."""
+    survey = log.measured.survey
+    names = tuple(f"{actuator.name}{end}" for actuator in log.scene.profile.actuators for end in (": ", " never "))
+    return (
+        *survey.doubts,
+        *survey.left_out,
+        *(one for one in survey.motion.repairs if one.startswith(names)),
+    )
+
+
+def _scores(
+    problem: EstimationProblem, base: Fit, kept: Fit, proof: HeldOutEvidence | None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    window_s = _window_s(problem.windows.weight, problem.windows.scene.step_s)
+    if proof is None:
+        errors = force_errors(problem.windows, fitted_force_model(problem.plain, base), problem.plain)
+        mse = dict(zip(AXES, np.mean(errors**2, axis=0).tolist(), strict=True))
+        return {"mse": mse, "rows": len(errors), "window_s": window_s}, {"mse": mse}
+    whole: Improvement = proof.whole
+    before: dict[str, Any] = {
+        "mse": dict(zip(AXES, whole.mse_before.tolist(), strict=True)),
+        "rows": len(whole.before),
+        "window_s": window_s,
+        "free_run": _free_run(proof.free_runs, proof.free_runs.before),
+    }
+    after: dict[str, Any] = {
+        "mse": dict(zip(AXES, whole.mse_after.tolist(), strict=True)),
+        "ratio": {
+            axis: {"value": 1.0 - float(removed), "low": 1.0 - float(high), "high": 1.0 - float(low)}
+            for axis, removed, low, high in zip(AXES, whole.removed, whole.low, whole.high, strict=True)
+        },
+        "free_run": _free_run(proof.free_runs, proof.free_runs.after),
+    }
+    return before, after
+
+
+def _left_shares(problem: EstimationProblem, mse: Mapping[str, float]) -> dict[str, float]:
+    """Return the squared force error that is left over the squared force that moves the vessel, by axis.
+
+    That is the thrust's or the inertia's, whichever is larger: a vessel that holds its place in a wind hardly accelerates.
+    """
+    seen = problem.windows
+    inertia = seen.measured[:, 3:] @ mass_of(problem.plain.hull).T
+    thrust = seen.mean(seen.scene.parts.sum(axis=1))
+    moves = np.maximum(np.mean(inertia**2, axis=0), np.mean(thrust**2, axis=0))
+    return {axis: mse[axis] / float(size) for axis, size in zip(AXES, moves, strict=True) if size > 0.0}
+
+
+def _moved(problem: EstimationProblem, kept: Fit) -> HullChange | None:
+    """Return the hull's coefficient that the refit moved farthest; None where none could move."""
+    free = problem.hull_spread > 0.0
+    if not free.any():
+        return None
+    away = np.divide(kept.hull - problem.plain.hull, problem.hull_spread, out=np.zeros_like(kept.hull), where=free)
+    k = int(np.argmax(np.abs(away)))
+    return HullChange(COEFFICIENTS[k], UNITS[k], float(problem.plain.hull[k]), float(kept.hull[k]), float(away[k]))
+
+
+def _window_s(weight: Floats, step_s: float) -> float:
+    return len(weight) * step_s
+
+
+def _duration_s(log: ScreenedLog) -> float:
+    return float(log.scene.t[-1] - log.scene.t[0])
+
+
+def _free_run(runs: FreeRuns, errors: Floats) -> dict[str, Any]:
+    if runs.starts == 0:
+        return {}
+    names = ("position_m", "heading_rad", "speed_mps", "yaw_rate_radps")
+    columns = {name: errors[:, k].tolist() for k, name in enumerate(names)}
+    return {"horizons_s": runs.horizons_s.tolist(), **columns, "starts": runs.starts, "note": ""}
+
+
+def _leftover(problem: EstimationProblem, base: Fit, kept: Fit) -> dict[str, Any]:
+    seen = problem.windows
+    psi = seen.mean(seen.scene.psi[:, None])[:, 0]
+    speed = seen.mean(np.hypot(seen.scene.nu[:, 0], seen.scene.nu[:, 1])[:, None])[:, 0]
+    return {
+        "t": seen.middle_s,
+        "before": force_errors(seen, fitted_force_model(problem.plain, base), problem.plain),
+        "after": force_errors(seen, fitted_force_model(problem.plain, kept), problem.plain),
+        "heading": np.degrees(np.mod(psi, 2.0 * np.pi)),
+        "speed": speed,
+    }

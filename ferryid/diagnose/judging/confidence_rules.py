@@ -1,0 +1,383 @@
+"""The confidence rules: the one ordered list of reasons for which a finding is lowered to a hint, or dropped.
+
+Each rule looks at one finding and its context and returns the finding as it stands then, None where it is dropped, and a note
+for the reader (empty where the finding itself tells the reason). `apply_rules` applies them in their order, each to all
+findings of a log, so that a rule sees the findings as the rules before it left them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from ferryid.diagnose.data.estimate import AXES
+from ferryid.diagnose.inference.onset_estimation import LEAST_BLOCKS
+from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
+from ferryid.diagnose.judging.finding import HINT, Finding
+from ferryid.effects import effects
+from ferryid.effects.wording import titled
+
+STRONG = 40.0
+"""Gain in held-out log-likelihood that needs no axis on which an improvement is seen: what acts seldom, as a wake on another
+thruster, is lost in the means over a log."""
+FAST_HZ = 0.2
+"""Frequency above which no force of the library has most of its power: they change with motion, heading and thrust."""
+OUT_OF_STEP = ("time_delay", "thruster_lag")
+"""Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
+FEWEST_LOGS = 3
+"""Logs of a campaign as of which one of them can be alone with a finding."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a rule knows: the finding's own figures, the log's, and all findings as the rules before it left them."""
+
+    own: Figures
+    log: LogFigures = field(default_factory=LogFigures)
+    beside: tuple[Claim, ...] = ()
+
+
+Outcome = tuple[Finding | None, str]
+
+
+@dataclass(frozen=True)
+class ConfidenceRule:
+    """One rule.
+
+    Attributes
+    ----------
+    name, about
+        Its name, and what it does in one line.
+    threshold, unit
+        Where it begins to apply; None where a fact decides and no figure.
+    judge
+        ``judge(finding, context, threshold)`` returns the finding and a note.
+    """
+
+    name: str
+    about: str
+    threshold: float | None
+    unit: str
+    judge: Callable[[Finding, Context, float], Outcome]
+
+    def __call__(self, finding: Finding, context: Context) -> Outcome:
+        """Return the finding as it stands by this rule, None where it is dropped, and a note."""
+        return self.judge(finding, context, 0.0 if self.threshold is None else self.threshold)
+
+
+def rule(threshold: float | None = None, unit: str = "") -> Callable[..., ConfidenceRule]:
+    """Make a rule of a function, with its name and the first line of its docstring."""
+
+    def made(judge: Callable[[Finding, Context, float], Outcome]) -> ConfidenceRule:
+        return ConfidenceRule(judge.__name__, (judge.__doc__ or "").partition("\n")[0], threshold, unit, judge)
+
+    return made
+
+
+def lowered(finding: Finding, *unresolved: str, manoeuvre: str | None = None) -> Finding:
+    """Return a finding as a hint, with what it cannot be told from, and what to record to tell."""
+    return replace(
+        finding,
+        probability=min(finding.probability, HINT),
+        unresolved_with=tuple(dict.fromkeys((*finding.unresolved_with, *unresolved))),
+        separating_manoeuvre=manoeuvre or finding.separating_manoeuvre,
+    )
+
+
+def title_of(finding: Finding) -> str:
+    """Return the title of a finding's effect, with the thruster that it is one of."""
+    known = effects().get(finding.effect)
+    return titled(known.title if known else finding.effect.replace("_", " ").capitalize(), finding.instance)
+
+
+def _because(finding: Finding, why: str) -> Outcome:
+    return lowered(finding), f"{title_of(finding)} is a hint: {why}."
+
+
+@rule()
+def in_baseline(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Drop a sensor error that the simulation has as well: intervals of all parameters overlap, so nothing differs."""
+    other = context.log.baseline_sensors.get(finding.effect)
+    if context.own.kind != "sensor" or other is None:
+        return finding, ""
+    alike = all(
+        name in other and mine.low <= other[name].high and other[name].low <= mine.high
+        for name, mine in finding.parameters.items()
+    )
+    return (None if alike else finding), ""
+
+
+@rule()
+def nothing_estimated(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Drop a force of which no parameter is known to differ from its neutral value, the hull's coefficients for one."""
+    return (None if context.own.kind == "force" and not finding.parameters else finding), ""
+
+
+@rule()
+def law_of_one_log(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower an empirical law that only one log of a campaign shows."""
+    others = context.own.other_logs
+    if others is None:
+        return finding, ""
+    holding = others.holding
+    shown = f", and {holding or 'none'} {'does' if holding < 2 else 'do'}" if others.able else ""
+    told = f"Of {others.count} other log{'s' if others.count > 1 else ''} {others.able or 'none'} could show it at this size"
+    return lowered(replace(finding, says=f"{finding.says} {told}{shown}.")), ""
+
+
+@rule(0.3, "of the power")
+def absent_in_velocities(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower a disturbance of whose power the velocities show less: errors of positions look like a force, too."""
+    if context.own.power_in_velocities >= threshold:
+        return finding, ""
+    says = f"{finding.says} The velocities do not show it: it may be an error of the positions."
+    return lowered(replace(finding, says=says)), ""
+
+
+@rule(1.0 / 3.0, "of a finding's improvement")
+def improves_no_claimed_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower what improves neither force nor free run, by an interval that excludes zero, on an axis that it claims.
+
+    It claims the axes on which this share of its improvement lies. The score adds up what every channel gains, in errors that
+    the noise's autoregression weighs: a little on all of them makes a likelihood on none of which anything is seen to improve.
+    Only one above `STRONG` needs no more.
+    """
+    own = context.own
+    if own.score is None or own.score > STRONG:
+        return finding, ""
+    claimed = [axis for axis, share in finding.axes.items() if share >= threshold or not any(finding.axes.values())]
+    if any(own.force_low[axis] > 0.0 or own.free_run_low[axis] > 0.0 for axis in claimed):
+        return finding, ""
+    return _because(
+        finding,
+        "on the axes that it claims, neither the held-out squared force error nor the free run improves by an interval that "
+        "excludes zero",
+    )
+
+
+@rule(LEAST_BLOCKS, "held-out blocks")
+def too_brief(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower what acts for less than this: a fit that is judged on one part of it must have seen another."""
+    if not _brief(context.own, threshold):
+        return finding, ""
+    needed = threshold * context.own.block_s
+    return _because(
+        finding, f"it acts for {context.own.lasts_s:.0f} s, and held-out data judge nothing below {needed:.0f} s"
+    )
+
+
+def _brief(own: Figures, blocks: float) -> bool:
+    return own.lasts_s < blocks * own.block_s
+
+
+@rule()
+def place_visited_once(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower what acts in a place that was visited once, as the effect defines it: something else may have come just then."""
+    if not context.own.once:
+        return finding, ""
+    return _because(
+        finding, "the vessel was in that place once, or hardly at all, so that something else may have come then"
+    )
+
+
+@rule(1.0, "times what hull and formulas may be off by in a part of the manoeuvres")
+def passes_by_little(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower what both begins and ends within the log and is smaller than this; what is too brief has its own rule."""
+    if context.own.passes >= threshold or _brief(context.own, LEAST_BLOCKS):
+        return finding, ""
+    return _because(finding, "it comes and goes, by less than hull and formulas may be off in a part of the manoeuvres")
+
+
+@rule(0.2, "of the held-out squared force error")
+def worse_on_an_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower what makes an axis worse by more than this, over the log or while it acts; less may be chance."""
+    change = {
+        axis: min(shares[axis] for shares in (context.own.removed, finding.improvement) if axis in shares)
+        for axis in AXES
+        if axis in context.own.removed or axis in finding.improvement
+    }
+    worst = min(change, key=lambda axis: change[axis], default="")
+    if not worst or change[worst] >= -threshold or context.own.kind != "force":
+        return finding, ""
+    return _because(
+        finding, f"it makes the held-out squared force error in {worst} {-100.0 * change[worst]:.0f} % larger"
+    )
+
+
+@rule(0.1, "of the held-out squared force error")
+def removes_little(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower what removes less than this on every axis while it acts: hull and formulas may be as much off."""
+    removed = context.own.removed
+    if not finding.sure or not removed or max(removed.values()) >= threshold:
+        return finding, ""
+    return _because(
+        finding,
+        f"on no axis does it remove {100.0 * threshold:.0f} % of the held-out squared force error while it acts",
+    )
+
+
+@rule()
+def less_than_is_unexplained(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower what explains less, on every axis, than a force without a name that is left: it may stand in for that force."""
+    removed, left = context.own.removed, unexplained_shares(context)
+    # Of an error of one, r is removed and h (1 - r) the nameless force's: r is more from h / (1 + h) on.
+    if not finding.sure or not removed or not left:
+        return finding, ""
+    if any(share >= left[axis] / (1.0 + left[axis]) for axis, share in removed.items()):
+        return finding, ""
+    return _because(
+        finding, "a force without a name is left that explains more on every axis, and it may stand in for that"
+    )
+
+
+def unexplained_shares(context: Context) -> dict[str, float]:
+    """Return the share of the squared error left that is a nameless force's, by axis; empty where there is none.
+
+    It counts as far as it is more than a hint and as slow as those of the library are: no bursts, and not above `FAST_HZ`.
+    """
+    slow = [
+        one.finding
+        for one in context.beside
+        if one.figures.kind in ("law", "unsteady")
+        and one.finding.sure
+        and (one.finding.law or one.finding.band_hz is None or one.finding.band_hz[0] < FAST_HZ)
+    ]
+    # What no law describes may be all that is left; and of a law that all logs of a vessel have, there may be more.
+    described = not context.log.joint and all(one.law for one in slow)
+    return {axis: max(0.0, *(one.improvement[axis] if described else 1.0 for one in slow)) for axis in AXES if slow}
+
+
+@rule()
+def hull_from_this_log(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower forces where the hull is known from nothing but the log that shows them.
+
+    A hull that a campaign's other logs speak for is known as far as forces go; what a disturbance shakes is still guessed at,
+    and may be its measurement.
+    """
+    guessed = {"force": not context.log.joint, "disturbance": True}.get(context.own.kind, False)
+    if context.log.hull_known or not guessed:
+        return finding, ""
+    return lowered(
+        finding, "hull_parameters", manoeuvre="a log in calm air and still water, to fit a hull model first"
+    ), ""
+
+
+@rule()
+def about_nothing_sure(finding: Finding, context: Context, _threshold: float) -> Outcome:
+    """Lower a disturbance about a mean that is no sure finding, such as gusts about a wind."""
+    if context.own.kind != "disturbance":
+        return finding, ""
+    about = effects()[finding.effect].about
+    sure = {"", *(one.finding.effect for one in context.beside if one.figures.kind == "force" and one.finding.sure)}
+    if about in sure or not finding.sure:
+        return finding, ""
+    return _because(finding, f"the {effects()[about].title.lower()} about which it comes and goes is no sure finding")
+
+
+@rule(0.15, "of what moves the vessel")
+def noise_drowns_an_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower all findings on forces where the velocity's noise, times damping, is more than this on some axis."""
+    drowned = context.own.kind != "sensor" and drowned_axes(context.log, threshold)
+    return lowered(finding) if drowned else finding, ""
+
+
+def drowned_axes(log: LogFigures, threshold: float) -> dict[str, float]:
+    """Return the axes on which the velocity's noise drowns the motion, with its share.
+
+    Such an axis spoils the findings on the others, too: a mass or a delay that it asks for belongs to all of them.
+    """
+    return {axis: share for axis, share in log.velocity_noise.items() if share > threshold}
+
+
+@rule(0.5, "of the held-out squared force error")
+def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower a delay or lag beside unmeasured disturbances, unless it removes this much on an axis.
+
+    A controller answers every gust some time after it has moved the vessel, so that force and motion seem to be out of step.
+    That explains little of what moves the vessel: what removes most of the error is no such thing.
+    """
+    removes = max(context.own.removed.values(), default=0.0)
+    if not context.log.unsteady or finding.effect not in OUT_OF_STEP or removes >= threshold:
+        return finding, ""
+    return lowered(finding, "gusts", manoeuvre="the same manoeuvres in calm air"), ""
+
+
+@rule(0.5, "of the logs")
+def absent_in_other_logs(finding: Finding, context: Context, threshold: float) -> Outcome:
+    """Lower a lasting property of the vessel that fewer of its logs show; a condition is a log's own, and a fault an event."""
+    campaign = context.log.campaign
+    if len(campaign) < FEWEST_LOGS or not finding.sure or not lasting(finding):
+        return finding, ""
+    if sum(finding.key in shown for shown in campaign) >= threshold * len(campaign):
+        return finding, ""
+    return _because(
+        finding, "a property of the vessel would be in all of its logs, and fewer than half of them show it"
+    )
+
+
+def lasting(finding: Finding) -> bool:
+    """Return whether a finding is a property of the vessel throughout a log."""
+    known = effects().get(finding.effect)
+    return known is not None and known.vessel and finding.onset_s is None and finding.offset_s is None
+
+
+RULES: tuple[ConfidenceRule, ...] = (
+    in_baseline,
+    nothing_estimated,
+    law_of_one_log,
+    absent_in_velocities,
+    improves_no_claimed_axis,
+    too_brief,
+    place_visited_once,
+    passes_by_little,
+    worse_on_an_axis,
+    removes_little,
+    less_than_is_unexplained,
+    hull_from_this_log,
+    about_nothing_sure,
+    noise_drowns_an_axis,
+    out_of_step_beside_disturbance,
+    absent_in_other_logs,
+)
+"""In the order in which they are applied: what a rule reads of other findings has been settled by those before it."""
+
+
+def apply_rules(
+    claims: Sequence[Claim], log: LogFigures, rules: Sequence[ConfidenceRule] = RULES
+) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+    """Return findings as they stand by all rules, and the notes, in the order of the rules.
+
+    Parameters
+    ----------
+    claims
+        All findings of a log.
+    log
+        The log's own figures.
+    rules
+        In their order.
+    """
+    beside, notes = tuple(claims), list[str]()
+    for one in rules:
+        judged = [(claim, *one(claim.finding, Context(claim.figures, log, beside))) for claim in beside]
+        notes += [note for _, _, note in judged if note]
+        beside = tuple(replace(claim, finding=finding) for claim, finding, _ in judged if finding is not None)
+    return tuple(one.finding for one in beside), tuple(notes)
+
+
+def log_notes(log: LogFigures) -> list[str]:
+    """Return what lowers every finding of a log alike, and what to record instead, as sentences."""
+    notes = []
+    if not log.hull_known and not log.joint:
+        notes.append(
+            "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
+            f"stand in for what a hull model would explain. Take them as hints, of probability {HINT:g} at most."
+        )
+    if drowned := drowned_axes(log, noise_drowns_an_axis.threshold or 0.0):
+        shares = " and ".join(
+            f"{100.0 * share:.0f} % of what moves the vessel in {axis}" for axis, share in drowned.items()
+        )
+        notes.append(
+            f"The noise of the velocity, times damping, is {shares}: all that is found of forces is a hint. "
+            "Record larger motions, or a velocity with less noise."
+        )
+    return notes

@@ -1,0 +1,159 @@
+"""What a log could have shown: the chance of finding each effect at its usual size, the axes that moved, what to record next.
+
+An effect of usual size adds a known change to the prediction errors. The hull and all that was found may imitate it as far as
+their own uncertainty goes; what then is left of it, in units of the noise, is what the evidence for it would be made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import erf, sqrt
+
+import numpy as np
+
+from ferryid.diagnose.inference.estimation import (
+    NUDGE,
+    Candidate,
+    EstimationProblem,
+    Fit,
+    effect_slopes,
+    fitted_force_model,
+)
+from ferryid.diagnose.inference.search import ODDS
+from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
+from ferryid.effects import effects
+from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.effects.wording import listed, titled
+from ferryid.vessel.profile import Floats
+
+SEEN = 0.5
+"""An effect of usual size that a log would show with less than this chance counts as one that it could not show."""
+LEARNT = 0.5
+"""An axis is excited if some combination of its coefficients is known to this share of what was known before the log."""
+
+AXES = {
+    axis: tuple(k for k, name in enumerate(COEFFICIENTS) if name.startswith(begins))
+    for axis, begins in (("surge", ("m1", "X_")), ("sway", ("m2", "Y_")), ("yaw", ("m3", "N_")))
+}
+"""Places of each axis's coefficients in the hull's."""
+EXCITES = {
+    "surge": "accelerations from rest to full speed and back, ahead and astern",
+    "sway": "moves sideways to both sides, from rest and back to rest",
+    "yaw": "turns on the spot both ways, at several rates",
+}
+HULL = "hull_parameters"
+"""What a log tells of the hull's coefficients is told by axis."""
+
+
+@dataclass(frozen=True)
+class DetectionPower:
+    """The chance, 0 to 1, that a candidate of usual size would have been found in a log."""
+
+    candidate: Candidate
+    chance: float
+
+
+def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Candidate]) -> tuple[DetectionPower, ...]:
+    """Return the chance of finding each candidate, beside what was found.
+
+    With d the change of the whitened prediction errors that the effect makes at its usual size, less what hull and findings
+    can imitate, and S the information on its parameters, the logarithm of the evidence is normal about ``½ d'd - ½ z'z - ½ log
+    det(1 + S)`` with a variance of ``d'd``; z are the parameters in their sizes. It has to exceed `ODDS`. Of effects that may
+    go either way the less visible one counts.
+
+    Parameters
+    ----------
+    problem, kept
+        The log, and what was found in it.
+    library
+        The candidates; those that were found are left out.
+    """
+    picture = fitted_force_model(problem.plain, kept)
+    before = problem.white(picture)
+    nuisance = np.column_stack([problem.by_hull, effect_slopes(problem, kept)])
+    inner = nuisance.T @ nuisance + np.eye(nuisance.shape[1])
+
+    def apart(columns: Floats) -> Floats:
+        return np.asarray(columns - nuisance @ np.linalg.solve(inner, nuisance.T @ columns))
+
+    taken = {one.key for one in kept.candidates}
+    made = []
+    for candidate in library:
+        if candidate.key in taken or candidate.effect.id == HULL:
+            continue
+        size = np.array([one.size for one in candidate.parameters])
+        chance = 1.0
+        for usual in _usual(candidate):
+            there = problem.white(candidate.act(picture, usual))
+            change = apart(there - before)
+            if not change.any():
+                # Of what comes and goes by chance a picture holds no force: it is found in the noise, and not here.
+                break
+            columns = [
+                (problem.white(candidate.act(picture, usual + NUDGE * step)) - there) / NUDGE for step in np.diag(size)
+            ]
+            information = np.column_stack(columns).T @ apart(np.column_stack(columns))
+            strength = float(change @ change)
+            occam = float(np.linalg.slogdet(np.eye(len(size)) + information)[1])
+            evidence = 0.5 * (strength - len(size) - occam)
+            chance = min(chance, 0.5 * (1.0 + erf((evidence - ODDS) / sqrt(2.0 * max(strength, 1.0)))))
+        else:
+            made.append(DetectionPower(candidate, chance))
+    return tuple(made)
+
+
+def _usual(candidate: Candidate) -> list[Floats]:
+    """Return parameters of usual size: all larger than neutral, and every other one smaller where that is possible."""
+    neutral = np.array([one.neutral for one in candidate.parameters])
+    size = np.array([one.size for one in candidate.parameters])
+    low, high = (np.array([getattr(one, end) for one in candidate.parameters]) for end in ("low", "high"))
+    signs = [np.ones(len(size)), np.where(np.arange(len(size)) % 2 == 0, -1.0, 1.0)]
+    return [np.clip(neutral + sign * size, low, high) for sign in signs]
+
+
+def unexcited_axes(problem: EstimationProblem) -> tuple[str, ...]:
+    """Return the axes of whose hull coefficients the log tells next to nothing."""
+    information = problem.by_hull.T @ problem.by_hull
+    found = []
+    for axis, places in AXES.items():
+        most = float(np.linalg.eigvalsh(information[np.ix_(places, places)])[-1])
+        if 1.0 / sqrt(1.0 + max(most, 0.0)) > LEARNT:
+            found.append(axis)
+    return tuple(found)
+
+
+def is_testable(every: Sequence[DetectionPower], axes: Sequence[str]) -> bool:
+    """Tell whether a log in which nothing was found can be said to match: more than half of the effects would have shown."""
+    return 2 * sum(one.chance >= SEEN for one in every) > len(every) and len(axes) < len(AXES)
+
+
+def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> list[str]:
+    """Return what the log could not show, and what to record next, in sentences; each effect and manoeuvre once."""
+    told = []
+    if axes:
+        what = " and ".join(axes)
+        told.append(
+            f"The vessel was hardly moved in {what}: the log tells nothing of its hull there. "
+            f"To excite {'it' if len(axes) == 1 else 'them'}, record {'; '.join(EXCITES[axis] for axis in axes)}."
+        )
+    by_manoeuvre: dict[str, dict[str, list[str]]] = {}
+    for one in every:
+        if one.chance < SEEN:
+            known = by_manoeuvre.setdefault(SHOWS.get(one.candidate.effect.id, OTHERWISE), {})
+            known.setdefault(one.candidate.effect.title.lower(), []).extend(filter(None, [one.candidate.instance]))
+    if by_manoeuvre:
+        parts = [
+            f"for {listed([titled(title, ', '.join(of)) for title, of in names.items()])}, record {manoeuvre}"
+            for manoeuvre, names in by_manoeuvre.items()
+        ]
+        told.append(f"This log would not have shown everything at its usual size. To make sure: {'; '.join(parts)}.")
+    return told
+
+
+def untested_notes(untested: Mapping[str, str]) -> list[str]:
+    """Return a sentence for every reason why effects, by id, could not be tested."""
+    by_reason: dict[str, list[str]] = {}
+    for effect, reason in untested.items():
+        by_reason.setdefault(reason, []).append(effects()[effect].title.lower())
+    return [f"Not tested: {listed(titles)}, since {reason}." for reason, titles in by_reason.items()]

@@ -1,0 +1,176 @@
+"""A diagnosis of one log: its verdict, findings and figures, and the same as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.locate import Location, plain_location
+from ferryid.diagnose.judging.posterior import Posterior
+from ferryid.diagnose.judging.verdict import Remainder
+from ferryid.signals.track import LeftOut
+from ferryid.vessel.profile import Floats
+
+SCHEMA = "ferryid.diagnosis/1"
+
+
+@dataclass(frozen=True)
+class HullChange:
+    """The coefficient of the hull that a refit moved farthest.
+
+    Attributes
+    ----------
+    coefficient, unit
+        Of `ferryid.effects.force_model.COEFFICIENTS`.
+    before, value
+        What was believed of it, and what came out.
+    deviations
+        The move in standard deviations of what was believed.
+    """
+
+    coefficient: str
+    unit: str
+    before: float
+    value: float
+    deviations: float
+
+
+@dataclass(frozen=True)
+class Withheld:
+    """What the diagnosis found of a signal that it was not shown, beside what the sensor had measured.
+
+    `found` and `measured` are by the names of the effect's parameters; `measured` is the mean over the log, of a payload
+    over the time that it was aboard, in the unit of `found`.
+    """
+
+    signal: str
+    found: Mapping[str, Estimate]
+    measured: Mapping[str, float]
+    says: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict on one log.
+
+    Attributes
+    ----------
+    log, vessel
+        Names.
+    verdict
+        One of `VERDICTS`.
+    findings
+        In the order in which they matter.
+    before, after
+        On held-out rows, without and with the findings:
+
+        - ``mse``: force error by axis [N² or N²m²];
+        - ``free_run``: as `ferryid.identify.scores.free_run_plain` gives it, or empty;
+        - ``rows`` (in `before`, optional): how many rows these are, so that several logs can be pooled;
+        - ``window_s`` (in `before`, optional): length of the windows that force is averaged over [s];
+        - ``ratio`` (in `after`, optional): `after` over `before` of the force error by axis, each
+          ``{"value", "low", "high"}`` with a 95 % interval from a block bootstrap;
+        - ``free_run_ratio`` (in `after`, optional): the same for the root-mean-square errors of the free run, by
+          ``position_m``, ``heading_rad``, ``speed_mps`` and ``yaw_rate_radps``, at the horizon ``horizon_s`` [s];
+        - ``placebos`` (in `after`, optional): force error by axis with findings that cannot be true in the place of
+          these, by name ("time shifted", "heading reversed").
+    notes
+        Sentences for the reader: what was not tested and why, what is left in the residual.
+    model
+        Path of the model with the findings in it.
+    evidence
+        What was left over in the whole log, one row a window: ``t`` [s], shape (m,); ``before``, ``after`` [N, N, N·m],
+        shape (m, 3); optionally ``heading`` [deg] and ``speed`` [m/s], shape (m,).
+    withheld
+        Signals that were hidden from the diagnosis.
+    against
+        The simulation that a recording was compared with, as
+        `ferryid.diagnose.inference.simulation_baseline.simulation_as_json` gives it, or empty.
+    posterior
+        What a model can learn from it; None where it found no force left out, was held against a simulation, or shares
+        the hull of other logs.
+    located
+        Where and when the recording and the model differ.
+    moved
+        How far the hull went that was fitted together with the findings; None where there are none of forces.
+    duration_s
+        From the first to the last row of the log [s].
+    remainder
+        What is left beside the findings.
+    left_out
+        Rows of the log that are not used, by reason.
+    """
+
+    log: str
+    vessel: str
+    verdict: str
+    findings: tuple[Finding, ...]
+    before: Mapping[str, Any]
+    after: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
+    model: str | None = None
+    evidence: Mapping[str, Floats] = field(default_factory=dict)
+    withheld: tuple[Withheld, ...] = ()
+    against: Mapping[str, Any] = field(default_factory=dict)
+    posterior: Posterior | None = None
+    located: Location | None = None
+    moved: HullChange | None = None
+    duration_s: float | None = None
+    remainder: Remainder = field(default_factory=Remainder)
+    left_out: tuple[LeftOut, ...] = ()
+
+
+def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the diagnosis as ``ferryid.diagnosis/1``."""
+    return {
+        "schema": SCHEMA,
+        "log": diagnosis.log,
+        "vessel": diagnosis.vessel,
+        "verdict": diagnosis.verdict,
+        "findings": [_finding(one) for one in diagnosis.findings],
+        "before": {"mse": {}, "free_run": {}, **diagnosis.before},
+        "after": {"mse": {}, "free_run": {}, **diagnosis.after},
+        "notes": list(diagnosis.notes),
+        "withheld": [
+            {
+                "signal": one.signal,
+                "found": {name: vars(estimate) for name, estimate in one.found.items()},
+                "measured": dict(one.measured),
+                "says": one.says,
+            }
+            for one in diagnosis.withheld
+        ],
+        "model": diagnosis.model,
+        **({"against": dict(diagnosis.against)} if diagnosis.against else {}),
+        **({} if diagnosis.located is None else {"located": plain_location(diagnosis.located)}),
+        **({} if diagnosis.moved is None else {"hull_moved": vars(diagnosis.moved)}),
+        **({} if diagnosis.duration_s is None else {"duration_s": diagnosis.duration_s}),
+        "left_out": [asdict(one) for one in diagnosis.left_out],
+    }
+
+
+def _finding(one: Finding) -> dict[str, Any]:
+    return {
+        "effect": one.effect,
+        "instance": one.instance,
+        "probability": one.probability,
+        "parameters": {name: vars(estimate) for name, estimate in one.parameters.items()},
+        "where": {
+            "axes": dict(one.axes),
+            "intervals": [list(pair) for pair in one.intervals],
+            "onset": one.onset_s,
+            "offset": one.offset_s,
+            "regime": one.regime,
+            **({} if one.band_hz is None else {"band_hz": list(one.band_hz)}),
+            **({"law": [{**vars(term), "coefficient": vars(term.coefficient)} for term in one.law]} if one.law else {}),
+        },
+        "improvement": dict(one.improvement),
+        "held_out": one.held_out,
+        "rivals": [vars(rival) for rival in one.rivals],
+        "unresolved_with": list(one.unresolved_with),
+        "separating_manoeuvre": one.separating_manoeuvre,
+        "says": one.says,
+    }

@@ -1,0 +1,129 @@
+"""Disturbances that come and go by chance, as findings with their figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import exp, inf
+from typing import Any
+
+import numpy as np
+
+from ferryid.diagnose.data.estimate import AXES
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.force_errors import force_errors
+from ferryid.diagnose.inference.spectra import fine_windows, spectrum_of
+from ferryid.diagnose.inference.stochastic_disturbance import WORTH, DisturbanceState
+from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.effects.effect import Process
+from ferryid.effects.force_model import Measurements
+from ferryid.vessel.profile import Floats
+
+ABOUT_PEAK = 0.1
+"""Share of its peak's power down to which a disturbance is compared with the velocities: a navigation that smooths them shifts
+a peak a little, and a narrow one then misses itself."""
+PASSED = 1e-2
+"""Share of the power that windows must let through for a frequency to be shown."""
+
+
+def disturbance_claims(
+    problem: EstimationProblem, made: Fit, states: Sequence[DisturbanceState], scene: Measurements
+) -> list[Claim]:
+    """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over.
+
+    Parameters
+    ----------
+    problem
+        With the disturbances in its filter.
+    made
+        What else was found.
+    states
+        The disturbances.
+    scene
+        The log's scene at its full rate.
+    """
+    short = fine_windows(problem, scene)
+    frequency, power = spectrum_of(short, force_errors(short, fitted_force_model(problem.plain, made), problem.plain))
+    return [_claim(problem, state, short, frequency, power) for state in states]
+
+
+def density(process: Process, frequency_hz: Floats) -> Floats:
+    """Return the one-sided power spectral density of a disturbance's amplitude [1/Hz], shape (f,).
+
+    The Fourier transform of its covariance, ``std² exp(-|t| / T) cos(2 pi f t)``: a peak at f and its mirror image at -f.
+    """
+    T, peak = process.time_constant_s, process.frequency_hz
+    sides = [1.0 / (1.0 + (2.0 * np.pi * (frequency_hz + side * peak) * T) ** 2) for side in (-1.0, 1.0)]
+    return np.asarray(2.0 * process.std**2 * T * (sides[0] + sides[1]))
+
+
+def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[Process], axis: int) -> dict[str, Any]:
+    """Return `evidence` and `labels` of a disturbance: the spectrum of what is left over, and its own by its parameters."""
+    if frequency.size < 2:
+        return {}
+    step_s = short.scene.step_s
+    turns = np.exp(-2j * np.pi * np.outer(frequency, step_s * np.arange(len(short.weight))))
+    passed = np.abs(turns @ short.weight * step_s) ** 2
+    # A mean is no part of what comes and goes, and what the windows stop tells nothing.
+    seen = (frequency > 0.0) & (passed > PASSED)
+    pushed = sum(
+        (np.mean(one.force[:, axis] ** 2) * density(one, frequency) for one in pushes), np.zeros_like(frequency)
+    )
+    kind, unit = ("moment", "(N·m)²/Hz") if axis == 2 else ("force", "N²/Hz")
+    return {
+        "evidence": {
+            "frequency": frequency[seen],
+            "before": (power[:, axis] / frequency[1])[seen],
+            "explained": (passed * pushed)[seen],
+        },
+        "labels": {
+            "residual": f"{AXES[axis]} {kind} left over [{unit}]",
+            "regressor": "frequency [Hz]",
+        },
+    }
+
+
+def _claim(
+    problem: EstimationProblem, state: DisturbanceState, short: Windows, frequency: Floats, spectrum: Floats
+) -> Claim:
+    scene = problem.windows.scene
+    candidate = state.candidate
+    assert candidate.effect.unsteady is not None
+    parameters = {name: one for name, one in state.estimates.items() if name in state.known}
+    picture = problem.filter.picture or problem.plain
+    pushes = candidate.effect.unsteady(picture)(state.values)
+    pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in pushes]
+    # Newtons and newton metres compare as what they do to the vessel.
+    arm = np.array([1.0, 1.0, np.sqrt(picture.hull[0] / picture.hull[4])])
+    power = np.sum(pushed, axis=0) * arm**2
+    values = {name: one.value for name, one in parameters.items()}
+    shown = _columns(short, frequency, spectrum, pushes, int(np.argmax(power)))
+    finding = Finding(
+        effect=candidate.effect.id,
+        instance=None,
+        probability=1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0))),
+        parameters=parameters,
+        axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
+        intervals=((float(scene.t[0]), float(scene.t[-1])),),
+        onset_s=None,
+        regime="",
+        improvement={},
+        held_out=False,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says=candidate.effect.says(values, None),
+        **shown,
+    )
+    power_in_velocities = _power_in_velocities(shown["evidence"]) if shown else inf
+    return Claim(finding, Figures("disturbance", power_in_velocities=power_in_velocities))
+
+
+def _power_in_velocities(evidence: Mapping[str, Floats]) -> float:
+    """Return the share of what a disturbance does about its peak that the velocities show.
+
+    It was found in positions, whose errors in a narrow band look like a force; a force moves velocities as well.
+    """
+    strong = evidence["explained"] >= ABOUT_PEAK * evidence["explained"].max()
+    return float(evidence["before"][strong].sum() / max(evidence["explained"][strong].sum(), 1e-300))

@@ -1,0 +1,234 @@
+"""What was found as findings: how probable, since when, on which axes, and what else could stand in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.inference.estimation import (
+    WIDER,
+    Candidate,
+    EstimationProblem,
+    Fit,
+    fit,
+    fitted_force_model,
+    starting_point,
+)
+from ferryid.diagnose.inference.folds import block_s
+from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
+from ferryid.diagnose.inference.profile_likelihood import intervals
+from ferryid.diagnose.judging.backward_elimination import Elimination
+from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.experiment_design import manoeuvre
+from ferryid.diagnose.judging.figure_data import figure_columns, figure_regressor
+from ferryid.diagnose.judging.finding import NEAR, Finding, Rival
+from ferryid.diagnose.judging.held_out import Proof
+from ferryid.diagnose.judging.locate import locate
+from ferryid.effects.force_model import Measurements
+from ferryid.vessel.profile import Floats
+
+TIME_DROP = 50.0
+"""Fall of the logarithm of the evidence as of which no time farther away comes into question; smaller dips may lie between."""
+TIME_STEP, TIME_FIT = 0.125, 3
+"""Step between times that are weighed, in lengths of a window, and steps of the fit for each."""
+TIME_NEAR, TIME_FINE_S = 10.0, 0.2
+"""Fall of the logarithm of the evidence up to which times are weighed in fine steps, and these [s]: the forces' own."""
+SHOWN_RIVALS = 3
+
+
+def force_claims(problem: EstimationProblem, stands: Elimination, scene: Measurements) -> list[Claim]:
+    """Return the findings of forces with their figures, that which removes most of the error first.
+
+    Parameters
+    ----------
+    problem
+        With the noise that the selection leaves.
+    stands
+        What is left of the selection.
+    scene
+        The log's scene at its full rate.
+    """
+    removed = removed_shares(problem, stands)
+    claims = [
+        _force_claim(problem, stands, scene, i, removed.get(one.key, {})) for i, one in enumerate(stands.fit.candidates)
+    ]
+    return sorted(claims, key=lambda one: -sum(one.finding.improvement.values()))
+
+
+def _force_claim(
+    problem: EstimationProblem, stands: Elimination, scene: Measurements, i: int, removed: Mapping[str, float]
+) -> Claim:
+    kept, standing = stands.fit, stands.standings[i]
+    candidate, values = kept.candidates[i], kept.values[i]
+    others = [j for j in range(len(kept.candidates)) if j != i]
+    rivals = tuple(
+        Rival(one.candidate.effect.id, one.candidate.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
+    )
+    unresolved = tuple(dict.fromkeys(one.candidate.effect.id for one in standing.rivals if one.gain > -NEAR))
+    # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
+    bare = replace(
+        kept,
+        candidates=tuple(kept.candidates[j] for j in others),
+        values=tuple(kept.values[j] for j in others),
+    )
+    place = locate(problem, bare, kept, scene)
+    estimates = _estimates(problem, candidate, kept, i)
+    by_name = dict(zip((p.name for p in candidate.parameters), values.tolist(), strict=True))
+    told = {name: value for name, value in by_name.items() if name in estimates}
+    proof = None if stands.proof is None else stands.proof.proofs[i]
+    finding = Finding(
+        effect=candidate.effect.id,
+        instance=candidate.instance,
+        probability=standing.probability,
+        parameters=estimates,
+        axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
+        intervals=_intervals(problem, estimates),
+        onset_s=_value(estimates, "onset"),
+        offset_s=_value(estimates, "offset"),
+        regime=place.regime,
+        improvement={} if proof is None else dict(zip(AXES, proof.improvement.removed.tolist(), strict=True)),
+        held_out=proof is not None,
+        rivals=rivals,
+        unresolved_with=unresolved,
+        separating_manoeuvre=manoeuvre(candidate.effect.id, unresolved),
+        says=candidate.effect.says(told, candidate.instance) if told else "",
+        **figure_columns(
+            problem, place, figure_regressor(candidate, fitted_force_model(problem.plain, bare), values, place)
+        ),
+    )
+    return Claim(finding, _figures(problem, candidate, values, told, proof, removed))
+
+
+def _figures(
+    problem: EstimationProblem,
+    candidate: Candidate,
+    values: Floats,
+    told: Mapping[str, float],
+    proof: Proof | None,
+    removed: Mapping[str, float],
+) -> Figures:
+    first = candidate.parameters[0]
+    passes = inf
+    if len(candidate.times) == 2 and candidate.effect.passing > 0.0:
+        passes = abs(told.get(first.name, first.neutral) - first.neutral) / candidate.effect.passing
+    shown = {} if proof is None else _lower_ends(proof)
+    return Figures(
+        kind="force",
+        removed=removed,
+        lasts_s=lasts_s(problem, candidate) if candidate.times else inf,
+        block_s=block_s(problem.windows),
+        once=candidate.effect.once(problem.plain.scene, values),
+        passes=passes,
+        **shown,
+    )
+
+
+def _lower_ends(proof: Proof) -> dict[str, Any]:
+    # Position and speed belong to surge and sway, heading and yaw rate to yaw; some horizons have no data.
+    runs = np.max(np.nan_to_num(proof.free_runs.low, nan=-inf), axis=0).reshape(2, 2).max(axis=0)[[0, 0, 1]]
+    return {
+        "score": proof.improvement.score,
+        "force_low": dict(zip(AXES, proof.improvement.low.tolist(), strict=True)),
+        "free_run_low": dict(zip(AXES, runs.tolist(), strict=True)),
+    }
+
+
+def removed_shares(problem: EstimationProblem, stands: Elimination) -> dict[tuple[str, str | None], dict[str, float]]:
+    """Return how much of the held-out squared force error each candidate removes while it acts, by axis."""
+    times, shares = problem.windows.middle_s, {}
+    for proof in () if stands.proof is None else stands.proof.proofs:
+        acts = (times >= proof.candidate.onset_s) & (times < proof.candidate.offset_s)
+        before, after = (np.sum(one[acts] ** 2, axis=0) for one in (proof.improvement.before, proof.improvement.after))
+        share = 1.0 - after / np.where(before > 0.0, before, np.inf)
+        shares[proof.candidate.key] = dict(zip(AXES, share.tolist(), strict=True))
+    return shares
+
+
+def _estimates(problem: EstimationProblem, candidate: Candidate, kept: Fit, index: int) -> dict[str, Estimate]:
+    error = kept.reported_errors(index)
+    estimates = {}
+    untold = candidate.effect.untold(problem.plain.scene, kept.values[index])
+    followed = intervals(problem, kept, index) if candidate.effect.ridge and not candidate.times else {}
+    for parameter, value, spread in zip(candidate.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
+        low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
+        if parameter.name in followed:
+            low, high = min(followed[parameter.name][0], value), max(followed[parameter.name][1], value)
+        least = candidate.effect.least
+        if parameter.name in untold:
+            continue
+        if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
+            continue
+        estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
+    for end in candidate.times:
+        estimates[end.removesuffix("_s")] = _time(problem, kept, index, end)
+    return estimates
+
+
+def _value(estimates: Mapping[str, Estimate], name: str) -> float | None:
+    return estimates[name].value if name in estimates else None
+
+
+def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estimate:
+    """Return when an effect began or ended, as the median of its posterior with the interval.
+
+    An idle thruster hides its fault, so that the posterior may be wide, and have several tops.
+
+    Parameters
+    ----------
+    problem, kept, index
+        The log, what was found, and which of it.
+    end
+        ``onset_s`` or ``offset_s``.
+    """
+    candidate = kept.candidates[index]
+    times = problem.windows.middle_s
+    step = TIME_STEP * len(problem.windows.weight) * problem.windows.scene.step_s
+
+    begin = starting_point(problem, kept)
+
+    def evidence_at(time: float) -> float:
+        moved = replace_candidate(kept.candidates, index, candidate.moved(end, time))
+        return fit(problem, moved, kept.values, steps=TIME_FIT, begin=begin).evidence
+
+    # It ends after it began.
+    first = max(candidate.onset_s, float(times[0])) if end == "offset_s" else float(times[0])
+    last = min(candidate.offset_s, float(times[-1])) if end == "onset_s" else float(times[-1])
+    here = getattr(candidate, end)
+    tried = {here: evidence_at(here)}
+    for side in (-1.0, 1.0):
+        time = here + side * step
+        while first < time < last:
+            tried[time] = evidence_at(time)
+            if tried[time] < max(tried.values()) - TIME_DROP:
+                break
+            time += side * step
+    # About the likeliest it changes within a step.
+    top = max(tried.values())
+    for time in [time for time, evidence in tried.items() if evidence > top - TIME_NEAR]:
+        for near_by in (
+            time + TIME_FINE_S * np.arange(-round(step / TIME_FINE_S), round(step / TIME_FINE_S) + 1)
+        ).tolist():
+            if first < near_by < last and min(abs(near_by - other) for other in tried) > 0.5 * TIME_FINE_S:
+                tried[near_by] = evidence_at(near_by)
+    moments = np.array(sorted(tried))
+    # Each moment stands for the time about it; the posterior is as much wider as that of other parameters.
+    edges = np.concatenate([moments[:1], 0.5 * (moments[1:] + moments[:-1]), moments[-1:]])
+    edges[[0, -1]] += np.array([-0.5, 0.5]) * TIME_FINE_S
+    log_weights = np.array([tried[time] for time in moments.tolist()]) / WIDER**2
+    weights = np.exp(log_weights - log_weights.max()) * np.diff(edges)
+    shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
+    low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
+    # Forces have a value a row: within one, nothing is known of when they change.
+    row_s = problem.windows.scene.step_s
+    return Estimate(middle, max(low - row_s, 0.0), high + row_s, "s")
+
+
+def _intervals(problem: EstimationProblem, estimates: Mapping[str, Estimate]) -> tuple[tuple[float, float], ...]:
+    t = problem.windows.scene.t
+    begun, ended = _value(estimates, "onset"), _value(estimates, "offset")
+    return ((max(begun or 0.0, float(t[0])), float(t[-1]) if ended is None else min(ended, float(t[-1]))),)

@@ -1,0 +1,158 @@
+"""Free runs of two hypotheses in held-out blocks of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.folds import FOLDS, Folds, by_block, draws
+from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.effects.force_model import ForceModel, Measurements, acceleration
+from ferryid.vessel.profile import Floats
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class FreeRuns:
+    """Errors of held-out free runs, root mean square over all starts, at some horizons.
+
+    Attributes
+    ----------
+    horizons_s
+        Shape (h,).
+    before, after
+        Position [m], heading [rad], speed [m/s] and yaw rate [rad/s], shape (h, 4); NaN where the log has no position.
+    removed, low, high
+        Fraction of the error that was removed with its 95 % block-bootstrap interval, shape (h, 4).
+    starts
+        Number of runs.
+    """
+
+    horizons_s: Floats
+    before: Floats
+    after: Floats
+    removed: Floats
+    low: Floats
+    high: Floats
+    starts: int
+
+
+def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], after: Sequence[Fit]) -> FreeRuns:
+    """Integrate the pictures of two hypotheses from many starts in held-out blocks and compare them with the log.
+
+    From its start a run knows the forces that the picture holds to act along the measured path, and integrates hull, load and
+    flow from there with Heun's rule; a run stays in its block. Both hypotheses start alike, from the smoothed velocity.
+
+    Parameters
+    ----------
+    problem, folds
+        The log.
+    before, after
+        Fits for every fold.
+    """
+    windows, scene = problem.windows, problem.windows.scene
+    width_s = len(windows.weight) * scene.step_s
+    horizons = width_s * np.array([0.5, 1.0, 2.0, 4.0])
+    stride = max(1, round(width_s / 40.0 / scene.step_s))
+    steps = np.maximum(1, np.round(horizons / scene.step_s / stride).astype(int))
+    starts, last, block = _starts(windows, folds, stride * int(steps[0]))
+    horizons = steps * stride * scene.step_s
+    errors = np.full((2, len(starts), len(steps), 4), np.nan)
+    for k in range(FOLDS):
+        own = np.flatnonzero(block % FOLDS == k)
+        if own.size == 0:
+            continue
+        for which, fits in enumerate((before, after)):
+            path = _run(fitted_force_model(problem.plain, fits[k]), starts[own], stride, int(steps[-1]))
+            for h, count in enumerate(steps):
+                rows = starts[own] + stride * int(count)
+                inside = rows <= last[own]
+                errors[which, own[inside], h] = _error(scene, rows[inside], path[int(count), inside])
+    # A run that left the numbers behind counts for neither.
+    bad = ~np.isfinite(errors[:, :, :, 1:]).all(axis=(0, 3))
+    errors[:, bad] = np.nan
+    return _judged(horizons, errors, block)
+
+
+def _starts(windows: Windows, folds: Folds, shortest: int) -> tuple[Ints, Ints, Ints]:
+    """Return first and last possible row of each run, and its block: one run every window's length."""
+    starts, last, block = [], [], []
+    for first, end in windows.runs:
+        for k in np.unique(folds.block[first:end]):
+            rows = windows.starts[first:end][folds.block[first:end] == k]
+            final = int(rows[-1]) + len(windows.weight) - 1
+            for row in range(int(rows[0]), final - shortest + 1, len(windows.weight)):
+                starts.append(row)
+                last.append(final)
+                block.append(int(k))
+    return np.array(starts, dtype=np.int64), np.array(last, dtype=np.int64), np.array(block, dtype=np.int64)
+
+
+def _run(picture: ForceModel, starts: Ints, stride: int, steps: int) -> Floats:
+    """Return states of all runs, shape (steps + 1, starts, 6)."""
+    scene = picture.scene
+    end, dt = len(scene.t) - 1, stride * scene.step_s
+    state = np.hstack([np.nan_to_num(scene.eta[starts]), scene.nu[starts]])
+    path = np.empty((steps + 1, len(starts), 6))
+    path[0] = state
+    rate = _rates(picture, np.minimum(starts, end), state)
+    for k in range(steps):
+        following = np.minimum(starts + (k + 1) * stride, end)
+        after = _rates(picture, following, state + dt * rate)
+        state = state + 0.5 * dt * (rate + after)
+        # What diverges is stopped, and left out where errors are judged.
+        state = np.where(np.abs(state) < 1e6, state, np.nan)
+        path[k + 1] = state
+        rate = _rates(picture, following, state)
+    return path
+
+
+def _rates(picture: ForceModel, rows: Ints, state: Floats) -> Floats:
+    """Return the derivative of states, shape (s, 6), with the forces of some rows."""
+    nu, psi = state[:, 3:], state[:, 2]
+    now: Measurements = replace(picture.scene, t=picture.scene.t[rows], eta=state[:, :3], nu=nu, nu_raw=nu)
+    at = replace(
+        picture,
+        scene=now,
+        parts=picture.parts[rows],
+        external=picture.external[rows],
+        flow=None if picture.flow is None else picture.flow[rows],
+        load=None if picture.load is None else picture.load[rows],
+        damping_factor=None if picture.damping_factor is None else picture.damping_factor[rows],
+    )
+    c, s = np.cos(psi), np.sin(psi)
+    velocity = np.column_stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1], nu[:, 2]])
+    return np.hstack([velocity, acceleration(at)])
+
+
+def _error(scene: Measurements, rows: Ints, state: Floats) -> Floats:
+    """Return errors of position, heading, speed and yaw rate, shape (s, 4)."""
+    away = state[:, :2] - scene.eta[rows, :2]
+    turned = np.abs(state[:, 2] - scene.psi[rows])
+    slip = state[:, 3:] - scene.nu[rows]
+    return np.column_stack(
+        [np.hypot(away[:, 0], away[:, 1]), turned, np.hypot(slip[:, 0], slip[:, 1]), np.abs(slip[:, 2])]
+    )
+
+
+def _judged(horizons: Floats, errors: Floats, block: Ints) -> FreeRuns:
+    """Return root mean squares over runs and their bootstrap over blocks, from errors of shape (2, starts, h, 4)."""
+    shape = errors.shape[2:]
+    known = np.isfinite(errors).all(axis=0)
+    flat = [np.where(known, one, 0.0).reshape(len(block), -1) for one in errors]
+    count = known.reshape(len(block), -1).astype(np.float64)
+    total = np.maximum(count.sum(axis=0), 1.0)
+    seen = count.sum(axis=0) > 0
+    before, after = (np.where(seen, np.sqrt((one**2).sum(axis=0) / total), np.nan).reshape(shape) for one in flat)
+    picks = draws(block)
+    sums = [picks @ by_block(one**2, block) for one in flat]
+    ratio = np.sqrt(sums[1] / np.where(sums[0] > 0.0, sums[0], np.nan))
+    low, high = np.full(ratio.shape[1], np.nan), np.full(ratio.shape[1], np.nan)
+    low[seen], high[seen] = np.nanquantile(1.0 - ratio[:, seen], [0.025, 0.975], axis=0)
+    removed = 1.0 - after / before
+    return FreeRuns(horizons, before, after, removed, low.reshape(shape), high.reshape(shape), len(block))

@@ -1,0 +1,60 @@
+"""What was found of a signal that was hidden, beside what its sensor had measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.payload import aboard
+from ferryid.diagnose.judging.diagnosis import Withheld
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.effects import effects
+from ferryid.effects.force_model import Measurements
+from ferryid.vessel.profile import Floats
+
+
+def compare_hidden_signals(
+    hidden: Mapping[str, Floats], scene: Measurements, findings: Sequence[Finding]
+) -> tuple[Withheld, ...]:
+    """Return every hidden signal beside the finding of the same name.
+
+    Parameters
+    ----------
+    hidden
+        By signal, two columns: north and east [m/s], of a payload mass [kg] and place [m], shape (n, 2).
+    scene
+        What was measured otherwise.
+    findings
+        Of the log.
+    """
+    return tuple(_beside(signal, values, scene, findings) for signal, values in hidden.items())
+
+
+def _beside(signal: str, values: Floats, scene: Measurements, findings: Sequence[Finding]) -> Withheld:
+    # A signal has the name of the effect that it measures.
+    finding = next((one for one in findings if one.effect == signal), None)
+    t = scene.t[: len(values)]
+    rows = scene.usable[: len(values)] & np.isfinite(values).all(axis=1)
+    measured: dict[str, float] = {}
+    if signal == "payload":
+        rows, measured = aboard(t, values, rows)
+        names, when = ("mass", "x"), "while it was aboard"
+    else:
+        names, when = ("north", "east"), "on average"
+    measured = {**dict(zip(names, np.mean(values[rows], axis=0).tolist(), strict=True)), **measured}
+    units = {one.name: one.unit for one in effects()[signal].parameters_of(scene.profile)}
+    found: dict[str, Estimate] = {}
+    if finding is not None:
+        found = {name: one for name, one in finding.parameters.items() if name in measured}
+    shown = ", ".join(_says(name, value, units) for name, value in measured.items())
+    told = ", ".join(_says(name, one.value, units) for name, one in found.items())
+    says = (
+        f"The {signal} was hidden. Measured {when}: {shown}; {f'found: {told}' if told else 'nothing of it was found'}."
+    )
+    return Withheld(signal, found, measured, says)
+
+
+def _says(name: str, value: float, units: Mapping[str, str]) -> str:
+    return f"{name} {value:.4g} {units.get(name, 's')}"

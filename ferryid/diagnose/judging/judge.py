@@ -1,0 +1,110 @@
+"""Judging: what of a selection stands, and what was measured of it for the confidence rules to weigh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ferryid.diagnose.checks import SensorFinding
+from ferryid.diagnose.data.estimate import AXES
+from ferryid.diagnose.inference.estimation import Fit, fit
+from ferryid.diagnose.inference.stages import SelectedLog
+from ferryid.diagnose.judging.backward_elimination import Elimination, eliminate_backward
+from ferryid.diagnose.judging.campaign_laws import CampaignLaws, find_campaign_laws
+from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
+from ferryid.diagnose.judging.disturbance_findings import disturbance_claims
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.findings import force_claims
+from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
+from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
+
+
+@dataclass(frozen=True)
+class JudgedLog:
+    """A log with what stands of its selection, before the confidence rules.
+
+    Attributes
+    ----------
+    selected
+        The selection.
+    base
+        The fit without any effect.
+    stands
+        What is left of the selection.
+    unknown
+        What is left of the log.
+    claims
+        All findings with their figures: of sensors, of forces, of disturbances, and those without a name.
+    figures
+        Of the log as a whole.
+    """
+
+    selected: SelectedLog
+    base: Fit
+    stands: Elimination
+    unknown: Unexplained
+    claims: tuple[Claim, ...]
+    figures: LogFigures
+
+
+def judge(logs: Sequence[SelectedLog], progress: Callable[[str], None]) -> tuple[JudgedLog, ...]:
+    """Judge the selections of the logs of a campaign: one by one, and by laws that hold in all of them."""
+    stand = [eliminate_backward(log.search.problem, log.search.fit, log.steady, progress) for log in logs]
+    laws: Mapping[str, CampaignLaws] = {}
+    if any(log.estimated.baseline.joint for log in logs):
+        progress("looking for laws that hold in all logs")
+        laws = find_campaign_laws(
+            {log.path: (log.search.problem, one.fit) for log, one in zip(logs, stand, strict=True)}
+        )
+    return tuple(_judged(log, one, laws.get(log.path), progress) for log, one in zip(logs, stand, strict=True))
+
+
+def _judged(
+    log: SelectedLog, stands: Elimination, laws: CampaignLaws | None, progress: Callable[[str], None]
+) -> JudgedLog:
+    problem, states, scene = log.search.problem, log.search.states, log.estimated.averaged.screened.scene
+    base = fit(problem, ())
+    progress("looking for what has no name")
+    unknown = find_unexplained(problem, stands.fit, scene, laws)
+    progress("locating")
+    claims = (
+        *sensor_claims(log.estimated.averaged.screened.sensors),
+        *force_claims(problem, stands, scene),
+        *disturbance_claims(problem, stands.fit, states, scene),
+        *unknown.claims,
+    )
+    baseline = log.estimated.baseline
+    figures = LogFigures(
+        hull_known=baseline.hull_known,
+        joint=baseline.joint,
+        velocity_noise=velocity_noise_shares(problem),
+        unsteady=unknown.unsteady or bool(states),
+        baseline_sensors=baseline.sensors,
+    )
+    return JudgedLog(log, base, stands, unknown, claims, figures)
+
+
+def sensor_claims(sensors: Sequence[SensorFinding]) -> tuple[Claim, ...]:
+    """Return what the checks found as findings: kinematics alone shows them, so that no force is improved."""
+    return tuple(
+        Claim(
+            Finding(
+                effect=one.effect,
+                instance=None,
+                probability=1.0,
+                parameters=one.parameters,
+                axes=dict.fromkeys(AXES, 0.0),
+                intervals=(),
+                onset_s=None,
+                regime="",
+                improvement={},
+                held_out=False,
+                rivals=(),
+                unresolved_with=(),
+                separating_manoeuvre=None,
+                says=one.says,
+            ),
+            Figures("sensor"),
+        )
+        for one in sensors
+    )

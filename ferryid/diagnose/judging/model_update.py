@@ -1,0 +1,262 @@
+"""From diagnoses to a model: the refitted hull, the vessel's properties from all logs, and the conditions of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from math import hypot, nan, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid import __version__
+from ferryid.counts import counted
+from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.posterior import Posterior
+from ferryid.effects import effects
+from ferryid.effects.force_model import COEFFICIENTS, UNITS
+from ferryid.files import alone
+from ferryid.identify.accept import accept
+from ferryid.identify.model import AXES, Model, blank
+from ferryid.identify.pictured import Pictured
+from ferryid.identify.result import Verdict
+from ferryid.identify.store import checked_name, save
+from ferryid.identify.stored_effect import Conditions, Quantity, StoredEffect
+from ferryid.vessel.profile import Floats, Profile
+
+APART = 0.25
+"""Logs contradict each other about a parameter where its intervals are apart, by more than this share of its usual size."""
+
+
+def store_updated_model(
+    diagnoses: Sequence[Diagnosis], profile: Profile, model: Model | None, out: Path, *, name: str = ""
+) -> tuple[Diagnosis, ...]:
+    """Store the model that diagnoses lead to, and return them with its path; as they are where nothing was left out.
+
+    Parameters
+    ----------
+    diagnoses
+        Of one vessel.
+    profile
+        The vessel.
+    model
+        The model that was examined; None for the profile's hull.
+    out
+        Output folder.
+    name
+        Name of the new model; that of the examined model, else the vessel's, where empty.
+
+    Raises
+    ------
+    FerryIdError
+        For a name that a model cannot have, and a folder that cannot be written.
+    """
+    made, notes = update_model(diagnoses, profile, model, checked_name(name or (model.name if model else profile.name)))
+    if made is None:
+        return tuple(diagnoses)
+    with alone(out / "models"):
+        path = str(save(made, out).path)
+    return tuple(
+        replace(one, model=path, notes=(*one.notes, *one.posterior.notes, *notes)) if one.posterior else one
+        for one in diagnoses
+    )
+
+
+def update_model(
+    diagnoses: Sequence[Diagnosis], profile: Profile, model: Model | None, name: str
+) -> tuple[Model | None, tuple[str, ...]]:
+    """Return the model that diagnoses lead to, None where they found nothing, and what a reader must know of it."""
+    logs = [one.posterior for one in diagnoses if one.posterior is not None]
+    if not logs:
+        return None, ()
+    vessel, notes = _properties(logs, profile)
+    verdict, scores = _scores([one for one in diagnoses if one.posterior is not None], logs)
+    start = blank(profile, name) if model is None else replace(model, name=name)
+    hull, covariance = _hull(logs)
+    if model is not None and model.vessel_effects:
+        # The picture that was refitted had these effects in it, which multiply coefficients and come on top again.
+        known = Pictured(model)
+        factor = np.divide(known.altered_hull(), known.hull, out=np.ones_like(hull), where=known.hull != 0.0)
+        hull, covariance = hull / factor, covariance / np.outer(factor, factor)
+    diagnosed_from = profile.name if model is None else model.label
+    made = replace(
+        start,
+        version=0,
+        created=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        ferryid_version=__version__,
+        settings={**start.settings, "diagnosed_from": diagnosed_from},
+        ranges=start.ranges or _spanned([one.ranges for one in logs]),
+        training=_trained(start, logs),
+        scores=scores,
+        accepted=verdict.accepted and bool(vessel),
+        hull=_quantities(hull, covariance),
+        vessel_effects=_composed(start.vessel_effects, vessel, profile),
+        conditions=_added(start.conditions, logs),
+    )
+    return made, notes
+
+
+def _hull(logs: Sequence[Posterior]) -> tuple[Floats, Floats]:
+    """Return the hull that all logs together speak for, and its covariance; what was believed before counts once.
+
+    The posterior of each log is a Gaussian; what the log adds to what was believed before is the difference of their
+    precisions, and those of several logs add up.
+    """
+    free = logs[0].spread > 0.0
+    hull, covariance = logs[0].hull.copy(), logs[0].covariance.copy()
+    if len(logs) == 1:
+        return hull, covariance
+    place = np.ix_(free, free)
+    prior = np.diag(logs[0].spread[free] ** -2.0)
+    precision, weighed = prior.copy(), prior @ logs[0].before[free]
+    for one in logs:
+        own = np.diag(one.spread[free] ** -2.0)
+        after = np.linalg.inv(one.covariance[place])
+        precision += after - own
+        weighed += after @ one.hull[free] - own @ one.before[free]
+    covariance[place] = np.linalg.inv(precision)
+    hull[free] = covariance[place] @ weighed
+    return hull, covariance
+
+
+def _quantities(hull: Floats, covariance: Floats) -> dict[str, Quantity]:
+    ends = 1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return {
+        name: Quantity(value, value - end, value + end, unit)
+        for name, value, end, unit in zip(COEFFICIENTS, hull.tolist(), ends.tolist(), UNITS, strict=True)
+    }
+
+
+def _properties(logs: Sequence[Posterior], profile: Profile) -> tuple[tuple[StoredEffect, ...], tuple[str, ...]]:
+    """Return the vessel's properties that the logs agree on, and what is to be told of them."""
+    by_key: dict[tuple[str, str | None], list[StoredEffect]] = {}
+    for log in logs:
+        for one in log.vessel:
+            by_key.setdefault(one.key, []).append(one)
+    kept, notes = [], []
+    for found in by_key.values():
+        first = found[0]
+        title = effects()[first.effect].title + (f" ({first.instance})" if first.instance else "")
+        apart = _contradictions(found, profile)
+        if apart:
+            notes.append(
+                f"{title} does not enter the model: the logs contradict each other about {', '.join(apart)}. "
+                "Something changed between them; diagnose each by itself."
+            )
+            continue
+        if len(found) < len(logs):
+            where = ", ".join(one.sources[0].log for one in found)
+            notes.append(
+                f"{title} was found in {len(found)} of {counted(len(logs), 'log')} ({where}) and holds for the vessel."
+            )
+        kept.append(_together(found))
+    return tuple(kept), tuple(notes)
+
+
+def _contradictions(found: Sequence[StoredEffect], profile: Profile) -> list[str]:
+    """Return the parameters whose intervals lie apart between two logs, with their values."""
+    told = []
+    for parameter in effects()[found[0].effect].parameters_of(profile):
+        several = [stored.parameters[parameter.name] for stored in found]
+        values = [each.value for each in several]
+        gap = max(each.low for each in several) - min(each.high for each in several)
+        if gap > 0.0 and max(values) - min(values) > APART * parameter.size:
+            told.append(f"{parameter.name} ({' against '.join(f'{value:.3g}' for value in values)} {parameter.unit})")
+    return told
+
+
+def _together(found: Sequence[StoredEffect]) -> StoredEffect:
+    """Return one effect from several logs, each weighed by its inverse variance.
+
+    Where the logs differ by more than their intervals say, the interval of the mean is widened by as much; Birge (1932).
+    """
+    if len(found) == 1:
+        return found[0]
+    parameters = {}
+    for name, one in found[0].parameters.items():
+        several = [stored.parameters[name] for stored in found]
+        values = np.array([each.value for each in several])
+        variance = np.maximum(np.array([(each.high - each.low) / 3.92 for each in several]), 1e-12) ** 2
+        weight = 1.0 / variance
+        mean = float(np.sum(weight * values) / np.sum(weight))
+        excess = float(np.sum(weight * (values - mean) ** 2)) / (len(found) - 1)
+        end = 1.96 * sqrt(max(1.0, excess) / float(np.sum(weight)))
+        parameters[name] = Quantity(mean, mean - end, mean + end, one.unit)
+    sources = tuple(source for stored in found for source in stored.sources)
+    return replace(found[0], parameters=parameters, sources=sources)
+
+
+def _composed(
+    before: Sequence[StoredEffect], found: Sequence[StoredEffect], profile: Profile
+) -> tuple[StoredEffect, ...]:
+    """Return effects with those found on top of them: factors multiply, all else adds up."""
+    late = {one.key: one for one in found}
+    result = []
+    for one in before:
+        more = late.pop(one.key, None)
+        result.append(one if more is None else _on_top(one, more, profile))
+    return (*result, *late.values())
+
+
+def _on_top(one: StoredEffect, more: StoredEffect, profile: Profile) -> StoredEffect:
+    neutral = {parameter.name: parameter.neutral for parameter in effects()[one.effect].parameters_of(profile)}
+    parameters = {}
+    for name, a in one.parameters.items():
+        b = more.parameters[name]
+        x, y = 0.5 * (a.high - a.low), 0.5 * (b.high - b.low)
+        if neutral[name] == 1.0:
+            value, end = a.value * b.value, hypot(a.value * y, b.value * x)
+        else:
+            value, end = a.value + b.value, hypot(x, y)
+        parameters[name] = Quantity(value, value - end, value + end, a.unit)
+    return replace(one, parameters=parameters, sources=(*one.sources, *more.sources))
+
+
+def _added(before: Sequence[Conditions], logs: Sequence[Posterior]) -> tuple[Conditions, ...]:
+    """Return the conditions of all logs; what was found in a log that had conditions already comes after these."""
+    known = {one.sha256: one for one in before}
+    for log in logs:
+        if log.conditions:
+            sha256 = str(log.training["sha256"])
+            old = known.get(sha256, Conditions(str(log.training["name"]), sha256, ()))
+            known[sha256] = replace(old, effects=(*old.effects, *log.conditions))
+    return tuple(known.values())
+
+
+def _trained(start: Model, logs: Sequence[Posterior]) -> tuple[Mapping[str, Any], ...]:
+    known = {str(log["sha256"]): log for log in start.training}
+    for one in logs:
+        known.setdefault(str(one.training["sha256"]), one.training)
+    return tuple(known.values())
+
+
+def _spanned(several: Sequence[Mapping[str, tuple[float, float]]]) -> dict[str, tuple[float, float]]:
+    return {name: (min(one[name][0] for one in several), max(one[name][1] for one in several)) for name in several[0]}
+
+
+def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[Verdict, dict[str, Any]]:
+    """Return held-out force errors without and with the findings, pooled over logs, as a model file has its scores."""
+    weights = np.array([float(one.before.get("rows", 0)) for one in diagnoses])
+    weights = weights / weights.sum() if weights.sum() > 0.0 else np.full(len(diagnoses), 1.0 / len(diagnoses))
+    before, after = (
+        weights @ np.array([[float(getattr(one, part)["mse"][axis]) for axis in AXES] for one in diagnoses])
+        for part in ("before", "after")
+    )
+    verdict = accept(before, after)
+    unknown = dict.fromkeys(AXES, nan)
+    scores = {
+        "mse": {
+            "base": dict(zip(AXES, before.tolist(), strict=True)),
+            "model": dict(zip(AXES, after.tolist(), strict=True)),
+        },
+        "r2": {"base": unknown, "model": unknown},
+        "per_axis": dict(verdict.per_axis),
+        "normalised_mse": verdict.normalised_mse,
+        "rows": sum(int(one.before.get("rows", 0)) for one in diagnoses),
+        "seconds": sum(float(str(log.training["seconds"])) for log in logs),
+        "split": "blocks",
+        "split_notes": ["Of windows of the weak form, held out in contiguous blocks; with the conditions of each log."],
+    }
+    return verdict, scores

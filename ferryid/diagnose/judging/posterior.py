@@ -1,0 +1,181 @@
+"""What one log teaches about a vessel: its hull as it was refitted, and the effects that were believed, with their spread."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+
+import numpy as np
+
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.measurements import Survey
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, effect_slopes, fit
+from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.identify.excitation import ranges
+from ferryid.identify.stored_effect import Quantity, Source, StoredEffect
+from ferryid.vessel.profile import Floats
+
+IN_THE_HULL = "hull_parameters"
+"""The effect that is nothing but other coefficients of the hull: it becomes these."""
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What one log teaches.
+
+    Attributes
+    ----------
+    training
+        The log, as a model file lists what it was trained on.
+    ranges
+        Ranges of validity.
+    before, spread
+        What was believed of the hull's coefficients before the log, shape (26,) each.
+    hull, covariance
+        What is believed of them now, shapes (26,) and (26, 26).
+    vessel, conditions
+        Properties of the vessel and conditions of the log, in the order in which they act.
+    notes
+        What did not enter and why, as sentences.
+    """
+
+    training: Mapping[str, object]
+    ranges: Mapping[str, tuple[float, float]]
+    before: Floats
+    spread: Floats
+    hull: Floats
+    covariance: Floats
+    vessel: tuple[StoredEffect, ...]
+    conditions: tuple[StoredEffect, ...]
+    notes: tuple[str, ...] = ()
+
+
+def posterior_of(
+    problem: EstimationProblem,
+    kept: Fit,
+    states: Sequence[DisturbanceState],
+    findings: Sequence[Finding],
+    survey: Survey,
+) -> Posterior | None:
+    """Return what a log teaches; None where no force was left out that is more likely than not.
+
+    Parameters
+    ----------
+    problem, kept
+        The log and what was found, hull included.
+    states
+        Disturbances that came and went by chance: conditions of the log, where a steady one was found as well.
+    findings
+        The same as it is told; those that are doubtful there do not count, and the hull is refitted without them.
+    survey
+        Of the log.
+    """
+    told = {(one.effect, one.instance): one for one in findings}
+    believed = [i for i, one in enumerate(kept.candidates) if one.key in told and told[one.key].sure]
+    if not believed:
+        return None
+    notes = [
+        f"{one.effect.title} is too doubtful to enter a model."
+        for i, one in enumerate(kept.candidates)
+        if i not in believed and one.key in told
+    ]
+    if len(believed) < len(kept.candidates):
+        kept = fit(problem, [kept.candidates[i] for i in believed], [kept.values[i] for i in believed])
+    motion, recording = survey.motion, survey.recording
+    before, spread, hull, covariance = _hull(problem, kept)
+    stored = []
+    for i, candidate in enumerate(kept.candidates):
+        if candidate.effect.id != IN_THE_HULL:
+            finding = told[candidate.key]
+            source = Source(
+                motion.log,
+                recording.sha256,
+                finding.probability,
+                # Those that are told, which are the middles of their intervals.
+                finding.onset_s or candidate.onset_s or None,
+                dict(finding.improvement),
+                finding.unresolved_with,
+                finding.offset_s or (candidate.offset_s if isfinite(candidate.offset_s) else None),
+            )
+            # A fault that passed within the log is no property that others have.
+            lasts = candidate.effect.vessel and source.offset_s is None
+            untold = candidate.effect.untold(problem.plain.scene, kept.values[i])
+            errors = [
+                nan if one.name in untold else error
+                for one, error in zip(candidate.parameters, kept.reported_errors(i).tolist(), strict=True)
+            ]
+            stored.append((lasts, _stored(candidate, kept.values[i], errors, finding.parameters, source)))
+    for state in states:
+        candidate = state.candidate
+        if candidate.key in told and told[candidate.key].sure:
+            source = Source(motion.log, recording.sha256, told[candidate.key].probability)
+            found = {
+                name: Quantity(one.value, one.low, one.high, one.unit)
+                if name in state.known
+                else Quantity(one.value, nan, nan, one.unit)
+                for name, one in state.estimates.items()
+            }
+            stored.append((False, StoredEffect(*candidate.key, found, (source,))))
+    rows = motion.valid
+    return Posterior(
+        training={
+            "name": motion.log,
+            "files": [str(file).rpartition("/")[2] for file in recording.files],
+            "sha256": recording.sha256,
+            "seconds": float(rows.sum() / motion.rate_hz),
+            "rows": int(rows.sum()),
+        },
+        ranges=ranges(motion.nu[rows], motion.nu_dot[rows]),
+        before=before,
+        spread=spread,
+        hull=hull,
+        covariance=covariance,
+        vessel=tuple(one for vessel, one in stored if vessel),
+        conditions=tuple(one for vessel, one in stored if not vessel),
+        notes=tuple(notes),
+    )
+
+
+def _stored(
+    candidate: Candidate, values: Floats, errors: Sequence[float], told: Mapping[str, Estimate], source: Source
+) -> StoredEffect:
+    """Return an effect with its intervals: those that were told, or of these errors, unknown (NaN) where they are."""
+    parameters = {}
+    for one, value, error in zip(candidate.parameters, values.tolist(), errors, strict=True):
+        # With the limit second, what is unknown stays so.
+        low, high = max(value - 1.96 * error, one.low), min(value + 1.96 * error, one.high)
+        if one.name in told:
+            low, high = min(told[one.name].low, value), max(told[one.name].high, value)
+        parameters[one.name] = Quantity(value, low, high, one.unit)
+    return StoredEffect(candidate.effect.id, candidate.instance, parameters, (source,))
+
+
+def _hull(problem: EstimationProblem, kept: Fit) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return the hull's coefficients and their spread before, the same and their covariance after a fit.
+
+    The covariance is that of the linearised posterior, effects included. Factors on single coefficients, where the hull model
+    was found wrong, are multiplied in.
+    """
+    h = len(COEFFICIENTS)
+    parameters = [one for candidate in kept.candidates for one in candidate.parameters]
+    sizes = np.array([one.size for one in parameters])
+    J = np.column_stack([problem.by_hull, effect_slopes(problem, kept)])
+    posterior = np.linalg.inv(J.T @ J + np.eye(J.shape[1]))
+    units = np.append(problem.hull_spread, sizes)
+    posterior = posterior * np.outer(units, units)
+    into = np.zeros((h, h + len(parameters)))
+    into[:, :h] = np.eye(h)
+    hull, spread = kept.hull.copy(), problem.hull_spread.copy()
+    column = h
+    for candidate, values in zip(kept.candidates, kept.values, strict=True):
+        for one, factor in zip(candidate.parameters, values.tolist(), strict=True):
+            if candidate.effect.id == IN_THE_HULL:
+                k = COEFFICIENTS.index(one.name)
+                into[k, k], into[k, column] = factor, hull[k]
+                spread[k] = float(np.hypot(spread[k], one.size * problem.plain.hull[k]))
+                hull[k] *= factor
+            column += 1
+    return problem.plain.hull, spread, hull, into @ posterior @ into.T

@@ -1,0 +1,95 @@
+"""What else could stand in a finding's place, and how probable that leaves the finding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import exp
+
+from ferryid.diagnose.inference.estimation import (
+    Candidate,
+    EstimationProblem,
+    Fit,
+    choose_parameters,
+    fit,
+    starting_point,
+    without,
+)
+from ferryid.diagnose.inference.onset_estimation import brief
+from ferryid.diagnose.inference.search import FAR, ODDS
+from ferryid.diagnose.parallel import over
+
+NEAREST = 4
+"""Rivals that are fitted to the end."""
+
+
+@dataclass(frozen=True)
+class RivalFit:
+    """Another candidate in the place of one that was found.
+
+    Attributes
+    ----------
+    candidate
+        What it is.
+    fit
+        Of it beside the others that were found.
+    gain
+        Its evidence over that of what was found.
+    """
+
+    candidate: Candidate
+    fit: Fit
+    gain: float
+
+
+@dataclass(frozen=True)
+class RivalComparison:
+    """How one of several candidates stands beside the others.
+
+    Attributes
+    ----------
+    rivals
+        The best first.
+    probability
+        Of the candidate, over its rivals and none of them.
+    """
+
+    rivals: tuple[RivalFit, ...]
+    probability: float
+
+
+def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: Sequence[Candidate]) -> RivalComparison:
+    """Return how a candidate stands against every other of the library in its place, in its span.
+
+    One that is too brief to be judged is weighed against none at all only: it is no name, whatever else could stand there.
+    """
+    candidate = kept.candidates[index]
+    bare = without(problem, kept, index)
+    none = exp(min(bare.evidence - kept.evidence + ODDS, 50.0))
+    if brief(problem, candidate):
+        return RivalComparison((), 1.0 / (1.0 + none))
+    begin = starting_point(problem, bare)
+    taken = {one.key for one in kept.candidates}
+
+    def instead(other: Candidate) -> RivalFit:
+        refit_spans = (
+            replace(other, onset_s=candidate.onset_s, offset_s=candidate.offset_s) if other.effect.onset else other
+        )
+        stand_in = choose_parameters(problem, bare, refit_spans)
+        start = [*bare.values, stand_in.start]
+        made = fit(
+            problem, [*bare.candidates, stand_in], start, steps=FAR, begin=None if stand_in.effect.bends_hull else begin
+        )
+        return RivalFit(stand_in, made, made.evidence - kept.evidence)
+
+    def settled_in(one: RivalFit) -> RivalFit:
+        made = fit(problem, one.fit.candidates, one.fit.values, begin=starting_point(problem, one.fit))
+        return RivalFit(one.candidate, made, made.evidence - kept.evidence)
+
+    rivals = over(instead, [other for other in library if other.key not in taken])
+    rivals.sort(key=lambda one: -one.gain)
+    # How far behind the others are does not matter to the digit.
+    rivals[:NEAREST] = over(settled_in, rivals[:NEAREST])
+    rivals.sort(key=lambda one: -one.gain)
+    against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
+    return RivalComparison(tuple(rivals), 1.0 / (1.0 + against))

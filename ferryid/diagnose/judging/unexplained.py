@@ -1,0 +1,277 @@
+"""What is left when everything with a name has been tried: described, not named.
+
+Either a law of the motion holds for it on data that it was not fitted to, or it is unsteady: then it is told on which axes,
+when, where, and how fast it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import exp
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.inference.candidate_terms import FORCE, Term
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
+from ferryid.diagnose.inference.folds import Folds, folds_of
+from ferryid.diagnose.inference.onset_estimation import brief
+from ferryid.diagnose.inference.search import ODDS
+from ferryid.diagnose.inference.spectra import BURST_HZ, Band, Burst, bursts_of
+from ferryid.diagnose.judging.campaign_laws import CampaignLaws
+from ferryid.diagnose.judging.claims import Claim, Figures, OtherLogs
+from ferryid.diagnose.judging.error_profiles import TELLS
+from ferryid.diagnose.judging.figure_data import figure_columns
+from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
+from ferryid.diagnose.judging.locate import Location, locate
+from ferryid.diagnose.judging.sparse_regression import Law, select_law
+from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.vessel.profile import Floats
+
+USUAL = 0.9
+"""Quantile of a quantity's size at which its force is told."""
+BAND_SHARE = 0.5
+"""A band is told that holds this share of the power."""
+SPANS = 5
+"""Intervals that are told."""
+BURSTS = 5.0
+"""Standard deviations from even as of which bursts are told."""
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left beside all that has a name.
+
+    Attributes
+    ----------
+    claims
+        Findings without a name, with their figures.
+    left
+        What the errors look like.
+    unsteady
+        True where they come and go.
+    """
+
+    claims: tuple[Claim, ...]
+    left: Location
+    unsteady: bool
+
+
+def find_unexplained(
+    problem: EstimationProblem, kept: Fit, scene: Measurements, laws: CampaignLaws | None = None
+) -> Unexplained:
+    """Return what is left of a log beside what was named.
+
+    Parameters
+    ----------
+    problem
+        With the noise that the named effects leave.
+    kept
+        Hull and named effects.
+    scene
+        The log's scene at its full rate.
+    laws
+        What the vessel's other logs say; None where there are none.
+    """
+    claims = []
+    folds = folds_of(problem.windows)
+    after, seen = kept, problem
+    if folds is not None and laws is not None and (common := laws.common(problem, kept, folds)) is not None:
+        shared = _lawful(common, after, scene, f"that holds in all {counted(laws.able, 'log')} that can show it")
+        claims.append(Claim(shared, Figures("law")))
+        after, seen = common.fit, common.problem
+    if folds is not None and (law := select_law(seen, after, folds)) is not None:
+        own = _lawful(law, after, scene, "that was seen in this log only")
+        claims.append(Claim(own, Figures("law", other_logs=None if laws is None else OtherLogs(*laws.of_others(law)))))
+        after, seen = law.fit, law.problem
+    left = locate(seen, after, after, scene)
+    # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
+    known = bool(problem.filter.processes)
+    uneven = bool(left.profiles) and left.profiles[0].statistic >= TELLS
+    burst = bursts_of(seen, fitted_force_model(seen.plain, after), scene)
+    if burst is not None and burst.deviations >= BURSTS:
+        uneven = True
+        if not known:
+            claims.append(Claim(_in_bursts(burst), Figures("bursts")))
+    elif uneven and not known:
+        claims.append(Claim(_unsteady(seen, left), Figures("unsteady")))
+    return Unexplained(tuple(claims), left, uneven)
+
+
+def find_displaced(problem: EstimationProblem, kept: Fit) -> tuple[int, ...]:
+    """Return which of the named effects a law of fewer means makes idle.
+
+    Physics outside the library may look a little like an effect. If a law that is fitted in the effect's place explains more
+    than the effect, and leaves it nothing to explain, then the effect was named by mistake. A law that says the same as the
+    effect in other words is no such law, nor is one that explains more by no more than the effect's formula may be off.
+    """
+    folds = folds_of(problem.windows)
+    if folds is None:
+        return ()
+    every = (i for i, one in enumerate(kept.candidates) if not brief(problem, one))
+    return tuple(i for i in every if _displaced(problem, kept, i, folds))
+
+
+def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) -> bool:
+    others = [k for k in range(len(kept.candidates)) if k != index]
+    rest, start = [kept.candidates[k] for k in others], [kept.values[k] for k in others]
+    without = fit(problem, rest, start)
+    named = problem.windows.gap(fitted_force_model(problem.plain, kept))
+    bare = replace(kept, candidates=tuple(rest), values=tuple(start))
+    moved = named - problem.windows.gap(fitted_force_model(problem.plain, bare))
+    law = select_law(problem.with_noise_of(without), without, folds, unlike=moved)
+    if law is None:
+        return False
+    told, coefficients = law.fit.candidates[-1], law.fit.values[-1]
+    candidate, values = kept.candidates[index], kept.values[index]
+    both = fit(problem, [*rest, told, candidate], [*start, coefficients, candidate.start])
+    fair = problem.with_noise_of(both)
+    with_neither = fit(fair, rest, start).evidence
+    with_law = fit(fair, [*rest, told], [*start, coefficients]).evidence
+    with_effect = fit(fair, [*rest, candidate], [*start, values]).evidence
+    with_both = fit(fair, [*rest, told, candidate], both.values).evidence
+    better = with_law - with_effect > max(ODDS, candidate.effect.form * (with_law - with_neither))
+    return better and with_both - with_law < ODDS
+
+
+def _lawful(law: Law, kept: Fit, scene: Measurements, whose: str) -> Finding:
+    problem = law.problem
+    # The hull stays as it is with the law: refitted without, it would bend to it on axes where it does not act.
+    before = replace(law.fit, candidates=law.fit.candidates[:-1], values=law.fit.values[:-1])
+    place = locate(problem, before, law.fit, scene)
+    picture = fitted_force_model(problem.plain, before)
+    terms = [
+        _told(term, picture, problem, float(value), float(error))
+        for term, value, error in zip(law.terms, law.values, law.errors, strict=True)
+    ]
+    first = law.terms[0]
+    size = "" if first.name == "1" else f"{first.name} [{first.unit}]" if first.unit else first.name
+    regressor = (size, first.value(picture)) if size else None
+    parts = [one.says for one in terms]
+    told = "; ".join(parts)
+    return Finding(
+        effect=UNKNOWN,
+        instance=None,
+        probability=1.0 - exp(-min(law.gain - max(law.chance, 0.0), 700.0)),
+        parameters={},
+        axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
+        intervals=((float(problem.windows.scene.t[0]), float(problem.windows.scene.t[-1])),),
+        onset_s=None,
+        regime=place.regime,
+        improvement=dict(zip(AXES, law.held_out.removed.tolist(), strict=True)),
+        held_out=True,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says=f"A force acts that has no name here, but a law {whose}: {told}.",
+        band_hz=_band(place.bands, place.shares, [band.before - band.after for band in place.bands]),
+        law=tuple(terms),
+        **figure_columns(problem, place, regressor),
+    )
+
+
+def _told(term: Term, picture: ForceModel, problem: EstimationProblem, value: float, error: float) -> LawTerm:
+    """Return a term as people read it: its force where its quantity is as large as it usually gets."""
+    quantity = term.value(picture)[problem.windows.scene.usable]
+    at = 1.0 if term.name == "1" else float(f"{np.quantile(np.abs(quantity), USUAL):.1g}")
+    low, high = value - 1.96 * error, value + 1.96 * error
+    share = not term.force_unit
+    scale, unit = (100.0 * at, "%") if share else (at, term.force_unit)
+    ends = sorted((low * scale, high * scale))
+    size = f"{value * scale:+.3g} {unit} ({ends[0]:.3g} to {ends[1]:.3g})"
+    place = "" if term.name == "1" else f" where {term.name} is {at:g} {term.unit}".rstrip()
+    if term.name.startswith(("cos", "sin")):
+        place = f" times {term.name}"
+    grows = "" if term.name == "1" or term.name.startswith(("cos", "sin")) else ", in proportion to it"
+    constant = ", constant" if term.name == "1" and not share else ""
+    says = f"{_subject(term)} {size}{constant}{place}{grows}"
+    return LawTerm(term.on, term.name, Estimate(value, low, high, term.coefficient_unit), says)
+
+
+def _subject(term: Term) -> str:
+    if term.on in AXES:
+        return f"in {term.on}"
+    return f"towards {term.on}" if term.on in ("north", "east") else f"on the {term.on}"
+
+
+def _in_bursts(burst: Burst) -> Finding:
+    axis = int(np.argmax(burst.shares))
+    band = f"{burst.low_hz:g} to {burst.high_hz:g} Hz"
+    spans = [f"{first:.0f}-{last:.0f} s" for first, last in burst.intervals[:SPANS]]
+    more = " and later" if len(burst.intervals) > SPANS else ""
+    when = f", strongest at {', '.join(spans)}{more}" if spans else ""
+    unit = FORCE[axis]
+    inside = [(burst.t >= first) & (burst.t <= last) for first, last in burst.intervals]
+    loud = burst.force[np.any(inside, axis=0), axis] if inside else burst.force[:, axis]
+    size = float(np.sqrt(np.mean(loud**2)))
+    return Finding(
+        effect=UNKNOWN,
+        instance=None,
+        probability=_no_chance(burst.deviations, len(BURST_HZ) - 1),
+        parameters={},
+        axes=dict(zip(AXES, burst.shares.tolist(), strict=True)),
+        intervals=burst.intervals,
+        onset_s=None,
+        regime="",
+        improvement={},
+        held_out=False,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says=f"Something unsteady moves the vessel in bursts of {band}, most in {AXES[axis]} ({size:.2g} {unit} in the root "
+        f"mean square){when}; no law of its motion explains it.",
+        evidence={"t": burst.t, "before": burst.force[:, axis]},
+        labels={"residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'}, {band} [{unit}]"},
+        band_hz=(burst.low_hz, burst.high_hz),
+    )
+
+
+def _no_chance(deviations: float, looked_at: int) -> float:
+    """Return one less the bound on how often the strongest of so many is as strong by chance."""
+    return max(0.0, 1.0 - looked_at * 0.5 * exp(-0.5 * deviations * deviations))
+
+
+def _unsteady(problem: EstimationProblem, left: Location) -> Finding:
+    band = _band(left.bands, left.shares, [one.before for one in left.bands])
+    spans = [f"{first:.0f}-{last:.0f} s" for first, last in left.intervals[:SPANS]]
+    whole = len(left.intervals) == 1 and left.onset_s is None and left.offset_s is None
+    more = " and later" if len(left.intervals) > SPANS else ""
+    when = "" if whole or not spans else f", strongest at {', '.join(spans)}{more}"
+    where = "" if left.regime.startswith("time") or not left.regime else f", most of it at {left.regime}"
+    fast = f", mostly at {band[0]:g} to {band[1]:g} Hz" if band else ""
+    axis = AXES[int(np.argmax(left.shares))]
+    return Finding(
+        effect=UNKNOWN,
+        instance=None,
+        probability=_no_chance(left.profiles[0].statistic, len(left.profiles)),
+        parameters={},
+        axes=dict(zip(AXES, left.shares.tolist(), strict=True)),
+        intervals=left.intervals,
+        onset_s=left.onset_s,
+        offset_s=left.offset_s,
+        regime=left.regime,
+        improvement={},
+        held_out=False,
+        rivals=(),
+        unresolved_with=(),
+        separating_manoeuvre=None,
+        says=f"Something unsteady moves the vessel, most in {axis}{fast}{when}{where}; no law of its motion explains it.",
+        band_hz=band,
+        **figure_columns(problem, left, None, alone=True),
+    )
+
+
+def _band(bands: Sequence[Band], shares: Floats, detection_powers: Sequence[Floats]) -> tuple[float, float] | None:
+    """Return the fewest neighbouring bands that hold most of the power, each axis in its own unit."""
+    if not bands:
+        return None
+    total = np.maximum(np.sum(np.maximum(detection_powers, 0.0), axis=0), 1e-12)
+    level = np.array([float(np.maximum(power, 0.0) / total @ shares) for power in detection_powers])
+    for count in range(1, len(bands) + 1):
+        sums = [float(level[k : k + count].sum()) for k in range(len(bands) - count + 1)]
+        best = int(np.argmax(sums))
+        if sums[best] >= BAND_SHARE * level.sum():
+            return bands[best].low_hz, bands[best + count - 1].high_hz
+    return None

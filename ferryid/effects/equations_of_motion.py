@@ -1,0 +1,223 @@
+"""The equations of motion in every row of a picture, compiled: one pass instead of some hundred over short-lived arrays.
+
+The coefficients of the hull are in the order of `ferryid.effects.force_model.COEFFICIENTS`; what a force model has not
+got is an array without rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.compiled import borrowing, compiled
+from ferryid.vessel.profile import Floats
+
+Places = NDArray[np.int64]
+
+MASSES = 5
+"""Coefficients that are masses; those of damping follow."""
+DAMPED = (0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 1, 1, 2, 2)
+"""Axis of every coefficient of damping."""
+
+
+@borrowing
+def relative(i: int, nu: Floats, flow: Floats) -> tuple[float, float, float]:
+    """Return a row's velocity through the water, which moves by `flow`, shape (n, 2), along the vessel's axes."""
+    if flow.shape[0] == 0:
+        return nu[i, 0], nu[i, 1], nu[i, 2]
+    return nu[i, 0] - flow[i, 0], nu[i, 1] - flow[i, 1], nu[i, 2]
+
+
+@borrowing
+def products(u: float, v: float, r: float, out: Floats) -> None:
+    """Fill in what the coefficients of damping multiply, shape (21,)."""
+    av, ar = abs(v), abs(r)
+    vv, rv, vr, rr = av * v, ar * v, av * r, ar * r
+    out[0], out[1], out[2] = u, abs(u) * u, u * u * u
+    out[3], out[4], out[5], out[6], out[7], out[8], out[9] = v, vv, rv, v * v * v, r, vr, rr
+    out[10], out[11], out[12], out[13], out[14], out[15], out[16] = v, vv, rv, r, vr, rr, r * r * r
+    out[17], out[18], out[19], out[20] = u * v, u * r, u * v, u * r
+
+
+@borrowing
+def masses(i: int, hull: Floats, load: Floats) -> tuple[float, float, float, float, float]:
+    """Return the entries of a row's mass matrix, that of the load included."""
+    if load.shape[0] == 0:
+        return hull[0], hull[1], hull[2], hull[3], hull[4]
+    return hull[0] + load[i, 0], hull[1] + load[i, 1], hull[2] + load[i, 2], hull[3] + load[i, 3], hull[4] + load[i, 4]
+
+
+@borrowing
+def other_forces(
+    i: int,
+    mass: tuple[float, float, float, float, float],
+    u: float,
+    v: float,
+    r: float,
+    hull: Floats,
+    external: Floats,
+    factor: Floats,
+    product: Floats,
+) -> tuple[float, float, float]:
+    """Return the forces on the hull in a row but the actuators': external ones, damping, and the Coriolis forces."""
+    m11, m22, m23, m32, _ = mass
+    X, Y, N = 0.0, 0.0, 0.0
+    for k in range(3):
+        X += hull[MASSES + k] * product[k]
+    for k in range(3, 10):
+        Y += hull[MASSES + k] * product[k]
+    for k in range(10, 17):
+        N += hull[MASSES + k] * product[k]
+    Y += hull[22] * product[17] + hull[23] * product[18]
+    N += hull[24] * product[19] + hull[25] * product[20]
+    much = 1.0 if factor.shape[0] == 0 else factor[i]
+    c13, c23 = -m22 * v - 0.5 * (m23 + m32) * r, m11 * u
+    return (
+        external[i, 0] + much * X - c13 * r,
+        external[i, 1] + much * Y - c23 * r,
+        external[i, 2] + much * N + c13 * u + c23 * v,
+    )
+
+
+@borrowing
+def solved(mass: tuple[float, float, float, float, float], X: float, Y: float, N: float) -> tuple[float, float, float]:
+    """Return the acceleration that a force gives."""
+    m11, m22, m23, m32, m33 = mass
+    det = m22 * m33 - m23 * m32
+    return X / m11, (m33 * Y - m23 * N) / det, (m22 * N - m32 * Y) / det
+
+
+@compiled
+def accelerations(
+    nu: Floats, hull: Floats, parts: Floats, external: Floats, flow: Floats, load: Floats, factor: Floats
+) -> Floats:
+    """Return the acceleration over ground of every row, shape (n, 3).
+
+    Parameters
+    ----------
+    nu
+        Velocities over ground, shape (n, 3).
+    hull
+        Shape (26,).
+    parts, external, load, factor
+        As `parts`, `external`, `load` and `damping_factor` of a picture.
+    flow
+        Velocity of the water along the vessel's axes, shape (n, 2).
+    """
+    out, product = np.empty_like(nu), np.empty(len(DAMPED))
+    for i in range(nu.shape[0]):
+        u, v, r = relative(i, nu, flow)
+        products(u, v, r, product)
+        mass = masses(i, hull, load)
+        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor, product)
+        for k in range(parts.shape[1]):
+            X, Y, N = X + parts[i, k, 0], Y + parts[i, k, 1], N + parts[i, k, 2]
+        a, b, c = solved(mass, X, Y, N)
+        if flow.shape[0] > 0:
+            # The body frame turns through the water.
+            a, b = a + r * flow[i, 1], b - r * flow[i, 0]
+        out[i, 0], out[i, 1], out[i, 2] = a, b, c
+    return out
+
+
+@compiled
+def required(
+    nu_dot: Floats, nu: Floats, hull: Floats, external: Floats, flow: Floats, load: Floats, factor: Floats
+) -> Floats:
+    """Return the force of the actuators that an acceleration over ground needs, shape (n, 3); see `accelerations`."""
+    out, product = np.empty_like(nu), np.empty(len(DAMPED))
+    for i in range(nu.shape[0]):
+        u, v, r = relative(i, nu, flow)
+        products(u, v, r, product)
+        mass = masses(i, hull, load)
+        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor, product)
+        a, b, c = nu_dot[i, 0], nu_dot[i, 1], nu_dot[i, 2]
+        if flow.shape[0] > 0:
+            a, b = a - r * flow[i, 1], b + r * flow[i, 0]
+        m11, m22, m23, m32, m33 = mass
+        out[i, 0], out[i, 1], out[i, 2] = m11 * a - X, m22 * b + m23 * c - Y, m32 * b + m33 * c - N
+    return out
+
+
+@compiled
+def slopes(
+    places: Places,
+    moves: Floats,
+    nu: Floats,
+    hull: Floats,
+    parts: Floats,
+    external: Floats,
+    flow: Floats,
+    load: Floats,
+    factor: Floats,
+) -> Floats:
+    """Return by how much the acceleration changes if coefficients of the hull move one by one, shape (n, 3, q).
+
+    Damping is linear in its coefficients, so that one pass gives the change of all; masses are moved.
+
+    Parameters
+    ----------
+    places, moves
+        Which coefficients move and by how much, shape (q,) each.
+    nu, hull, parts, external, flow, load, factor
+        As of `accelerations`.
+    """
+    out, product, moved = np.empty((nu.shape[0], 3, places.shape[0])), np.empty(len(DAMPED)), hull.copy()
+    for i in range(nu.shape[0]):
+        u, v, r = relative(i, nu, flow)
+        products(u, v, r, product)
+        mass = masses(i, hull, load)
+        X, Y, N = other_forces(i, mass, u, v, r, hull, external, factor, product)
+        thrust_X, thrust_Y, thrust_N = 0.0, 0.0, 0.0
+        for k in range(parts.shape[1]):
+            thrust_X, thrust_Y, thrust_N = (
+                thrust_X + parts[i, k, 0],
+                thrust_Y + parts[i, k, 1],
+                thrust_N + parts[i, k, 2],
+            )
+        here = solved(mass, X + thrust_X, Y + thrust_Y, N + thrust_N)
+        much = 1.0 if factor.shape[0] == 0 else factor[i]
+        for q in range(places.shape[0]):
+            k = places[q]
+            if k < MASSES:
+                moved[k] = hull[k] + moves[q]
+                other = masses(i, moved, load)
+                X, Y, N = other_forces(i, other, u, v, r, hull, external, factor, product)
+                there = solved(other, X + thrust_X, Y + thrust_Y, N + thrust_N)
+                moved[k] = hull[k]
+                out[i, 0, q], out[i, 1, q], out[i, 2, q] = there[0] - here[0], there[1] - here[1], there[2] - here[2]
+            else:
+                push, axis = moves[q] * much * product[k - MASSES], DAMPED[k - MASSES]
+                X, Y, N = push if axis == 0 else 0.0, push if axis == 1 else 0.0, push if axis == 2 else 0.0
+                out[i, 0, q], out[i, 1, q], out[i, 2, q] = solved(mass, X, Y, N)
+    return out
+
+
+@compiled
+def from_antenna(values: Floats, x: float, y: float, cosine: float, sine: float) -> None:
+    """Turn accelerations of the body origin, shape (n, 3, q), into those of an antenna along other axes, in place.
+
+    Parameters
+    ----------
+    values
+        Surge, sway, yaw.
+    x, y
+        Place of the antenna, ahead and to starboard of the origin [m].
+    cosine, sine
+        Of the angle from the other axes to the vessel's, counterclockwise.
+    """
+    for i in range(values.shape[0]):
+        for q in range(values.shape[2]):
+            turn = values[i, 2, q]
+            a, b = values[i, 0, q] - y * turn, values[i, 1, q] + x * turn
+            values[i, 0, q], values[i, 1, q] = cosine * a + sine * b, cosine * b - sine * a
+
+
+@compiled
+def to_ground(values: Floats, cosine: Floats, sine: Floats) -> None:
+    """Turn vectors along the vessel's axes, shape (n, 3, q), to north and east, in place; cosine and sine of the heading."""
+    for i in range(values.shape[0]):
+        c, s = cosine[i], sine[i]
+        for q in range(values.shape[2]):
+            a, b = values[i, 0, q], values[i, 1, q]
+            values[i, 0, q], values[i, 1, q] = c * a - s * b, s * a + c * b

@@ -1,0 +1,308 @@
+"""What was measured of a vessel, and a model of the forces that move it.
+
+An effect takes a force model and returns another, in which its own physics acts. Effects so combine in any number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import cos, inf, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.counts import counted
+from ferryid.effects.equations_of_motion import Places, accelerations, from_antenna, required, slopes
+from ferryid.vessel.hull import payload_mass
+from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.wind import wind_force
+
+MASS = ("m11", "m22", "m23", "m32", "m33")
+SURGE = ("X_u", "X_|u|u", "X_uuu")
+SWAY = ("Y_v", "Y_|v|v", "Y_|r|v", "Y_vvv", "Y_r", "Y_|v|r", "Y_|r|r")
+YAW = ("N_v", "N_|v|v", "N_|r|v", "N_r", "N_|v|r", "N_|r|r", "N_rrr")
+LIFT = ("Y_uv", "Y_ur", "N_uv", "N_ur")
+"""Circulatory lift of a hull that moves ahead, on sway and yaw."""
+COEFFICIENTS = (*MASS, *SURGE, *SWAY, *YAW, *LIFT)
+"""Order of the hull's coefficients in `ForceModel.hull`."""
+UNITS = (
+    *("kg", "kg", "kg·m", "kg·m", "kg·m²"),
+    *("kg/s", "kg/m", "kg·s/m²"),
+    *("kg/s", "kg/m", "kg", "kg·s/m²", "kg·m/s", "kg", "kg·m"),
+    *("kg·m/s", "kg", "kg·m", "kg·m²/s", "kg·m", "kg·m²", "kg·m²·s"),
+    *("kg/m", "kg", "kg", "kg·m"),
+)
+"""Units of `COEFFICIENTS`, radians left out."""
+_NO_FLOW, _NO_LOAD, _NO_FACTOR = np.empty((0, 2)), np.empty((0, 5)), np.empty(0)
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What was measured, n rows on a uniform grid, and the vessel that it was measured on.
+
+    Attributes
+    ----------
+    profile
+        The vessel.
+    t
+        Time [s], shape (n,).
+    eta
+        North, east [m] and heading [rad, unwrapped] as measured, shape (n, 3).
+    nu_raw, nu
+        Velocities over ground as measured and lightly smoothed [m/s, m/s, rad/s], shape (n, 3).
+    parts
+        Force of each actuator on the hull [N, N, N·m], shape (n, k, 3).
+    angles
+        Measured angle of each azimuth thruster [rad], NaN for other actuators, shape (n, k).
+    wind, current
+        Where air and water go to, north and east [m/s], shape (n, 2), or None where not measured.
+    payload
+        Mass [kg] and place [m] aboard, shape (n, 2), or None.
+    usable
+        Rows on which everything was measured, shape (n,).
+    """
+
+    profile: Profile
+    t: Floats
+    eta: Floats
+    nu_raw: Floats
+    nu: Floats
+    parts: Floats
+    angles: Floats
+    usable: NDArray[np.bool_]
+    wind: Floats | None = None
+    current: Floats | None = None
+    payload: Floats | None = None
+
+    @property
+    def step_s(self) -> float:
+        """Distance of two rows [s]."""
+        return float(self.t[1] - self.t[0])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the actuators, in the order of `parts`."""
+        return tuple(actuator.name for actuator in self.profile.actuators)
+
+    @property
+    def psi(self) -> Floats:
+        """Heading [rad], shape (n,)."""
+        return self.eta[:, 2]
+
+    @cached_property
+    def pointing(self) -> tuple[Floats, Floats]:
+        """Cosine and sine of the heading, shape (n,) each."""
+        return np.cos(self.psi), np.sin(self.psi)
+
+    @cached_property
+    def turning(self) -> Floats:
+        """Acceleration of a vessel whose velocities along its own axes stay as they are [m/s²], shape (n, 3)."""
+        u, v, r = self.nu.T
+        return np.column_stack([-r * v, r * u, np.zeros_like(r)])
+
+    @cached_property
+    def air_load(self) -> Floats:
+        """Load of the wind that was measured, of still air where none was [N, N, N·m], shape (n, 3)."""
+        areas = self.profile.wind
+        if areas is None:
+            return np.zeros((len(self.t), 3))
+        return wind_force(areas, np.zeros((len(self.t), 2)) if self.wind is None else self.wind, self.psi, self.nu)
+
+
+@dataclass(frozen=True)
+class ForceModel:
+    """Measurements with a model of the forces that act.
+
+    Attributes
+    ----------
+    scene
+        What was measured.
+    hull
+        Coefficients in the order of `COEFFICIENTS`, shape (26,).
+    parts, angles
+        As in the scene, with what the effects make of them.
+    external
+        All other forces on the hull [N, N, N·m], shape (n, 3).
+    flow
+        Where the water goes to, north and east [m/s], shape (n, 2), or None for still water.
+    load
+        What is added to the mass matrix: m11, m22 [kg], m23, m32 [kg·m], m33 [kg·m²], shape (n, 5), or None.
+    damping_factor
+        Factor on all damping, shape (n,), or None.
+    air
+        Where an air flow goes to that is imagined and not measured, north and east [m/s], shape (2,), or None; its load is
+        among the external forces.
+    air_factors
+        Those on the load that the profile tells of it, surge, sway and yaw, shape (3,), or None for one each.
+    gust_std
+        Standard deviation of gusts about that flow, of north and east each [m/s].
+    ambient
+        Those of the external forces that follow from what was measured: ``ambient(scene)``, shape (n, 3); None where none do.
+    turned
+        Angle from the axes that the navigation measures along to the vessel's, counterclockwise [rad].
+    antenna
+        What the navigation measures the motion of, ahead and to starboard of the body origin [m].
+    """
+
+    scene: Measurements
+    hull: Floats
+    parts: Floats
+    angles: Floats
+    external: Floats
+    flow: Floats | None = None
+    load: Floats | None = None
+    damping_factor: Floats | None = None
+    air: Floats | None = None
+    air_factors: Floats | None = None
+    gust_std: float = 0.0
+    ambient: Callable[[Measurements], Floats] | None = None
+    turned: float = 0.0
+    antenna: tuple[float, float] = (0.0, 0.0)
+
+
+def hull_of(profile: Profile) -> Floats:
+    """Return the coefficients of a profile's hull in the order of `COEFFICIENTS`, zero where unknown."""
+    M, D = profile.hull.M, profile.hull.D
+    mass = (M[0, 0], M[1, 1], M[1, 2], M[2, 1], M[2, 2])
+    return np.array([*mass, *(D.get(name, 0.0) for name in COEFFICIENTS[5:])], dtype=np.float64)
+
+
+def named(hull: Floats) -> Mapping[str, float]:
+    """Return coefficients by name."""
+    return dict(zip(COEFFICIENTS, hull.tolist(), strict=True))
+
+
+def body_current(picture: ForceModel) -> tuple[Floats, Floats]:
+    """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n,) each."""
+    flow, scene = picture.flow, picture.scene
+    if flow is None:
+        still = np.zeros(len(scene.t))
+        return still, still
+    cosine, sine = scene.pointing
+    north, east = flow.T
+    return cosine * north + sine * east, cosine * east - sine * north
+
+
+def acceleration(picture: ForceModel) -> Floats:
+    """Return the acceleration over ground that a picture gives at the measured velocities, shape (n, 3).
+
+    ``M nu_dot = tau + external - C(nu_r) nu_r - D(nu_r) nu_r``, with ``[r v_c, -r u_c, 0]`` added for the water that the body
+    frame turns through; Fossen (2021), section 10.3.
+    """
+    scene = picture.scene
+    parts = np.ascontiguousarray(picture.parts)
+    return accelerations(np.ascontiguousarray(scene.nu), picture.hull, parts, *_forces(picture))
+
+
+def hull_changes(picture: ForceModel, places: Places, moves: Floats) -> Floats:
+    """Return by how much `as_measured` changes if coefficients of the hull move one by one, shape (n, 3, q).
+
+    Parameters
+    ----------
+    picture
+        n rows.
+    places, moves
+        Which of `COEFFICIENTS` move, and by how much, shape (q,) each.
+    """
+    parts = np.ascontiguousarray(picture.parts)
+    changes = slopes(places, moves, np.ascontiguousarray(picture.scene.nu), picture.hull, parts, *_forces(picture))
+    return _from_antenna(picture, changes)
+
+
+def corrected(picture: ForceModel, scene: Measurements) -> ForceModel:
+    """Return the picture of a scene whose measurements were corrected, with the ambient forces at what it then shows."""
+    if picture.ambient is None:
+        return replace(picture, scene=scene)
+    more = picture.ambient(scene) - picture.ambient(picture.scene)
+    return replace(picture, scene=scene, external=picture.external + more)
+
+
+def as_measured(picture: ForceModel) -> Floats:
+    """Return `acceleration` as the navigation would measure it: that of its antenna, along its own axes, shape (n, 3)."""
+    rates = acceleration(picture)
+    return _from_antenna(picture, rates[:, :, None])[:, :, 0]
+
+
+def _from_antenna(picture: ForceModel, rates: Floats) -> Floats:
+    """Turn accelerations, shape (n, 3, q), into those that the navigation measures, in place."""
+    if picture.antenna != (0.0, 0.0) or picture.turned != 0.0:
+        from_antenna(rates, *picture.antenna, cos(picture.turned), sin(picture.turned))
+    return rates
+
+
+def required_force(picture: ForceModel, nu_dot: Floats) -> Floats:
+    """Return the force that the actuators need for an acceleration over ground [N, N, N·m], shape (n, 3).
+
+    The inverse of `acceleration`: what `parts` add up to plays no part.
+
+    Parameters
+    ----------
+    picture
+        Hull, water, load and all other forces.
+    nu_dot
+        Shape (n, 3) [m/s², m/s², rad/s²].
+    """
+    nu = np.ascontiguousarray(picture.scene.nu)
+    return required(np.ascontiguousarray(nu_dot), nu, picture.hull, *_forces(picture))
+
+
+def _forces(picture: ForceModel) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return external forces, flow along the vessel's axes, load, and factor on damping, for the equations of motion."""
+    n = len(picture.scene.t)
+    flow = _NO_FLOW if picture.flow is None else np.column_stack(body_current(picture))
+    load = _NO_LOAD if picture.load is None else picture.load
+    factor = _NO_FACTOR if picture.damping_factor is None else picture.damping_factor
+    # Compiled code does not look where an array ends.
+    lengths = {len(one) for one in (picture.external, flow, load, factor) if len(one)}
+    if lengths - {n} or picture.scene.nu.shape != (n, 3) or picture.parts.shape[::2] != (n, 3):
+        raise ValueError(f"a picture of {counted(n, 'row')} has parts of other lengths: {sorted(lengths)}")
+    external, flow, load, factor = map(np.ascontiguousarray, (picture.external, flow, load, factor))
+    return external, flow, load, factor
+
+
+def added_mass(picture: ForceModel) -> Floats:
+    """Return the part of a picture's mass matrix that is not the rigid body's, as a load, shape (5,)."""
+    hull = picture.scene.profile.hull
+    moment = hull.mass_kg * hull.x_g_m
+    return np.asarray(picture.hull[:5] - [hull.mass_kg, hull.mass_kg, moment, moment, hull.inertia_z])
+
+
+def aboard(payload: Floats) -> Floats:
+    """Return what masses and their places, as of `payload_mass`, shape (n, 2), are as the load of a picture, shape (n, 5)."""
+    return payload_mass(payload)[:, [0, 1, 1, 2, 2], [0, 1, 2, 1, 2]]
+
+
+def between(
+    before: ForceModel, after: ForceModel, onset_s: float, offset_s: float = inf, kick: Floats | None = None
+) -> ForceModel:
+    """Return the second picture from an onset until an offset [s], else the first; hull and scene are the second's.
+
+    `kick` is a momentum by row, as of `ferryid.effects.effect.Effect`; that of the first row of the onset acts there.
+    """
+    rows = (before.scene.t >= onset_s) & (before.scene.t < offset_s)
+    if kick is not None and rows.any() and not rows[0]:
+        external, first = after.external.copy(), int(np.argmax(rows))
+        external[first] += kick[first] / before.scene.step_s
+        after = replace(after, external=external)
+
+    def mixed(old: Floats, new: Floats) -> Floats:
+        return np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+
+    def either(old: Floats | None, new: Floats | None, blank: float = 0.0) -> Floats | None:
+        known = new if old is None else old
+        if known is None:
+            return None
+        nothing = np.full_like(known, blank)
+        return mixed(nothing if old is None else old, nothing if new is None else new)
+
+    return replace(
+        after,
+        parts=mixed(before.parts, after.parts),
+        angles=mixed(before.angles, after.angles),
+        external=mixed(before.external, after.external),
+        flow=either(before.flow, after.flow),
+        load=either(before.load, after.load),
+        damping_factor=either(before.damping_factor, after.damping_factor, 1.0),
+    )

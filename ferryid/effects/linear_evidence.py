@@ -1,0 +1,69 @@
+"""Evidence of many alternatives at once, by a model that is linear in an effect and in the hull."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.effects.effect import Residual
+from ferryid.effects.force_model import ForceModel
+from ferryid.vessel.profile import Floats
+
+HULL_STD = 0.12
+"""Standard deviation of what is believed of a coefficient of the hull that nothing is wrong with, as a share of it."""
+TINY = 0.01
+
+
+def hull_jacobian(
+    picture: ForceModel, believed: Floats, residual: Residual, places: list[int]
+) -> tuple[Floats, Floats]:
+    """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
+
+    The line is drawn at the picture's hull, which is the fitted one, as acceleration is far from linear in mass.
+    """
+    e = residual(picture)
+    columns, away = [], []
+    for k in places:
+        hull = picture.hull.copy()
+        hull[k] += TINY * believed[k]
+        columns.append((residual(replace(picture, hull=hull)) - e) / TINY)
+        away.append(picture.hull[k] / believed[k] - 1.0 if believed[k] != 0.0 else 0.0)
+    J = np.column_stack(columns)
+    return J, e - J @ np.array(away)
+
+
+def profiled_loss(J: Floats, residuals: Floats) -> Floats:
+    """Return the negative logarithm of the likelihood of each of some residuals, with the hull profiled_loss to it.
+
+    Parameters
+    ----------
+    J
+        From `hull_jacobian`.
+    residuals
+        With the hull as believed, shape (w, q).
+    """
+    H = HULL_STD * J
+    product = H.T @ residuals
+    share = np.einsum("pq,pq->q", product, np.linalg.solve(H.T @ H + np.eye(H.shape[1]), product))
+    return np.asarray(0.5 * (np.einsum("wq,wq->q", residuals, residuals) - share))
+
+
+def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float) -> Floats:
+    """Return the evidence of each of some alternatives, with the hull's coefficients profiled_loss beside it.
+
+    Parameters
+    ----------
+    J, e
+        From `hull_jacobian`.
+    columns
+        Derivatives of the residual by the one parameter of each alternative, shape (w, q).
+    size
+        Standard deviation of what is believed of that parameter.
+    """
+    H, every = HULL_STD * J, np.column_stack([e, columns])
+    free = every - H @ np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ every)
+    power = np.einsum("wq,wq->q", columns, free[:, 1:])
+    product = columns.T @ free[:, 0]
+    ratio = power * size**2
+    return np.asarray(0.5 * product**2 * size**2 / (1.0 + ratio) - 0.5 * np.log1p(ratio))

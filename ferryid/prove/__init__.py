@@ -1,1 +1,0 @@
-"""The proof: physics concealed by an independent plant, answers sealed, diagnosed blind, and scored against an oracle."""

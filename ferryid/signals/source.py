@@ -1,0 +1,177 @@
+"""One stream before it goes on a grid: wild, stale and stuck samples taken out, its usual period, what counts as a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.counts import counted, verb
+from ferryid.signals.quality import VELOCITY, clean, is_actuator, is_load, is_order, stale, stuck
+from ferryid.signals.stream import Stream
+from ferryid.signals.track import segments
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Nanoseconds = NDArray[np.int64]
+
+GAP_PERIODS = 3.0
+GAP_LEAST_S = 0.5
+"""A stretch without samples is a gap when longer than three periods of its stream and than this [s]."""
+
+STUCK_PERIODS = 10.0
+"""A velocity that repeats itself for longer than a gap and than this many periods was not measured meanwhile."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A stretch in which signals are wrong, mostly as they repeat an old value.
+
+    Attributes
+    ----------
+    signals
+        Canonical names.
+    start_ns, end_ns
+        Times of the last right sample before and of the first one after [ns].
+    reason
+        What is wrong, to stand after "because".
+    """
+
+    signals: tuple[str, ...]
+    start_ns: int
+    end_ns: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """One stream, cleaned.
+
+    Attributes
+    ----------
+    topic
+        Its name.
+    time_ns
+        Times [ns], shape (n,).
+    columns
+        Canonical name to values, shape (n,), NaN where a sample is missing or was taken out.
+    period_s, bridge_s
+        Usual period, and the longest interval that is interpolated [s].
+    on_change
+        True where each value holds until the next.
+    held
+        Stretches that repeat an old measurement.
+    taken_out
+        What was taken out or is interpolated, as sentences with numbers.
+    remarks
+        What else was found, and how values are bridged, as sentences.
+    """
+
+    topic: str
+    time_ns: Nanoseconds
+    columns: Mapping[str, Floats]
+    period_s: float
+    bridge_s: float
+    on_change: bool
+    held: tuple[Held, ...] = ()
+    taken_out: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def source_of(stream: Stream) -> Source:
+    """Take implausible, stale and stuck samples out of a stream, and find what counts as a gap in it."""
+    time_ns = np.asarray(stream.time_ns)
+    time_s = (time_ns - time_ns[0]) * 1e-9
+    period = _usual_period(time_s)
+    bridge = max(GAP_PERIODS * period, GAP_LEAST_S)
+    columns: dict[str, Floats] = {}
+    taken_out: list[str] = []
+    remarks: list[str] = []
+    for name, raw in stream.columns.items():
+        columns[name], quality = clean(name, time_s, raw)
+        taken_out += quality.taken_out()
+        remarks += quality.remarks()
+    held: list[Held] = []
+    old = stale(time_s, stream.columns, bridge)
+    if old.any():
+        for values in columns.values():
+            values[old] = np.nan
+        held += _stretches(tuple(columns), time_ns, old, f"{stream.topic} repeats an old measurement")
+        taken_out.append(
+            f"{stream.topic}: {int(old.sum())} of {counted(old.size, 'message')} "
+            f"{verb(int(old.sum()), 'repeats')} an old measurement for more than "
+            f"{bridge:.2f} s; taken as missing."
+        )
+    frozen = max(bridge, STUCK_PERIODS * period)
+    for name in VELOCITY:
+        if name in columns and (same := stuck(time_s, stream.columns[name], frozen) & ~old).any():
+            columns[name][same] = np.nan
+            held += _stretches((name,), time_ns, same, f"{name} repeats an old value to the last digit")
+            taken_out.append(
+                f"{name}: {int(same.sum())} of {counted(same.size, 'sample')} "
+                f"{verb(int(same.sum()), 'repeats')} an old one to the last digit for more "
+                f"than {frozen:.2f} s; taken as missing."
+            )
+    on_change = _on_change(time_s, stream.columns)
+    interval = np.diff(time_s)
+    gaps = interval > bridge
+    if interval.size and all(is_load(name) for name in columns):
+        remarks.append(f"{stream.topic}: each value holds until the next, at most for {interval.max():.1f} s.")
+    elif interval.size and on_change:
+        remarks.append(
+            f"{stream.topic}: published when it changes; each value holds until the next, "
+            f"at most for {interval.max():.1f} s."
+        )
+    elif gaps.any():
+        remarks.append(
+            f"{stream.topic}: {counted(int(gaps.sum()), 'gap')} longer than {bridge:.2f} s, {interval[gaps].sum():.1f} s in "
+            "all; not bridged."
+        )
+    return Source(
+        stream.topic, time_ns, columns, period, bridge, on_change, tuple(held), tuple(taken_out), tuple(remarks)
+    )
+
+
+def _stretches(signals: tuple[str, ...], time_ns: Nanoseconds, wrong: Flags, reason: str) -> list[Held]:
+    last = time_ns.size - 1
+    return [
+        Held(signals, int(time_ns[max(one.start - 1, 0)]), int(time_ns[min(one.stop, last)]), reason)
+        for one in segments(wrong)
+    ]
+
+
+def _usual_period(time_s: Floats) -> float:
+    """Return the mean interval [s] of a stream without its gaps.
+
+    The mean, since messages that are received in bursts leave a median that says nothing.
+    """
+    interval = np.diff(time_s)
+    interval = interval[interval > 0.0]
+    if interval.size == 0:
+        return 1.0
+    period = float(interval.mean())
+    for _ in range(5):
+        within = interval <= max(GAP_PERIODS * period, GAP_LEAST_S)
+        if not within.any():
+            break
+        shorter = float(interval[within].mean())
+        if shorter == period:
+            break
+        period = shorter
+    return period
+
+
+def _on_change(time_s: Floats, columns: Mapping[str, Floats]) -> bool:
+    """True for a payload, and actuator streams that are irregular and whose messages (nearly) all say something new."""
+    if all(is_load(name) for name in columns):
+        return True
+    if not all(is_actuator(name) or is_order(name) for name in columns) or time_s.size < 3:
+        return False
+    interval = np.diff(time_s)
+    irregular = float(np.mean(interval > GAP_PERIODS * np.median(interval)))
+    new = np.zeros(interval.size, dtype=bool)
+    for values in columns.values():
+        new |= np.diff(values) != 0.0
+    return irregular > 0.1 and float(new.mean()) > 0.9

@@ -1,0 +1,92 @@
+"""Checkpoints: a file of JSON lines a stage, one line a case, written whole as soon as the case is done."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ferryid.batch.remaining import told_time
+from ferryid.batch.spread import Spread
+from ferryid.files import finite, unwritable, write_text
+
+T = TypeVar("T")
+
+
+def completed(path: Path) -> dict[str, Any]:
+    """Return the results in a file by the name of their case; lines that broke off count as not done."""
+    if not path.exists():
+        return {}
+    data = path.read_bytes()
+    whole = data[: data.rfind(b"\n") + 1]
+    if whole != data:
+        with path.open("r+b") as file:
+            file.truncate(len(whole))
+    results = {}
+    for text in whole.splitlines():
+        try:
+            line = json.loads(text)
+            results[line["name"]] = line["result"]
+        except (ValueError, TypeError, KeyError):  # what a crash of the machine left of it: to be done again
+            continue
+    return results
+
+
+def discard(path: Path, names: Iterable[str]) -> None:
+    """Have some cases of a stage done again."""
+    gone, lines = set(names), completed(path)
+    if gone & set(lines):
+        kept = [{"name": name, "result": result} for name, result in lines.items() if name not in gone]
+        write_text(path, "".join(json.dumps(line) + "\n" for line in kept))
+
+
+def run_stage(
+    stage: str,
+    path: Path,
+    work: Mapping[str, T],
+    function: Callable[[T], Any],
+    workers: Spread,
+    *,
+    progress: Callable[[str], None],
+) -> dict[str, Any]:
+    """Do what is left of some work, and return the results of all of it by name, in the order of the work.
+
+    Parameters
+    ----------
+    stage
+        Name of the stage, for people.
+    path
+        JSON lines of this and earlier times.
+    work
+        What `function` is given, by the name of its case.
+    function
+        Returns plain data.
+    workers
+        What carries it out.
+    progress
+        Called with what is done and the time left.
+    """
+    done = {name: result for name, result in completed(path).items() if name in work}
+    left = [name for name in work if name not in done]
+    if left:
+        progress(f"{stage}: {len(done)} of {len(work)}")
+        start = time.monotonic()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = path.open("a", encoding="utf-8")
+        except OSError as error:
+            raise unwritable(path, error) from error
+        with file:
+            for count, (number, result) in enumerate(workers.over(function, [work[name] for name in left]), 1):
+                done[left[number]] = written = finite(result)
+                try:
+                    file.write(json.dumps({"name": left[number], "result": written}, allow_nan=False) + "\n")
+                    file.flush()
+                except OSError as error:
+                    raise unwritable(path, error) from error
+                seconds = (time.monotonic() - start) / count * (len(left) - count)
+                progress(f"{stage}: {len(done)} of {len(work)}, {told_time(seconds)} left")
+        progress("")
+    return {name: done[name] for name in work}

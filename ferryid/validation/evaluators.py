@@ -1,0 +1,86 @@
+"""The validation run as it is: what draws and writes its cases, what evaluates them, and what becomes of all that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ferryid.validation.case import Truth
+from ferryid.validation.case_sampling import sample_cases
+from ferryid.validation.interfaces import Evaluator, Pipeline, Trial
+from ferryid.validation.log_generation import generate, realised_parameters
+from ferryid.validation.plant.effects import plant_effects
+from ferryid.validation.records import CaseResult, OracleResult, TransferResult
+from ferryid.vessel.profile import Profile
+
+RIVALS_EVERY = 5
+"""Rivals run on one log in so many: they take longer than a diagnosis. The numbers of cases are random."""
+
+
+def pipeline() -> Pipeline:
+    """Return what a validation run is put together from."""
+    evaluators = {
+        "oracle": Evaluator(evaluate_oracle, OracleResult),
+        "transfer": Evaluator(evaluate_transfer, TransferResult),
+    }
+    return Pipeline(sample_cases, generate, realised_parameters, evaluators, _score, _targets, _render)
+
+
+def evaluate_oracle(trial: Trial) -> OracleResult | None:
+    """Return the oracle's estimates of what is in a log; in a clean log, those of every effect, gained by chance."""
+    # What evaluates is heavy, and drawing need not wait for it.
+    from ferryid.validation.oracle import oracle, oracle_of_each
+    from ferryid.vessel import load_profile
+
+    profile = load_profile(trial.profile)
+    if trial.case.kind == "clean":
+        return oracle_of_each(str(trial.log), profile, _every_effect(profile))
+    if not trial.case.truths:
+        return None
+    return oracle(str(trial.log), profile, trial.case.truths)
+
+
+def evaluate_transfer(trial: Trial) -> TransferResult | None:
+    """Return the scores of the diagnosed model, and in one case of `RIVALS_EVERY` of the rivals, on a transfer log."""
+    from ferryid.validation.rivals import RIVALS
+    from ferryid.validation.transfer_test import transfer_test
+    from ferryid.vessel import load_profile
+
+    rivals = RIVALS if int(trial.case.name) % RIVALS_EVERY == 0 else {}
+    if trial.model is None and not rivals:
+        # Where nothing was found, nothing is claimed.
+        return None
+    other = generate(trial.case, trial.folder, transfer=True)
+    profile, out = load_profile(trial.profile), trial.folder / "out"
+    return transfer_test(str(trial.log), str(other.log), profile, out, diagnosed=trial.model, rivals=rivals)
+
+
+def _score(results: Sequence[CaseResult]) -> Any:
+    from ferryid.validation.scores import score
+
+    return score(results)
+
+
+def _targets(scores: Any) -> Any:
+    from ferryid.validation.targets import targets
+
+    return targets(scores)
+
+
+def _render(result: Mapping[str, Any], scores: Any) -> Mapping[str, str]:
+    from ferryid.validation.page import figures, page
+
+    drawn = {f"proof/{name}": text for name, text in figures(scores).items()}
+    return {"proof.md": page(result, scores), **drawn}
+
+
+def _every_effect(profile: Profile) -> list[Truth]:
+    """Return every effect that a vessel can have, without its size."""
+    from ferryid.effects import effects
+
+    library = effects()
+    return [
+        Truth(name, instance, {})
+        for name in plant_effects()
+        for instance in (library[name].instances(profile) if name in library else (None,))
+    ]

@@ -1,0 +1,220 @@
+"""Scores of the names in a diagnosis: right, wrong, and mistaken for each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from scipy.stats import beta
+
+from ferryid.effects import effects
+from ferryid.effects.wording import titled
+from ferryid.validation.json_record import Record
+from ferryid.validation.records import UNKNOWN, CaseResult, Finding, Key
+
+NONE, OTHER, REFUSED = "none", "wrong place", "refused"
+"""Columns of the confusion matrix that are no effect: nothing named, something found without a name, the right effect of the
+wrong thruster or other coefficients of the hull, and an error message in the place of a diagnosis."""
+ELSEWHERE = "other coefficients"
+"""Instance of a hull that is named wrong in coefficients which are right."""
+LEVEL = 0.95
+HULL = "hull_parameters"
+
+
+@dataclass(frozen=True)
+class Share(Record):
+    """So many of so many."""
+
+    DERIVED: ClassVar[Mapping[str, str]] = {"value": "value", "interval": "interval"}
+
+    count: int
+    of: int
+
+    @property
+    def value(self) -> float:
+        """Return the share, NaN of none."""
+        return self.count / self.of if self.of else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Return the 95 % interval of Clopper and Pearson (1934)."""
+        k, n, tail = self.count, self.of, 0.5 * (1.0 - LEVEL)
+        low = 0.0 if k == 0 else float(beta.ppf(tail, k, n - k + 1))
+        high = 1.0 if k == n else float(beta.ppf(1.0 - tail, k + 1, n - k))
+        return low, high
+
+    @property
+    def text(self) -> str:
+        """The share in per cent, its counts and its interval."""
+        if not self.of:
+            return "none"
+        low, high = self.interval
+        return f"{100.0 * self.value:.1f} % ({self.count}/{self.of}) [{100.0 * low:.1f}, {100.0 * high:.1f}]"
+
+
+@dataclass(frozen=True)
+class Confusion(Record):
+    """What was named first in every kind of trial with at most one effect.
+
+    Attributes
+    ----------
+    rows, columns
+        Cells, and first names; the last columns are `OTHER`, `UNKNOWN`, `NONE` and `REFUSED`.
+    counts
+        Runs, by row and column.
+    """
+
+    rows: tuple[str, ...]
+    columns: tuple[str, ...]
+    counts: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class Cell(Record):
+    """How often the injected effects of some runs were named.
+
+    Attributes
+    ----------
+    cell, kind
+        As in the cases.
+    runs
+        How many.
+    first, every
+        Of the runs with a truth: those whose first name is one, and those in which all are named.
+    false
+        Runs with a wrong name.
+    refused
+        Runs that ended in an error message.
+    """
+
+    cell: str
+    kind: str
+    runs: int
+    first: Share
+    every: Share
+    false: Share
+    refused: int
+
+
+def names(result: CaseResult) -> list[Key]:
+    """Return what a diagnosis names, the likeliest first."""
+    return list(named_findings(result))
+
+
+def named_findings(result: CaseResult) -> dict[Key, Finding]:
+    """Return the findings that name something, the likeliest first; of several with one name, the first.
+
+    A hull is the one that is in the log only if a wrong coefficient is named: its instance is `ELSEWHERE` otherwise.
+    """
+    injected = {name for truth in result.truths if truth.effect == HULL for name in truth.values}
+    found: dict[Key, Finding] = {}
+    for one in result.diagnosis.findings:
+        if one.hint or one.effect == UNKNOWN:
+            continue
+        missed = one.effect == HULL and injected and not injected & set(one.parameters)
+        found.setdefault((HULL, ELSEWHERE) if missed else one.key, one)
+    return found
+
+
+def wrong_names(result: CaseResult) -> list[Key]:
+    """Return what a diagnosis names that is not in the log.
+
+    What the case allows is not wrong, nor is one of several explanations among which the diagnosis does not decide, the truth
+    among them.
+    """
+    effects = {truth.effect for truth in result.truths}
+    return [
+        key
+        for key in names_not_in_log(result)
+        if key[0] not in result.case.allowed and not effects & set(named_findings(result)[key].unresolved_with)
+    ]
+
+
+def names_not_in_log(result: CaseResult) -> list[Key]:
+    """Return what a diagnosis names that is not in the log, whatever the case allows."""
+    present = {truth.key for truth in result.truths}
+    return [key for key in names(result) if key not in present]
+
+
+def hints_not_in_log(result: CaseResult) -> list[Key]:
+    """Return the hints of what is not in the log."""
+    present = {truth.key for truth in result.truths}
+    hints = [one for one in result.diagnosis.findings if one.hint]
+    return [one.key for one in hints if one.effect != UNKNOWN and one.key not in present]
+
+
+def outcome_of_missed(result: CaseResult, key: Key) -> str:
+    """Return what became of an effect that is in the log of a case and was not named."""
+    diagnosis = result.diagnosis
+    if diagnosis.error:
+        return REFUSED
+    if any(one.key == key and one.hint for one in diagnosis.findings):
+        return "a hint"
+    effect = effects().get(key[0])
+    title = key[0] if effect is None else titled(effect.title, key[1])
+    if any("suspected, but dropped" in note and title.lower() in note.lower() for note in diagnosis.notes):
+        return "dropped"
+    other = first_name(result)
+    return other if other in (UNKNOWN, NONE, OTHER) else f"taken for {other}"
+
+
+def first_name(result: CaseResult) -> str:
+    """Return what a diagnosis names first as a column of the confusion matrix."""
+    if result.diagnosis.error:
+        return REFUSED
+    found = names(result)
+    if not found:
+        return UNKNOWN if any(one.effect == UNKNOWN for one in result.diagnosis.findings) else NONE
+    present = {truth.key for truth in result.truths}
+    effect = found[0][0]
+    return OTHER if found[0] not in present and effect in {name for name, _ in present} else effect
+
+
+def confusion(results: Iterable[CaseResult]) -> Confusion:
+    """Return what was named first, by cell."""
+    counts: dict[str, dict[str, int]] = {}
+    for result in results:
+        if len(result.truths) <= 1:
+            row = counts.setdefault(result.case.cell, {})
+            column = first_name(result)
+            row[column] = row.get(column, 0) + 1
+    last = (OTHER, UNKNOWN, NONE, REFUSED)
+    columns = (*sorted({name for row in counts.values() for name in row} - set(last)), *last)
+    return Confusion(
+        tuple(counts), columns, tuple(tuple(row.get(name, 0) for name in columns) for row in counts.values())
+    )
+
+
+def false_names(results: Sequence[CaseResult]) -> dict[str, Share]:
+    """Return the share of runs with a wrong name: of ``all`` and of every kind of cell."""
+    kinds = {"all": list(results)}
+    for result in results:
+        kinds.setdefault(result.case.kind, []).append(result)
+    return {kind: Share(sum(bool(wrong_names(result)) for result in some), len(some)) for kind, some in kinds.items()}
+
+
+def cells(results: Iterable[CaseResult]) -> tuple[Cell, ...]:
+    """Return every cell, in the order of their first runs."""
+    sorted_by: dict[tuple[str, str], list[CaseResult]] = {}
+    for result in results:
+        sorted_by.setdefault((result.case.cell, result.case.kind), []).append(result)
+    return tuple(_cell(cell, kind, some) for (cell, kind), some in sorted_by.items())
+
+
+def _cell(cell: str, kind: str, results: Sequence[CaseResult]) -> Cell:
+    first = every = true = 0
+    for result in results:
+        present, found = {truth.key for truth in result.truths}, names(result)
+        true += bool(present)
+        first += bool(found) and found[0] in present
+        every += bool(present) and present <= set(found)
+    return Cell(
+        cell,
+        kind,
+        len(results),
+        Share(first, true),
+        Share(every, true),
+        Share(sum(bool(wrong_names(result)) for result in results), len(results)),
+        sum(bool(result.diagnosis.error) for result in results),
+    )

@@ -1,0 +1,35 @@
+"""Hash of ferryid's sources: what was diagnosed with others is diagnosed again."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from pathlib import Path
+
+import ferryid
+
+EVALUATION = (
+    *("report/", "reproduce/", "batch/", "schemas/", "cli/"),
+    *(
+        "validation/estimate_errors",
+        "validation/evaluators",
+        "validation/name_scores",
+        "validation/oracle",
+        "validation/page",
+        "validation/rivals/",
+        "validation/scores",
+        "validation/transfer",
+    ),
+)
+"""How the names of those begin that have no part in a log and its diagnosis: they only evaluate it, or draw, or print."""
+KINDS = (".py", ".toml")
+
+
+def source_hash(*, evaluation: bool = False) -> str:
+    """Return a hash of all sources that a log and its diagnosis depend on; with those that evaluate it if `evaluation`."""
+    root = Path(ferryid.__file__).parent
+    digest = sha256()
+    for path in sorted(path for path in root.rglob("*") if path.suffix in KINDS):
+        name = path.relative_to(root).as_posix()
+        if evaluation or not name.startswith(EVALUATION):
+            digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]

@@ -1,0 +1,84 @@
+"""The targets of a validation run, and whether they were reached."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ferryid.validation.json_record import Record
+from ferryid.validation.name_scores import Share
+from ferryid.validation.scores import CLEAN, Scores
+
+MOST_RATIO = 1.5
+"""Ratio of the sizes named reliably, the diagnosis's over the oracle's, that is allowed."""
+COVERED = (0.93, 0.97)
+"""Share of 95 % intervals that is to hold the truth."""
+FALSE = 0.01
+"""Share of logs that may have a wrong name."""
+IN_TIME = 0.9
+"""Share of onsets and offsets that is to be within 5 s."""
+
+
+@dataclass(frozen=True)
+class Target(Record):
+    """A target.
+
+    Attributes
+    ----------
+    what
+        What was to be reached, and the value.
+    reached
+        None where the value is within the target and its interval allows either, and where nothing was tested.
+    sure
+        Whether the interval lies on one side of the target alone.
+    tested
+        False where the run has no case that tests it.
+    """
+
+    what: str
+    reached: bool | None
+    sure: bool
+    tested: bool = True
+
+    @property
+    def outcome(self) -> str:
+        """Whether it was reached, in words."""
+        if not self.tested:
+            return "not tested"
+        if self.reached is None:
+            return "reached, though the interval allows either"
+        return "yes" if self.reached else "**missed**" if self.sure else "**missed**, though the interval allows either"
+
+
+def targets(scores: Scores) -> list[Target]:
+    """Return every target."""
+    every = scores.recoveries[0]
+    near = [
+        one
+        for one in scores.detections
+        if one.ratio is not None and one.ratio.value is not None and one.ratio.value <= MOST_RATIO
+    ]
+    tested = len(scores.detections)
+    sizes = f"sizes named 19 times in 20 at most {MOST_RATIO} times the oracle's"
+    return [
+        share_target(
+            "clean logs with a wrong name: at most 1 %", scores.false_names.get(CLEAN, Share(0, 0)), at_most=FALSE
+        ),
+        share_target("all logs with a wrong name: at most 1 %", scores.false_names["all"], at_most=FALSE),
+        share_target(
+            "95 % intervals that hold the truth: 93 to 97 %", every.covered, at_least=COVERED[0], at_most=COVERED[1]
+        ),
+        share_target("onsets and offsets within 5 s: at least 90 %", every.in_time, at_least=IN_TIME),
+        Target(f"{sizes}: {len(near)} of {tested} effects", len(near) == tested, True)
+        if tested
+        else Target(sizes, None, False, tested=False),
+    ]
+
+
+def share_target(what: str, share: Share, *, at_least: float = 0.0, at_most: float = 1.0) -> Target:
+    """Return the target that a share lies within limits."""
+    if not share.of:
+        return Target(what, None, False, tested=False)
+    low, high = share.interval
+    inside = at_least <= share.value <= at_most
+    sure = at_least <= low and high <= at_most if inside else high < at_least or low > at_most
+    return Target(f"{what}; {share.text}", inside if sure or not inside else None, sure)

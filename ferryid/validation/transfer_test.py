@@ -1,0 +1,187 @@
+"""The transfer test: the models of diagnosis and rivals on another log of the same truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.errors import FerryIdError
+from ferryid.identify.model import AXES, Model
+from ferryid.identify.predict import Prediction, predict
+from ferryid.identify.result import FreeRun
+from ferryid.identify.scores import force_scores, usable
+from ferryid.identify.store import load_file
+from ferryid.identify.stored_effect import Conditions, StoredEffect
+from ferryid.signals.prepare import Prepared
+from ferryid.validation.records import DIAGNOSED, StoredEffectNote, TransferResult, TransferScore
+from ferryid.validation.rivals import RIVALS, Learner
+from ferryid.validation.rivals.base import base_of, prepared_log
+from ferryid.validation.rivals.learner import SMOOTHER, WINDOW_S
+from ferryid.vessel.profile import Floats, Profile
+
+HORIZON_S = 60.0
+"""Length of the free runs that are scored [s]."""
+
+Rows = NDArray[np.bool_]
+
+
+def transfer_test(
+    first_log: str,
+    transfer_log: str,
+    profile: Profile,
+    out: Path,
+    *,
+    diagnosed: Model | str | Path | None,
+    rivals: Mapping[str, Learner] = RIVALS,
+) -> TransferResult:
+    """Score the base model, a diagnosed one and every rival on another log of the truth that they were fitted to.
+
+    All predict the same: the force that the thrusters must have given for the measured motion, and where the vessel goes in
+    60 s under the measured forces. The free runs of all take forces from outside as they were along the measured path.
+
+    Parameters
+    ----------
+    first_log, transfer_log
+        Paths; parts of one recording joined by ``+``.
+    profile
+        The vessel.
+    out
+        Output folder, whose ``logs`` keep the ingested tables.
+    diagnosed
+        The model that a diagnosis of the first log wrote, or its path; None where it wrote none, having found no force left
+        out: the base model is then what it leaves.
+    rivals
+        Learners by name.
+
+    Raises
+    ------
+    FerryIdError
+        For logs that cannot be used, two that are the same, and a model that was not diagnosed from the first.
+    """
+    one, other = (prepared_log(log, profile, out) for log in (first_log, transfer_log))
+    if one.recording.sha256 == other.recording.sha256:
+        raise FerryIdError(
+            f"{transfer_log}: the same log as {first_log}, so that every model would be scored on its training data. "
+            "Fix: give another log"
+        )
+    base = base_of(other, profile).prediction
+    found: dict[str, Prediction] = {}
+    # What is known of each method beside its errors.
+    known: dict[str, dict[str, Any]] = {DIAGNOSED: {}}
+    if diagnosed is None:
+        found[DIAGNOSED] = base
+        known[DIAGNOSED]["why"] = "the diagnosis wrote no model: the base model takes its place"
+    else:
+        model = diagnosed if isinstance(diagnosed, Model) else load_file(Path(diagnosed))
+        moved = transferred(model, one, other)
+        found[DIAGNOSED] = predict(moved, other, profile, window_s=WINDOW_S, smoother=SMOOTHER)
+        known[DIAGNOSED] |= _acting_effects(found[DIAGNOSED], other.recording.sha256)
+    for name, learn in rivals.items():
+        try:
+            learnt = learn(first_log, profile, out)
+            found[name] = learnt.predict(other)
+        except FerryIdError as error:
+            known[name] = {"why": str(error)}
+            continue
+        known[name] = {"names": learnt.names}
+    motion = other.motion
+    # On the same rows for all, so that nobody gains by what it cannot predict.
+    rows = usable(motion, base.tau, *(each.tau for each in found.values()))
+    base_run = base.free_run(rows)
+    return TransferResult(
+        _base_score(motion.tau, base, rows, base_run),
+        {name: _score(motion.tau, base.tau, found.get(name), rows, base_run, more) for name, more in known.items()},
+    )
+
+
+def transferred(model: Model, first: Prepared, second: Prepared) -> Model:
+    """Return a model diagnosed from one log as it applies to another of the same truth.
+
+    The conditions of a log belong to its hash, and act in no other. Where the truth is known to be the same, those of the
+    first prevail in the second, and all begins and ends at the same time in both.
+
+    Raises
+    ------
+    FerryIdError
+        For a model that was not diagnosed from the first log.
+    """
+    before, after = first.recording.sha256, second.recording.sha256
+    if not any(log["sha256"] == before for log in model.training):
+        raise FerryIdError(
+            f"{model.label}: not a model of {first.motion.log}, whose conditions are to hold in {second.motion.log} too. "
+            "Fix: give the model that the diagnosis of the first log wrote"
+        )
+
+    def also(stored: StoredEffect) -> StoredEffect:
+        sources = [replace(one, log=second.motion.log, sha256=after) for one in stored.sources if one.sha256 == before]
+        return replace(stored, sources=(*stored.sources, *sources))
+
+    prevailing = tuple(also(one) for one in model.conditions_of(before))
+    return replace(
+        model,
+        vessel_effects=tuple(also(one) for one in model.vessel_effects),
+        conditions=(
+            *(one for one in model.conditions if one.sha256 != after),
+            *((Conditions(second.motion.log, after, prevailing),) if prevailing else ()),
+        ),
+    )
+
+
+def _acting_effects(found: Prediction, sha256: str) -> dict[str, Any]:
+    """Return which effects of a diagnosed model act, and which do not."""
+    idle = [one for one in found.idle if "conditions are those of one log" not in one]
+    acting = (*found.vessel, *found.conditions)
+    notes = tuple(StoredEffectNote(one.effect, one.instance, one.says(sha256)) for one in acting)
+    return {"effects": notes, "why": " ".join(idle)}
+
+
+def _score(
+    tau: Floats, base: Floats, found: Prediction | None, rows: Rows, base_run: FreeRun, known: Mapping[str, Any]
+) -> TransferScore:
+    """Return the errors of a method, none where it has no prediction; several reasons become one text."""
+    _, base_position_m, base_heading_rad = _free_run_errors(base_run)
+    if found is None:
+        ran, mse = TransferScore(dict.fromkeys(AXES)), dict[str, float | None](dict.fromkeys(AXES))
+    else:
+        ran = _free_run_score(found.free_run(rows))
+        ratio = force_scores(tau, base, found.tau, rows)["per_axis"]
+        mse = {axis: _number(ratio[axis]) for axis in AXES}
+    why = "; ".join(one for one in (known.get("why", ""), ran.why) if one)
+    return replace(
+        ran,
+        mse=mse,
+        base_position_m=base_position_m,
+        base_heading_rad=base_heading_rad,
+        **{**known, "why": why},
+    )
+
+
+def _base_score(tau: Floats, base: Prediction, rows: Rows, run: FreeRun) -> TransferScore:
+    error = force_scores(tau, base.tau, base.tau, rows)["mse"]["base"]
+    return replace(_free_run_score(run), mse={axis: _number(error[axis]) for axis in AXES})
+
+
+def _free_run_score(run: FreeRun) -> TransferScore:
+    """Return the errors of free runs at the horizon, and what became of the runs."""
+    why, position_m, heading_rad = _free_run_errors(run)
+    return TransferScore({}, position_m, heading_rad, run.starts, run.diverged, why=why)
+
+
+def _free_run_errors(run: FreeRun) -> tuple[str, float | None, float | None]:
+    """Return why there is no error at the horizon, and the errors of position and heading."""
+    at = int(np.argmin(np.abs(run.horizons_s - HORIZON_S)))
+    position, heading = _number(float(run.position_m[at])), _number(float(run.heading_rad[at]))
+    why = run.note
+    if not why and position is None:
+        why = f"no stretch of {HORIZON_S:g} s in which position was measured"
+    return why, position, heading
+
+
+def _number(value: float) -> float | None:
+    return float(value) if isfinite(value) else None

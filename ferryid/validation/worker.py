@@ -1,0 +1,130 @@
+"""The process that diagnoses: `python -m ferryid.validation.worker`, which is given logs and profiles and nothing else.
+
+It writes the hash of its sources as one JSON line on standard output, then reads requests as JSON lines on standard input and
+writes one JSON line for each. In its folder a log lies alone with the vessel's profile.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ferryid.diagnose import keep_to_one_thread
+from ferryid.errors import FerryIdError, UnwritableError, one_line
+from ferryid.validation.records import Diagnosis
+from ferryid.validation.source_hash import source_hash
+
+UNWRITABLE = "unwritable"
+"""Key of an answer that is no diagnosis: why what comes of it could not be written."""
+RIVALS = 2
+"""How many rivals of a finding are kept."""
+KEPT = ("effect", "instance", "probability", "parameters", "improvement", "unresolved_with")
+
+
+def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
+    """Return the diagnosis of one log; ``refused`` for one that cannot be used.
+
+    Parameters
+    ----------
+    log, profile
+        The log, and the TOML file of its vessel.
+    out
+        Folder for the model that comes of it.
+
+    Raises
+    ------
+    UnwritableError
+        Where the model could not be written.
+    """
+    from ferryid.diagnose import diagnose_and_store, to_json
+    from ferryid.vessel import load_profile
+
+    start = time.perf_counter()
+    try:
+        vessel = load_profile(profile)
+        (found,) = diagnose_and_store([str(log)], vessel, out, tables=None, progress=lambda stage: None)
+        seconds = time.perf_counter() - start
+        made = to_json(found)
+    except UnwritableError:
+        raise
+    except FerryIdError as error:
+        return Diagnosis("refused", time.perf_counter() - start, error=str(error))
+    return Diagnosis.from_json(
+        {name: made[name] for name in ("verdict", "notes", "before", "after")}
+        | {
+            "seconds": seconds,
+            "findings": [_finding(one) for one in made["findings"]],
+            "model": None if made["model"] is None else os.path.relpath(made["model"], out),
+        }
+    )
+
+
+def _finding(one: Mapping[str, Any]) -> dict[str, Any]:
+    where = one["where"]
+    return {
+        **{name: one[name] for name in KEPT},
+        "rivals": one["rivals"][:RIVALS],
+        "onset": where["onset"],
+        "offset": where["offset"],
+    }
+
+
+def main(diagnose: Callable[[Path, Path, Path], Diagnosis] = diagnose_log) -> None:
+    """Answer requests until standard input ends.
+
+    Parameters
+    ----------
+    diagnose
+        Diagnoses one log.
+    """
+    # An interrupt is for the process that asks, with which this one ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # What libraries print must not come between the answers.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    _answer(answers, {"sources": source_hash()})
+    keep_to_one_thread()
+    for line in iter(_requests(sys.stdin.buffer).get, b""):
+        request = json.loads(line)
+        log, profile, out = (Path(request[name]) for name in ("log", "profile", "out"))
+        start = time.perf_counter()
+        try:
+            answer = diagnose(log, profile, out).to_json()
+        except UnwritableError as error:
+            answer = {UNWRITABLE: str(error)}
+        except Exception as error:  # noqa: BLE001 - a bug that one log shows is reported in its line, and the others go on
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            bug = one_line(f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+            answer = Diagnosis("crashed", time.perf_counter() - start, error=bug).to_json()
+        _answer(answers, answer)
+
+
+def _answer(stream: BinaryIO, answer: Mapping[str, Any]) -> None:
+    stream.write(json.dumps(answer).encode() + b"\n")
+    stream.flush()
+
+
+def _requests(stream: BinaryIO) -> queue.SimpleQueue[bytes]:
+    """Return a queue of lines; the process ends at once, also in the middle of a diagnosis, when the one that asks is gone."""
+    lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+
+    def read() -> None:
+        for line in stream:
+            lines.put(line)
+        os._exit(0)
+
+    threading.Thread(target=read, daemon=True).start()
+    return lines
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,144 @@
+"""When an effect acts: the scan finds the span of a push that can be worked out, and searches find what ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit, starting_point
+from ferryid.diagnose.inference.folds import block_s
+from ferryid.diagnose.inference.onset_estimation import brief, lasts_s, linearise, part_s, promising_spans, refine_span
+from ferryid.diagnose.inference.search import list_candidates, search
+from ferryid.diagnose.inference.weak_form import windows
+from ferryid.diagnose.judging.rivals import compare_rivals
+from tests.diagnose.inference.test_estimation import PUSH, problem
+from tests.diagnose.trials import sailed, trial_on
+
+TWELVE = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "twelve-corner" }
+controller = { delta = 0.7, sigma = 0.7 }
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+"""
+
+
+def pushed(force: float, first_s: float, last_s: float) -> EstimationProblem:
+    """The trial of a vessel at rest that a force was said to push, but for some time only."""
+    case = problem(force)
+    t = case.plain.scene.t
+    missing = (t < first_s) | (t >= last_s)
+    away = case.plain.external + np.array([force, 0.0, 0.0]) * missing[:, None]
+    # What is not there pushes the other way in the picture: measured and pictured differ within the span only.
+    return replace(case, plain=replace(case.plain, external=away))
+
+
+@pytest.mark.parametrize(("first_s", "last_s"), [(0.0, inf), (100.0, inf), (0.0, 180.0), (90.0, 170.0)])
+def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: float) -> None:
+    case = pushed(240.0, first_s, last_s)
+    bare = fit(case, ())
+    begin = starting_point(case, bare)
+    whole = fit(case, [PUSH]).evidence
+    spans = promising_spans(case, linearise(case, bare, begin), PUSH)
+    gains = [fit(case, [one]).evidence - whole for one in spans]
+    if (first_s, last_s) == (0.0, inf):
+        assert max(gains, default=-1.0) < 0.0
+        return
+    best, wide = spans[0], part_s(case, PUSH)
+    assert gains[0] == max(gains)
+    assert gains[0] > 0.0
+    assert best.onset_s == pytest.approx(first_s, abs=wide)
+    assert best.offset_s == pytest.approx(last_s, abs=wide)
+    sharp = refine_span(case, fit(case, [best]), 0, begin, 0.5 * wide).candidates[0]
+    # It is some ten times as strong as what else pushes, which forgets itself in 8 s.
+    assert sharp.onset_s == pytest.approx(first_s, abs=2.0)
+    assert sharp.offset_s == pytest.approx(last_s, abs=2.0)
+
+
+def test_what_lasts_less_than_two_blocks_is_brief() -> None:
+    case = problem(0.0)
+    two_s = 2.0 * block_s(case.windows)
+    assert two_s == pytest.approx(80.0)
+    assert brief(case, replace(PUSH, onset_s=100.0, offset_s=97.0 + two_s))
+    assert not brief(case, replace(PUSH, onset_s=100.0, offset_s=103.0 + two_s))
+    assert not brief(case, PUSH)
+    # It has no rivals: no name could be judged there.
+    made = fit(case, [replace(PUSH, onset_s=100.0, offset_s=130.0)])
+    assert compare_rivals(case, made, 0, [PUSH]).rivals == ()
+
+
+def test_where_nothing_pushes_no_span_is_promising() -> None:
+    case = problem(0.0)
+    bare = fit(case, ())
+    assert promising_spans(case, linearise(case, bare, starting_point(case, bare)), PUSH) == []
+
+
+def test_the_gain_of_a_span_is_that_of_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+
+    def spy(gains: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+        def told(G: np.ndarray, g: np.ndarray, a: np.ndarray, b: np.ndarray, candidate: Candidate) -> np.ndarray:
+            found = gains(G, g, a, b, candidate)
+            seen.append((a, b, found.copy()))
+            return found
+
+        return told
+
+    from ferryid.diagnose.inference import onset_estimation as module
+
+    monkeypatch.setattr(module, "_gains", spy(module._gains))
+    case = pushed(20.0, 90.0, 170.0)
+    bare = fit(case, ())
+    promising_spans(case, linearise(case, bare, starting_point(case, bare)), PUSH)
+    a, b, gains = seen[0]
+    edges = module._edges(case, PUSH)
+    for k in range(0, len(a), 29):
+        span = replace(PUSH, onset_s=edges[a[k]] if a[k] else 0.0, offset_s=edges[b[k]] if b[k] < b.max() else inf)
+        # The push is linear, so that the two differ by the step that an edge lies in alone.
+        exact = fit(case, [span]).evidence - bare.evidence + len(span.times) * np.log(len(case.windows.starts))
+        assert gains[k] == pytest.approx(exact, abs=0.1 + 0.15 * abs(exact))
+
+
+def test_in_a_gap_nothing_begins_or_ends() -> None:
+    case = problem(0.0)
+    t = case.plain.scene.t
+    seen = windows(replace(case.plain.scene, usable=(t < 100.0) | (t >= 200.0)), 8.0, 2.0)
+    # At rest in the log, pushed back in the picture.
+    pushed_back = np.outer((t >= 60.0) & (t < 240.0), [-240.0, 0.0, 0.0])
+    gappy = replace(case, windows=seen, plain=replace(case.plain, scene=seen.scene, external=pushed_back))
+    bare = fit(gappy, ())
+    spans = promising_spans(gappy, linearise(gappy, bare, starting_point(gappy, bare)), PUSH)
+    assert spans
+    assert (spans[0].onset_s, spans[0].offset_s) == (pytest.approx(60.0, abs=10.0), pytest.approx(240.0, abs=10.0))
+    # Of the 180 s of the push 100 s are missing, and half a window at each side of the gap.
+    assert lasts_s(gappy, replace(PUSH, onset_s=60.0, offset_s=240.0)) == pytest.approx(80.0, abs=9.0)
+    ends = [end for one in spans for end in (one.onset_s, one.offset_s)]
+    assert not [end for end in ends if 101.0 < end < 199.0]
+
+
+def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None:
+    load = "[[payload]]\nmass_kg = 300\nx_m = 0.6\nuntil_s = 400\n"
+    case = trial_on(sailed(tmp_path, "leaves", TWELVE + load, 5))
+    known = [one for one in list_candidates(case.plain.scene)[0] if one.effect.onset]
+    found = search(case, lambda stage: None, known=known).fit
+    assert [one.key for one in found.candidates] == [("payload", None)]
+    (one,) = found.candidates
+    assert one.onset_s == 0.0
+    assert one.offset_s == pytest.approx(400.0, abs=5.0)
+    assert found.values[0] == pytest.approx([300.0, 0.6], rel=0.1)
+
+
+def test_a_fault_that_passes_is_found_with_both_its_ends(tmp_path: Path) -> None:
+    fault = '[[thrusters.faults]]\nthruster = "thruster2"\nfactor = 0.55\nfrom_s = 260\nuntil_s = 400\n'
+    case = trial_on(sailed(tmp_path, "passes", TWELVE + fault, 6))
+    known = [one for one in list_candidates(case.plain.scene)[0] if one.effect.onset]
+    found = search(case, lambda stage: None, known=known).fit
+    assert [one.key for one in found.candidates] == [("thruster_gain", "thruster2")]
+    (one,) = found.candidates
+    assert (one.onset_s, one.offset_s) == (pytest.approx(260.0, abs=5.0), pytest.approx(400.0, abs=5.0))
+    assert found.values[0] == pytest.approx([0.55], abs=0.03)

@@ -1,0 +1,101 @@
+"""Selection and judgement on a log in which one thruster's gain and a loss by inflow together look like the other's gain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, starting_point
+from ferryid.diagnose.inference.search import list_candidates, search
+from ferryid.diagnose.judging.backward_elimination import LAW, PLACEBO, _fallen, _told, eliminate_backward
+from tests.diagnose.trials import sailed, trial_on
+
+TRIAL = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "twelve-corner" }
+controller = { delta = 0.7, sigma = 0.7 }
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+thrusters = { inflow_loss_per_mps = 0.25, faults = [{ thruster = "thruster1", factor = 1.26 }] }
+"""
+
+
+@pytest.fixture(scope="module")
+def problem(tmp_path_factory: pytest.TempPathFactory) -> EstimationProblem:
+    return trial_on(sailed(tmp_path_factory.mktemp("both"), "both", TRIAL, 8))
+
+
+def candidates(problem: EstimationProblem) -> list[Candidate]:
+    return [one for one in list_candidates(problem.plain.scene)[0] if one.effect.unsteady is None]
+
+
+def of(problem: EstimationProblem, *keys: tuple[str, str | None]) -> list[Candidate]:
+    return [next(one for one in candidates(problem) if one.key == key) for key in keys]
+
+
+LOSS, FIRST, SECOND = ("thrust_inflow_loss", None), ("thruster_gain", "thruster1"), ("thruster_gain", "thruster2")
+
+
+def test_a_fit_ends_at_the_same_place_wherever_it_begins(problem: EstimationProblem) -> None:
+    rough = fit(problem, of(problem, LOSS, FIRST))
+    # Under the little noise that is left the profile's hull is far away, in standard deviations.
+    sharp = problem.with_noise_of(rough)
+    afar = fit(sharp, rough.candidates)
+    close = fit(sharp, rough.candidates, rough.values, begin=starting_point(sharp, rough))
+    assert afar.evidence == pytest.approx(close.evidence, abs=0.5)
+    for one, other, errors in zip(afar.values, close.values, (afar.errors(0), afar.errors(1)), strict=True):
+        assert np.all(np.abs(one - other) < 0.05 * errors)
+
+
+def test_both_are_found_though_the_other_thrusters_gain_is_likelier_alone(problem: EstimationProblem) -> None:
+    alone = {key: fit(problem, of(problem, key)).evidence for key in (LOSS, FIRST, SECOND)}
+    assert max(alone, key=lambda key: alone[key]) == SECOND
+    found = search(problem, lambda stage: None)
+    assert found.rounds[0].ranked[0].candidate.key == SECOND
+    kept = eliminate_backward(found.problem, found.fit, candidates(problem), lambda stage: None).fit
+    values = dict(zip([one.key for one in kept.candidates], kept.values, strict=True))
+    assert set(values) == {LOSS, FIRST}
+    assert values[LOSS][0] == pytest.approx(0.25, rel=0.1)
+    assert values[FIRST][0] == pytest.approx(1.26, rel=0.02)
+
+
+def test_a_likelier_rival_takes_the_place_of_what_was_selected_first(problem: EstimationProblem) -> None:
+    wrong = fit(problem, of(problem, LOSS, SECOND))
+    told = eliminate_backward(problem.with_noise_of(wrong), wrong, candidates(problem), lambda stage: None)
+    assert {one.key for one in told.fit.candidates} == {LOSS, FIRST}
+    assert all(one.probability > 0.99 for one in told.standings)
+    assert all(one.gain < 0.0 for standing in told.standings for one in standing.rivals)
+
+
+def test_what_helps_no_held_out_stretch_falls_and_is_told(problem: EstimationProblem) -> None:
+    right = fit(problem, of(problem, LOSS, FIRST))
+    idle = of(problem, ("wind", None))
+    breeze = Fit(
+        (*right.candidates, *idle),
+        (*right.values, np.array([0.2, 0.1, 1.0, 1.0, 1.0])),
+        np.eye(7),
+        right.hull,
+        right.evidence,
+    )
+    told = eliminate_backward(problem.with_noise_of(right), breeze, [], lambda stage: None)
+    assert {one.key for one in told.fit.candidates} == {LOSS, FIRST}
+    (sentence,) = told.told
+    assert sentence == f"{idle[0].effect.title} was suspected, but dropped: {PLACEBO}."
+
+
+def test_what_fell_for_one_reason_is_one_sentence() -> None:
+    assert _told({LAW: ["Wind", "Current", "Wind"], PLACEBO: ["Payload"]}) == (
+        f"Wind and Current were suspected, but dropped: {LAW}.",
+        f"Payload was suspected, but dropped: {PLACEBO}.",
+    )
+
+
+def test_what_is_too_small_to_matter_falls_without_a_word(problem: EstimationProblem) -> None:
+    """A loss of 0.25 that is judged by somebody to whom one of less than 1 does not matter."""
+    loss, first = of(problem, LOSS, FIRST)
+    careless = replace(loss, effect=replace(loss.effect, idle=1.0))
+    for one, falls in ((loss, (None, "")), (careless, (0, ""))):
+        both = fit(problem, [one, first])
+        assert _fallen(problem.with_noise_of(both), both, None) == falls

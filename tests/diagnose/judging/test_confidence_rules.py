@@ -1,0 +1,298 @@
+"""The confidence rules, one by one: what each lowers or drops, what it leaves alone, and on which side of its threshold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, nextafter
+
+import pytest
+
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.claims import Claim, Figures, Kind, LogFigures, OtherLogs
+from ferryid.diagnose.judging.confidence_rules import (
+    RULES,
+    STRONG,
+    ConfidenceRule,
+    Context,
+    about_nothing_sure,
+    absent_in_other_logs,
+    absent_in_velocities,
+    apply_rules,
+    hull_from_this_log,
+    improves_no_claimed_axis,
+    in_baseline,
+    law_of_one_log,
+    less_than_is_unexplained,
+    log_notes,
+    noise_drowns_an_axis,
+    nothing_estimated,
+    out_of_step_beside_disturbance,
+    passes_by_little,
+    place_visited_once,
+    removes_little,
+    too_brief,
+    unexplained_shares,
+    worse_on_an_axis,
+)
+from ferryid.diagnose.judging.finding import HINT, UNKNOWN, Finding, LawTerm
+from tests.diagnose.judging.findings import found
+
+
+def stands(rule: ConfidenceRule, finding: Finding, context: Context) -> bool:
+    """Return whether a finding is sure by a rule; with a note, which names it, only where it is not."""
+    judged, note = rule(finding, context)
+    assert judged is not None
+    if judged.sure:
+        assert (judged, note) == (finding, "")
+    else:
+        assert judged.probability == HINT
+    return judged.sure
+
+
+def on(kind: Kind, **figures: object) -> Context:
+    return Context(Figures(kind, **figures))  # type: ignore[arg-type]
+
+
+def test_every_rule_has_a_name_a_line_and_its_unit() -> None:
+    names = [one.name for one in RULES]
+    assert len(names) == len(set(names)) == 16
+    for one in RULES:
+        assert one.about.endswith((".", ":", ",")) or one.about, one.name
+        assert (one.threshold is None) == (one.unit == ""), one.name
+
+
+def test_a_sensor_error_that_the_simulation_has_as_well_is_no_difference() -> None:
+    offset = replace(found("clock_offset"), parameters={"seconds": Estimate(0.3, 0.25, 0.35, "s")})
+    for low, high, dropped in ((0.3, 0.4, True), (0.36, 0.4, False)):
+        log = LogFigures(baseline_sensors={"clock_offset": {"seconds": Estimate(high, low, high, "s")}})
+        assert (in_baseline(offset, Context(Figures("sensor"), log))[0] is None) == dropped
+    other = LogFigures(baseline_sensors={"lever_arm": offset.parameters})
+    assert in_baseline(offset, Context(Figures("sensor"), other)) == (offset, "")
+
+
+def test_a_force_without_a_parameter_that_is_known_is_dropped() -> None:
+    bare = replace(found("hull_parameters"), parameters={})
+    assert nothing_estimated(bare, on("force")) == (None, "")
+    assert nothing_estimated(found("wind"), on("force"))[0] is not None
+    # What has no name has no parameters.
+    assert nothing_estimated(replace(bare, effect=UNKNOWN), on("law"))[0] is not None
+
+
+def test_a_law_that_one_log_of_a_campaign_shows_is_a_hint() -> None:
+    law = replace(found(UNKNOWN), parameters={})
+    assert law_of_one_log(law, on("law")) == (law, "")
+    for others, told in (
+        (OtherLogs(2, 2, 0), "Of 2 other logs 2 could show it at this size, and none does."),
+        (OtherLogs(2, 2, 1), "Of 2 other logs 2 could show it at this size, and 1 does."),
+        (OtherLogs(1, 0, 0), "Of 1 other log none could show it at this size."),
+    ):
+        judged, note = law_of_one_log(law, on("law", other_logs=others))
+        assert judged is not None
+        assert (judged.probability, judged.says, note) == (HINT, f"It is there. {told}", "")
+
+
+def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
+    least = 0.3
+    assert stands(absent_in_velocities, found("waves"), on("disturbance", power_in_velocities=least))
+    judged, _ = absent_in_velocities(found("waves"), on("disturbance", power_in_velocities=nextafter(least, 0.0)))
+    assert judged is not None
+    assert not judged.sure
+    assert judged.says == "It is there. The velocities do not show it: it may be an error of the positions."
+
+
+@pytest.mark.parametrize(
+    ("sway", "force", "run", "score", "sure"),
+    [
+        (0.5, 0.1, -0.1, 20.0, True),
+        (0.5, -0.1, 0.1, 20.0, True),
+        (0.4, 0.1, -0.1, 20.0, True),
+        (0.5, -0.1, -inf, 20.0, False),
+        (0.3, 0.1, 0.1, 20.0, False),
+        (0.3, 0.1, 0.1, STRONG, False),
+        (0.3, 0.1, 0.1, nextafter(STRONG, inf), True),
+    ],
+)
+def test_only_an_axis_that_is_claimed_shows_an_improvement(
+    sway: float, force: float, run: float, score: float, sure: bool
+) -> None:
+    one = replace(found("wind"), axes={"surge": 0.0, "sway": sway, "yaw": 1.0 - sway})
+    low = {"surge": 0.5, "sway": force, "yaw": -0.1}
+    figures = Figures("force", score, low, {"surge": 0.5, "sway": run, "yaw": -0.1})
+    assert stands(improves_no_claimed_axis, one, Context(figures)) == sure
+
+
+def test_what_nothing_was_held_out_for_is_not_asked_to_improve() -> None:
+    assert stands(improves_no_claimed_axis, found("wind"), on("force"))
+
+
+def test_what_acts_for_less_than_two_blocks_is_a_hint() -> None:
+    assert stands(too_brief, found("wind"), on("force", lasts_s=80.0, block_s=40.0))
+    assert not stands(too_brief, found("wind"), on("force", lasts_s=79.0, block_s=40.0))
+    assert stands(too_brief, found("wind"), on("force", block_s=40.0))
+    assert too_brief(found("wind"), on("force", lasts_s=30.0, block_s=40.0))[1] == (
+        "Steady wind is a hint: it acts for 30 s, and held-out data judge nothing below 80 s."
+    )
+
+
+def test_what_acts_in_a_place_that_was_visited_once_is_a_hint() -> None:
+    assert stands(place_visited_once, found("mooring"), on("force"))
+    assert not stands(place_visited_once, found("mooring"), on("force", once=True))
+
+
+def test_what_comes_and_goes_by_little_is_a_hint() -> None:
+    assert stands(passes_by_little, found("wind"), on("force", passes=1.0))
+    assert not stands(passes_by_little, found("wind"), on("force", passes=0.99))
+    # What is too brief as well has one reason.
+    assert stands(passes_by_little, found("wind"), on("force", passes=0.5, lasts_s=30.0, block_s=40.0))
+
+
+def test_what_makes_an_axis_worse_is_a_hint_and_the_axis_is_named() -> None:
+    for removed, improvement, sure in (
+        ({"surge": 0.6, "yaw": -0.2}, {"surge": 0.6, "yaw": -0.2}, True),
+        ({"surge": 0.6, "yaw": -0.25}, {"surge": 0.6, "yaw": -0.1}, False),
+        # Over the whole log, too, as its own figures say it.
+        ({"surge": 0.6, "yaw": 0.1}, {"surge": 0.6, "yaw": -0.25}, False),
+    ):
+        assert stands(worse_on_an_axis, found("wind", **improvement), on("force", removed=removed)) == sure
+    _, note = worse_on_an_axis(found("wind"), on("force", removed={"surge": 0.6, "yaw": -3.33}))
+    assert note == "Steady wind is a hint: it makes the held-out squared force error in yaw 333 % larger."
+    assert stands(worse_on_an_axis, found(UNKNOWN, yaw=-0.5), on("law"))
+
+
+def test_what_removes_hardly_anything_of_the_error_is_a_hint() -> None:
+    assert stands(removes_little, found("wind"), on("force", removed={"surge": -0.2, "sway": 0.1}))
+    assert not stands(removes_little, found("wind"), on("force", removed={"surge": -0.2, "sway": 0.09}))
+    # Gusts are states of the filter, and remove nothing of the error.
+    assert stands(removes_little, found("gusts"), on("disturbance"))
+    assert removes_little(found("thruster_gain"), on("force", removed={"yaw": 0.01}))[1] == (
+        "Thruster force (thruster1) is a hint: on no axis does it remove 10 % of the held-out squared force error while it "
+        "acts."
+    )
+
+
+def term() -> LawTerm:
+    return LawTerm("sway", "v", Estimate(1.0, 0.5, 1.5, "kg/s"), "")
+
+
+def beside(kind: Kind, left: Finding, removed: dict[str, float], *, joint: bool = False) -> Context:
+    return Context(Figures("force", removed=removed), LogFigures(joint=joint), (Claim(left, Figures(kind)),))
+
+
+def test_what_explains_less_than_is_left_without_a_name_is_a_hint() -> None:
+    nameless, law = found(UNKNOWN), replace(found(UNKNOWN, surge=-0.1, sway=0.0, yaw=0.2), law=(term(),))
+    # Of an error of one, 0.5 is removed and all of the rest nameless: as much.
+    for removed, sure in (({"sway": 0.5}, True), ({"sway": 0.49}, False)):
+        assert stands(less_than_is_unexplained, found("wind"), beside("unsteady", nameless, removed)) == sure
+    # A law holds what it removes, and is no stand-in where it does not act.
+    for removed, sure in (({"sway": 0.0, "yaw": 0.17}, True), ({"yaw": 0.16}, False), ({"surge": 0.0}, True)):
+        assert stands(less_than_is_unexplained, found("wind"), beside("law", law, removed)) == sure
+    # In a campaign there may be more than its law.
+    assert not stands(less_than_is_unexplained, found("wind"), beside("law", law, {"yaw": 0.17}, joint=True))
+
+
+def test_bursts_hints_and_what_is_fast_stand_in_for_nothing() -> None:
+    nameless = found(UNKNOWN)
+    for kind, left in (
+        ("bursts", nameless),
+        ("unsteady", replace(nameless, probability=HINT)),
+        ("unsteady", replace(nameless, band_hz=(0.2, 0.4))),
+    ):
+        assert unexplained_shares(beside(kind, left, {})) == {}  # type: ignore[arg-type]
+    slow = beside("unsteady", replace(nameless, band_hz=(0.1, 0.4)), {})
+    assert unexplained_shares(slow) == {"surge": 1.0, "sway": 1.0, "yaw": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("kind", "known", "joint", "sure"),
+    [
+        ("force", True, False, True),
+        ("force", False, False, False),
+        ("force", False, True, True),
+        ("disturbance", False, False, False),
+        ("disturbance", False, True, False),
+        ("disturbance", True, True, True),
+        ("sensor", False, False, True),
+    ],
+)
+def test_a_force_is_a_hint_where_only_the_log_itself_tells_of_the_hull(
+    kind: Kind, known: bool, joint: bool, sure: bool
+) -> None:
+    figures = LogFigures(hull_known=known, joint=joint)
+    assert stands(hull_from_this_log, found("wind"), Context(Figures(kind), figures)) == sure
+    judged, _ = hull_from_this_log(found("wind", 0.2), Context(Figures("force"), LogFigures(hull_known=False)))
+    assert judged is not None
+    assert judged.probability == 0.2
+    assert judged.unresolved_with == ("current", "hull_parameters")
+    assert "to fit a hull model first" in str(judged.separating_manoeuvre)
+    assert bool(log_notes(figures)) == (not known and not joint)
+
+
+def test_gusts_about_a_wind_that_is_not_sure_are_a_hint() -> None:
+    def context(*beside: Finding) -> Context:
+        return Context(Figures("disturbance"), beside=tuple(Claim(one, Figures("force")) for one in beside))
+
+    assert stands(about_nothing_sure, found("gusts"), context(found("wind")))
+    assert not stands(about_nothing_sure, found("gusts"), context(found("wind", 0.4)))
+    assert not stands(about_nothing_sure, found("gusts"), context())
+    assert stands(about_nothing_sure, found("waves"), context())
+    assert "steady wind" in about_nothing_sure(found("gusts"), context())[1]
+
+
+@pytest.mark.parametrize("kind", ["force", "disturbance", "law", "unsteady", "bursts", "sensor"])
+def test_where_noise_drowns_an_axis_all_but_sensor_errors_are_hints(kind: Kind) -> None:
+    for share, drowned in ((0.15, False), (nextafter(0.15, 1.0), True)):
+        figures = LogFigures(velocity_noise={"surge": 0.0, "sway": share})
+        sure = stands(noise_drowns_an_axis, found("wind"), Context(Figures(kind), figures))
+        assert sure == (not drowned or kind == "sensor")
+        assert bool(log_notes(figures)) == drowned
+
+
+@pytest.mark.parametrize(("effect", "sure"), [("thruster_lag", False), ("time_delay", False), ("payload", True)])
+def test_what_a_controllers_answer_looks_like_is_a_hint_beside_gusts(effect: str, sure: bool) -> None:
+    def context(yaw: float | None, *, unsteady: bool = True) -> Context:
+        removed = {} if yaw is None else {"surge": 0.1, "yaw": yaw}
+        return Context(Figures("force", removed=removed), LogFigures(unsteady=unsteady))
+
+    for little in (0.49, None):
+        assert stands(out_of_step_beside_disturbance, found(effect), context(little)) == sure
+    judged, _ = out_of_step_beside_disturbance(found(effect), context(0.3))
+    assert judged is not None
+    assert ("gusts" in judged.unresolved_with) != sure
+    assert stands(out_of_step_beside_disturbance, found(effect), context(0.5))
+    assert stands(out_of_step_beside_disturbance, found(effect), context(0.3, unsteady=False))
+
+
+@pytest.mark.parametrize(
+    ("showing", "logs", "sure"), [(1, 4, False), (2, 4, True), (1, 3, False), (1, 2, True), (1, 1, True)]
+)
+def test_a_property_of_the_vessel_that_few_logs_show_is_a_hint(showing: int, logs: int, sure: bool) -> None:
+    loss = found("thrust_inflow_loss")
+    shown = (frozenset({loss.key}),) * showing + (frozenset[tuple[str, str | None]](),) * (logs - showing)
+    context = Context(Figures("force"), LogFigures(campaign=shown))
+    assert stands(absent_in_other_logs, loss, context) == sure
+    # A condition is a log's own, and what begins in a log is an event of it.
+    assert stands(absent_in_other_logs, found("wind"), context)
+    assert stands(absent_in_other_logs, replace(found("thruster_gain"), onset_s=30.0), context)
+
+
+def test_a_rule_sees_the_findings_as_those_before_it_left_them() -> None:
+    wind, gusts = (
+        Claim(found("wind"), Figures("force", removed={"sway": 0.6})),
+        Claim(found("gusts"), Figures("disturbance")),
+    )
+    assert [one.sure for one in apply_rules([gusts, wind], LogFigures())[0]] == [True, True]
+    faint = replace(wind, figures=Figures("force", removed={"sway": 0.05}))
+    findings, notes = apply_rules([gusts, faint], LogFigures())
+    assert [(one.effect, one.sure) for one in findings] == [("gusts", False), ("wind", False)]
+    assert [note.partition(" is a hint")[0] for note in notes] == ["Steady wind", "Gusts"]
+
+
+def test_no_rule_raises_a_probability_and_dropped_findings_are_gone() -> None:
+    for probability in (0.0, 0.3, HINT, 0.7, 1.0):
+        claims = [
+            Claim(found("wind", probability), Figures("force", once=True)),
+            Claim(replace(found("hull_parameters", probability), parameters={}), Figures("force")),
+        ]
+        (only,), _ = apply_rules(claims, LogFigures(hull_known=False, velocity_noise={"yaw": 1.0}))
+        assert only.effect == "wind"
+        assert only.probability == min(probability, HINT)

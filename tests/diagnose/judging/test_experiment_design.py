@@ -1,0 +1,50 @@
+"""What to record next: every pair that is told apart is of effects that exist, once, and either way round."""
+
+from __future__ import annotations
+
+from itertools import combinations, combinations_with_replacement
+
+import pytest
+
+from ferryid.diagnose.judging.experiment_design import OTHERWISE, PAIRS, SHOWS, manoeuvre
+from ferryid.effects import effects
+
+RELATED = ("fouling", "hull_parameters", "shallow_water", "payload", "thruster_gain")
+"""Effects that explain more or less of the same: those of mass, damping and strength."""
+
+
+def test_pairs_are_of_known_effects_and_stand_once() -> None:
+    known = {*effects(), "gusts", "waves"}
+    pairs = [pair for pair, _ in PAIRS]
+    assert len(set(pairs)) == len(pairs)
+    assert set().union(*pairs) <= known
+
+
+@pytest.mark.parametrize(("one", "other"), list(combinations(RELATED, 2)))
+def test_related_effects_have_a_manoeuvre_of_their_own(one: str, other: str) -> None:
+    text = manoeuvre(one, [other])
+    assert text is not None
+    assert frozenset({one, other}) in dict(PAIRS)
+    assert manoeuvre(other, [one]) == text
+
+
+def test_nothing_to_tell_apart_needs_no_manoeuvre() -> None:
+    assert manoeuvre("wind", []) is None
+
+
+@pytest.mark.parametrize(("one", "other"), list(combinations_with_replacement(sorted(effects()), 2)))
+def test_every_pair_has_a_manoeuvre_that_names_what_to_do(one: str, other: str) -> None:
+    """A pair that nobody thought of is told apart by what shows the one and what shows the other."""
+    text = manoeuvre(one, [other])
+    assert text
+    assert text == dict(PAIRS).get(frozenset({one, other})) or SHOWS.get(one, SHOWS.get(other, OTHERWISE)) in text
+
+
+def test_a_pair_without_its_own_is_told_apart_by_what_shows_each() -> None:
+    assert manoeuvre("payload", ["azimuth_resolution"]) == f"{SHOWS['payload']}; {SHOWS['azimuth_resolution']}"
+
+
+def test_several_rivals_are_all_told_apart() -> None:
+    text = manoeuvre("wind", ["current", "mooring"]) or ""
+    pairs = dict(PAIRS)
+    assert text == f"{pairs[frozenset({'wind', 'current'})]}; {pairs[frozenset({'wind', 'mooring'})]}"

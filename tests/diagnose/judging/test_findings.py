@@ -1,0 +1,158 @@
+"""What was measured of findings of forces, and which of it makes them hints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.data.estimate import AXES
+from ferryid.diagnose.inference.estimation import EstimationProblem, fit
+from ferryid.diagnose.judging.backward_elimination import Elimination
+from ferryid.diagnose.judging.claims import LogFigures
+from ferryid.diagnose.judging.confidence_rules import Context, apply_rules, improves_no_claimed_axis
+from ferryid.diagnose.judging.finding import HINT, Finding
+from ferryid.diagnose.judging.findings import force_claims
+from ferryid.diagnose.judging.held_out import held_out_evidence
+from ferryid.diagnose.judging.rivals import RivalComparison
+from ferryid.effects import effects
+from tests.diagnose.judging.test_held_out import WIND, candidate, sailed, trial_on
+
+
+@pytest.fixture(scope="module")
+def windy() -> tuple[EstimationProblem, Elimination]:
+    problem = trial_on(sailed(480.0, WIND))
+    found = fit(problem, [candidate("wind")])
+    problem = problem.with_noise_of(found)
+    return problem, Elimination(found, held_out_evidence(problem, found), (RivalComparison((), 0.999),), ())
+
+
+def with_lows(stands: Elimination, forces: list[float], runs: list[float], score: float = 20.0) -> Elimination:
+    """Return the same with another score and lower ends: of force by axis, and of position, heading, speed and yaw rate."""
+    assert stands.proof is not None
+    (proof,) = stands.proof.proofs
+    low = np.broadcast_to(runs, proof.free_runs.low.shape)
+    other = replace(
+        proof,
+        improvement=replace(proof.improvement, low=np.array(forces), score=score),
+        free_runs=replace(proof.free_runs, low=low),
+    )
+    return replace(stands, proof=replace(stands.proof, proofs=(other,)))
+
+
+def judged_by_rules(problem: EstimationProblem, stands: Elimination) -> tuple[Finding, tuple[str, ...]]:
+    (finding,), notes = apply_rules(force_claims(problem, stands, problem.windows.scene), LogFigures())
+    return finding, notes
+
+
+def test_a_wind_that_blew_is_told_for_sure(windy: tuple[EstimationProblem, Elimination]) -> None:
+    finding, notes = judged_by_rules(*windy)
+    assert finding.sure
+    assert notes == ()
+
+
+def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    finding, (note,) = judged_by_rules(problem, with_lows(stands, [-0.1] * 3, [np.nan, -0.1, -0.1, -0.1]))
+    assert finding.probability == HINT
+    assert note == (
+        "Steady wind is a hint: on the axes that it claims, neither the held-out squared force error nor the free run "
+        "improves by an interval that excludes zero."
+    )
+
+
+def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    (blown,) = stands.fit.candidates
+    brief = replace(blown, effect=replace(blown.effect, once=lambda scene, p: True))
+    finding, (note,) = judged_by_rules(problem, replace(stands, fit=replace(stands.fit, candidates=(brief,))))
+    assert finding.probability == HINT
+    assert "the vessel was in that place once" in note
+
+
+def test_what_acts_for_less_than_two_blocks_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    (blown,) = stands.fit.candidates
+    for offset_s, sure in ((150.0, False), (300.0, True)):
+        brief = replace(blown, onset_s=100.0, offset_s=offset_s)
+        finding, notes = judged_by_rules(problem, replace(stands, fit=replace(stands.fit, candidates=(brief,))))
+        assert finding.sure == sure
+        assert any("held-out data judge nothing below 80 s" in note for note in notes) != sure
+
+
+@pytest.mark.parametrize(
+    ("onset_s", "offset_s", "passing", "sure"),
+    [(100.0, 300.0, 4.0, False), (100.0, 300.0, 1.0, True), (100.0, inf, 4.0, True), (0.0, inf, 4.0, True)],
+)
+def test_what_comes_and_goes_by_little_is_a_hint(
+    windy: tuple[EstimationProblem, Elimination], onset_s: float, offset_s: float, passing: float, sure: bool
+) -> None:
+    """A wind of 2.5 m/s northwards, where 4 m/s or 1 m/s are little."""
+    problem, stands = windy
+    (blown,) = stands.fit.candidates
+    candidate = replace(
+        blown, effect=replace(blown.effect, passing=passing, onset=True), onset_s=onset_s, offset_s=offset_s
+    )
+    made = replace(stands.fit, candidates=(candidate,), values=(np.array([2.5, 0.0, 1.0, 1.0, 1.0]),))
+    finding, notes = judged_by_rules(problem, replace(stands, fit=made))
+    assert finding.sure == sure
+    assert any("by less than hull and formulas may be off" in note for note in notes) != sure
+
+
+@pytest.mark.parametrize(("grown", "sure"), [(1.2, False), (1.05, True)])
+def test_what_makes_an_axis_worse_is_a_hint(
+    windy: tuple[EstimationProblem, Elimination], grown: float, sure: bool
+) -> None:
+    """By 44 and by 10 % of the squared error in yaw, whatever it improves elsewhere."""
+    problem, stands = windy
+    assert stands.proof is not None
+    (proof,) = stands.proof.proofs
+    after = proof.improvement.after.copy()
+    after[:, 2] = grown * proof.improvement.before[:, 2]
+    other = replace(proof, improvement=replace(proof.improvement, after=after))
+    finding, notes = judged_by_rules(problem, replace(stands, proof=replace(stands.proof, proofs=(other,))))
+    assert finding.sure == sure
+    assert notes == (
+        () if sure else ("Steady wind is a hint: it makes the held-out squared force error in yaw 44 % larger.",)
+    )
+
+
+@pytest.mark.parametrize(
+    ("shares", "forces", "runs", "shows"),
+    [
+        ([0.0, 0.1, 0.9], [0.1, 0.1, -0.2], [0.1, -0.1, 0.1, -0.1], False),
+        ([0.0, 0.1, 0.9], [-0.1, -0.1, 0.02], [-0.1, -0.1, -0.1, -0.1], True),
+        ([0.0, 0.1, 0.9], [-0.1, -0.1, -0.2], [-0.1, -0.1, -0.1, 0.01], True),
+        ([0.0, 0.6, 0.4], [-0.1, 0.05, -0.2], [-0.1, -0.1, -0.1, -0.1], True),
+        ([0.9, 0.1, 0.0], [-0.1, -0.1, -0.2], [-0.1, -0.1, 0.01, -0.1], True),
+        ([0.9, 0.1, 0.0], [-0.1, 0.2, 0.2], [-0.1, 0.1, -0.1, 0.1], False),
+        ([0.0, 0.0, 0.0], [-0.1, -0.1, 0.2], [-0.1, -0.1, -0.1, -0.1], True),
+    ],
+)
+def test_only_an_axis_that_is_claimed_shows_a_finding(
+    windy: tuple[EstimationProblem, Elimination],
+    shares: list[float],
+    forces: list[float],
+    runs: list[float],
+    shows: bool,
+) -> None:
+    problem, stands = windy
+    (claim,) = force_claims(problem, with_lows(stands, forces, runs), problem.windows.scene)
+    finding = replace(claim.finding, axes=dict(zip(AXES, shares, strict=True)))
+    judged, _ = improves_no_claimed_axis(finding, Context(claim.figures))
+    assert judged is not None
+    assert judged.sure is shows
+
+
+def test_a_strong_likelihood_needs_no_more(windy: tuple[EstimationProblem, Elimination]) -> None:
+    problem, stands = windy
+    (claim,) = force_claims(problem, with_lows(stands, [-0.1] * 3, [-0.1] * 4, score=45.0), problem.windows.scene)
+    assert improves_no_claimed_axis(claim.finding, Context(claim.figures)) == (claim.finding, "")
+
+
+def test_a_motion_before_its_force_is_a_clocks() -> None:
+    says = effects()["time_delay"].says
+    assert says({"seconds": 0.2}, None) == "The navigation's data are 0.20 s later than the actuators'."
+    assert says({"seconds": -0.09}, None).startswith("The actuators' data are 0.09 s later than the navigation's: ")

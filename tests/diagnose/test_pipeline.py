@@ -1,0 +1,117 @@
+"""Whole diagnoses of simulated logs: what is named, how large, since when, and what is left in doubt."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from ferryid.diagnose.checks import screening
+from ferryid.diagnose.data import measurements
+from ferryid.diagnose.inference.baselines import HullBaseline
+from ferryid.diagnose.inference.estimation import HULL_SPREAD
+from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_campaign
+from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
+from ferryid.vessel import load_profile
+
+SHORT = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
+
+
+def diagnosed(name: str, folder: Path) -> Diagnosis:
+    log = folder / f"{name}.mcap"
+    write_log(simulate(load_scenario(name)), log)
+    return diagnose([str(log)], load_profile("milliampere"), None, progress=lambda stage: None)[0]
+
+
+@pytest.mark.parametrize("together", [False, True])
+def test_every_log_is_read_aligned_and_checked_once(
+    together: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counts: Counter[str] = Counter()
+    for module, name in ((measurements, "record"), (measurements, "align"), (screening, "examine")):
+        stage = getattr(module, name)
+
+        def counted(*args: object, name: str = name, stage=stage, **more: object) -> object:
+            counts[name] += 1
+            return stage(*args, **more)
+
+        monkeypatch.setattr(module, name, counted)
+    logs = [str(shutil.copy(SHORT, tmp_path / f"{name}.mcap")) for name in "ab"]
+    settings = DiagnosisSettings(together=together)
+    made = diagnose(logs, load_profile("milliampere"), None, settings, progress=lambda stage: None)
+    assert [one.log for one in made] == ["a", "b"]
+    assert counts == {"record": 2, "align": 2, "examine": 2}
+
+
+def test_one_log_is_a_campaign_of_one() -> None:
+    ferry, log = load_profile("milliampere"), str(SHORT)
+    (alone,) = diagnose([log], ferry, None, progress=lambda stage: None)
+    (one,) = diagnose_campaign(
+        [log], ferry, None, HullBaseline(ferry), DiagnosisSettings(), progress=lambda stage: None
+    )
+    assert to_json(alone) == to_json(one)
+
+
+def test_a_thruster_that_gives_up_half_way_and_a_breeze(tmp_path: Path) -> None:
+    result = diagnosed("thruster-fault", tmp_path)
+    assert result.verdict == "explained"
+    fault, wind, gusts = result.findings
+    assert (fault.effect, fault.instance, wind.effect) == ("thruster_gain", "thruster2", "wind")
+    true = load_scenario("thruster-fault").wind
+    assert gusts.effect == "gusts"
+    assert gusts.parameters["std"].value == pytest.approx(true.gust_std_mps, rel=0.25)
+    assert fault.parameters["factor"].value == pytest.approx(0.6, abs=0.02)
+    onset = fault.parameters["onset"]
+    assert onset.low - 1.0 <= 720.0 <= onset.high + 1.0
+    assert wind.parameters["north"].value == pytest.approx(0.6, abs=0.1)
+    assert wind.parameters["east"].value == pytest.approx(-0.4, abs=0.1)
+    assert min(fault.probability, wind.probability) > 0.95
+    assert fault.improvement["yaw"] > 0.8
+    assert result.after["mse"]["yaw"] < 0.2 * result.before["mse"]["yaw"]
+    moved = result.moved
+    assert moved is not None
+    # The profile's hull is the true one, so that no coefficient has reason to go beyond what chance lets it.
+    assert 0.0 < abs(moved.deviations) < 3.0
+    assert moved.value - moved.before == pytest.approx(moved.deviations * HULL_SPREAD * abs(moved.before))
+
+
+def test_gusts_make_a_delay_doubtful(tmp_path: Path) -> None:
+    result = diagnosed("twelve-corner-gusty", tmp_path)
+    wind = next(one for one in result.findings if one.effect == "wind")
+    scenario = load_scenario("twelve-corner-gusty")
+    assert wind.parameters["north"].value == pytest.approx(scenario.wind.north_mps, abs=0.5)
+    assert wind.parameters["east"].value == pytest.approx(scenario.wind.east_mps, abs=0.5)
+    assert result.verdict == "partly_explained"
+    for one in result.findings:
+        if one.effect in ("time_delay", "thruster_lag"):
+            assert one.probability <= 0.5
+            assert "gusts" in one.unresolved_with
+
+
+def test_a_calm_log_matches(tmp_path: Path) -> None:
+    result = diagnosed("twelve-corner-calm", tmp_path)
+    assert result.verdict == "matched"
+    assert result.findings == ()
+    assert result.moved is None
+    assert result.duration_s == pytest.approx(load_scenario("twelve-corner-calm").duration_s, abs=2.0)
+    assert result.before["window_s"] == pytest.approx(8.0)
+
+
+def test_a_squall_that_no_steady_wind_explains_is_not_matched(tmp_path: Path) -> None:
+    rows = [(0.0, 0.0), (412.0, 0.0), (427.0, 1.0), (552.0, 1.0), (567.0, 0.0)]
+    text = "time,north,east\n" + "".join(f"{t:.1f},{3.4 * share:.3f},{-1.6 * share:.3f}\n" for t, share in rows)
+    (tmp_path / "wind.csv").write_text(text, encoding="utf-8")
+    scenario = (
+        'schema = "ferryid.scenario/1"\nvessel = "milliampere"\npath = { kind = "twelve-corner" }\n'
+        'controller = { delta = 0.7, sigma = 0.7 }\nenvironment = { wind = { series = "wind.csv" } }\n'
+        "true_hull = { m11 = 0.9, m22 = 1.1, m33 = 0.9, X_u = 1.1, Y_v = 0.9 }\n"
+        "sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }\n"
+    )
+    log = tmp_path / "squall.mcap"
+    write_log(simulate(parse_scenario(scenario, "squall", tmp_path), 3), log)
+    result = diagnose([str(log)], load_profile("milliampere"), None, progress=lambda stage: None)[0]
+    assert result.verdict in ("unexplained", "partly_explained")
+    assert not [one for one in result.findings if one.sure and one.effect not in ("wind", "gusts", "unknown")]

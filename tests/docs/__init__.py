@@ -1,0 +1,1 @@
+"""The documents: their drawing, their code blocks, their words, and the site they build."""

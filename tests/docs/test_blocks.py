@@ -1,0 +1,96 @@
+"""Code blocks in the documents run: python as it stands, console commands with the output that is shown."""
+
+from __future__ import annotations
+
+import doctest
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.docs.pages import PAGES, ROOT, Block, Call, blocks, calls
+
+RUN = ("python", "console")
+LONGEST_S = 1800.0
+
+
+def _cases() -> list[object]:
+    """Return the pages that have something to run; what follows a slow block on its page may need what that has left."""
+    cases = []
+    for page in PAGES:
+        run = [one for one in blocks(page) if one.language in RUN]
+        slow = [pytest.mark.slow] if any(one.slow for one in run) else []
+        if run:
+            cases.append(pytest.param(page, run, id=page.relative_to(ROOT).as_posix(), marks=slow))
+    return cases
+
+
+def agrees(shown: str, printed: str) -> bool:
+    """Tell whether printed lines are those shown, where ``...`` stands for anything, also in a line."""
+    lines = [line.rstrip() for line in printed.strip().splitlines()]
+    wanted = [line.rstrip() for line in shown.strip().splitlines()]
+    return _matched(wanted, lines)
+
+
+def _matched(wanted: list[str], lines: list[str]) -> bool:
+    if not wanted:
+        return not lines
+    if wanted[0] == "...":
+        return any(_matched(wanted[1:], lines[k:]) for k in range(len(lines) + 1))
+    if not lines:
+        return False
+    one = doctest.OutputChecker().check_output(wanted[0] + "\n", lines[0] + "\n", doctest.ELLIPSIS)
+    return one and _matched(wanted[1:], lines[1:])
+
+
+def called(call: Call, folder: Path) -> None:
+    """Run a command in a folder, and hold what it prints against what is shown."""
+    environment = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "COLUMNS": "80",
+    }
+    run = subprocess.run(
+        ["bash", "-c", call.command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST_S,
+        check=False,
+    )
+    assert run.returncode == 0, f"{call.command}: exit code {run.returncode}\n{run.stderr}"
+    assert agrees(call.shown, run.stdout), f"{call.command} is shown with\n{call.shown}\nand printed\n{run.stdout}"
+
+
+@pytest.mark.parametrize(("page", "run"), _cases())
+def test_blocks_of_a_page_run_in_order(
+    page: Path, run: list[Block], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "fixtures").symlink_to(ROOT / "fixtures")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "page"}
+    for block in run:
+        if block.language == "python":
+            # Lines as on the page, for tracebacks; a module of that name, for dataclasses.
+            code = compile("\n" * block.line + block.text, str(page), "exec")
+            monkeypatch.setitem(sys.modules, "page", type(sys)("page"))
+            exec(code, names)
+        else:
+            for call in calls(block):
+                called(call, tmp_path)
+
+
+def test_every_fence_has_a_language() -> None:
+    assert [f"{page.name}:{one.line}" for page in PAGES for one in blocks(page) if not one.language] == []
+
+
+def test_output_is_compared_line_by_line() -> None:
+    assert agrees("a\n...\nd", "a\nb\nc\nd\n")
+    assert agrees("a ... c\n...", "a b c\n")
+    assert agrees("...", "")
+    assert not agrees("a\n...\nd", "a\nb\nc\n")
+    assert not agrees("a", "a\nb\n")
+    assert not agrees("a 1.0", "a 1.1\n")

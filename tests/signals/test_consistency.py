@@ -1,0 +1,134 @@
+"""Velocities against the pose: wrong signs, units and scales are named; noise, chance and jumps are not taken for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ferryid.signals.consistency import cross_checks
+from ferryid.signals.prepare import open_track
+from ferryid.signals.track import Track
+from ferryid.vessel import load_profile
+from tests.damage import SURGE, changed, scaled, ten_minutes, written
+
+Floats = NDArray[np.float64]
+
+T = np.arange(0, 120, 0.05)
+
+
+def voyage(**changes: Floats) -> Track:
+    """A turning, speeding voyage with position, velocity and heading that agree."""
+    psi = 0.5 * np.sin(0.1 * T) + 0.05 * T
+    u, v, r = 1.0 + 0.5 * np.sin(0.07 * T), 0.3 * np.cos(0.05 * T), 0.05 * np.cos(0.1 * T) + 0.05
+    fine = np.linspace(0, T[-1], 20 * T.size)
+    heading = 0.5 * np.sin(0.1 * fine) + 0.05 * fine
+    north = np.cos(heading) * (1.0 + 0.5 * np.sin(0.07 * fine)) - np.sin(heading) * 0.3 * np.cos(0.05 * fine)
+    east = np.sin(heading) * (1.0 + 0.5 * np.sin(0.07 * fine)) + np.cos(heading) * 0.3 * np.cos(0.05 * fine)
+    step = fine[1] - fine[0]
+    x, y = (np.interp(T, fine, np.concatenate([[0], np.cumsum((d[1:] + d[:-1]) / 2 * step)])) for d in (north, east))
+    columns = {"x": x, "y": y, "psi": psi, "u": u, "v": v, "r": r, **changes}
+    return Track("trial", T, 0, 20.0, columns, np.ones(T.size, dtype=bool))
+
+
+def test_agreeing_signals_raise_no_finding() -> None:
+    assert cross_checks(voyage()) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "said"),
+    [
+        ("r", -1.0, "yaw rate has the wrong sign against the heading"),
+        ("r", 180 / np.pi, "degrees per second look read as rad/s"),
+        ("r", np.pi / 180, "rad/s look read as degrees per second"),
+        (
+            "u",
+            1 / 0.514444,
+            "surge velocity does not match the position (gain 0.514 [0.514, 0.514], correlation 1.00): knots look",
+        ),
+        ("u", 0.514444, "m/s look read as knots"),
+        ("v", -1.0, "sway velocity has the wrong sign against the position (gain -1"),
+        ("u", 1.3, "surge velocity does not match the position (gain 0.769"),
+    ],
+)
+def test_wrong_signs_and_units_are_named(name: str, factor: float, said: str) -> None:
+    track = voyage()
+    (finding,) = cross_checks(voyage(**{name: factor * track.columns[name]}))
+    assert said in finding.says
+    assert finding.certain is (factor != 1.3)
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.4])
+def test_frames_of_the_wrong_hand_are_named(turned: float) -> None:
+    track = voyage()
+    x, y, psi = (track.columns[name] for name in ("x", "y", "psi"))
+    (finding,) = cross_checks(voyage(x=y, y=x))
+    assert finding.says.startswith("The positions are mirrored")
+    assert finding.certain
+    doubts = cross_checks(voyage(psi=0.5 * np.pi + turned - psi))
+    assert [doubt.certain for doubt in doubts] == [True, True]
+    assert "wrong sign against the heading" in doubts[0].says
+    assert doubts[1].says.startswith("The heading turns the wrong way round")
+
+
+def test_a_turned_frame_is_not_of_the_wrong_hand() -> None:
+    track = voyage()
+    doubts = cross_checks(voyage(psi=track.columns["psi"] + 1.5))
+    assert doubts
+    assert not any(doubt.certain for doubt in doubts if "mirrored" in doubt.says or "round" in doubt.says)
+
+
+def test_a_yaw_rate_from_elsewhere_is_named() -> None:
+    (finding,) = cross_checks(voyage(r=0.1 * np.sin(2.1 * T)))
+    assert "does not follow the heading" in finding.says
+    assert not finding.certain
+
+
+def test_only_measured_rows_enter_the_cross_checks() -> None:
+    track = voyage()
+    columns = {name: values.copy() for name, values in track.columns.items()}
+    columns["x"][600:1800] = np.nan
+    columns["r"][1000:1400] = 1.0
+    valid = columns["r"] < 0.9
+    assert cross_checks(Track("trial", T, 0, 20.0, columns, valid)) == ()
+
+
+def test_one_jump_of_the_position_does_not_outweigh_the_rest() -> None:
+    track = voyage()
+    assert cross_checks(voyage(x=track.columns["x"] + np.where(T > 60, 500.0, 0.0))) == ()
+
+
+@pytest.mark.parametrize("name", ["u", "v", "r"])
+@pytest.mark.parametrize("gain", [0.9, 1.1])
+def test_a_tenth_is_found_in_clean_signals(name: str, gain: float) -> None:
+    (finding,) = cross_checks(voyage(**{name: voyage().columns[name] / gain}))
+    assert f"(gain {gain:.3g} [" in finding.says
+    assert "check the scale of the" in finding.says
+    assert ("lever arm" in finding.says) is (name != "r")
+    assert not finding.certain
+
+
+def test_slow_noise_of_a_velocity_is_no_wrong_scale() -> None:
+    """Errors of a navigation filter last for many seconds and attenuate the gain, by their size and by chance."""
+    fired = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        white = np.convolve(rng.standard_normal(T.size + 400), np.ones(401) / np.sqrt(401.0), mode="valid")
+        u = voyage().columns["u"]
+        # Motion without its mean, as on a course that turns back.
+        fired += bool(cross_checks(voyage(u=u + 0.2 * np.sqrt(np.mean(u**2)) * white)))
+    assert fired <= 2
+
+
+def test_the_undamaged_trial_raises_no_doubt_and_a_tenth_does(tmp_path: Path) -> None:
+    ferry = load_profile("milliampere")
+    assert open_track(str(written(ten_minutes(), tmp_path / "clean.mcap")), ferry, None).doubts == ()
+    made = changed(ten_minutes(), [(-1.0, 1e4)], scaled(SURGE, 1.0 / 0.9))
+    (doubt,) = open_track(str(written(made, tmp_path / "tenth.mcap")), ferry, None).doubts
+    assert doubt.startswith("The surge velocity does not match the position (gain 0.8")
+    assert doubt.endswith(
+        "check the scale of the surge velocity in the profile, and the lever arm of what is measured away "
+        "from the body origin."
+    )

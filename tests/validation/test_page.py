@@ -1,0 +1,99 @@
+"""The page: every figure where a reader looks for it, and targets that are not called reached before they are."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from ferryid.validation.name_scores import Share
+from ferryid.validation.page import figures, page
+from ferryid.validation.records import TransferResult, TransferScore
+from ferryid.validation.run import render_summary
+from ferryid.validation.scores import score
+from ferryid.validation.targets import share_target, targets
+from tests.validation.test_scores import WIND, curve_results, finding, result
+
+RESULT: dict[str, Any] = {
+    "seed": 5,
+    "settings": {"runs": 4.0, "only": []},
+    "counts": {"cases": 41, "diagnosed": 40, "refused": 1, "crashed": 0},
+    "commitment": "0123" * 16,
+    "sources": "89ab" * 4,
+    "folder": "out/proof",
+}
+
+
+@pytest.mark.parametrize(
+    ("share", "limits", "reached"),
+    [
+        (Share(0, 400), {"at_most": 0.01}, True),
+        (Share(0, 20), {"at_most": 0.01}, None),
+        (Share(1, 20), {"at_most": 0.01}, False),
+        (Share(950, 1000), {"at_least": 0.93, "at_most": 0.97}, True),
+        (Share(19, 20), {"at_least": 0.93, "at_most": 0.97}, None),
+        (Share(990, 1000), {"at_least": 0.93, "at_most": 0.97}, False),
+    ],
+)
+def test_a_target_is_reached_when_its_interval_says_so(
+    share: Share, limits: dict[str, float], reached: bool | None
+) -> None:
+    assert share_target("so much", share, **limits).reached is reached
+
+
+def test_the_page_has_commitment_sizes_and_what_was_missed() -> None:
+    absent = TransferScore(dict.fromkeys(("surge", "sway", "yaw")), why="pysindy is not installed")
+    transfer = TransferResult(absent, {"sindy": absent})
+    results = [*curve_results(), result([WIND], [finding("current")], "pair", "pair", transfer=transfer)]
+    text = page(RESULT, score(results))
+    assert RESULT["commitment"] in text
+    assert "40 were diagnosed, 1 refused, each in 2 s" in text
+    # Half of the sizes of the diagnosis: the oracle names from 1 m/s on, which the diagnosis does from 2 on.
+    (row,) = (line for line in text.splitlines() if line.startswith("| wind | m/s |"))
+    assert row.endswith("| **more than 1.5**: 4 none |")
+    assert "sizes named 19 times in 20 at most 1.5 times the oracle's: 0 of 1 effects | **missed** |" in text
+    assert "| nothing | 20 |  |  | 0/20 |" in text
+    assert "| two effects | 1 | 0/1 | 0/1 | 1/1 |" in text
+    assert "- `sindy` has no result: pysindy is not installed" in text
+    # Clean logs come before effects, effects before pairs.
+    assert text.index("### Nothing") < text.index("### One effect, from") < text.index("### Two effects")
+    assert not any(line.startswith(("{%", "{{")) for line in text.splitlines())
+
+
+def test_a_target_without_data_is_not_tested() -> None:
+    clean = score([result([], [], "clean", "clean")])
+    every = targets(clean)
+    assert [one.tested for one in every] == [True, True, False, False, False]
+    assert [one.reached for one in every if not one.tested] == [None, None, None]
+    text = page(RESULT, clean)
+    for what in ("95 % intervals that hold the truth", "onsets and offsets within 5 s", "sizes named 19 times in 20"):
+        (row,) = (line for line in text.splitlines() if line.startswith(f"| {what}"))
+        assert row.endswith("| not tested |")
+    summary = render_summary({**RESULT, "targets": [one.to_json() for one in every]})
+    assert summary.count("not tested") == 3
+    # Nor are figures linked that there are not.
+    assert "detection.svg" not in text
+    assert "errors.svg" not in text
+
+
+@pytest.mark.parametrize(
+    ("share", "outcome"),
+    [
+        (Share(0, 400), "yes"),
+        (Share(0, 20), "reached, though the interval allows either"),
+        (Share(1, 20), "**missed**, though the interval allows either"),
+        (Share(20, 20), "**missed**"),
+        (Share(0, 0), "not tested"),
+    ],
+)
+def test_the_outcome_of_a_target_is_open_where_its_interval_allows_either(share: Share, outcome: str) -> None:
+    assert share_target("so much", share, at_most=0.01).outcome == outcome
+
+
+def test_the_figures_are_drawings_of_what_there_is() -> None:
+    drawn = figures(score(curve_results()))
+    assert set(drawn) == {"confusion.svg", "detection.svg", "errors.svg"}
+    for text in drawn.values():
+        assert ElementTree.fromstring(text).tag.endswith("svg")
+    assert set(figures(score([result([], [], "clean", "clean")]))) == {"confusion.svg"}
