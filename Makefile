@@ -4,13 +4,21 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: test docs evidence demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
+.PHONY: quick test docs evidence demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
 
+# On two cores: a worker takes a slow test at a time and the rest by files, so that the fixtures of a file are made once.
+SPREAD = -n 2 --dist loadgroup --no-loadscope-reorder
+
+# What most changes break, within a minute.
+quick: $(VENV)/installed
+	$(BIN)/ruff check .
+	$(BIN)/pytest $(SPREAD) -q -m "not slow"
+
+# Everything. The types are checked beside the first tests.
 test: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/pytest -n 2
+	$(BIN)/mypy & $(BIN)/pytest $(SPREAD) --durations=25; code=$$?; wait $$! && exit $$code
 
 # The documents as a site, in build/site; a broken link is an error.
 docs: $(VENV)/installed

@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import ferryid
+from ferryid.cli import INTERRUPTED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +38,7 @@ def main() -> None:
             interrupts.by_default()
     except KeyboardInterrupt:
         # Before or after the command.
-        os.write(2, b"ferryid: interrupted, nothing half-written was left\n")
+        os.write(2, INTERRUPTED)
         os._exit(130)
 
 

@@ -31,6 +31,8 @@ class Terminated(BaseException):
 
 
 _received = 0
+_ending = threading.Lock()
+"""Held by the first thread that ends this process."""
 
 
 def received() -> int:
@@ -87,6 +89,8 @@ def end_at_once() -> None:
 
 def end(number: int, message: str = MESSAGE) -> None:
     """Remove temporary files, end child processes and this one, whatever its threads are doing."""
+    # On a busy machine the way out through exceptions may come here just as the thread that watches does.
+    _ending.acquire(timeout=GRACE_S)
     from ferryid.files import remove_unfinished
 
     children = _children()

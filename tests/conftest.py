@@ -24,6 +24,22 @@ def shared_data() -> Callable[[str], Path]:
     return locate
 
 
+def pytest_collection_modifyitems(items: list[Any]) -> None:
+    """Begin with the slow tests, one by one, and keep those together that share fixtures, or are quick, in a file.
+
+    A worker that takes its last test early has nothing to do while the other one is at a slow test; a fixture of a file is
+    made again by every worker that takes a test of it.
+    """
+    for item in items:
+        definitions = item._fixtureinfo.name2fixturedefs.values()
+        shares = any(one[-1].scope in ("module", "class") for one in definitions)
+        if shares or item.get_closest_marker("slow") is None:
+            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+    slow = {item.nodeid.partition("::")[0] for item in items if item.get_closest_marker("slow")}
+    # Stable: files stay in their order.
+    items.sort(key=lambda item: item.nodeid.partition("::")[0] not in slow)
+
+
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Show how a test with a seed is repeated, and what tests give notice of, whether they passed or failed."""
     for outcome in ("passed", "failed"):

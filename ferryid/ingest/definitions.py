@@ -46,6 +46,12 @@ _FIELD_NAME = re.compile(r"_?[A-Za-z][A-Za-z0-9_]*")
 _IDL_FILE = re.compile(r"^=+\r?\nIDL: [^\n]*\n", re.MULTILINE)
 # Lines that define nothing, on which rosbags' parser spends far more time than on those that do.
 _BLANK = re.compile(r"^[ \t]*(#[^\n]*)?\n", re.MULTILINE)
+# Strings, characters and comments, which may hold anything and may lack their end, brackets, and names of annotations.
+_IDL_TOKEN = re.compile(
+    r'"(?:[^"\\]|\\.?)*+(?:"|\Z)|\'(?:[^\'\\]|\\.?)*+(?:\'|\Z)|//[^\n]*|/\*.*?(?:\*/|\Z)|[()]'
+    r"|@[ \t]*(?:::)?\w++(?:::\w++)*+",
+    re.DOTALL,
+)
 # What rosbags' generated module uses itself: a type of this name, outside any package, would stand in for it.
 _RESERVED = frozenset({"dataclass", "annotations", "T", "TYPE_CHECKING", "ClassVar", "Typesdict", "FIELDDEFS", "np"})
 # rosbags raises these for texts that it cannot parse or turn into code.
@@ -99,7 +105,7 @@ def parse_definition(text: str, msgtype: str, encoding: str) -> Types:
             types: Types = {}
             for part in _IDL_FILE.split(text):
                 if part.strip():
-                    types.update(_IdlParser(part).types())
+                    types.update(_IdlParser(_without_annotations(part)).types())
         else:
             types = dict(get_types_from_msg(_BLANK.sub("", text), msgtype))
     except DefinitionError:
@@ -292,6 +298,31 @@ class _Extents:
         self._unrolled += count
         if self._unrolled > MAX_UNROLLED:
             raise DefinitionError(f"cannot be used: it has arrays of more than {MAX_UNROLLED} strings or messages")
+
+
+def _without_annotations(text: str) -> str:
+    """Return IDL without annotations, which change nothing of what is decoded and cost rosbags' parser most of its time."""
+    kept: list[str] = []
+    start = depth = 0
+    # Where the last annotation begins and its name ends, as long as what it is given may follow.
+    begin = named = -1
+    for token in _IDL_TOKEN.finditer(text):
+        first = token[0][0]
+        if begin >= 0 and depth == 0 and (first != "(" or text[named : token.start()].strip()):
+            kept += (text[start:begin], " ")
+            start, begin = named, -1
+        if begin < 0:
+            if first == "@":
+                begin, named = token.span()
+        elif first in "()":
+            depth += 1 if first == "(" else -1
+            if depth == 0:
+                kept += (text[start:begin], " ")
+                start, begin = token.end(), -1
+    if begin >= 0 and depth == 0:
+        kept += (text[start:begin], " ")
+        start = named
+    return "".join([*kept, text[start:]])
 
 
 class _Integer(int):

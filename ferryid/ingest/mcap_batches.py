@@ -68,8 +68,8 @@ class _Plan:
 
     @property
     def alone(self) -> bool:
-        """True where lz4 gives the whole chunk in memory of its own."""
-        return self.whole and self.chunk.compression == "lz4"
+        """True where lz4 gives the whole chunk in memory of its own; small ones share a batch, which saves more."""
+        return self.whole and self.chunk.compression == "lz4" and self.chunk.uncompressed_size > SMALL
 
     @property
     def size(self) -> int:
@@ -105,7 +105,7 @@ def batches(
     thorough = verify or not index.complete
 
     def carefully(chunk: Chunk, reason: str) -> Loaded:
-        return load_carefully(file, whole_file, chunk, wanted, name, topics, reason)
+        return load_carefully(file, whole_file, chunk, index.walks, wanted, name, topics, reason)
 
     def run(batch: Sequence[_Plan], room: Bytes) -> list[Loaded]:
         try:

@@ -1,6 +1,6 @@
 """The content of one MCAP chunk: decompressed as far as needed, checked, walked, and what is damaged reported.
 
-A walk takes at most one message per byte that the chunk takes up in the file (`LEAST_WALK` at least): no recorder
+A walk takes at most one message per byte that the chunk takes up in the file, and some more as `Walks` has it: no recorder
 reaches that, as every message has its own time. So what is held of a file's messages is at most 26 bytes, and those of
 the wanted fields, per byte of the file.
 """
@@ -27,15 +27,13 @@ from ferryid.ingest.mcap_index import (
     Chunk,
     DamagedRecord,
     Messages,
+    Walks,
     index_entries,
     message_table,
     stored_crc,
     walk,
 )
 from ferryid.ingest.mcap_unpack import Unpacker
-
-LEAST_WALK = 4096
-"""Records of a chunk that are walked whatever its size in the file."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +49,7 @@ def load_carefully(
     file: memoryview,
     whole_file: Bytes,
     chunk: Chunk,
+    walks: Walks,
     wanted: Collection[int],
     name: str,
     topics: Mapping[int, str],
@@ -62,6 +61,8 @@ def load_carefully(
     ----------
     file, whole_file
         The same bytes of the file as a memoryview and as an array.
+    walks
+        Bounds how many records are taken.
     wanted
         Channel ids.
     name, topics
@@ -72,7 +73,7 @@ def load_carefully(
     crc = 0 if chunk.truncated else stored_crc(file, chunk.offset)
     try:
         data = content(file, whole_file, chunk, crc)
-        table, others, end = walk_table(data, chunk)
+        table, others, end = walk_table(data, chunk, walks)
     except DamagedRecord as error:
         return Loaded(whole_file[:0], {}, tuple(_lost(file, chunk, wanted, name, topics, str(error))))
     indexed = chunk.counts()
@@ -146,7 +147,7 @@ def check(data: Bytes, crc: int) -> None:
         raise DamagedRecord("the checksum of a chunk is wrong")
 
 
-def walk_table(data: Bytes, chunk: Chunk) -> tuple[Messages, list[tuple[int, int, int]], int]:
+def walk_table(data: Bytes, chunk: Chunk, walks: Walks) -> tuple[Messages, list[tuple[int, int, int]], int]:
     """Walk the records of a chunk; returns its messages, its other records and where the walk ended.
 
     Raises
@@ -154,8 +155,9 @@ def walk_table(data: Bytes, chunk: Chunk) -> tuple[Messages, list[tuple[int, int
     DamagedRecord
         Where it holds more records than bytes in the file.
     """
-    limit = max(LEAST_WALK, chunk.compressed_size)
+    limit = walks.limit(chunk.compressed_size)
     offsets, others, end = walk(data.data, 0, len(data), limit)
+    walks.take(len(offsets) + len(others), chunk.compressed_size)
     if end < len(data) and len(offsets) + len(others) >= limit:
         raise DamagedRecord("a chunk holds more records than it has bytes in the file, which no recorder writes")
     table, _ = message_table(data, np.array(offsets, np.int64))
@@ -233,7 +235,7 @@ def check_covered(data: Bytes, offsets: NDArray[np.int64]) -> list[tuple[int, in
 
 
 def walk_chunk(
-    file: memoryview, whole_file: Bytes, chunk: Chunk, name: str
+    file: memoryview, whole_file: Bytes, chunk: Chunk, walks: Walks, name: str
 ) -> tuple[Chunk, list[tuple[int, memoryview]], Loss | None]:
     """Find the messages of a chunk that has no index, or a doubtful one, by walking it.
 
@@ -247,7 +249,7 @@ def walk_chunk(
     crc = 0 if chunk.truncated else stored_crc(file, chunk.offset)
     try:
         data = content(file, whole_file, chunk, crc)
-        table, others, end = walk_table(data, chunk)
+        table, others, end = walk_table(data, chunk, walks)
     except DamagedRecord as error:
         if chunk.indexed is not None:
             return chunk, [], None

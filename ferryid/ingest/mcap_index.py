@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from array import array
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -45,8 +46,16 @@ MESSAGE_FIELDS = np.dtype(
 FOOTER_SIZE = RECORD_HEADER + 20 + len(MAGIC)
 # Least content of every kind of record [bytes], by opcode. No record has the opcode 0; unknown kinds may be empty.
 _LEAST = (1 << 64, 8, 20, 14, 16, 22, 40, 6, 64, 36, 48, 46, 8, 20, 17, 4, *[0] * 240)
+LEAST_WALK = 4096
+"""Records of a chunk that are walked whatever its size in the file, as long as the file has them to spare."""
+SPARE_RECORDS = 1 << 20
+MAX_CHANNELS = 10_000
+"""Channels of a file, as many as connections of a ROS 1 bag: far more than any vessel records."""
 LATEST_NS = (1 << 63) - 1
 """Times are unsigned in the file; from 2**63 ns on (the year 2262) they cannot be represented here."""
+
+FEW = 64
+"""Fewer messages are counted faster one by one."""
 
 record_header: Callable[..., tuple[int, int]] = struct.Struct("<BQ").unpack_from
 _chunk_fields: Callable[..., tuple[int, int, int, int]] = struct.Struct("<QQQI").unpack_from
@@ -58,6 +67,10 @@ Definition = TypeVar("Definition")
 
 class DamagedRecord(ValueError):
     """A record that contradicts itself or its index; reported to the user as a Loss, never raised out of the reader."""
+
+
+class ExcessError(Exception):
+    """More of something than a recorder writes: the file is refused."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +93,9 @@ class Messages:
         """Return the messages of the wanted channels that have any, each in the order of this table."""
         if not len(self):
             return {}
+        first = int(self.channels[0])
+        if (self.channels == first).all():
+            return {first: self} if first in wanted else {}
         order = np.argsort(self.channels, kind="stable")
         ids, firsts = np.unique(self.channels[order], return_index=True)
         stops = [*firsts[1:].tolist(), len(self)]
@@ -92,6 +108,8 @@ class Messages:
     @cached_property
     def counts(self) -> dict[int, int]:
         """Number of messages per channel id."""
+        if len(self) < FEW:
+            return dict(Counter(self.channels.tolist()))
         ids, counts = np.unique(self.channels, return_counts=True)
         return dict(zip(ids.tolist(), counts.tolist(), strict=True))
 
@@ -154,6 +172,27 @@ class Chunk:
 
 
 @dataclass
+class Walks:
+    """Records that walks over the chunks of a file may take beyond one for every byte that a chunk takes up in the file.
+
+    Attributes
+    ----------
+    spare
+        What is left for the whole file.
+    """
+
+    spare: int = field(default_factory=lambda: SPARE_RECORDS)
+
+    def limit(self, stored: int) -> int:
+        """Return how many records a walk over a chunk of `stored` bytes may take."""
+        return stored + min(max(self.spare, 0), LEAST_WALK)
+
+    def take(self, records: int, stored: int) -> None:
+        """Count the records that were taken from a chunk of `stored` bytes."""
+        self.spare -= max(records - stored, 0)
+
+
+@dataclass
 class Index:
     """Everything known of a file before a message is decoded; filled by `read_summary` or `scan`.
 
@@ -178,6 +217,8 @@ class Index:
         its index when it is read.
     contradiction
         In what the chunks that the summary lists and the file contradict each other, None where they agree.
+    walks
+        Bounds how many records of chunks are walked.
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -190,6 +231,7 @@ class Index:
     conflicts: list[str] = field(default_factory=list)
     complete: bool = False
     contradiction: str | None = None
+    walks: Walks = field(default_factory=Walks)
 
     def define(self, opcode: int, content: Bytes | memoryview) -> None:
         """Take a Schema or Channel record; the first definition of an id stands.
@@ -210,6 +252,8 @@ class Index:
             self.schemas.setdefault(definition.id, definition)
         else:
             self.channels.setdefault(definition.id, definition)
+            if len(self.channels) > MAX_CHANNELS:
+                raise ExcessError(f"it holds more than {MAX_CHANNELS} channels, which no vessel records")
 
     def conflict(self, definition: Schema | Channel) -> str:
         """Say what in a definition contradicts the known one of the same id; an empty string where nothing does."""

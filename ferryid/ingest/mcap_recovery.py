@@ -207,7 +207,7 @@ def _walk_chunks(index: Index, file: memoryview, whole_file: Bytes, name: str) -
 def _walk_into(index: Index, number: int, file: memoryview, whole_file: Bytes, name: str) -> None:
     """Walk a chunk: take its definitions, and its messages where its index has others."""
     chunk = index.chunks[number]
-    walked, definitions, loss = walk_chunk(file, whole_file, chunk, name)
+    walked, definitions, loss = walk_chunk(file, whole_file, chunk, index.walks, name)
     for opcode, text in definitions:
         try:
             index.define(opcode, text)

@@ -61,9 +61,12 @@ def type_name(channel: Channel, schema: Schema | None) -> str:
     """Return the name of a channel's message type, ROS types as ``package/msg/Name``."""
     if schema is None:
         return ""
-    if channel.message_encoding in ("ros1", "cdr") and re.fullmatch(r"\w+/\w+|\w+/msg/\w+", schema.name):
-        return str(normalize_msgtype(schema.name))
-    return schema.name
+    return _ros_name(schema.name) if channel.message_encoding in ("ros1", "cdr") else schema.name
+
+
+@lru_cache(maxsize=4096)
+def _ros_name(name: str) -> str:
+    return str(normalize_msgtype(name)) if re.fullmatch(r"\w+/\w+|\w+/msg/\w+", name) else name
 
 
 def problem(channel: Channel, schema: Schema | None) -> str:

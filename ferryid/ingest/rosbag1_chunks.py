@@ -30,6 +30,7 @@ from ferryid.ingest.rosbag1_records import (
 MAX_CHUNK = 512 << 20
 FREE_CHUNK = 64 << 20
 FREE_TOTAL = 256 << 20
+FREE_RECORDS = 1 << 20
 # What lz4 can expand to at most.
 EXPANSION = 255
 SALVAGE_STEP = 4096
@@ -38,20 +39,23 @@ DAMAGE = (RuntimeError, OSError, EOFError, ValueError, MemoryError)
 
 @dataclass
 class Allowance:
-    """Bytes that the chunks of a file may still expand to.
+    """Bytes that the chunks of a file may still expand to, and records that walks over them may still take.
 
     A chunk expands to 64 MiB + 255 times its stored bytes at most, and to 512 MiB; one at a time is held, and twice
     that while it is decompressed. All chunks of a file of N bytes together expand to 256 MiB + 255 N at most.
-    lz4 cannot reach either limit but by size; only bz2 data made for it, or megabytes of zeros, are cut off.
+    lz4 cannot reach either limit but by size; only bz2 data made for it, or megabytes of zeros, are cut off. Walks take a
+    million records and one for every second byte of the file: every message that a recorder writes has its own time,
+    which takes up more.
     """
 
     left: int
+    records: int
     most: int = MAX_CHUNK
 
     @classmethod
     def of_file(cls, size: int) -> Allowance:
         """Return the allowance for one pass over a file of `size` bytes."""
-        return cls(FREE_TOTAL + EXPANSION * size)
+        return cls(FREE_TOTAL + EXPANSION * size, FREE_RECORDS + size // 2)
 
     def of_chunk(self, stored: int) -> int:
         """Return how many bytes a chunk of `stored` bytes may expand to."""
@@ -184,6 +188,8 @@ def _steps(stored: memoryview, first: int, step: int, compression: str, limit: i
 class WalkedChunk(NamedTuple):
     """Records of one decompressed chunk; `whole` when the last of them ends where the chunk does.
 
+    `excess` when there are more of them than a walk may take.
+
     `following` leads from the place of each connection record to that of the message behind it, which index records may
     mean by that place.
     """
@@ -192,17 +198,22 @@ class WalkedChunk(NamedTuple):
     entries: dict[int, Entries]
     whole: bool
     following: dict[int, int]
+    excess: bool
 
 
-def walk_chunk(buffer: Any) -> WalkedChunk:
-    """List the connections and the message records of one decompressed chunk, up to its first damaged byte."""
+def walk_chunk(buffer: Any, allowance: Allowance) -> WalkedChunk:
+    """List the connections and the message records of one decompressed chunk, up to its first damaged byte.
+
+    The records are taken off the `allowance`.
+    """
     connections: dict[int, Connection] = {}
     entries: dict[int, array[int]] = {}
     size = memoryview(buffer).nbytes
     position, records = 0, Records(buffer)
     before: list[int] = []
     following: dict[int, int] = {}
-    while position < size:
+    while position < size and allowance.records > 0:
+        allowance.records -= 1
         try:
             record = records.at(position)
             if record.end > size:
@@ -224,7 +235,8 @@ def walk_chunk(buffer: Any) -> WalkedChunk:
             break
         position = record.end
     found = {number: np.frombuffer(one, np.uint32).reshape(-1, 3) for number, one in entries.items()}
-    return WalkedChunk(connections, found, position == size, following)
+    excess = position < size and allowance.records <= 0
+    return WalkedChunk(connections, found, position == size, following, excess)
 
 
 def distinct(starts: NDArray[np.int64], bounds: set[int]) -> bool:
@@ -271,7 +283,7 @@ def replaced(data: Any, chunk: Chunk, allowance: Allowance, *, intact: bool) -> 
     content = decompressed(data, chunk, allowance, exact=True)
     if not content.whole:
         return None
-    walked = walk_chunk(content.buffer)
+    walked = walk_chunk(content.buffer, allowance)
     if not walked.whole:
         return None
     entries, doubtful = walked.entries, dict[int, Entries]()

@@ -43,6 +43,7 @@ from ferryid.ingest.rosbag1_records import (
 # information this many in all; that of a connection has its topic too.
 BEFORE_KIND = 64
 MAX_SHORT_HEADER = 1024
+EXCESS = "the bag holds more records than a recorder writes to as many bytes"
 NOT_LISTED = "no chunk information agrees with them"
 
 
@@ -323,7 +324,7 @@ def _walk_chunks(data: Any, found: Walked) -> None:
         if chunk.walked is not None or (trusted and known):
             continue
         content = decompressed(data, chunk, allowance, exact=True)
-        walked = walk_chunk(content.buffer)
+        walked = walk_chunk(content.buffer, allowance)
         for number, connection in walked.connections.items():
             found.connections.setdefault(number, connection)
         _check_numbers(found)
@@ -334,7 +335,7 @@ def _walk_chunks(data: Any, found: Walked) -> None:
         if not trusted:
             chunk.walked = walked.entries
             if not whole:
-                found.faults[chunk.position] = content.fault or "its records are damaged"
+                found.faults[chunk.position] = content.fault or (EXCESS if walked.excess else "its records are damaged")
             elif last and chunk.position not in found.doubts and missing(chunk, chunk, found.connections):
                 found.faults[chunk.position] = "its index records count more messages than it holds"
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -74,6 +75,39 @@ def started(code: str, *arguments: str | Path) -> subprocess.Popen[str]:
         [sys.executable, "-c", code, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env=environment(), preexec_fn=default_interrupts, start_new_session=True,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("module", ["ferryid.cli.main", "typer"])
+def test_an_interrupt_while_the_command_line_is_loaded_shows_no_traceback(module: str) -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    entry, _, function = project["scripts"]["ferryid"].partition(":")
+    loading = f"""
+import os, signal, sys
+
+class Interrupt:
+    def find_spec(self, name, path, target=None):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupt())
+sys.argv = ["ferryid", "--help"]
+from {entry} import {function}
+{function}()
+"""
+    out, error = (process := started(loading)).communicate(timeout=60)
+    assert (process.returncode, out, error) == (130, "", MESSAGE)
+
+
+def test_two_threads_that_end_a_process_say_so_once() -> None:
+    ending = """
+import threading, time
+from ferryid import interrupts
+interrupts._children = lambda: time.sleep(0.3) or []
+for _ in range(3):
+    threading.Thread(target=interrupts.end, args=(2,)).start()
+"""
+    _, error = (process := started(ending)).communicate(timeout=60)
+    assert (process.returncode, error) == (130, MESSAGE)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["interrupt", "terminate"])

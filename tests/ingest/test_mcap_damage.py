@@ -9,6 +9,8 @@ import lz4.frame
 import pytest
 import zstandard
 
+from ferryid.errors import FerryIdError
+from ferryid.ingest import mcap_index
 from ferryid.ingest.formats.mcap import McapLog
 from tests.ingest.mcap_records import (
     COUNT,
@@ -336,6 +338,35 @@ def unchunked(numbers: range, key: int = 1) -> bytes:
     data = head + b"".join(message(number, key) for number in numbers) + DATA_END
     summary = DEFINITIONS + channel(key) + record(11, STATISTICS.pack(len(numbers), 1, 1, 0, 0, 0, T0, T0 + COUNT, 0))
     return data + summary + footer(len(data), summary, crc=True)
+
+
+def test_more_channels_than_any_vessel_records_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    channels = b"".join(channel(key, f"/a{key}") for key in range(12))
+    for content in (
+        HEAD + channels,
+        HEAD + chunk(channels, "zstd"),
+        with_summary([], definitions=DEFINITIONS + channels),
+    ):
+        McapLog(Path("log.mcap"), content)
+        with monkeypatch.context() as patch:
+            patch.setattr(mcap_index, "MAX_CHANNELS", 10)
+            with pytest.raises(FerryIdError, match=r"log.mcap: .* more than 10 channels.* Fix: "):
+                McapLog(Path("log.mcap"), content)
+
+
+def test_the_records_that_chunks_hold_are_bounded_for_the_whole_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mcap_index, "SPARE_RECORDS", 1000)
+    chunks = [chunk(message(number) + message(99) * 400, "zstd") for number in range(30)]
+    log = McapLog(Path("log.mcap"), HEAD + b"".join(chunks) + DATA_END + footer(0))
+    assert 2 <= log.topics[0].count < 20
+    assert any("more records than it has bytes in the file" in loss.what for loss in log.losses)
+
+
+def test_small_chunks_are_read_some_at_a_time() -> None:
+    chunks = [chunk(message(number), "lz4", start=T0 + number) for number in range(500)]
+    log = McapLog(Path("log.mcap"), HEAD + b"".join(chunks) + DATA_END + footer(0))
+    assert log.read({"/a": ["data"]})["/a"].columns["data"].tolist() == list(range(500))
+    assert sum(1 for _ in log._loaded([1], False)) < 5
 
 
 @pytest.mark.parametrize(("cut", "short"), [(0, 0), (30, 0), (0, 30), (90, 0), (0, 90)])

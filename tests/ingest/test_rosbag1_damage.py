@@ -273,6 +273,20 @@ def test_more_connections_than_any_recorder_writes_are_refused(tmp_path: Path, m
         open_log(path)
 
 
+def test_a_walk_ends_at_more_records_than_a_recorder_writes(
+    tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unclosed(records: list[Raw]) -> None:
+        del records[places(records, CHUNK_INFO)[0] :]
+        records[:] = [record for record in records if record.op != INDEX]
+
+    walked = 40
+    monkeypatch.setattr(rosbag1_chunks.Allowance, "of_file", classmethod(lambda cls, size: cls(1 << 30, walked)))
+    count, reader = read_changed(tmp_path / "a.bag", whole, unclosed)
+    assert count < walked
+    assert any(rosbag1_recovery.EXCESS in loss.what and loss.messages is None for loss in reader.losses)
+
+
 def test_a_first_chunk_whose_record_is_damaged_is_reported_without_chunk_information_too(
     tmp_path: Path, whole: bytes
 ) -> None:

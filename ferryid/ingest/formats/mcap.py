@@ -19,7 +19,7 @@ from ferryid.ingest.checksum import crc32
 from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
 from ferryid.ingest.mcap_batches import batches
 from ferryid.ingest.mcap_chunks import Loaded
-from ferryid.ingest.mcap_index import DATA_END, MAGIC, RECORD_HEADER, Messages, record_header
+from ferryid.ingest.mcap_index import DATA_END, MAGIC, RECORD_HEADER, ExcessError, Messages, record_header
 from ferryid.ingest.mcap_recovery import read_index
 from ferryid.ingest.mcap_spans import spans
 
@@ -61,7 +61,12 @@ class McapLog:
                 "Fix: give the recording itself"
             )
         self._bytes = np.frombuffer(self._file, np.uint8)
-        self._index = read_index(self._file, self._bytes, self._name)
+        try:
+            self._index = read_index(self._file, self._bytes, self._name)
+        except ExcessError as error:
+            raise FerryIdError(
+                f"{path}: the MCAP file cannot be read, {error}. Fix: take the vessel's topics out of it with mcap filter"
+            ) from error
         self._topic_of = {key: channel.topic for key, channel in self._index.channels.items()}
         self._opening = tuple(self._index.losses) + self._undefined()
         self.topics: tuple[Topic, ...] = self._describe()

@@ -255,6 +255,7 @@ class Rosbag1Reader:
         ]
         messages = Messages()
         repaired: list[Chunk] = []
+        self._walks = Allowance.of_file(len(self._data))
         for chunk, content in zip(chunks, self._decompressed(chunks, verify, unsure), strict=True):
             check = verify or chunk.position in unsure
             tally = self._decode(chunk, content, messages, decoders, topic_of, check=check)
@@ -388,8 +389,7 @@ class Rosbag1Reader:
         unique = distinct(starts, bounds)
         covered = not check or (intact is None and covers(buffer, together[:, 2].astype(np.int64), starts + sizes))
         if chunk.walked is None and not (intact is None and unique and covered):
-            allowance = Allowance.of_file(len(self._data))
-            better = replaced(self._data, chunk, allowance, intact=intact is None and unique)
+            better = replaced(self._data, chunk, self._walks, intact=intact is None and unique)
             if better is not None:
                 whole = Content(better.buffer, "", True)
                 tally = self._decode(better.chunk, whole, messages, decoders, topic_of, check=False)

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import pi
 
-import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ferryid.compiled import compiled
 from ferryid.simulate.plant.hull import Force, State
 from ferryid.simulate.plant.motion import Plant, advance, build, resting
 from ferryid.simulate.scenario import NOWHERE, Scenario
@@ -21,7 +21,7 @@ MILLIAMPERE = load_profile("milliampere")
 Floats = NDArray[np.float64]
 
 
-@numba.njit  # type: ignore[misc]
+@compiled
 def _steps(plant, h, first, count, state, thrusters, orders):  # type: ignore[no-untyped-def]
     rows = np.empty((count, 15))
     for k in range(count):
