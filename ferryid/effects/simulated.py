@@ -113,7 +113,7 @@ if numba.config.DISABLE_JIT:
         return len(_functions) - 1
 
     def _numbers_at(address: int) -> Any:
-        return ctypes.cast(address, ctypes.POINTER(ctypes.c_double))
+        return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_double))
 
     def call_load(address: int, *given: Any) -> Any:
         """Call the load at a place in the list."""

@@ -228,9 +228,9 @@ def verdict(one: Compared) -> str:
             f"{counted(count, 'structure')}."
         )
     which = (
-        f"all {counted(count, 'structure')}, as none can be told from the best at 95 %"
+        f"all {counted(count, 'structure')}, as none is significantly worse than the best (5 % level)"
         if len(kept) == count
-        else f"the {len(kept)} of {counted(count, 'structure')} that cannot be told from the best at 95 %"
+        else f"the {len(kept)} of {counted(count, 'structure')} that are not significantly worse than the best (5 % level)"
     )
     return f"The data support {supported.title}, with {size}: the fewest of {which}."
 
@@ -267,7 +267,7 @@ def _scores(one: Compared) -> list[str]:
         "  terms in surge/sway/yaw; axes: MSE over the base model's; score: each axis over its least MSE, mean"
     )
     lines.append(
-        "  p: that no other is better; · cannot be told from the best at 95 %; * of these the fewest coefficients"
+        "  p: that no other is better; · not significantly worse than the best (5 % level); * of these the fewest coefficients"
     )
     return lines
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rosbags.serde import SerdeError
 from rosbags.typesys.base import normalize_fieldname
 
-from ferryid.counts import counted
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.ingest.definitions import PARSER_ERRORS
 from ferryid.ingest.fixed import Fixed
@@ -357,7 +357,8 @@ class BulkDecoder:
         return (
             Loss(
                 file=file,
-                what=f"{counted(len(self._bad), 'message')} of {self._topic} do not fit their type {self._msgtype}",
+                what=f"{counted(len(self._bad), 'message')} of {self._topic} {verb(len(self._bad), 'does')} not fit the type "
+                f"{self._msgtype}",
                 topic=self._topic,
                 messages=len(self._bad),
                 start_ns=int(times.min()),

@@ -93,8 +93,8 @@ def scan(file: memoryview, name: str) -> Index:
         size = sum(RECORD_HEADER + length for _, _, length in odd)
         kind, first, _ = min(odd, key=lambda record: record[1])
         what = (
-            f"{len(odd)} damaged, unknown or misplaced records ({counted(size, 'byte')}) were passed over, the first of kind "
-            f"0x{kind:02X} at byte {first}"
+            f"{counted(len(odd), 'damaged, unknown or misplaced record')} ({counted(size, 'byte')}) "
+            f"{verb(len(odd), 'was')} passed over, the first of kind 0x{kind:02X} at byte {first}"
         )
         index.losses.append(Loss(name, what))
     return index
@@ -156,7 +156,8 @@ def unread_behind(file: memoryview, data_end: int, name: str) -> Loss | None:
     if data_end < len(file):
         start = _next_record(file, walk(file, data_end, len(file))[2], len(file), range(1 << 16))
         if start is not None:
-            what = f"{counted(len(file) - start, 'byte')} behind the end of the data hold records that are not read"
+            size = len(file) - start
+            what = f"{counted(size, 'byte')} behind the end of the data {verb(size, 'holds')} records that are not read"
             return Loss(name, what)
     return None
 
@@ -370,11 +371,12 @@ def _gaps(index: Index, gaps: Sequence[tuple[int, int]], size: int, name: str) -
                 )
             yield Loss(name, what, None, None, last, None)
         else:
-            what = f"{counted(stop - start, 'damaged byte')} from byte {start} were passed over"
+            what = f"{counted(stop - start, 'damaged byte')} from byte {start} {verb(stop - start, 'was')} passed over"
             yield Loss(name, what, None, None, last, min((time for time in after if time >= 0), default=None))
     if more:
         lost = sum(stop - start for start, stop in more)
         yield Loss(
             name,
-            f"{counted(lost, 'damaged byte')} in {counted(len(more), 'place')} from byte {more[0][0]} on were passed over",
+            f"{counted(lost, 'damaged byte')} in {counted(len(more), 'place')} from byte {more[0][0]} on "
+            f"{verb(lost, 'was')} passed over",
         )

@@ -92,7 +92,7 @@ def selected(reader: Reader, profile: Profile) -> Selection:
         For a log without a single message, and for a required signal that it does not have.
     """
     if not any(topic.count for topic in reader.topics):
-        there = f"{len(reader.topics)} topic{'s' * (len(reader.topics) != 1)} and no message"
+        there = f"{counted(len(reader.topics), 'topic')} and no message"
         if reader.losses:
             raise FerryIdError(
                 f"{name_of(reader)}: the log holds no data that can be read, found {there}: "

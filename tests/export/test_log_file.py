@@ -140,7 +140,7 @@ def test_findings_stand_at_their_times(tmp_path: Path) -> None:
     values = {one.key: one.value for one in messages[0][1].status[1].values}
     assert values["north"] == "-3 m/s (-3.2 to -2.8)"
     assert values["held-out error removed, sway"] == "unknown"
-    assert values["not told apart from"] == "current"
+    assert values["not separated from"] == "current"
     assert messages[0][1].status[0].hardware_id == "milliampere"
 
 

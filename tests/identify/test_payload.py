@@ -309,7 +309,7 @@ def test_prepared_log_holds_the_messages(logs: dict[str, str], tmp_path: Path, d
 
 def conforms(data: dict, name: str) -> None:
     schema = json.loads(files("ferryid.schemas").joinpath(f"{name}.json").read_text(encoding="utf-8"))
-    jsonschema.validate(data, schema)
+    jsonschema.validate(json.loads(json.dumps(data)), schema)
 
 
 def test_current_and_payload_reach_basis_report_and_json(logs: dict[str, str], tmp_path: Path) -> None:
@@ -333,6 +333,6 @@ def test_current_and_payload_reach_basis_report_and_json(logs: dict[str, str], t
 
 def test_what_is_not_weighed_is_told(logs: dict[str, str], tmp_path: Path) -> None:
     result = fit([logs["boarded"], logs["unweighed"]], PROFILE, SETTINGS, tmp_path)
-    assert any("1 of 2 logs have no payload measured" in warning for warning in result.warnings)
+    assert any("1 of 2 logs has no payload measured" in warning for warning in result.warnings)
     (entry,) = evaluate(result.model, [logs["unweighed"]], tmp_path, progress=lambda _: None)["logs"]
     assert any("this log has none: it is taken as empty" in warning for warning in entry["warnings"])

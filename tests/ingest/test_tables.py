@@ -367,9 +367,9 @@ def test_unreadable_numbers_and_times_are_counted(tmp_path: Path) -> None:
     assert series.receive_ns.tolist() == [0, 10**9, 2 * 10**9, 4 * 10**9]
     np.testing.assert_array_equal(series.columns["a"], [1, np.nan, 4, 5])
     by_text = {loss.what.split(" ")[1]: loss for loss in reader.losses}
-    assert set(by_text) == {"cells", "rows"}
-    assert by_text["rows"].messages == 1
-    assert by_text["rows"].seconds == pytest.approx(2.0)
+    assert set(by_text) == {"cell", "row"}
+    assert by_text["row"].messages == 1
+    assert by_text["row"].seconds == pytest.approx(2.0)
 
 
 def test_reading_twice_does_not_count_twice(tmp_path: Path) -> None:

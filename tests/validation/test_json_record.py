@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-from ferryid.diagnose.result import Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.case_sampling import sample_cases
 from ferryid.validation.json_record import Record

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from ferryid.diagnose.result import Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects import effects
 from ferryid.effects.shallow_water import HEAVIER
 from ferryid.effects.wind import COEFFICIENTS

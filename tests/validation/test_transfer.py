@@ -143,7 +143,7 @@ def test_what_began_in_the_first_log_begins_in_the_second_at_the_same_time(logs:
 def test_free_runs_that_diverge_are_counted(scored: TransferResult) -> None:
     unstable = scored.methods["unstable"]
     assert unstable.diverged > 0
-    assert f"{unstable['diverged']} of {unstable['starts']} runs diverged" in unstable.why
+    assert f"{unstable.diverged} of {unstable.starts} runs diverged" in unstable.why
     assert unstable.mse == scored.methods["blank"].mse
     assert scored.methods["blank"].diverged == 0
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.onset_estimation import LEAST_BLOCKS
 from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
@@ -121,7 +122,7 @@ def law_of_one_log(finding: Finding, context: Context, _threshold: float) -> Out
         return finding, ""
     holding = others.holding
     shown = f", and {holding or 'none'} {'does' if holding < 2 else 'do'}" if others.able else ""
-    told = f"Of {others.count} other log{'s' if others.count > 1 else ''} {others.able or 'none'} could show it at this size"
+    told = f"Of {counted(others.count, 'other log')} {others.able or 'none'} could show it at this size"
     return lowered(replace(finding, says=f"{finding.says} {told}{shown}.")), ""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.counts import counted
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, one_line
 from ferryid.ingest.arrow_columns import column_from_arrow
 from ferryid.ingest.log import Column, Format, Loss, TableLayout, Topic
@@ -130,8 +130,8 @@ def _read_groups(
     # The count of a group may be what is damaged; that of the file is another.
     lost = max(lost, file.metadata.num_rows - sum(len(next(iter(part.values()), ())) for part in parts))
     what = (
-        f"{counted(lost, 'row')} in {groups} of {file.num_row_groups} row groups are damaged and were left "
-        f"out ({_reason(first)})"
+        f"{counted(lost, 'row')} in {groups} of {file.num_row_groups} row groups {verb(lost, 'is')} damaged and "
+        f"{verb(lost, 'was')} left out ({_reason(first)})"
     )
     return joined, (Loss(str(path), what, "table", messages=lost),)
 

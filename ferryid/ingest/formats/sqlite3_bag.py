@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.counts import counted
+from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.bulk import Decoder, decoder_for
 from ferryid.ingest.log import Format, Loss, Series, TableLayout, Topic
@@ -130,7 +130,8 @@ class Sqlite3Log:
         left = sum(_wal_frames(log) for log in logs if log.name.endswith("-wal")) - max(applied, 0)
         if left > 0:
             what = (
-                f"{counted(left, 'page')} in {names} are of unfinished or damaged transactions: their messages are lost"
+                f"{counted(left, 'page')} in {names} {verb(left, 'is')} of unfinished or damaged transactions: "
+                "their messages are lost"
             )
             losses = (Loss(str(path), what),)
         return copy, losses

@@ -20,7 +20,7 @@ from ferryid.vessel import load_profile
 from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
 
-SHORT = str(Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap")
+SHORT = str(Path(__file__).resolve().parents[3] / "fixtures" / "short.mcap")
 FERRY = load_profile("milliampere")
 
 

@@ -29,7 +29,7 @@ from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 
 FERRY = load_profile("milliampere")
-FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
 BASE = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"
