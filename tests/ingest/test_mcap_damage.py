@@ -284,7 +284,7 @@ def test_a_definition_longer_than_its_record_is_no_definition() -> None:
     bad = record(4, struct.pack("<HH", 2, 1) + struct.pack("<I", 2**31) + text("cdr") + bytes(4))
     got, losses = accounted(HEAD + bad + b"".join(message(number) for number in range(COUNT)))
     assert got == ALL
-    assert any("1 damaged, unknown or misplaced records" in loss.what for loss in losses)
+    assert any("1 damaged, unknown or misplaced record " in loss.what for loss in losses)
 
 
 def test_a_summary_that_lists_a_chunk_behind_the_file_is_not_believed() -> None:

@@ -227,14 +227,14 @@ def test_a_chunk_expands_to_its_allowance_at_most(
     monkeypatch.setattr(rosbag1_chunks, "MAX_CHUNK", 100_000)
     for size in (0, 10**6, 2**32 - 1):
         data, chunk = stored_chunk(compression, bytes(10**6), size)
-        content = decompressed(data, chunk, Allowance(10**9, 100_000), exact=exact)
+        content = decompressed(data, chunk, Allowance(10**9, 10**6, 100_000), exact=exact)
         assert len(content.buffer) <= min(100_000, 1000 + 255 * len(data))
         assert not content.whole
         assert "more than" in content.fault
 
 
 def test_all_chunks_together_expand_to_the_allowance_of_the_file() -> None:
-    allowance = Allowance(25_000)
+    allowance = Allowance(25_000, 10**6)
     data, chunk = stored_chunk("bz2", bytes(10_000), 10_000)
     sizes = [len(decompressed(data, chunk, allowance, exact=True).buffer) for _ in range(4)]
     assert sizes == [10_000, 10_000, 5000, 0]
