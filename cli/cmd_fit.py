@@ -61,19 +61,20 @@ def command(
     json: Json = None,
 ) -> None:
     """Fit a model to one or more logs, validate it, store it and write a report."""
-    from ferryid.identify.settings import FitSettings, window_choice
+    from ferryid.identify import FitSettings, parse_window
     from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
     settings = FitSettings(
-        basis=basis, structure=structure, components=components, **window_choice(window), smoother=smoother, residual=residual,
+        basis=basis, structure=structure, components=components, **parse_window(window), smoother=smoother, residual=residual,
         split=split, inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
     )  # fmt: skip
-    profile = load_profile(vessel)
+    profile, run = load_profile(vessel), RunContext(out, progress, verify)
     if archive:
-        outcome = fit_archive_and_report(profile, settings, out, logs or (), name=name, progress=progress)
+        outcome = fit_archive_and_report(profile, settings, run, logs or (), name=name)
     else:
-        outcome = fit_and_report(given(logs), profile, settings, out, name=name, verify=verify, progress=progress)
+        outcome = fit_and_report(given(logs), profile, settings, run, name=name)
     emit(outcome.json, outcome.text, json)
     if require_accept and not outcome.accepted:
         raise typer.Exit(3)

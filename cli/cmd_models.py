@@ -16,13 +16,13 @@ def command(
     json: Json = None,
 ) -> None:
     """List the stored models and which is current, or show one."""
-    from ferryid.identify.catalogue import listing, render_listing, render_model
-    from ferryid.identify.model import to_json
-    from ferryid.identify.store import load
+    from ferryid.models import model_to_json
+    from ferryid.models.store import list_versions, load
+    from ferryid.report.model_text import render_listing, render_model
 
     if model:
         loaded = load(model, out)
-        emit(to_json(loaded), render_model(loaded), json)
+        emit(model_to_json(loaded), render_model(loaded), json)
     else:
-        result = listing(out)
+        result = list_versions(out)
         emit(result, render_listing(result, out), json)

@@ -37,7 +37,7 @@ def command(
     json: Json = None,
 ) -> None:
     """Simulate a trial and write a log like a recording."""
-    from ferryid.identify.store import load
+    from ferryid.models.store import load
     from ferryid.simulate import render_scenarios, render_simulation, run_scenario, scenario_listing
 
     if list_:

@@ -58,9 +58,10 @@ def command(
     json: Json = None,
 ) -> None:
     """Cross-validate smoothing windows, component counts, or all bases in both structures, and mark which to fit with."""
-    from ferryid.identify.settings import FitSettings, windows_of
+    from ferryid.identify import FitSettings, parse_windows
     from ferryid.report.structures_report import structures_and_report
     from ferryid.report.sweep_report import sweep_and_report
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
     settings = FitSettings(
@@ -72,10 +73,9 @@ def command(
         logs or [] if archive else given(logs),
         load_profile(vessel),
         settings,
-        out,
-        windows_s=windows_of(windows),
+        RunContext(out, progress),
+        windows_s=parse_windows(windows),
         folds=folds,
         archive=archive,
-        progress=progress,
     )
     emit(outcome.json, outcome.text, json)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.bases import names
+from ferryid.regression.bases import basis_names
 
 Logs = Annotated[
     list[str],
@@ -27,7 +27,7 @@ Json = Annotated[
     str | None, typer.Option("--json", help="Write the result as JSON to this file, - for standard output.")
 ]
 Verify = Annotated[bool, typer.Option("--verify", help="Read the whole file and check every checksum.")]
-Basis = Annotated[str, typer.Option("--basis", help=f"Basis functions: {', '.join(names())}.")]
+Basis = Annotated[str, typer.Option("--basis", help=f"Basis functions: {', '.join(basis_names())}.")]
 Structure = Annotated[
     str, typer.Option("--structure", help="coupled: every term in every axis; decoupled: each where physics has it.")
 ]

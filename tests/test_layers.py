@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -18,11 +19,16 @@ ORDER = (
     "files",
     "interrupts",
     "compiled",
+    "lazy",
+    "types",
     "ingest",
     "vessel",
     "signals",
     "effects",
+    "regression",
+    "models",
     "identify",
+    "compare",
     "diagnose",
     "simulate",
     "report",
@@ -80,6 +86,74 @@ def test_imports_point_one_way(path: Path) -> None:
             assert target in allowed or target == "schemas", f"{path}:{line} imports {name} from a later layer"
         if package in HOMES:
             assert layer in HOMES[package], f"{path}:{line} imports {package}, which belongs to {HOMES[package]}"
+
+
+BORDERS = ("regression", "models", "identify", "compare")
+"""Packages of which others import only what the `__all__` of the package, or of a package in it, names."""
+MOST_PUBLIC_NAMES = 20
+
+
+def _packages() -> list[Path]:
+    return sorted(path for name in BORDERS for path in (ROOT / "ferryid" / name).rglob("__init__.py"))
+
+
+def _public(path: Path) -> list[str]:
+    """Return the names in the `__all__` of a file; none where it has no such list."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and [getattr(target, "id", "") for target in node.targets] == ["__all__"]:
+            return list(ast.literal_eval(node.value))
+    return []
+
+
+@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_others_import_from_the_borders_of_a_package(path: Path) -> None:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        imported = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom):
+            imported = [node.module or ""]
+        for name in imported:
+            parts = name.split(".")
+            if parts[0] != "ferryid" or len(parts) < 2 or parts[1] not in BORDERS or parts[1] == _layer(path):
+                continue
+            init = ROOT.joinpath(*parts, "__init__.py")
+            assert init.exists(), f"{path}:{node.lineno} imports the module {name}; import from its package"
+            assert isinstance(node, ast.ImportFrom), f"{path}:{node.lineno} imports {name} as a whole"
+            for alias in node.names:
+                assert alias.name in _public(init), f"{path}:{node.lineno} {alias.name} is not public in {name}"
+
+
+@pytest.mark.parametrize("path", _packages(), ids=lambda path: str(path.parent.relative_to(ROOT)))
+def test_the_border_of_a_package_is_small_and_all_there(path: Path) -> None:
+    names = _public(path)
+    package = import_module(".".join(path.parent.relative_to(ROOT).parts))
+    assert len(names) <= MOST_PUBLIC_NAMES
+    assert all(hasattr(package, name) for name in names)
+    # A module of the same name would take the place of the function once it is imported.
+    assert not set(names) & {file.stem for file in path.parent.iterdir()}
+
+
+def test_no_circle_of_imports() -> None:
+    paths = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in _modules()}
+    paths = {name.removesuffix(".__init__"): path for name, path in paths.items() if name.startswith("ferryid")}
+    needs = {name: {other for other in _needed(path) if other in paths} - {name} for name, path in paths.items()}
+    left = dict(needs)
+    while free := [name for name, others in left.items() if not others & left.keys()]:
+        for name in free:
+            del left[name]
+    assert not left, "these modules import one another: " + ", ".join(sorted(left))
+
+
+def _needed(path: Path) -> Iterator[str]:
+    """Yield what a module imports when it is imported itself, of a package the module that has the name."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            names = [node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)]
+            own = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            for name in names:
+                yield name
+                # Packages around what is imported are imported first.
+                around = (name.rpartition(".")[0], ".".join(name.split(".")[:2]), ".".join(name.split(".")[:3]))
+                yield from (package for package in around if not own.startswith(f"{package}."))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import Any
 
 from ferryid.diagnose import check_withheld
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.settings import FitSettings
+from ferryid.identify import FitSettings
 from ferryid.vessel.toml_lines import KeyPath, key_lines, line_of, too_deep
 
 STEPS = ("fit", "evaluate", "diagnose")

@@ -30,9 +30,9 @@ from ferryid.batch.trend import trends_of
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, one_line
 from ferryid.files import alone, dump_json, finite, remove_abandoned, write_text
-from ferryid.identify.model import Model, to_json
 from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
+from ferryid.models import Model, model_to_json
 from ferryid.report.batch_page import render
 from ferryid.report.diagnosis_report import patient
 from ferryid.signals.recording import log_name
@@ -140,7 +140,7 @@ def _patients(entries: Sequence[Entry], recipe: Recipe, out: Path) -> dict[str |
 
 def _task(entry: Entry, of: tuple[Profile, Model | None], recipe: Recipe, limit: int, again: bool, out: Path) -> Task:
     profile, model = of
-    text = None if model is None else dump_json(to_json(model))
+    text = None if model is None else dump_json(model_to_json(model))
     stamp = {
         "version": __version__,
         "recipe": _hash(dump_json(recipe.plain())),

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.batch.recipe import Recipe
+from ferryid.compare import evaluate
 from ferryid.diagnose import DiagnosisSettings
 from ferryid.files import dump_json, write_text
-from ferryid.identify.evaluate import evaluate
-from ferryid.identify.kept_pieces import kept
-from ferryid.identify.model import Model, blank
+from ferryid.identify import load_block_sums
+from ferryid.models import Model, blank_model
 from ferryid.report.diagnosis_report import diagnose_and_report
 from ferryid.report.fit_report import fit_and_report
+from ferryid.types import RunContext, no_progress
 from ferryid.vessel.profile import Profile
 
 LONGEST_NAME = 80
@@ -64,18 +65,14 @@ class Job:
         return whole[: LONGEST_NAME - len(end)] + end
 
 
-def _quiet(_stage: str) -> None:
-    """Tell nobody."""
-
-
 def _fitted(job: Job) -> dict[str, Any]:
     made = fit_and_report(
-        [job.log], job.profile, job.recipe.fit, job.folder, name=job.model_name(), tables=job.tables, progress=_quiet
+        [job.log], job.profile, job.recipe.fit, RunContext(job.folder), name=job.model_name(), tables=job.tables
     )
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
     if job.recorded.exists():
         settings = job.recipe.fit.on(job.profile)
-        kept(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
+        load_block_sums(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
     told, scores = made.json, made.json["scores"]
     return {
         "model": job.below(told["model"]["path"]),
@@ -90,8 +87,8 @@ def _fitted(job: Job) -> dict[str, Any]:
 
 
 def _evaluated(job: Job) -> dict[str, Any]:
-    model = job.model or blank(job.profile, job.profile.name)
-    told = evaluate(model, [job.log], job.tables, profile=job.profile, progress=_quiet)
+    model = job.model or blank_model(job.profile, job.profile.name)
+    told = evaluate(model, [job.log], RunContext(job.tables), profile=job.profile)
     write_text(job.folder / "evaluation.json", dump_json(told))
     entry = told["logs"][0]
     return {
@@ -115,7 +112,7 @@ def _diagnosed(job: Job) -> dict[str, Any]:
         tables=job.tables,
         name=job.model_name("-diagnosed"),
         command=[*words, *(["--model", job.recipe.model] if job.recipe.model else [])],
-        progress=_quiet,
+        progress=no_progress,
     )
     told = made.json
     return {

@@ -15,8 +15,8 @@ from ferryid import __version__
 from ferryid.batch.kept import Row
 from ferryid.batch.logs import Entry
 from ferryid.files import replacing
+from ferryid.types import AXES
 
-AXES = ("surge", "sway", "yaw")
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 CLOCK_SINCE = datetime(1990, 1, 1, tzinfo=UTC)
 """A log whose clock is earlier counts from its own start, and does not say when it was recorded."""

@@ -153,13 +153,13 @@ def _row(task: Task) -> Row:
 
 def _carry_out(task: Task, row: Row) -> None:
     from ferryid.batch.steps import CARRY_OUT, Job
-    from ferryid.identify.model import from_json
+    from ferryid.models import model_from_json
     from ferryid.signals.cache import folder_of
     from ferryid.signals.recording import record
     from ferryid.vessel import parse_profile
 
     profile = parse_profile(task.profile_text, task.profile_path)
-    model = None if task.model_text is None else from_json(json.loads(task.model_text), "the model of the recipe")
+    model = None if task.model_text is None else model_from_json(json.loads(task.model_text), "the model of the recipe")
     begun = time.perf_counter()
     recording = record(task.log, profile, task.tables)
     row |= {

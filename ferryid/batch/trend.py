@@ -11,16 +11,14 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.batch.summary import found_in, parameters_of
 from ferryid.counts import counted, verb
 from ferryid.diagnose import HINT
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
+from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 FEWEST = 6
 """Logs below which no trend is told: five in perfect order are no rarity."""

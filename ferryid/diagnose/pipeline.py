@@ -17,8 +17,8 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.judge import judge
 from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model
-from ferryid.identify.store import checked_name
+from ferryid.models import Model
+from ferryid.models.store import check_name
 from ferryid.vessel.profile import Profile
 
 
@@ -167,6 +167,6 @@ def diagnose_and_store(
     """
     chosen = settings or DiagnosisSettings()
     if name:
-        checked_name(name)
+        check_name(name)
     found = diagnose(logs, profile, tables, chosen, progress=progress)
     return store_updated_model(found, profile, chosen.model, out, name=name)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements
+from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 
 SECOND_ORDER = (
@@ -20,7 +21,7 @@ SECOND_ORDER = (
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return a factor for each axis."""
-    return tuple(Parameter(axis, "-", 1.0, 0.3, 6.0, neutral=1.0) for axis in ("surge", "sway", "yaw"))
+    return tuple(Parameter(axis, "-", 1.0, 0.3, 6.0, neutral=1.0) for axis in AXES)
 
 
 def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
@@ -39,18 +40,18 @@ def cannot(scene: Measurements) -> str:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence."""
-    parts = ", ".join(f"{axis} {100.0 * (values[axis] - 1.0):+.0f} %" for axis in ("surge", "sway", "yaw"))
+    parts = ", ".join(f"{axis} {100.0 * (values[axis] - 1.0):+.0f} %" for axis in AXES)
     return f"Damping at speed has changed ({parts}): the hull is fouled, or cleaner than the hull model."
 
 
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's fouling."""
-    return {"fouling": {axis: values[axis] for axis in ("surge", "sway", "yaw")}}
+    return {"fouling": {axis: values[axis] for axis in AXES}}
 
 
 def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the squared speed along the axis, with its sign."""
-    k = ("surge", "sway", "yaw").index(axis)
+    k = AXES.index(axis)
     speed = picture.scene.nu[:, k]
     return f"{axis} speed squared, signed [{'rad²/s²' if axis == 'yaw' else 'm²/s²'}]", np.abs(speed) * speed
 

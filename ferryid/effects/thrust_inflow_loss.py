@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, body_current
+from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -44,7 +45,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
 
 def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return force times inflow, of all thrusters together."""
-    j = ("surge", "sway", "yaw").index(axis)
+    j = AXES.index(axis)
     # A hundredth of the loss, so that nothing is clipped.
     lost = picture.parts.sum(axis=1) - apply(picture, np.array([0.01]), instance).parts.sum(axis=1)
     unit = "N·m·m/s" if axis == "yaw" else "N·m/s"

@@ -7,6 +7,7 @@ from typing import Any
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel
+from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -42,7 +43,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
 def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the thruster's own force."""
     k = picture.scene.names.index(str(instance))
-    j = ("surge", "sway", "yaw").index(axis)
+    j = AXES.index(axis)
     return f"{instance}'s own {axis} {'moment [N·m]' if axis == 'yaw' else 'force [N]'}", picture.parts[:, k, j]
 
 

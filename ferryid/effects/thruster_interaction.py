@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 from ferryid.vessel.thrusters import thrust
 
@@ -71,7 +72,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
 
 def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the force of a thruster by how much of a full wake it lies in: the angle alone leaves its direction open."""
-    j = ("surge", "sway", "yaw").index(axis)
+    j = AXES.index(axis)
     lost = picture.parts.sum(axis=1) - apply(picture, np.array([1.0]), instance).parts.sum(axis=1)
     what, unit = ("moment", "N·m") if axis == "yaw" else ("force", "N")
     return f"{axis} {what} of the thruster in the wake [{unit}]", lost[:, j]

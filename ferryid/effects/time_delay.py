@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -46,7 +47,7 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
 
 def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return how fast the thrust changes."""
-    j = ("surge", "sway", "yaw").index(axis)
+    j = AXES.index(axis)
     rate = np.gradient(picture.parts[:, :, j].sum(axis=1), picture.scene.step_s)
     return f"change of the thrusters' {axis} {'moment [N·m/s]' if axis == 'yaw' else 'force [N/s]'}", rate
 

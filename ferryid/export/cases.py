@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.identify.estimate import Estimator
+from ferryid.models.forces import Estimator
 from ferryid.vessel.profile import Floats
 
 TOLERANCE = 1e-9

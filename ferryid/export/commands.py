@@ -12,7 +12,7 @@ from ferryid.export.formats import formats
 from ferryid.export.log_file import export_log
 from ferryid.export.model_file import export_model
 from ferryid.files import check_result
-from ferryid.identify.store import load
+from ferryid.models.store import load
 from ferryid.vessel import load_profile
 
 

@@ -12,12 +12,8 @@ from ferryid.effects.wording import titled
 from ferryid.errors import FerryIdError
 from ferryid.export.cases import Case, cases, effective_mass, invertible
 from ferryid.export.names import identifier, legal
-from ferryid.identify.estimate import Estimator
-from ferryid.identify.excitation import RANGE_UNITS
-from ferryid.identify.model import Model
-from ferryid.identify.pictured import acting_estimator
-from ferryid.identify.residual import scaled
-from ferryid.identify.stored_effect import Quantity, StoredEffect
+from ferryid.models import RANGE_UNITS, Model, Quantity, StoredEffect
+from ferryid.models.forces import Estimator, acting_estimator, scale_hull
 from ferryid.vessel.profile import Floats, Hull
 
 HULL, THRUSTERS, SENSORS = "hull", "thrusters", "sensors"
@@ -79,7 +75,7 @@ class Exported:
     @property
     def hull(self) -> Hull:
         """The hull with the factors delta and sigma in it."""
-        return scaled(self.force.profile.hull, self.force.scale)
+        return scale_hull(self.force.profile.hull, self.force.scale)
 
     @property
     def zeta(self) -> float:

@@ -13,9 +13,9 @@ from ferryid.errors import FerryIdError
 from ferryid.export.findings import diagnostics, read_diagnosis, told_by
 from ferryid.export.model_file import SCHEMA
 from ferryid.files import replacing
-from ferryid.identify.model import Model
-from ferryid.identify.predict import Prediction, predict, predict_before, signal_map
-from ferryid.identify.residual import base_force
+from ferryid.models import Model
+from ferryid.models.forces import base_force
+from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.recording import log_name
 from ferryid.signals.track import Motion
@@ -99,7 +99,7 @@ def export_log(
         base = base_force(profile, motion, {})
     else:
         estimated = predict(model, prepared, profile, window_s=window_s, smoother=smoother)
-        base = predict_before(model, prepared, profile, window_s=window_s, smoother=smoother).tau
+        base = predict_base(model, prepared, profile, window_s=window_s, smoother=smoother).tau
     progress("writing")
     streams = _streams(motion, track.t0_ns, base, None if estimated is None else estimated.tau)
     if diagnosis is not None and found is not None:

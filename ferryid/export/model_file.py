@@ -14,7 +14,7 @@ from ferryid.export.formats import formats
 from ferryid.export.names import identifier
 from ferryid.export.words import MARK
 from ferryid.files import taken, unwritable, write_text
-from ferryid.identify.store import find, load_file
+from ferryid.models.store import find, load_file
 
 SCHEMA = "ferryid.export/1"
 FOLDER = "exports"

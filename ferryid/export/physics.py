@@ -15,8 +15,7 @@ from math import isfinite, pi
 from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.export.exported import Exported
 from ferryid.export.names import legal, number
-from ferryid.identify.strips import LEAST
-from ferryid.identify.term import STRIPS, Term
+from ferryid.regression.bases import CROSSFLOW_FACTORS, LEAST_SPEED_MPS, Term
 from ferryid.vessel.parse_hull import rigid_mass
 from ferryid.vessel.profile import Floats, Hull, WindAreas
 from ferryid.vessel.wind import AIR_DENSITY
@@ -40,9 +39,9 @@ FACTORS = {
             "gamma": "(-atan2(v_{0}, u_{0}))",
         }.items()
     },
-    **{name: name for name in STRIPS},
+    **{name: name for name in CROSSFLOW_FACTORS},
 }
-"""What the factors of a basis's terms are, `ferryid.identify.term.DIMENSIONS`; V cos(gamma) is the part of a flow along x."""
+"""What the factors of a basis's terms are, see `ferryid.regression.bases.term`; V cos(gamma) is the part of a flow along x."""
 STRIPS_SAY = (
     "fore: integral of abs(v + x r) (v + x r) for x from 0 to half_length, aft from -half_length to 0; "
     "x_fore, x_aft with x before it"
@@ -107,7 +106,7 @@ class Physics:
 
 
 def physics(one: Exported) -> Physics:
-    """Return the lines of `ferryid.identify.estimate.Estimator`: base hull, wind load, payload, zeta, terms, intercept."""
+    """Return the lines of `ferryid.models.forces.Estimator`: base hull, wind load, payload, zeta, terms, intercept."""
     constants = {made.name: made for made in _constants(one)}
     wind = _wind(constants) if one.force.profile.wind is not None else ()
     blocks = (
@@ -171,7 +170,7 @@ def _constants(one: Exported) -> Iterator[Constant]:
         return
     if isfinite(force.basis.length_m):
         yield Constant("half_length", 0.5 * force.basis.length_m, "m", "half the length of the hull")
-        yield Constant("least", LEAST, "m/s", "keeps a speed that is divided by from being zero")
+        yield Constant("least", LEAST_SPEED_MPS, "m/s", "keeps a speed that is divided by from being zero")
     for k, term in enumerate(force.basis.functions):
         for j, axis in enumerate(AXES):
             if force.theta[k, j] != 0.0:
@@ -306,7 +305,7 @@ def _scale() -> tuple[Line, ...]:
 
 
 def _strips() -> Iterator[Line]:
-    """Yield the lines of `ferryid.identify.strips`: ``even`` and ``odd`` of each half, and the integrals made of them."""
+    """Yield the lines of `crossflow_integrals`: ``even`` and ``odd`` of each half, and the integrals made of them."""
     for half, sign in (("fore", "+"), ("aft", "-")):
         end, both, even, odd = (f"{name}_{half}" for name in ("end", "both", "even", "odd"))
         crossing = f"crossing_{half}"

@@ -1,1 +1,30 @@
-"""Identification: residual, basis, SIMPLS on cross-products, validation, acceptance and the model store."""
+"""Identification of a correction to the base model, from logs, from an archive, or from motions in memory."""
+
+from ferryid.identify.acceptance import Acceptance, accept, accept_on_motions, force_mse
+from ferryid.identify.archive import fit_archive
+from ferryid.identify.block_sum_store import load_block_sums
+from ferryid.identify.model_selection import Selection
+from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
+from ferryid.identify.pipeline import fit_logs
+from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings, check_window, parse_window, parse_windows
+
+__all__ = [
+    "FOLDS",
+    "TEST_WINDOW_S",
+    "Acceptance",
+    "ComponentCurve",
+    "Excitation",
+    "FitOutcome",
+    "FitSettings",
+    "LogFit",
+    "Selection",
+    "accept",
+    "accept_on_motions",
+    "check_window",
+    "fit_archive",
+    "fit_logs",
+    "force_mse",
+    "load_block_sums",
+    "parse_window",
+    "parse_windows",
+]

@@ -5,54 +5,42 @@ Memory does not grow with the number of logs, apart from one cross-product each 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid import __version__
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.identify.accept import accept
-from ferryid.identify.archived_logs import folders
-from ferryid.identify.basis import Basis, basis
-from ferryid.identify.bootstrap import bootstrap
-from ferryid.identify.cautions import general_cautions, of_logs
-from ferryid.identify.choose import choose, deviation
-from ferryid.identify.combine import spanned
-from ferryid.identify.cross_products import CrossProducts, total
-from ferryid.identify.crossed import FOLDS, MOST_GROUPS, Folds, FoldSums
-from ferryid.identify.excitation import SECTORS, sector_coverage, singular_values, undetermined
-from ferryid.identify.fit import curve_of, quiet, regress
-from ferryid.identify.inertia import unforced
-from ferryid.identify.kept_pieces import Kept, kept
-from ferryid.identify.model import AXES, Model
-from ferryid.identify.result import Excitation, FitResult, FreeRun
-from ferryid.identify.scores import by_axis
-from ferryid.identify.settings import FitSettings, check_components
-from ferryid.identify.split import validating
-from ferryid.identify.store import checked_name
+from ferryid.identify.archived_logs import archived_folders
+from ferryid.identify.block_sum_store import StoredSums, load_block_sums
+from ferryid.identify.estimation import estimate_correction
+from ferryid.identify.excitation import SECTORS, sector_coverage
+from ferryid.identify.fit_data import Coefficients, Estimate, FitData
+from ferryid.identify.fit_warnings import general_warnings, log_warnings
+from ferryid.identify.inertia import axes_without_force
+from ferryid.identify.log_sums import pooled_deviation
+from ferryid.identify.model_selection import select_model
+from ferryid.identify.outcome import ArchivedLog, Excitation, FitOutcome, LogFit
+from ferryid.identify.pipeline import accept_estimate
+from ferryid.identify.settings import FOLDS, FitSettings, check_components
+from ferryid.identify.split import validation_blocks
+from ferryid.models import ForceScores, ModelScores, span_ranges
+from ferryid.models.prediction import FreeRun
+from ferryid.models.store import check_name
+from ferryid.regression import CrossProducts, singular_values, total, undetermined_terms
+from ferryid.regression.bases import Basis, make_basis
+from ferryid.regression.cross_validation import Folds, FoldSums
+from ferryid.types import Flags, Floats, RunContext
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 MOST_DRAWN = 500
 """Blocks that the bootstrap draws from; with more of them several logs' blocks are joined."""
-_NOTHING = np.zeros(0)
-NOT_RUN = FreeRun(
-    _NOTHING,
-    _NOTHING,
-    _NOTHING,
-    _NOTHING,
-    _NOTHING,
-    starts=0,
-    example={},
-    note="not run free: a fit over an archive sees sums and no motion; ferryid evaluate runs it on a log",
+_NOT_RUN = FreeRun.not_run(
+    "not run free: a fit over an archive sees sums and no motion; ferryid evaluate runs it on a log"
 )
 
 
@@ -95,11 +83,11 @@ class _Sums:
         self.validation_force: list[Floats] = []
         self._apiece = max(1, MOST_DRAWN // logs)
         self._short = 0
-        self._whole = validating(logs) if by_logs else None
+        self._whole = validation_blocks(logs) if by_logs else None
 
-    def add(self, log: Kept) -> None:
+    def add(self, log: StoredSums) -> None:
         """Add one log."""
-        one = log.studied
+        one = log.sums
         validates = self._validates(one.test.blocks)
         self.folds.add(one.training, one.test, ~validates)
         training_rows = 0
@@ -126,7 +114,7 @@ class _Sums:
         if self._whole is not None:
             return np.full(blocks, self._whole[len(self.logs)])
         if blocks >= 3:
-            return validating(blocks)
+            return validation_blocks(blocks)
         # A log too short for blocks of its own is one block among those of its kind.
         self._short += 1
         return np.full(blocks, self._short % 3 == 2)
@@ -142,91 +130,92 @@ class _Sums:
                 drawn[len(self.logs) % MOST_DRAWN] += block
 
 
-def fit_archive(
-    profile: Profile,
-    settings: FitSettings,
-    out: Path,
-    logs: Sequence[str] = (),
-    *,
-    name: str = "",
-    progress: Callable[[str], None] = quiet,
-) -> FitResult:
-    """Fit one correction to every log under an output folder; arguments as in `ferryid.identify.fit.fit`.
+@dataclass(frozen=True, eq=False)
+class ArchiveData(FitData):
+    """Sums of the logs of an archive at one window.
 
-    Parameters
+    Attributes
     ----------
-    logs
-        Names or paths of the logs to take, all that were ingested with the profile where none is given.
-
-    Raises
-    ------
-    FerryIdError
-        For logs that cannot be added up, by name.
+    sums
+        Sums at every window that was tried.
+    window
+        Which of these is fitted.
     """
-    name = checked_name(name or profile.name)
-    settings = settings.on(profile)
-    if settings.split == "every-kth":
-        raise FerryIdError("--split every-kth: an archive keeps blocks, no rows. Fix: give blocks or logs")
-    windows_s = settings.windows_s or (settings.window_s,)
-    where = folders(out, profile, logs)
-    sums = _Sums(len(windows_s), len(where), by_logs=settings.split == "logs")
-    functions = _added(where, profile, settings, windows_s, sums.add, progress)
-    check_components(settings.components, functions)
-    validation = total([log.validation for log in sums.logs])
-    if not validation.n or not any(one.n for one in sums.training if one is not None):
-        raise FerryIdError(
-            f"{sums.logs[0].name}: too little for training and validation, found {counted(len(sums.logs), 'log')} of "
-            f"{counted(sum(log.rows for log in sums.logs), 'row')}. Fix: ingest more or longer logs"
+
+    sums: _Sums
+    window: int = 0
+
+    @property
+    def where(self) -> str:
+        """Name of the first log, for messages."""
+        return self.sums.logs[0].name
+
+    @property
+    def training(self) -> CrossProducts:
+        """Basis and residual of the training blocks."""
+        training = self.sums.training[self.window]
+        assert training is not None
+        return training
+
+    @cached_property
+    def validation(self) -> CrossProducts:
+        """Basis and error of the validation blocks."""
+        return total([log.validation for log in self.sums.logs])
+
+    @property
+    def without_force(self) -> Flags:
+        """Axes on which no actuator acts, shape (3,)."""
+        return axes_without_force(
+            pooled_deviation(np.concatenate(self.sums.force)), pooled_deviation(np.concatenate(self.sums.base))
         )
-    progress("fitting")
-    free = unforced(deviation(np.concatenate(sums.force)), deviation(np.concatenate(sums.base)))
-    window, components = 0, settings.components
-    if settings.windows_s or components == "auto":
-        choice = choose(profile, settings, functions, windows_s, sums.folds.folds(), free, where=sums.logs[0].name)
-        window, components = choice.window, choice.components
-        settings = replace(settings, window_s=choice.window_s)
-    training = sums.training[window]
-    assert training is not None
-    functions, model_fit, chosen, held = regress(profile, settings, functions, training, int(components), free)
-    theta, intercept = model_fit.coefficients[chosen - 1], model_fit.intercepts[chosen - 1]
-    progress("resampling blocks for the intervals")
-    spread = bootstrap(
-        sums.drawn[window], chosen, draws=settings.draws, seed=settings.seed, allowed=functions.mask, where=name
-    )
-    scores = _scores(sums, validation, theta, intercept, settings)
-    verdict = accept(*(np.array([scores["mse"][part][axis] for axis in AXES]) for part in ("base", "model")))
-    known = Excitation(
-        singular_values=singular_values(training),
-        ranges=spanned(sums.ranges),
-        heading_coverage=sector_coverage(sums.sectors),
-        undetermined=undetermined(training, functions.terms, functions.mask),
-        vip=model_fit.vip(chosen),
-    )
-    model = Model(
-        name=name,
-        version=0,
-        created=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        ferryid_version=__version__,
-        profile_text=profile.text,
-        scale=settings.scale,
-        settings={
-            **settings.plain(),
-            "basis": functions.name,
-            "components": chosen,
-            "archive": True,
-            "grid_hz": sorted({log.rate_hz for log in sums.logs}),
-        },
-        terms=functions.terms,
-        units=functions.units,
-        theta=theta,
-        intercept=intercept,
-        low=spread.low,
-        high=spread.high,
-        intercept_low=spread.intercept_low,
-        intercept_high=spread.intercept_high,
-        covariance=spread.covariance,
-        ranges=known.ranges,
-        training=tuple(
+
+    def resampling_blocks(
+        self, theta: Floats, intercept: Floats
+    ) -> tuple[Sequence[CrossProducts], float, tuple[str, ...]]:
+        """Return the training blocks as they were kept."""
+        return self.sums.drawn[self.window], float("nan"), ()
+
+    def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
+        """Return the force errors on validation blocks."""
+        logged, validation = self.sums.logs, self.validation
+        variance = pooled_deviation(np.concatenate(self.sums.validation_force)) ** 2
+        trained = sum(log.training_rows / log.rate_hz for log in logged)
+        validated = sum(log.validation.n / log.rate_hz for log in logged)
+        by_logs = self.settings.split == "logs"
+        note = f"{counted(len(logged), 'log')}: {trained:.0f} s train, {validated:.0f} s validate, " + (
+            "whole logs, one of every three in a row." if by_logs else "in blocks of every log."
+        )
+        return ModelScores(
+            ForceScores.of(*_errors(validation, found), variance), validation.n, validated, self.settings.split, (note,)
+        )
+
+    def archived_logs(self, found: Coefficients) -> tuple[ArchivedLog, ...]:
+        """Return how well the model fits each log: the ratio of MSE on its validation rows, NaN where it has none."""
+        logs = []
+        for log in self.sums.logs:
+            base, new = _errors(log.validation, found)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratio = np.where(base > 0.0, new / base, np.nan)
+            logs.append(ArchivedLog(log.name, log.files, log.sha256, log.rows, log.validation.n, ratio, log.warnings))
+        return tuple(logs)
+
+    def excitation(self, estimate: Estimate) -> Excitation:
+        """Return what the training blocks determine."""
+        return Excitation(
+            singular_values=singular_values(self.training),
+            ranges=span_ranges(self.sums.ranges),
+            heading_coverage=sector_coverage(self.sums.sectors),
+            undetermined=undetermined_terms(self.training, self.functions.terms, estimate.functions.mask),
+            vip=estimate.regression.vip(estimate.components),
+        )
+
+    def free_runs(self, found: Coefficients, progress: Callable[[str], None]) -> tuple[FreeRun, FreeRun]:
+        """Return no free runs, as there is no motion."""
+        return _NOT_RUN, _NOT_RUN
+
+    def training_logs(self) -> tuple[Mapping[str, Any], ...]:
+        """Return the training logs as a model file lists them."""
+        return tuple(
             {
                 "name": log.name,
                 "files": list(log.files),
@@ -234,53 +223,85 @@ def fit_archive(
                 "seconds": log.training_rows / log.rate_hz,
                 "rows": log.training_rows,
             }
-            for log in sums.logs
+            for log in self.sums.logs
             if log.training_rows
-        ),
-        scores=scores,
-        accepted=verdict.accepted,
-    )
-    warnings = (
-        *held,
-        *general_cautions(settings, known, scores, len(sums.logs), float(scores["seconds"])),
-        *spread.notes,
-        *of_logs([(log.name, log.warnings) for log in sums.logs]),
-    )
-    return FitResult(
-        model,
-        verdict,
-        (),
-        curve_of(model_fit, training, validation, scores, chosen),
-        known,
-        NOT_RUN,
-        NOT_RUN,
-        warnings,
-        archive=tuple(_per_log(sums, theta, intercept)),
-    )
+        )
+
+    def model_settings(self, estimate: Estimate) -> dict[str, Any]:
+        """Return that the fit was to an archive, and the rates of its logs."""
+        return {"archive": True, "grid_hz": sorted({log.rate_hz for log in self.sums.logs})}
+
+    def warnings(self, excitation: Excitation, scores: ModelScores) -> list[str]:
+        """Return what to know before trusting the scores, as sentences."""
+        logs = self.sums.logs
+        return [
+            *general_warnings(self.settings, excitation, scores, len(logs)),
+            *log_warnings([(log.name, log.warnings) for log in logs]),
+        ]
+
+
+def fit_archive(
+    profile: Profile, settings: FitSettings, run: RunContext, names: Sequence[str] = (), *, name: str = ""
+) -> FitOutcome:
+    """Fit one correction to every log under an output folder; other arguments as in `ferryid.identify.pipeline.fit_logs`.
+
+    Parameters
+    ----------
+    names
+        Names or paths of the logs to take, all that were ingested with the profile where none is given.
+
+    Raises
+    ------
+    FerryIdError
+        For logs that cannot be added up, by name.
+    """
+    name, settings = check_name(name or profile.name), settings.on(profile)
+    if settings.split == "every-kth":
+        raise FerryIdError("--split every-kth: an archive keeps blocks, no rows. Fix: give blocks or logs")
+    windows_s = settings.windows_s or (settings.window_s,)
+    where = archived_folders(run.out, profile, names)
+    sums = _Sums(len(windows_s), len(where), by_logs=settings.split == "logs")
+    functions = _add_logs(where, profile, settings, windows_s, sums.add, run.progress)
+    check_components(settings.components, functions)
+    data = ArchiveData(profile, settings, functions, sums)
+    if not data.validation.n or not any(one.n for one in sums.training if one is not None):
+        raise FerryIdError(
+            f"{data.where}: too little for training and validation, found {counted(len(sums.logs), 'log')} of "
+            f"{counted(sum(log.rows for log in sums.logs), 'row')}. Fix: ingest more or longer logs"
+        )
+    run.progress("fitting")
+    components = settings.components
+    if settings.windows_s or components == "auto":
+        choice = select_model(
+            profile, settings, functions, windows_s, sums.folds.folds(), data.without_force, where=data.where
+        )
+        components = choice.components
+        data = replace(data, settings=replace(settings, window_s=choice.window_s), window=choice.window)
+    estimate = estimate_correction(data, int(components), settings.draws, run.progress)
+    return accept_estimate(data, estimate, name, run)
 
 
 def archive_folds(
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     windows_s: Sequence[float],
-    logs: Sequence[str],
+    names: Sequence[str],
     folds: int,
-    progress: Callable[[str], None],
 ) -> tuple[Basis, Flags, dict[str, Folds], list[dict[str, Any]]]:
     """Return what a sweep needs of an archive: basis, axes without force, folds by stretches and whole logs, and the logs."""
-    where = folders(out, profile, logs)
+    where = archived_folders(run.out, profile, names)
     by = {"blocks": FoldSums(len(windows_s), folds)}
     if len(where) > 1:
-        by["logs"] = FoldSums(len(windows_s), min(MOST_GROUPS, len(where)), whole=True)
+        by["logs"] = FoldSums(len(windows_s), len(where), whole=True)
     force, base, told = [], [], []
 
-    def add(log: Kept) -> None:
+    def add(log: StoredSums) -> None:
         for sums in by.values():
-            sums.add(log.studied.training, log.studied.test)
-        force.append(log.studied.force)
-        base.append(log.studied.base)
-        rows = int(log.studied.test.n.sum())
+            sums.add(log.sums.training, log.sums.test)
+        force.append(log.sums.force)
+        base.append(log.sums.base)
+        rows = int(log.sums.test.n.sum())
         told.append(
             {
                 "name": log.name,
@@ -291,24 +312,24 @@ def archive_folds(
             }
         )
 
-    functions = _added(where, profile, settings, windows_s, add, progress)
-    free = unforced(deviation(np.concatenate(force)), deviation(np.concatenate(base)))
+    functions = _add_logs(where, profile, settings, windows_s, add, run.progress)
+    free = axes_without_force(pooled_deviation(np.concatenate(force)), pooled_deviation(np.concatenate(base)))
     return functions, free, {key: sums.folds() for key, sums in by.items()}, told
 
 
-def _added(
+def _add_logs(
     where: Sequence[Path],
     profile: Profile,
     settings: FitSettings,
     windows_s: Sequence[float],
-    add: Callable[[Kept], None],
+    add: Callable[[StoredSums], None],
     progress: Callable[[str], None],
 ) -> Basis:
     """Add every log, one after the other, and return the basis that they share."""
-    first: Kept | None = None
+    first: StoredSums | None = None
     for number, folder in enumerate(where):
         progress(f"adding up log {number + 1} of {len(where)}")
-        log = kept(folder, profile, settings, windows_s)
+        log = load_block_sums(folder, profile, settings, windows_s)
         if first is not None and log.basis != first.basis:
             raise FerryIdError(
                 f"{log.name}: its basis is {log.basis}, as its measurements allow, that of {first.name} {first.basis}: they do "
@@ -317,54 +338,11 @@ def _added(
         first = first or log
         add(log)
     assert first is not None
-    return basis(first.basis, structure=settings.structure)
+    return make_basis(first.basis, structure=settings.structure)
 
 
-def _scores(
-    sums: _Sums, validation: CrossProducts, theta: Floats, intercept: Floats, settings: FitSettings
-) -> dict[str, Any]:
-    """Return the scores of a model file, from sums."""
-    mse_base, mse_model = _errors(validation, theta, intercept)
-    variance = deviation(np.concatenate(sums.validation_force)) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(mse_base > 0.0, mse_model / mse_base, np.nan)
-        r2 = [np.where(variance > 0.0, 1.0 - mse / variance, np.nan) for mse in (mse_base, mse_model)]
-    judged = ratio[np.isfinite(ratio)]
-    trained = sum(log.training_rows / log.rate_hz for log in sums.logs)
-    validated = sum(log.validation.n / log.rate_hz for log in sums.logs)
-    return {
-        "mse": {"base": by_axis(mse_base), "model": by_axis(mse_model)},
-        "r2": {"base": by_axis(r2[0]), "model": by_axis(r2[1])},
-        "per_axis": by_axis(ratio),
-        "normalised_mse": float(judged.mean()) if judged.size else float("nan"),
-        "rows": validation.n,
-        "seconds": validated,
-        "split": settings.split,
-        "split_notes": [
-            f"{counted(len(sums.logs), 'log')}: {trained:.0f} s train, {validated:.0f} s validate, "
-            + ("whole logs, one of every three in a row." if settings.split == "logs" else "in blocks of every log.")
-        ],
-    }
-
-
-def _errors(rows: CrossProducts, theta: Floats, intercept: Floats) -> tuple[Floats, Floats]:
+def _errors(rows: CrossProducts, found: Coefficients) -> tuple[Floats, Floats]:
     """Return the mean square error of base and new model per axis, shape (3,)."""
+    theta, intercept = found.theta, found.intercept
     both = rows.sse(np.array([np.zeros_like(theta), theta]), np.array([np.zeros_like(intercept), intercept]))
     return both[0] / max(rows.n, 1), both[1] / max(rows.n, 1)
-
-
-def _per_log(sums: _Sums, theta: Floats, intercept: Floats) -> Iterator[dict[str, Any]]:
-    """Yield how well the model fits each log: the ratio of MSE on its validation rows, NaN where it has none."""
-    for log in sums.logs:
-        base, new = _errors(log.validation, theta, intercept)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.where(base > 0.0, new / base, np.nan)
-        yield {
-            "name": log.name,
-            "files": list(log.files),
-            "sha256": log.sha256,
-            "rows": log.rows,
-            "validation_rows": log.validation.n,
-            "per_axis": by_axis(ratio),
-            "warnings": list(log.warnings),
-        }

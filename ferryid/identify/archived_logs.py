@@ -27,7 +27,7 @@ class _Ingested:
         return max(self.files.values(), default=0)
 
 
-def folders(out: Path, profile: Profile, names: Sequence[str] = ()) -> list[Path]:
+def archived_folders(out: Path, profile: Profile, names: Sequence[str] = ()) -> list[Path]:
     """Return the folders of the logs that were ingested with a profile, each log once.
 
     Parameters

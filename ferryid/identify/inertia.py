@@ -7,19 +7,15 @@ simulated, so the inertia of that axis is held at the base model's, which fixes 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.model import AXES
+from ferryid.models.forces import ACCELERATIONS
+from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.parse_hull import rigid_mass
 from ferryid.vessel.profile import Hull, Profile
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
-ACCELERATIONS = ("u_dot", "v_dot", "r_dot")
 LEAST_INERTIA, MOST_INERTIA = 0.8, 5.0
 """Parts of the rigid body's inertia between which a fitted one is believed. Added mass can only add, and no hull carries four
 times its own; noise in the derivative takes some per cent, which the lower limit allows for."""
@@ -27,21 +23,12 @@ NO_FORCE = 1e-6
 """An axis is without actuators when its force varies less than this part of what the base model needs."""
 
 
-def effective_mass(profile: Profile, scale: Mapping[str, float], terms: Sequence[str], theta: Floats) -> Floats:
-    """Return the mass matrix of base model and correction together [kg, kg·m, kg·m²], shape (3, 3)."""
-    mass = profile.hull.M * scale.get("delta", 1.0) / scale.get("zeta", 1.0)
-    for column, name in enumerate(ACCELERATIONS):
-        if name in terms:
-            mass[:, column] += theta[terms.index(name)]
-    return np.asarray(mass, dtype=np.float64)
-
-
-def unforced(tau: Floats, base: Floats) -> Flags:
+def axes_without_force(tau: Floats, base: Floats) -> Flags:
     """Return the axes on which no actuator acts, shape (3,), from standard deviations of measured and base force, (3,)."""
     return np.asarray(tau <= NO_FORCE * base)
 
 
-def unbelievable(profile: Profile, mass: Floats) -> Flags:
+def implausible_inertia(profile: Profile, mass: Floats) -> Flags:
     """Return the axes whose effective inertia cannot be right, shape (3,); all of them where the matrix as a whole is."""
     share = np.diag(mass) / np.diag(_rigid(profile.hull))
     wrong = (share < LEAST_INERTIA) | (share > MOST_INERTIA)
@@ -58,7 +45,7 @@ def without_inertia(mask: Flags, terms: Sequence[str], axes: Flags) -> Flags:
     return kept
 
 
-def reason(axis: int, mass: Floats, profile: Profile, force_free: bool) -> str:
+def held_inertia_reason(axis: int, mass: Floats, profile: Profile, force_free: bool) -> str:
     """Return why the inertia of an axis is held, in a sentence."""
     if force_free:
         return (

@@ -6,32 +6,29 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import Basis, basis, relative_flow
-from ferryid.identify.cross_products import Rows
-from ferryid.identify.scores import usable
 from ferryid.identify.settings import FitSettings
+from ferryid.models import usable_rows
+from ferryid.regression import Rows
+from ferryid.regression.bases import Basis, make_basis, relative_flow
 from ferryid.signals.smooth import odd_rows
 from ferryid.signals.track import Motion
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from ferryid.types import Flags, Floats
 
 
-def basis_of(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
+def basis_for(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
     """Return the basis of the settings; wind and current join it when every log has them, unless the name says how."""
     if "+" in settings.basis:
-        return basis(settings.basis, structure=settings.structure)
+        return make_basis(settings.basis, structure=settings.structure)
     wind = "thesis" if all(motion.wind is not None for motion in motions) else None
     current = "thesis" if all(motion.current is not None for motion in motions) else None
-    return basis(settings.basis, wind=wind, current=current, structure=settings.structure)
+    return make_basis(settings.basis, wind=wind, current=current, structure=settings.structure)
 
 
 def known_rows(motion: Motion, functions: Basis, target: Floats, error: Floats) -> Flags:
     """Return the rows on which force, residual and every measurement that the basis needs are known."""
-    rows = usable(motion, target, error, motion.nu, motion.nu_dot)
+    rows = usable_rows(motion, target, error, motion.nu, motion.nu_dot)
     if functions.needs_wind and motion.wind is not None:
         rows &= np.isfinite(motion.wind).all(axis=1) & np.isfinite(motion.eta[:, 2])
     if functions.needs_current and motion.current is not None:

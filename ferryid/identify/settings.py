@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.basis import Basis, basis, sized
+from ferryid.regression.bases import Basis, make_basis, with_hull_length
 from ferryid.vessel.profile import Profile
 
 CHOICES = {
@@ -17,6 +17,10 @@ CHOICES = {
 }
 
 
+FOLDS = 5
+"""Usual number of folds of a cross-validation."""
+TEST_WINDOW_S = 1.0
+"""Smoothing window of test rows [s], whatever window is tried."""
 WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
 """Smoothing windows that are usually tried [s]."""
 SHORTEST_WINDOW_S = 0.01
@@ -32,7 +36,7 @@ class FitSettings:
     Attributes
     ----------
     basis, structure
-        See `ferryid.identify.basis.basis`; wind and current join the basis when all logs have them, and the hull's length
+        See `make_basis`; wind and current join the basis when all logs have them, and the hull's length
         where the name lacks it.
     smoother, residual, split, inertia
         One of `CHOICES`; inertia ``"auto"`` holds it at the base model's on axes where the fitted one cannot be right.
@@ -75,7 +79,7 @@ class FitSettings:
 
     def __post_init__(self) -> None:
         # Says what is wrong with either before any log is read; the hull's length comes with the profile.
-        basis(sized(self.basis, 1.0, "settings"), structure=self.structure)
+        make_basis(with_hull_length(self.basis, 1.0, "settings"), structure=self.structure)
         for key, options in CHOICES.items():
             value = getattr(self, key)
             if value not in options:
@@ -122,7 +126,7 @@ class FitSettings:
         FerryIdError
             Where the basis needs a length that the profile does not have.
         """
-        return replace(self, basis=sized(self.basis, profile.hull.length_m, profile.path or profile.name))
+        return replace(self, basis=with_hull_length(self.basis, profile.hull.length_m, profile.path or profile.name))
 
     def plain(self) -> dict[str, Any]:
         """Return the settings as plain values for a model file."""
@@ -156,7 +160,7 @@ def check_window(window_s: float | None) -> None:
         )
 
 
-def windows_of(text: str) -> tuple[float, ...]:
+def parse_windows(text: str) -> tuple[float, ...]:
     """Return the smoothing windows [s] of a list such as ``"0.5,1,2"``; none of an empty one."""
     windows = []
     for part in filter(None, (part.strip() for part in text.split(","))):
@@ -169,7 +173,7 @@ def windows_of(text: str) -> tuple[float, ...]:
     return tuple(windows)
 
 
-def window_choice(text: str) -> dict[str, Any]:
+def parse_window(text: str) -> dict[str, Any]:
     """Return `window_s` of a number, `windows_s` of ``"auto"``, as settings take them."""
     if text == "auto":
         return {"windows_s": WINDOWS_S}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.track import Motion
-
-Flags = NDArray[np.bool_]
-Floats = NDArray[np.float64]
+from ferryid.types import Flags, Floats
 
 KINDS = ("blocks", "logs", "every-kth")
 BLOCK_S = 40.0
@@ -37,7 +35,7 @@ class Split:
     Attributes
     ----------
     kind
-        ``"blocks"``, ``"logs"``, ``"every-kth"`` or ``"fold <i> of <k>"``.
+        ``"blocks"``, ``"logs"``, ``"every-kth"``, or ``"none"`` where nothing is held out.
     training, validation
         One mask a log, shape (n,).
     purge_s
@@ -52,6 +50,12 @@ class Split:
     purge_s: float
     notes: tuple[str, ...] = ()
 
+    @classmethod
+    def nothing(cls, motions: Sequence[Motion]) -> Split:
+        """Return the split of motions of which no row is used yet."""
+        none = tuple(np.zeros(len(motion.t), dtype=bool) for motion in motions)
+        return cls("none", none, none, 0.0)
+
     def within(self, rows: Sequence[Flags]) -> Split:
         """Return the split without what lies outside `rows`, one mask a log, shape (n,)."""
         training, validation = (
@@ -61,7 +65,7 @@ class Split:
         return replace(self, training=training, validation=validation)
 
 
-def split(
+def split_rows(
     motions: Sequence[Motion],
     kind: str = "blocks",
     *,
@@ -110,56 +114,6 @@ def split(
     raise FerryIdError(
         f'settings: there is no split called "{kind}".{did_you_mean(kind, KINDS)} Fix: choose one of {", ".join(KINDS)}'
     )
-
-
-def folds(
-    motions: Sequence[Motion],
-    k: int = 5,
-    *,
-    window_s: float,
-    guard_s: float = GUARD_S,
-    rows: Sequence[Flags] | None = None,
-) -> Iterator[Split]:
-    """Yield splits for cross-validation: contiguous parts of every log validate in turn, purged as blocks are.
-
-    A log is cut into k parts, or into as many as are two purge gaps long; a short log is one part. The parts are dealt
-    to the folds in order.
-
-    Parameters
-    ----------
-    motions, window_s, guard_s
-        As in `split`.
-    k
-        Number of folds, 2 or more; fewer where there are fewer parts.
-    rows
-        Rows to divide, one mask a log: the training rows of a `Split`, to leave its validation rows untouched. The
-        valid rows where None.
-
-    Raises
-    ------
-    FerryIdError
-        For a single log too short for two folds.
-    """
-    if k < 2:
-        raise FerryIdError(f"settings: cross-validation needs 2 folds or more, found {k}. Fix: give 5, which is usual")
-    used = [motion.valid if rows is None else rows[i] & motion.valid for i, motion in enumerate(motions)]
-    purge_s = [purge_seconds(motion.rate_hz, window_s, guard_s) for motion in motions]
-    parts = [
-        max(1, min(k, int(np.count_nonzero(mask) / motion.rate_hz / (2.0 * purge))))
-        for motion, mask, purge in zip(motions, used, purge_s, strict=True)
-    ]
-    number = min(k, sum(parts))
-    if number < 2:
-        raise _too_short(motions[0], used[0], 4.0 * purge_s[0], "two folds")
-    first = np.cumsum([0, *parts[:-1]])
-    fold_of = [(_number(mask, part) + start) % number for mask, part, start in zip(used, parts, first, strict=True)]
-    for fold in range(number):
-        masks = [
-            _purged(mask, of == fold, round(purge * motion.rate_hz))
-            for motion, mask, of, purge in zip(motions, used, fold_of, purge_s, strict=True)
-        ]
-        training, validation = zip(*masks, strict=True)
-        yield Split(f"fold {fold + 1} of {number}", training, validation, min(purge_s))
 
 
 def correlation_time(values: Floats, valid: Flags, rate_hz: float, longest_s: float = 30.0) -> float:
@@ -212,7 +166,7 @@ def _number(used: Flags, parts: int) -> NDArray[np.int64]:
     return number
 
 
-def _purged(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
+def _purge(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
     """Return training and validation masks at least `purge` + 1 rows apart; the purge is taken from training."""
     validation = used & validates
     reach = np.concatenate([[0], np.cumsum(validation)])
@@ -238,8 +192,8 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
             validates = np.full(motion.valid.size, short % _VALIDATES_EVERY == 1)
             number, short = 1, short + 1
         else:
-            validates = validating(number)[_number(motion.valid, number)]
-        train, check = _purged(motion.valid, validates, round(purge_s * motion.rate_hz))
+            validates = validation_blocks(number)[_number(motion.valid, number)]
+        train, check = _purge(motion.valid, validates, round(purge_s * motion.rate_hz))
         training.append(train)
         validation.append(check)
         purges.append(purge_s)
@@ -254,12 +208,12 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
 
 
 def block_number(seconds: float, purge_s: float, wanted: int | None = None) -> int:
-    """Return the number of blocks of a log of `seconds`, none shorter than four purge gaps; see `split`."""
+    """Return the number of blocks of a log of `seconds`, none shorter than four purge gaps; see `split_rows`."""
     usual = wanted or min(max(round(seconds / BLOCK_S), FEWEST_BLOCKS), MOST_BLOCKS)
     return min(usual, int(seconds / (_LEAST_PURGES * purge_s)))
 
 
-def validating(number: int) -> Flags:
+def validation_blocks(number: int) -> Flags:
     """Return which of `number` blocks validate, shape (number,): one of every three in a row.
 
     Which of the three follows multiples of the golden ratio. Always the same one would keep step with a trial that

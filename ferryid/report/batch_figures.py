@@ -13,8 +13,8 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MaxNLocator
 
 from ferryid.diagnose import HINT
-from ferryid.identify.result import AXES
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, UNITS, canvas, svg_text
+from ferryid.types import AXES
 
 PANEL = 1.35
 """Height of a panel [inches]."""

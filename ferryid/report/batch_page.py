@@ -13,10 +13,10 @@ from urllib.parse import quote
 
 from ferryid.counts import counted
 from ferryid.diagnose import HINT
-from ferryid.identify.result import AXES
 from ferryid.report import batch_figures
 from ferryid.report.diagnosis_words import title
 from ferryid.report.html import template
+from ferryid.types import AXES
 
 WORDS = {
     "done": "done",

@@ -8,14 +8,12 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-from numpy.typing import NDArray
 
-from ferryid.identify.compare import Trial
-from ferryid.identify.model import AXES
+from ferryid.compare import ComparedLog
 from ferryid.report.figures import MEASURED, STYLE, SYMBOLS, UNITS, canvas, legend_above, margins, svg_text
 from ferryid.report.structure import envelope
+from ferryid.types import AXES, Floats
 
-Floats = NDArray[np.float64]
 Row = dict[str, Any]
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -140,7 +138,7 @@ def _plain_ticks(axis: Any, low: float, high: float) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def forces(result: Row, trial: Trial, start_s: float | None) -> str:
+def forces(result: Row, trial: ComparedLog, start_s: float | None) -> str:
     """Measured force and every model's estimate in the minute of a log that starts at `start_s`; in all of it where None."""
     look = looks(result["models"])
     with mpl.rc_context(STYLE):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ferryid.identify.compare import Trial
-from ferryid.identify.model import AXES
-from ferryid.identify.physics_rows import render_effects
+from ferryid.compare import ComparedLog
 from ferryid.report import comparison_figures, comparison_words
+from ferryid.report.comparison_words import render_effects
 from ferryid.report.html import template
 from ferryid.report.structure import worst_minute
+from ferryid.types import AXES
 
 Row = dict[str, Any]
 
@@ -18,19 +18,19 @@ MAX_LOGS = 6
 """Logs that are drawn; the page stays readable."""
 
 
-def render(result: Row, trials: Sequence[Trial], made: Mapping[str, str]) -> tuple[str, dict[str, str]]:
+def render(result: Row, logs: Sequence[ComparedLog], made: Mapping[str, str]) -> tuple[str, dict[str, str]]:
     """Return the page and its drawings (SVG) by name; `made` are date, version and command."""
     known = comparison_words.scopes(result)
     reference = result["models"][0]["label"]
     # What counts most comes first: all logs together.
     ordered = [*known[len(result["logs"]) :], *known[: len(result["logs"])]]
-    drawn = [trial.name for trial in trials[:MAX_LOGS]]
-    left = [trial.name for trial in trials[MAX_LOGS:]]
+    drawn = [log.name for log in logs[:MAX_LOGS]]
+    left = [log.name for log in logs[MAX_LOGS:]]
     shown = [(title, scope) for on, title, scope in ordered if on is None or on in drawn]
     overall = _overall(result, shown, reference) if shown else []
     sections = []
     for on, title, scope in ordered:
-        trial = next((one for one in trials[:MAX_LOGS] if one.name == on), None)
+        log = next((one for one in logs[:MAX_LOGS] if one.name == on), None)
         sections.append(
             {
                 "title": title,
@@ -40,7 +40,7 @@ def render(result: Row, trials: Sequence[Trial], made: Mapping[str, str]) -> tup
                 "sentences": comparison_words.sentences(result, on),
                 "tracking": comparison_words.tracking_line(scope),
                 "warnings": scope.get("warnings", ()),
-                "figures": _figures(result, trial) if trial is not None else [],
+                "figures": _figures(result, log) if log is not None else [],
             }
         )
     labels = [model["label"] for model in result["models"]]
@@ -90,13 +90,13 @@ def _overall(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> l
     return figures
 
 
-def _figures(result: Row, trial: Trial) -> list[dict[str, str]]:
-    start = worst_minute(trial.motion, trial.taus, trial.rows, comparison_figures.MINUTE_S)
+def _figures(result: Row, log: ComparedLog) -> list[dict[str, str]]:
+    start = worst_minute(log.motion, log.taus, log.rows, comparison_figures.MINUTE_S)
     which = "This log" if start is None else f"The minute in which the models err most, from {start:.0f} s"
     return [
         {
-            "file": f"forces-{trial.name}" + ("" if start is None else "-worst-minute"),
-            "svg": comparison_figures.forces(result, trial, start),
+            "file": f"forces-{log.name}" + ("" if start is None else "-worst-minute"),
+            "svg": comparison_figures.forces(result, log, start),
             "caption": f"{which}: force measured at the actuators, and what each model makes of the same motion.",
         }
     ]

@@ -12,18 +12,18 @@ from pathlib import Path
 from typing import Any
 
 from ferryid import __version__
+from ferryid.compare import Comparison
 from ferryid.files import dump_json, finite, replacing
-from ferryid.identify.compare import Comparison
-from ferryid.identify.physics_rows import render_effects
 from ferryid.report import comparison_words
 from ferryid.report.comparison_page import render
+from ferryid.report.comparison_words import render_effects
 
 NAMED = 2
 """Models and logs that the folder's name holds; a sum stands for the others."""
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ComparisonReport:
     """The page, and the same as JSON and as text for a terminal."""
 
     report: Path
@@ -31,7 +31,7 @@ class Outcome:
     text: str
 
 
-def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Outcome:
+def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> ComparisonReport:
     """Write page, figures and JSON to a folder in ``reports``; a later comparison of the same models and logs replaces it.
 
     `command` are the words that the comparison was asked for with; the page repeats them.
@@ -50,14 +50,14 @@ def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Ou
     }
     file = folder / "report.html"
     plain = {**plain, "report": str(file)}
-    page, drawings = render(plain, comparison.trials, made)
+    page, drawings = render(plain, comparison.logs, made)
     with replacing(folder) as temporary:
         temporary.mkdir()
         (temporary / file.name).write_text(page, encoding="utf-8", errors="backslashreplace")
         for name, drawing in drawings.items():
             (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "compare.json").write_text(dump_json(plain), encoding="utf-8")
-    return Outcome(file, plain, f"{as_text(plain)}\n\nreport  {file}")
+    return ComparisonReport(file, plain, f"{as_text(plain)}\n\nreport  {file}")
 
 
 def as_text(result: dict[str, Any]) -> str:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.compare import BASE, is_of_a_hull
 from ferryid.counts import counted
-from ferryid.effects.wording import listed
-from ferryid.identify.candidates import BASE
-from ferryid.identify.model import AXES
-from ferryid.identify.physics_rows import is_of_a_hull
+from ferryid.effects import effects
+from ferryid.effects.wording import listed, titled
+from ferryid.types import AXES
 
 Row = dict[str, Any]
 
@@ -227,3 +227,13 @@ def cell(value: Row | None) -> tuple[str, str]:
 
 def _constant(term: str) -> str:
     return "constant" if term == "1" else term
+
+
+def render_effects(rows: Sequence[Row]) -> list[str]:
+    """Return effects that differ as lines."""
+    lines = []
+    for row in rows:
+        title = titled(effects()[row["effect"]].title, row["instance"])
+        lines.append(f"{title}, {'a condition of ' + row['log'] if row['log'] else 'a property of the vessel'}")
+        lines += [f"  {label}: {told['says'] if told else 'not in it'}" for label, told in row["values"].items()]
+    return lines

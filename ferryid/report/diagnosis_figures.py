@@ -21,7 +21,6 @@ from ferryid.report.figures import (
     STYLE,
     SYMBOLS,
     UNITS,
-    Floats,
     canvas,
     legend_above,
     plain_log,
@@ -30,6 +29,7 @@ from ferryid.report.figures import (
 from ferryid.report.left_out import shade_left_out
 from ferryid.report.structure import envelope
 from ferryid.signals.track import LeftOut
+from ferryid.types import Floats
 
 PROFILES = 4
 """Profiles that are drawn, the most telling ones; all are in the JSON."""

@@ -15,8 +15,8 @@ from ferryid import __version__
 from ferryid.diagnose import AXES, SCHEMA, Diagnosis, DiagnosisSettings, campaign_verdict, diagnose_and_store, to_json
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
-from ferryid.identify.model import Model
-from ferryid.identify.store import load
+from ferryid.models import Model
+from ferryid.models.store import load
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.vessel import load_profile, parse_profile
 from ferryid.vessel.profile import Profile

@@ -16,12 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
-from ferryid.identify.result import AXES, ComponentCurve, Excitation, FreeRun, LogFit
+from ferryid.identify import ComponentCurve, Excitation, LogFit
+from ferryid.models.prediction import FreeRun
 from ferryid.report.left_out import shade_left_out
 from ferryid.report.structure import autocorrelation, envelope, spectrum
 from ferryid.signals.track import segments
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 WIDTH = 6.0
 MEASURED, BASE, NEW, SHADE = "#222222", "#d55e00", "#0072b2", "#e8eef4"

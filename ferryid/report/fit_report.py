@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,22 +10,19 @@ from typing import Any
 import numpy as np
 
 from ferryid.files import alone, dump_json, replacing
-from ferryid.identify.archive import fit_archive
-from ferryid.identify.catalogue import fitted_with
-from ferryid.identify.fit import fit, quiet
-from ferryid.identify.result import AXES, FitResult
-from ferryid.identify.scores import free_run_plain
-from ferryid.identify.settings import FitSettings
-from ferryid.identify.store import Stored, numbered, planned, save
+from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
+from ferryid.models.store import StoredModel, assign_version, plan, save
+from ferryid.report.model_text import describe_settings
 from ferryid.report.page import headline, render
+from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FitReport:
     """What a fit leaves: the stored model, the report, and the same as JSON and as text for a terminal."""
 
-    stored: Stored
+    stored: StoredModel
     report: Path
     json: dict[str, Any]
     text: str
@@ -40,14 +37,12 @@ def fit_and_report(
     logs: Sequence[str],
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     *,
     name: str = "",
     tables: Path | None = None,
-    verify: bool = False,
-    progress: Callable[[str], None] = quiet,
-) -> Outcome:
-    """Fit a model to logs, store it under `out`, and write its report.
+) -> FitReport:
+    """Fit a model to logs, store it in the output folder, and write its report.
 
     Parameters
     ----------
@@ -57,47 +52,41 @@ def fit_and_report(
         The vessel.
     settings
         How to fit.
-    out
-        Output folder: ``logs``, ``models`` and ``reports`` are made in it.
+    run
+        Output folder, in which ``logs``, ``models`` and ``reports`` are made; progress; whether to check every checksum.
     name
         Name of the model; the profile's where empty.
     tables
         Output folder whose ``logs`` keep the ingested tables, where that is another.
-    verify
-        Check every checksum of the logs.
-    progress
-        Called with the name of each stage, and with an empty string at the end.
 
     Raises
     ------
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
-    return _reported(
-        fit(logs, profile, settings, tables or out, name=name, verify=verify, progress=progress), out, progress
-    )
+    return _reported(fit_logs(logs, profile, settings, replace(run, out=tables or run.out), name=name), run)
 
 
 def fit_archive_and_report(
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     logs: Sequence[str] = (),
     *,
     name: str = "",
-    progress: Callable[[str], None] = quiet,
-) -> Outcome:
-    """Fit a model to what is kept of the logs under `out`, else as `fit_and_report`; see `ferryid.identify.archive`."""
-    return _reported(fit_archive(profile, settings, out, logs, name=name, progress=progress), out, progress)
+) -> FitReport:
+    """Fit a model to the block sums of the logs in the output folder, else as `fit_and_report`."""
+    return _reported(fit_archive(profile, settings, run, logs, name=name), run)
 
 
-def _reported(result: FitResult, out: Path, progress: Callable[[str], None]) -> Outcome:
-    progress("writing the report")
+def _reported(result: FitOutcome, run: RunContext) -> FitReport:
+    run.progress("writing the report")
+    out = run.out
     with alone(out / "models"):
-        result = replace(result, model=numbered(result.model, out))
+        result = replace(result, model=assign_version(result.model, out))
         folder = out / "reports" / f"{result.model.name}-v{result.model.version}"
         page, drawings = render(result)
-        stored = planned(result.model, out)
+        stored = plan(result.model, out)
         plain = as_json(result, stored, folder / "report.html")
         with replacing(folder) as temporary:
             temporary.mkdir()
@@ -107,11 +96,11 @@ def _reported(result: FitResult, out: Path, progress: Callable[[str], None]) -> 
             (temporary / "fit.json").write_text(dump_json(plain), encoding="utf-8")
             # Last before the report takes its place: a full disk or an interrupt leaves neither without the other.
             save(result.model, out)
-    progress("")
-    return Outcome(stored, folder / "report.html", plain, as_text(result, stored, folder / "report.html"))
+    run.progress("")
+    return FitReport(stored, folder / "report.html", plain, as_text(result, stored, folder / "report.html"))
 
 
-def as_json(result: FitResult, stored: Stored, report: Path) -> dict[str, Any]:
+def as_json(result: FitOutcome, stored: StoredModel, report: Path) -> dict[str, Any]:
     """Return the result of a fit in the form of schema ``ferryid.fit/1``."""
     model = result.model
     return {
@@ -124,13 +113,13 @@ def as_json(result: FitResult, stored: Stored, report: Path) -> dict[str, Any]:
             "accepted": model.accepted,
         },
         "headline": headline(result),
-        "reasons": list(result.verdict.reasons),
+        "reasons": list(result.acceptance.reasons),
         "warnings": list(result.warnings),
-        "scores": dict(model.scores),
+        "scores": result.scores.to_json(),
         "settings": {**model.settings, **model.scale},
         "free_run": {
-            "base": free_run_plain(result.free_run_base),
-            "model": free_run_plain(result.free_run_model),
+            "base": result.free_run_base.to_json(),
+            "model": result.free_run_model.to_json(),
         },
         "components": {
             "chosen": result.curve.chosen,
@@ -144,29 +133,26 @@ def as_json(result: FitResult, stored: Stored, report: Path) -> dict[str, Any]:
             "ranges": {name: list(span) for name, span in result.excitation.ranges.items()},
         },
         "logs": [{"name": log.motion.log, **log.data_quality} for log in result.logs],
-        **({"archive": [dict(log) for log in result.archive]} if result.archive else {}),
+        **({"archive": [log.to_json() for log in result.archive]} if result.archive else {}),
         "report": str(report),
     }
 
 
-def as_text(result: FitResult, stored: Stored, report: Path) -> str:
+def as_text(result: FitOutcome, stored: StoredModel, report: Path) -> str:
     """Return the verdict for a terminal."""
-    model, scores = result.model, result.model.scores
+    model, scores = result.model, result.scores.force
     lines = [
         headline(result),
-        *(f"  {reason}" for reason in result.verdict.reasons),
+        *(f"  {reason}" for reason in result.acceptance.reasons),
         "",
-        f"fitted with {fitted_with(model)}",
+        f"fitted with {describe_settings(model)}",
         "",
     ]
     lines.append(f"{'on validation rows':<28}" + "".join(f"{axis:>12}" for axis in AXES))
     lines.append(f"{'':<28}" + "".join(f"{unit:>12}" for unit in ("[N]", "[N]", "[N·m]")))
-    for label, part in (("base", "base"), ("new", "model")):
-        lines.append(
-            f"{'rms force error, ' + label:<28}"
-            + "".join(f"{scores['mse'][part][axis] ** 0.5:>12.3g}" for axis in AXES)
-        )
-    lines.append(f"{'R², new':<28}" + "".join(f"{_number(scores['r2']['model'][axis]):>12}" for axis in AXES))
+    for label, mse in (("base", scores.mse_base), ("new", scores.mse_model)):
+        lines.append(f"{'rms force error, ' + label:<28}" + "".join(f"{value:>12.3g}" for value in np.sqrt(mse)))
+    lines.append(f"{'R², new':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
     lines.append("")
     lines.extend(f"warning: {warning}" for warning in result.warnings)
     state = "current" if stored.current else ("stored" if model.accepted else "stored, marked as rejected")

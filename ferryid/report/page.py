@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.identify.excitation import RANGE_UNITS
-from ferryid.identify.inertia import effective_mass
-from ferryid.identify.result import AXES, FitResult, LogFit
+from ferryid.identify import FitOutcome, LogFit
+from ferryid.models import RANGE_UNITS, ForceScores
+from ferryid.models.forces import effective_mass
 from ferryid.report import figures
 from ferryid.report.html import template
 from ferryid.report.left_out import left_out_table
 from ferryid.report.structure import remainder, worst_and_best_minute
+from ferryid.types import AXES, Floats
 from ferryid.vessel import parse_profile
 from ferryid.vessel.parse_hull import rigid_mass
 
@@ -22,7 +23,7 @@ MAX_LOGS = 6
 """Logs whose forces are drawn; the page stays below ten megabytes and readable."""
 
 
-def render(result: FitResult) -> tuple[str, dict[str, str]]:
+def render(result: FitOutcome) -> tuple[str, dict[str, str]]:
     """Return the report of a fit as HTML with the drawings inside, and the drawings (SVG) by name."""
     context = _context(result)
     return template("fit.html").render(context), dict(_drawings(context))
@@ -41,9 +42,9 @@ def _drawings(part: Any) -> Iterator[tuple[str, str]]:
             yield from _drawings(value)
 
 
-def headline(result: FitResult) -> str:
+def headline(result: FitOutcome) -> str:
     """Return the verdict in one sentence."""
-    change = result.verdict.normalised_mse - 1.0
+    change = result.acceptance.normalised_mse - 1.0
     hull = parse_profile(result.model.profile_text, result.model.name).hull
     base = "the base model's" if hull.has_model else "that of the base model, which is rigid-body mass alone,"
     if not np.isfinite(change):
@@ -55,13 +56,13 @@ def headline(result: FitResult) -> str:
     trust = (
         f" Read the {counted(count, 'warning')} first." if count > 1 else " Read the warning first." if count else ""
     )
-    if result.verdict.accepted:
+    if result.acceptance.accepted:
         return f"Accepted: {told}.{trust}"
     return f"Not accepted: {told}."
 
 
-def _context(result: FitResult) -> dict[str, Any]:
-    model, verdict = result.model, result.verdict
+def _context(result: FitOutcome) -> dict[str, Any]:
+    model, verdict = result.model, result.acceptance
     drawn = result.logs[:MAX_LOGS]
     left = [log.motion.log for log in result.logs[MAX_LOGS:]]
     return {
@@ -74,8 +75,8 @@ def _context(result: FitResult) -> dict[str, Any]:
         "reasons": verdict.reasons,
         "warnings": result.warnings,
         "axes": AXES,
-        "score_rows": _score_rows(model.scores),
-        "split_notes": model.scores.get("split_notes", ()),
+        "score_rows": _score_rows(result.scores.force),
+        "split_notes": result.scores.split_notes,
         "logs": [{"name": log.motion.log, "figures": _force_figures(log)} for log in drawn],
         "omitted": f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
         "free_run_notes": [
@@ -152,10 +153,10 @@ def _context(result: FitResult) -> dict[str, Any]:
         "quality": [_quality(log) for log in result.logs],
         "archive": [
             {
-                "name": log["name"],
-                "rows": log["rows"],
-                "validation_rows": log["validation_rows"],
-                "ratios": [_text(log["per_axis"][axis], ".3f") for axis in AXES],
+                "name": log.name,
+                "rows": log.rows,
+                "validation_rows": log.validation_rows,
+                "ratios": [_text(ratio, ".3f") for ratio in log.mse_ratio.tolist()],
             }
             for log in result.archive
         ],
@@ -163,17 +164,16 @@ def _context(result: FitResult) -> dict[str, Any]:
     }
 
 
-def _score_rows(scores: Mapping[str, Any]) -> list[dict[str, Any]]:
-    def row(name: str, values: Mapping[str, float], pattern: str, mean: str = "") -> dict[str, Any]:
-        return {"name": name, "values": [_text(values.get(axis), pattern) for axis in AXES], "mean": mean}
+def _score_rows(scores: ForceScores) -> list[dict[str, Any]]:
+    def row(name: str, values: Floats, pattern: str, mean: str = "") -> dict[str, Any]:
+        return {"name": name, "values": [_text(value, pattern) for value in values.tolist()], "mean": mean}
 
-    mse, r2 = scores["mse"], scores["r2"]
     return [
-        row("MSE over the base model's", scores["per_axis"], ".3f", _text(scores["normalised_mse"], ".3f")),
-        row("root-mean-square error, base [N, N, N·m]", {a: mse["base"][a] ** 0.5 for a in AXES}, ".3g"),
-        row("root-mean-square error, new [N, N, N·m]", {a: mse["model"][a] ** 0.5 for a in AXES}, ".3g"),
-        row("R², base", r2["base"], ".3f"),
-        row("R², new", r2["model"], ".3f"),
+        row("MSE over the base model's", scores.ratio, ".3f", _text(scores.normalised_mse, ".3f")),
+        row("root-mean-square error, base [N, N, N·m]", np.sqrt(scores.mse_base), ".3g"),
+        row("root-mean-square error, new [N, N, N·m]", np.sqrt(scores.mse_model), ".3g"),
+        row("R², base", scores.r2_base, ".3f"),
+        row("R², new", scores.r2_model, ".3f"),
     ]
 
 
@@ -199,7 +199,7 @@ def _force_figures(log: LogFit) -> list[dict[str, str]]:
     return shown
 
 
-def _free_run_figures(result: FitResult) -> list[dict[str, str]]:
+def _free_run_figures(result: FitOutcome) -> list[dict[str, str]]:
     base, new = result.free_run_base, result.free_run_model
     shown = []
     if base.starts or new.starts:
@@ -223,7 +223,7 @@ def _free_run_figures(result: FitResult) -> list[dict[str, str]]:
     return shown
 
 
-def _coefficients(result: FitResult) -> list[dict[str, Any]]:
+def _coefficients(result: FitOutcome) -> list[dict[str, Any]]:
     model = result.model
     rows = []
     for k, term in enumerate((*model.terms, "1 (constant)")):
@@ -253,7 +253,7 @@ def _coefficients(result: FitResult) -> list[dict[str, Any]]:
     return rows
 
 
-def _inertia(result: FitResult) -> list[dict[str, str]]:
+def _inertia(result: FitOutcome) -> list[dict[str, str]]:
     """Return the inertias that base and new model imply, beside those of the rigid body."""
     model = result.model
     profile = parse_profile(model.profile_text, model.name)
@@ -272,7 +272,7 @@ def _inertia(result: FitResult) -> list[dict[str, str]]:
     ]
 
 
-def _excitation_lines(result: FitResult) -> list[str]:
+def _excitation_lines(result: FitOutcome) -> list[str]:
     excitation = result.excitation
     values = excitation.singular_values
     lines = []
@@ -317,7 +317,7 @@ def _quality(log: LogFit) -> dict[str, Any]:
     return {"name": log.motion.log, "remarks": quality["remarks"], "streams": streams, "left_out": left_out}
 
 
-def _provenance(result: FitResult) -> list[dict[str, str]]:
+def _provenance(result: FitOutcome) -> list[dict[str, str]]:
     model = result.model
     rows = [
         ("model", f"{model.name}@{model.version}, ferryid {model.ferryid_version}, {model.created}"),

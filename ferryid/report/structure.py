@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.result import AXES, LogFit
+from ferryid.identify import LogFit
 from ferryid.signals.track import Motion
+from ferryid.types import AXES, Flags, Floats
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 POINTS = 900
 
 

@@ -7,13 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
-from ferryid.identify.compared import Compared
-from ferryid.identify.model import AXES
+from ferryid.identify.sweeps import StructureComparison
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, WIDTH, svg_text
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 1.85, 0.15, 0.35, 0.55
 """Margins in inches."""
@@ -27,7 +24,7 @@ _BETWEEN = (
 """Ticks of a decade, by the ratio of largest to least."""
 
 
-def forest(one: Compared) -> str:
+def forest(one: StructureComparison) -> str:
     """Return MSE over that of the best structure per axis, with its interval, a line for each structure."""
     with mpl.rc_context(STYLE):
         count = len(one.structures)

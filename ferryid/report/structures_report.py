@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.compared import (
-    Compared,
+from ferryid.identify import FOLDS, TEST_WINDOW_S, FitSettings
+from ferryid.identify.sweeps import (
+    BY,
     Ratios,
+    StructureComparison,
     StructureSweep,
     over_base,
-    render_structures,
     structures_json,
-    terms,
-    verdict,
+    sweep_structures,
 )
-from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S
-from ferryid.identify.model import AXES
-from ferryid.identify.settings import FitSettings
-from ferryid.identify.structures import sweep_structures
-from ferryid.identify.sweep import BY
 from ferryid.report.html import template
 from ferryid.report.structures_figures import forest
-from ferryid.report.sweep_report import Outcome, leave
+from ferryid.report.structures_text import count_terms, render_structures, supported_structure
+from ferryid.report.sweep_report import SweepReport, leave
+from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
 
@@ -32,25 +28,22 @@ def structures_and_report(
     logs: Sequence[str],
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     *,
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
     archive: bool = False,
-    progress: Callable[[str], None],
-) -> Outcome:
+) -> SweepReport:
     """Compare structures and write the page; arguments and errors are those of `sweep_structures`."""
     if archive:
         raise FerryIdError("--archive: what is kept of a log is of one basis. Fix: name the logs to compare bases on")
     if windows_s:
         raise FerryIdError("--windows: bases are compared at one window. Fix: give --window")
-    found = sweep_structures(logs, profile, settings, out, folds=folds, progress=progress)
-    progress("writing the report")
+    found = sweep_structures(logs, profile, settings, run, folds=folds)
+    run.progress("writing the report")
     page, drawings = render(found)
     text = render_structures(found)
-    return leave(
-        out, "basis", found.logs, page, drawings, lambda report: structures_json(found, report), text, progress
-    )
+    return leave(run, "basis", found.logs, page, drawings, lambda report: structures_json(found, report), text)
 
 
 def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
@@ -59,7 +52,7 @@ def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
     sections = [
         {
             "title": f"By {BY[key]}",
-            "verdict": verdict(one),
+            "verdict": supported_structure(one),
             "one": one,
             "best": one.structures[0].title,
             "simplest": one.simplest.title,
@@ -71,7 +64,7 @@ def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
     plain = structures_json(found)
     page = template("structures.html").render(
         vessel=found.vessel,
-        headline=verdict(found.by["blocks"]),
+        headline=supported_structure(found.by["blocks"]),
         notes=found.notes,
         unusable=found.unusable,
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
@@ -85,13 +78,13 @@ def render(found: StructureSweep) -> tuple[str, dict[str, str]]:
     return page, drawings
 
 
-def _rows(one: Compared) -> list[dict[str, Any]]:
+def _rows(one: StructureComparison) -> list[dict[str, Any]]:
     return [
         {
             "basis": structure.basis,
             "structure": structure.structure,
             "functions": structure.functions.name,
-            "terms": terms(structure),
+            "terms": count_terms(structure),
             "components": structure.components,
             "within": f"{min(structure.within)} to {max(structure.within)}",
             "ratios": [f"{value:.4f}" for value in over_base(structure, one)],

@@ -8,15 +8,15 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 
-from ferryid.identify.choose import Choice
-from ferryid.identify.model import AXES
-from ferryid.identify.sweep import Sweep
+from ferryid.identify import Selection
+from ferryid.identify.sweeps import Sweep
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, canvas, legend_above, svg_text
+from ferryid.types import AXES
 
 _COLOURS = (NEW, BASE, "#009e73")
 
 
-def heat_map(found: Sweep, choice: Choice) -> str:
+def heat_map(found: Sweep, choice: Selection) -> str:
     """Return the score of every window and component count; what lies within one standard error of the least is outlined."""
     score, band = choice.curves.normalised()
     best = np.unravel_index(int(np.argmin(score)), score.shape)
@@ -50,7 +50,7 @@ def heat_map(found: Sweep, choice: Choice) -> str:
         return svg_text(figure)
 
 
-def curves(found: Sweep, choice: Choice) -> str:
+def curves(found: Sweep, choice: Selection) -> str:
     """Return MSE over the base model's against the number of components, per axis, with one standard error."""
     with mpl.rc_context(STYLE):
         figure, (ax,) = canvas(1, 3.4)

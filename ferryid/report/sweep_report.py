@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.files import dump_json, replacing
-from ferryid.identify.crossed import FOLDS, TEST_WINDOW_S
-from ferryid.identify.model import AXES
-from ferryid.identify.settings import FitSettings
-from ferryid.identify.sweep import BY, Sweep, headline, render_sweep, sweep, sweep_json
+from ferryid.identify import FOLDS, TEST_WINDOW_S, FitSettings
+from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
 from ferryid.report.html import template
 from ferryid.report.sweep_figures import curves, heat_map
+from ferryid.report.sweep_text import headline, render_sweep
+from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SweepReport:
     """What a sweep leaves: its page, and the same as JSON and as text for a terminal."""
 
     report: Path
@@ -32,38 +32,32 @@ def sweep_and_report(
     logs: Sequence[str],
     profile: Profile,
     settings: FitSettings,
-    out: Path,
+    run: RunContext,
     *,
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
     archive: bool = False,
-    progress: Callable[[str], None],
-) -> Outcome:
-    """Sweep settings over logs and write the page; arguments and errors are those of `ferryid.identify.sweep.sweep`."""
-    found = sweep(
-        what, logs, profile, settings, out, windows_s=windows_s, folds=folds, archive=archive, progress=progress
-    )
-    progress("writing the report")
+) -> SweepReport:
+    """Sweep settings over logs and write the page; arguments and errors are those of `sweep_settings`."""
+    found = sweep_settings(what, logs, profile, settings, run, windows_s=windows_s, folds=folds, archive=archive)
+    run.progress("writing the report")
     page, drawings = render(found)
-    return leave(
-        out, what, found.logs, page, drawings, lambda report: sweep_json(found, report), render_sweep(found), progress
-    )
+    return leave(run, what, found.logs, page, drawings, lambda report: sweep_json(found, report), render_sweep(found))
 
 
 def leave(
-    out: Path,
+    run: RunContext,
     what: str,
     logs: Sequence[Mapping[str, Any]],
     page: str,
     drawings: Mapping[str, str],
     json_of: Callable[[str], dict[str, Any]],
     text: str,
-    progress: Callable[[str], None],
-) -> Outcome:
+) -> SweepReport:
     """Write page, drawings and JSON of a sweep into its folder; `json_of` returns the JSON for the page's path."""
     first = str(logs[0]["name"])
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
-    report = out / "reports" / f"sweep-{what}-{first}{more}" / "report.html"
+    report = run.out / "reports" / f"sweep-{what}-{first}{more}" / "report.html"
     plain = json_of(str(report))
     with replacing(report.parent) as temporary:
         os.makedirs(temporary)
@@ -71,8 +65,8 @@ def leave(
         for name, drawing in drawings.items():
             (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "sweep.json").write_text(dump_json(plain), encoding="utf-8")
-    progress("")
-    return Outcome(report, plain, f"{text}\nreport  {report}")
+    run.progress("")
+    return SweepReport(report, plain, f"{text}\nreport  {report}")
 
 
 def render(found: Sweep) -> tuple[str, dict[str, str]]:

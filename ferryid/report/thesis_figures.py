@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ferryid.report.drawing import Drawing, Floats, Panel
+from ferryid.report.drawing import Drawing, Panel
 from ferryid.report.figures import STYLE, WIDTH
 from ferryid.report.structure import envelope
+from ferryid.types import Floats
 
 COLOURS = ("#222222", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7f7f7f")
 LONGEST = 1500

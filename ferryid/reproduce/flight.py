@@ -8,8 +8,8 @@ from functools import cache, cached_property
 from importlib import resources
 from pathlib import Path
 
-from ferryid.identify.model import Model
-from ferryid.identify.settings import FitSettings
+from ferryid.identify import FitSettings
+from ferryid.models import Model
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, learn
 from ferryid.reproduce.performance import Performance, performance
 from ferryid.signals.align import align

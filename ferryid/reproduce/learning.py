@@ -6,20 +6,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ferryid.identify.adapt import data_matrix, fit_motions
-from ferryid.identify.cross_products import CrossProducts, Rows
-from ferryid.identify.estimate import Estimator
-from ferryid.identify.model import Model
-from ferryid.identify.qr import QrFactor, factorise
-from ferryid.identify.settings import FitSettings
+from ferryid.identify import FitSettings
+from ferryid.identify.adaptive import data_matrix, fit_motions
+from ferryid.models import Model
+from ferryid.models.forces import Estimator
+from ferryid.regression import CrossProducts, QrFactor, Rows, factorise
 from ferryid.signals.track import Motion
 from ferryid.vessel.load import parse_profile
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 BASE = {"delta": 0.4, "sigma": 0.4, "zeta": 1.0}
 """The thesis's base model, (4.2)-(4.5)."""
@@ -33,7 +27,7 @@ THESIS = FitSettings(
 
 def learn(motions: Sequence[Motion], profile: Profile, settings: FitSettings = THESIS) -> Model:
     """Return the model that the thesis would make of these rounds, (3.1)-(3.3); the motions' window is the settings'."""
-    return fit_motions(profile, motions, settings, name="reproduction")
+    return fit_motions(profile, motions, settings, name="reproduction").model
 
 
 def products(motions: Sequence[Motion], profile: Profile, settings: FitSettings = THESIS) -> CrossProducts | QrFactor:

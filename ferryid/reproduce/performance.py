@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.tracking import Tracking, running, signal_power, tracking_error
+from ferryid.compare import Tracking, cumulative_integral, signal_power, tracking_error
 from ferryid.simulate.states import Control, Truth
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ def performance(truth: Truth, control: Control, length_m: float) -> Performance:
     return Performance(
         control.t,
         tracking_error(eta, control.eta_d, length_m),
-        np.interp(control.t, truth.t, running(power, truth.t)),
+        np.interp(control.t, truth.t, cumulative_integral(power, truth.t)),
         control.tau_d - control.feedforward,
         control.feedforward,
     )

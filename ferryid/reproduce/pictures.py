@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.tracking import MEASURES
+from ferryid.compare import MEASURES
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.performance import Performance
 from ferryid.signals.track import Motion
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 FORCES = ("surge X [N]", "sway Y [N]", "yaw N [N·m]")
 UNITS = {"ISE": "ISE [m² s]", "IAE": "IAE [m s]", "IAEW": "IAEW [m s kJ]", "EC": "EC [kJ]"}

@@ -48,7 +48,7 @@ def data_quality(recording: Recording, track: Track | Motion | None = None) -> d
         "losses": [plain_loss(loss) for loss in recording.losses],
         "found": dict(recording.found),
         "missing": dict(recording.missing),
-        "left_out": [asdict(one) for one in track.left_out] if track is not None else [],
+        "left_out": [plain_left_out(one) for one in track.left_out] if track is not None else [],
         "remarks": remarks(recording, track.repairs if track is not None else ()),
     }
 
@@ -108,6 +108,11 @@ def rows_left_out(left_out: Sequence[LeftOut], total: int) -> tuple[str, ...]:
 def _rows(left_out: Sequence[LeftOut]) -> int:
     """Rows cut from the ends of a track count as well."""
     return sum(one.rows for one in left_out)
+
+
+def plain_left_out(one: LeftOut) -> dict[str, Any]:
+    """Return rows that are left out for JSON."""
+    return {**asdict(one), "intervals": [{**asdict(span), "signals": [*span.signals]} for span in one.intervals]}
 
 
 def lost_plain(losses: Sequence[Loss], left_out: Sequence[LeftOut], total: int) -> dict[str, Any]:

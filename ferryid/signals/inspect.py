@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,14 @@ from ferryid.ingest.clocks import ClockReport, repair_all
 from ferryid.ingest.hashing import content_hash
 from ferryid.ingest.log import Reader, Series, Topic
 from ferryid.ingest.stray_times import stray_times
-from ferryid.signals.data_quality import clock_notes, grouped_notes, plain_loss, rows_left_out, stream_quality
+from ferryid.signals.data_quality import (
+    clock_notes,
+    grouped_notes,
+    plain_left_out,
+    plain_loss,
+    rows_left_out,
+    stream_quality,
+)
 from ferryid.signals.faults import find_faults
 from ferryid.signals.prepare import track_of
 from ferryid.signals.recording import log_name, make_recording, selected
@@ -216,7 +223,7 @@ def _vessel(
         "found": dict(selection.found),
         "missing": dict(selection.missing),
         "streams": streams,
-        "left_out": [asdict(one) for one in left_out],
+        "left_out": [plain_left_out(one) for one in left_out],
         "remarks": list(dict.fromkeys(told)),
     }
 

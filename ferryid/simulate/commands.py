@@ -10,8 +10,8 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model
-from ferryid.identify.store import load_file
+from ferryid.models import Model
+from ferryid.models.store import load_file
 from ferryid.simulate.logs import write_log
 from ferryid.simulate.output_paths import check_output, log_path
 from ferryid.simulate.scenario import Scenario, check_seed, list_scenarios, load_scenario

@@ -27,7 +27,7 @@ from ferryid.simulate.states import Control, Truth
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
-    from ferryid.identify.model import Model
+    from ferryid.models import Model
 
 Floats = NDArray[np.float64]
 

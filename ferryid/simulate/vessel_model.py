@@ -10,10 +10,8 @@ from typing import Any
 
 from ferryid.effects import effects
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.estimate import hull_values, hull_with
-from ferryid.identify.hull_terms import other_terms
-from ferryid.identify.model import Model
-from ferryid.identify.stored_effect import Conditions, StoredEffect
+from ferryid.models import Conditions, Model, StoredEffect
+from ferryid.models.forces import hull_coefficients, replace_hull_coefficients, unmapped_terms
 from ferryid.simulate.check_scenario import vessel_of
 from ferryid.simulate.scenario import Scenario, scenario_of
 from ferryid.vessel import parse_profile
@@ -67,7 +65,7 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
             f"{scenario.where}: a trial of {expected.name} cannot be sailed by {model.label}, a model of {own.name}. "
             "Fix: give a model and a scenario of one vessel"
         )
-    left = other_terms(model)
+    left = unmapped_terms(model)
     if left:
         raise FerryIdError(
             f"{model.label}: the simulated vessel cannot have the model's terms {', '.join(left)}, which no hull has. Fix: "
@@ -89,7 +87,7 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
         raise FerryIdError(f"with {', '.join(_names(stored))} of {model.label}, {error}") from error
     return Sailing(
         changed,
-        replace(own, hull=hull_with(own.hull, hull_values(model))),
+        replace(own, hull=replace_hull_coefficients(own.hull, hull_coefficients(model))),
         tuple(f"the scenario's [{'.'.join(place)}] is set aside: the vessel is {model.label}" for place in aside),
     )
 

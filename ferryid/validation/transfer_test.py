@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import AXES, Model
-from ferryid.identify.predict import Prediction, predict
-from ferryid.identify.result import FreeRun
-from ferryid.identify.scores import force_scores, usable
-from ferryid.identify.store import load_file
-from ferryid.identify.stored_effect import Conditions, StoredEffect
+from ferryid.models import Conditions, Model, StoredEffect, force_scores, usable_rows
+from ferryid.models.prediction import FreeRun, Prediction, predict
+from ferryid.models.store import load_file
 from ferryid.signals.prepare import Prepared
+from ferryid.types import AXES
 from ferryid.validation.records import DIAGNOSED, StoredEffectNote, TransferResult, TransferScore
 from ferryid.validation.rivals import RIVALS, Learner
 from ferryid.validation.rivals.base import base_of, prepared_log
@@ -92,7 +90,7 @@ def transfer_test(
         known[name] = {"names": learnt.names}
     motion = other.motion
     # On the same rows for all, so that nobody gains by what it cannot predict.
-    rows = usable(motion, base.tau, *(each.tau for each in found.values()))
+    rows = usable_rows(motion, base.tau, *(each.tau for each in found.values()))
     base_run = base.free_run(rows)
     return TransferResult(
         _base_score(motion.tau, base, rows, base_run),
@@ -150,8 +148,8 @@ def _score(
         ran, mse = TransferScore(dict.fromkeys(AXES)), dict[str, float | None](dict.fromkeys(AXES))
     else:
         ran = _free_run_score(found.free_run(rows))
-        ratio = force_scores(tau, base, found.tau, rows)["per_axis"]
-        mse = {axis: _number(ratio[axis]) for axis in AXES}
+        ratio = force_scores(tau, base, found.tau, rows).ratio
+        mse = {axis: _number(value) for axis, value in zip(AXES, ratio.tolist(), strict=True)}
     why = "; ".join(one for one in (known.get("why", ""), ran.why) if one)
     return replace(
         ran,
@@ -163,8 +161,9 @@ def _score(
 
 
 def _base_score(tau: Floats, base: Prediction, rows: Rows, run: FreeRun) -> TransferScore:
-    error = force_scores(tau, base.tau, base.tau, rows)["mse"]["base"]
-    return replace(_free_run_score(run), mse={axis: _number(error[axis]) for axis in AXES})
+    error = force_scores(tau, base.tau, base.tau, rows).mse_base
+    mse = {axis: _number(value) for axis, value in zip(AXES, error.tolist(), strict=True)}
+    return replace(_free_run_score(run), mse=mse)
 
 
 def _free_run_score(run: FreeRun) -> TransferScore:

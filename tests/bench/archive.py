@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 from distributed import LocalCluster
 
-from ferryid.identify import kept_pieces
-from ferryid.identify.basis import basis
-from ferryid.identify.cross_products import CrossProducts
-from ferryid.identify.kept_pieces import Kept, kept
-from ferryid.identify.pieces import Pieces
+from ferryid.identify import block_sum_store
+from ferryid.identify.block_sum_store import StoredSums, load_block_sums
 from ferryid.identify.settings import FitSettings
+from ferryid.regression.bases.basis import make_basis
+from ferryid.regression.cross_products import CrossProducts
+from ferryid.regression.cross_validation.block_sums import BlockSums
 from ferryid.signals.cache import note_text, recordings
 from ferryid.signals.prepare import open_track
 from ferryid.simulate import load_scenario, simulate, write_log
@@ -115,9 +115,9 @@ def _season(out: Path, logs: int) -> None:
     open_track(str(problem), PROFILE, out)
     settings = FitSettings(delta=0.4, sigma=0.4)
     (folder, note), *_ = recordings(out).items()
-    one = kept(folder, PROFILE, settings, (settings.window_s,))
+    one = load_block_sums(folder, PROFILE, settings, (settings.window_s,))
     (path,) = folder.glob("pieces-*.parquet")
-    _, told = kept_pieces.read_table(path)
+    _, told = block_sum_store.read_table(path)
     long = _lengthened(one)
     for number in range(logs):
         name, sha256 = f"day{number:04d}", f"{number:08x}".ljust(64, "0")
@@ -127,28 +127,28 @@ def _season(out: Path, logs: int) -> None:
         (place / "recording.json").write_text(
             note_text({**note, "files": [[name, 0, number, number]], "recording": recording}), encoding="utf-8"
         )
-        kept_pieces.write(place / path.name, told["key"], replace(long, name=name, sha256=sha256))
+        block_sum_store.write_block_sums(place / path.name, told["key"], replace(long, name=name, sha256=sha256))
     for file in folder.iterdir():
         file.unlink()
     folder.rmdir()
 
 
-def _lengthened(log: Kept) -> Kept:
+def _lengthened(log: StoredSums) -> StoredSums:
     """Return a log of 36 blocks and two hours that repeats the blocks of a shorter one."""
-    blocks = log.studied.test.blocks
+    blocks = log.sums.test.blocks
     chosen = np.arange(36) % blocks
-    times = ROWS_A_LOG / log.studied.test.n[chosen].sum()
+    times = ROWS_A_LOG / log.sums.test.n[chosen].sum()
 
-    def longer(pieces: Pieces) -> Pieces:
+    def longer(pieces: BlockSums) -> BlockSums:
         n = np.round(pieces.n[chosen] * times).astype(np.int64)
         products = pieces.products[chosen] * times
         products[..., -1, -1] = n
         return replace(pieces, n=n, products=products)
 
-    one = log.studied
+    one = log.sums
     return replace(
         log,
-        studied=replace(
+        sums=replace(
             one,
             training=tuple(longer(pieces) for pieces in one.training),
             test=longer(one.test),
@@ -162,7 +162,7 @@ def _one_pass(rows: int) -> float:
     part = min(rows, 10_000_000)
     random = np.random.default_rng(0)
     nu, nu_dot, residual = (random.standard_normal((part, 3)) for _ in range(3))
-    piece = of_motion((nu, nu_dot), residual, basis("modulus"))
+    piece = of_motion((nu, nu_dot), residual, make_basis("modulus"))
     start = time.perf_counter()
     CrossProducts.of(piece)
     return (time.perf_counter() - start) * rows / part

@@ -17,12 +17,13 @@ from ikpls.numpy import PLS as ImprovedKernel
 from numpy.typing import NDArray
 from sklearn.cross_decomposition import PLSRegression
 
-from ferryid.identify.basis import Basis, basis
-from ferryid.identify.bootstrap import Blocks, bootstrap
-from ferryid.identify.cross_products import CrossProducts, Rows
-from ferryid.identify.pieces import Pieces, edges_of
-from ferryid.identify.qr import QrFactor
-from ferryid.identify.simpls import simpls, sweep_components
+from ferryid.regression.bases.basis import Basis, make_basis
+from ferryid.regression.cross_products import CrossProducts, Rows
+from ferryid.regression.cross_validation.block_sums import BlockSums, block_edges
+from ferryid.regression.cross_validation.folds import Folds
+from ferryid.regression.qr import QrFactor
+from ferryid.regression.resampling.bootstrap import Blocks, bootstrap_coefficients
+from ferryid.regression.simpls import fit_simpls
 from ferryid.signals.smooth import central_difference, moving_mean, odd_rows
 from tests.bench.page import Row, Section, duration, faster, within
 
@@ -63,14 +64,14 @@ def fits(n: int, repeats: int) -> Iterator[Row]:
     X, Y = regression(n)
 
     def ours() -> None:
-        simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
+        fit_simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
 
     yield once(f"fit, {n:,} rows", ours, "scikit-learn", lambda: PLSRegression(COMPONENTS).fit(X, Y), 80)
     yield faster(f"fit, {n:,} rows", ours, "ikpls", lambda: ImprovedKernel().fit(X, Y, COMPONENTS), 4, repeats)
     yield faster(f"fit, {n:,} rows", ours, "bare X'X", lambda: X.T @ X, None, repeats)
     yield faster(
         f"the same by chunk-wise QR, {n // 10:,} rows",
-        lambda: simpls(QrFactor.from_rows(X[: n // 10], Y[: n // 10]), COMPONENTS),
+        lambda: fit_simpls(QrFactor.from_rows(X[: n // 10], Y[: n // 10]), COMPONENTS),
         "numpy QR of all rows",
         lambda: np.linalg.qr(np.hstack([X[: n // 10], Y[: n // 10]]), mode="r"),
         None,
@@ -78,18 +79,23 @@ def fits(n: int, repeats: int) -> Iterator[Row]:
     )
 
 
+def cross_validate(folds: list[CrossProducts]) -> None:
+    """Cross-validate every number of components."""
+    Folds((tuple(folds),), tuple(folds)).curves(np.ones((folds[0].K, folds[0].m), dtype=bool), MOST, "benchmark")
+
+
 def sweeps(n: int, repeats: int) -> Iterator[Row]:
     nu, tau = problem(n)
-    function = basis("thesis")
+    function = make_basis("thesis")
     X, Y = regression(n)
 
     def ours() -> None:
         for window_s in WINDOWS_S:
             inputs, residual = prepared(nu, tau, window_s)
-            pieces = Pieces.of(
-                of_motion(inputs, residual, function), edges_of(np.ones(len(residual), dtype=bool), FOLDS, purge=0)
+            pieces = BlockSums.of(
+                of_motion(inputs, residual, function), block_edges(np.ones(len(residual), dtype=bool), FOLDS, purge=0)
             )
-            sweep_components([pieces.labelled(np.arange(FOLDS), fold) for fold in range(FOLDS)], MOST)
+            cross_validate([pieces.labelled(np.arange(FOLDS), fold) for fold in range(FOLDS)])
 
     def by_ikpls() -> None:
         for window_s in WINDOWS_S:
@@ -104,7 +110,7 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
 
     def folds_of_matrix() -> None:
         parts = np.linspace(0, n, FOLDS + 1).astype(int)
-        sweep_components([CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in pairwise(parts)], MOST)
+        cross_validate([CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in pairwise(parts)])
 
     yield faster(
         f"cross-validation, {FOLDS} folds × {MOST}, {n:,} rows",
@@ -122,7 +128,7 @@ def bootstraps(n: int, repeats: int) -> Iterator[Row]:
     count = n // BLOCK_ROWS
 
     def ours() -> None:
-        bootstrap(Blocks.of([rows], [RATE_HZ], BLOCK_ROWS / RATE_HZ), COMPONENTS, draws=DRAWS)
+        bootstrap_coefficients(Blocks.of([rows], [RATE_HZ], BLOCK_ROWS / RATE_HZ), COMPONENTS, draws=DRAWS)
 
     def drawn(number: int, refit: Callable[[Floats, Floats], object]) -> None:
         random = np.random.default_rng(0)
@@ -136,7 +142,7 @@ def bootstraps(n: int, repeats: int) -> Iterator[Row]:
         what,
         ours,
         "one by one",
-        lambda: drawn(20, lambda x, y: simpls(CrossProducts.from_rows(x, y), COMPONENTS)),
+        lambda: drawn(20, lambda x, y: fit_simpls(CrossProducts.from_rows(x, y), COMPONENTS)),
         300,
         times=DRAWS // 20,
         repeats=repeats,
@@ -160,7 +166,7 @@ def bootstraps(n: int, repeats: int) -> Iterator[Row]:
         for _ in range(20):
             times = random.multinomial(count, np.full(count, 1.0 / count))
             whole = np.tensordot(times.astype(float), products, axes=1)
-            simpls(CrossProducts(n, MOST, 3, blocks[0].shift, whole), COMPONENTS)
+            fit_simpls(CrossProducts(n, MOST, 3, blocks[0].shift, whole), COMPONENTS)
 
     yield once(what, ours, "one by one from the blocks' cross-products", summed, None, DRAWS // 20, repeats)
 
@@ -170,7 +176,7 @@ def fused(n: int, repeats: int) -> Row:
     part = n // 10
     random = np.random.default_rng(0)
     nu, nu_dot, residual = (random.standard_normal((part, 3)) for _ in range(3))
-    function = basis("thesis")
+    function = make_basis("thesis")
     rows = of_motion((nu, nu_dot), residual, function)
 
     def ours() -> None:
@@ -275,7 +281,7 @@ def every_number_refitted(X: Floats, Y: Floats) -> None:
 def extra_memory(n: int) -> int:
     X, Y = regression(n)
     tracemalloc.start()
-    simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
+    fit_simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return peak
@@ -283,13 +289,13 @@ def extra_memory(n: int) -> int:
 
 def digits() -> Iterator[str]:
     """Largest error of the coefficients over all numbers of components against 60 digits, per way and condition."""
-    from tests.identify.test_simpls import conditioned, error, reference
+    from tests.regression.test_simpls import conditioned, error, reference
 
     for condition in (40.0, 1.8e6):
         X, Y = conditioned(200, MOST, 3, condition)
         want = reference(X, Y, MOST, True)
         by_products, by_qr = (
-            error(simpls(kind.from_rows(X, Y), MOST), want).max() for kind in (CrossProducts, QrFactor)
+            error(fit_simpls(kind.from_rows(X, Y), MOST), want).max() for kind in (CrossProducts, QrFactor)
         )
         yield (
             f"Largest error of a coefficient at any of {MOST} components, condition {condition:g}, against 60 digits: "

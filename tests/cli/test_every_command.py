@@ -13,7 +13,7 @@ import jsonschema
 import pytest
 
 import ferryid.cli
-from ferryid.identify.bases import names
+from ferryid.regression.bases.forms import basis_names
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = sorted(
@@ -149,7 +149,7 @@ def test_sweep_structures(ferryid, fixtures: Path, tmp_path: Path) -> None:
     assert run.code == 0, run.err
     found = conforms(run.out)
     for one in found["by"].values():
-        assert len({(each["basis"], each["structure"]) for each in one["structures"]}) == 2 * len(names())
+        assert len({(each["basis"], each["structure"]) for each in one["structures"]}) == 2 * len(basis_names())
         scores = [each["score"] for each in one["structures"]]
         assert scores == pytest.approx(sorted(scores), rel=1e-9)
     page = Path(found["report"])

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.identify.store import save
+from ferryid.models.store.versions import save
 from tests.cli.test_bad_input import refused
 from tests.cli.test_every_command import conforms
 from tests.export.models import MODELS

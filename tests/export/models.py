@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ferryid.identify.basis import basis
-from ferryid.identify.model import Model
-from ferryid.identify.pictured import acting_estimator
-from ferryid.identify.stored_effect import Conditions
+from ferryid.models.forces.model_forces import acting_estimator
+from ferryid.models.model import Model
+from ferryid.models.stored_effect import Conditions
+from ferryid.regression.bases.basis import make_basis
 from ferryid.vessel import load_profile
-from tests.identify.test_store import made
-from tests.identify.test_stored_effect import HERE, WINDY, diagnosed, stored
+from tests.models.test_store import made
+from tests.models.test_stored_effect import HERE, WINDY, diagnosed, stored
 
 SHA = "5e" * 32
 RANGES = {"u": (-0.5, 1.25), "v": (-0.4, 0.4), "r": (-0.2, 0.2), "u_dot": (-0.1, 0.1), "payload_kg": (0.0, 400.0)}
@@ -37,7 +37,7 @@ def fitted(
     seed: int = 0,
 ) -> Model:
     """Return a model as a fit leaves it, with coefficients of the size of the vessel's."""
-    functions = basis(name, structure=structure)
+    functions = make_basis(name, structure=structure)
     profile = load_profile(vessel)
     rng = np.random.default_rng(seed)
     theta = 0.05 * profile.hull.mass_kg * rng.normal(size=(len(functions.terms), 3)) * functions.mask

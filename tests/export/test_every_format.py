@@ -17,11 +17,11 @@ from ferryid.export.formats import formats
 from ferryid.export.model_file import export_model
 from ferryid.export.names import identifier, legal, number, plain
 from ferryid.export.physics import FACTORS, FUNCTIONS, physics
-from ferryid.identify.basis import BASES, CURRENT, WIND
-from ferryid.identify.store import save
-from ferryid.identify.term import DIMENSIONS
+from ferryid.models.store.versions import save
+from ferryid.regression.bases.basis import BASES, CURRENT, WIND
+from ferryid.regression.bases.term import DIMENSIONS
 from tests.export.models import MODELS, SHA
-from tests.identify.test_stored_effect import FERRY, stored
+from tests.models.test_stored_effect import FERRY, stored
 
 FORMATS = sorted(formats())
 

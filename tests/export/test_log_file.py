@@ -16,8 +16,8 @@ from mcap_ros2.decoder import DecoderFactory
 from ferryid.errors import FerryIdError
 from ferryid.export.findings import read_diagnosis, told_by
 from ferryid.export.log_file import export_log
-from ferryid.identify.estimate import estimator
-from ferryid.identify.residual import base_force
+from ferryid.models.forces.estimator import model_estimator
+from ferryid.models.forces.residual import base_force
 from ferryid.signals.inspect import inspect
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.vessel import load_profile
@@ -76,7 +76,7 @@ def test_forces_and_motion_are_those_of_the_log_at_its_times(tmp_path: Path) -> 
     result = export(mcap)
     found, log = read(mcap), prepared(tmp_path / "out")
     motion, track = log.motion, log.track
-    tau = estimator(MODEL).of(motion)
+    tau = model_estimator(MODEL).of(motion)
     rows = motion.valid & np.isfinite(tau).all(axis=1)
     assert 0 < rows.sum() < len(rows)
     assert result["rows_left_out"] == len(rows) - rows.sum()

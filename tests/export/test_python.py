@@ -14,7 +14,7 @@ import pytest
 
 from ferryid.export.exported import exported
 from ferryid.export.formats import formats
-from ferryid.identify.model import Model
+from ferryid.models.model import Model
 from tests.export.models import MODELS, SHA, check, fitted, force, states
 
 DRIVER = """

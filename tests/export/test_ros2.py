@@ -13,8 +13,8 @@ from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.export.exported import exported
 from ferryid.export.formats import formats
 from ferryid.export.names import legal
-from ferryid.identify.pictured import acting_estimator
-from ferryid.identify.residual import scaled
+from ferryid.models.forces.model_forces import acting_estimator
+from ferryid.models.forces.residual import scale_hull
 from tests.export.models import MODELS, RANGES, SHA
 
 
@@ -30,7 +30,7 @@ def parameters(name: str) -> dict[str, Any]:
 def test_every_number_is_there_and_the_same(name: str) -> None:
     model, told = MODELS[name], parameters(name)
     force = acting_estimator(model)
-    hull = scaled(force.profile.hull, force.scale)
+    hull = scale_hull(force.profile.hull, force.scale)
     assert told["model"] == {"label": model.label, "sha256": SHA, "vessel": model.name}
     assert [[told["mass_matrix"][f"m{i}{j}"] for j in (1, 2, 3)] for i in (1, 2, 3)] == hull.M.tolist()
     assert told["rigid_body"] == {"mass": hull.mass_kg, "x_g": hull.x_g_m, "inertia_z": hull.inertia_z}

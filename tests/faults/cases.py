@@ -155,14 +155,14 @@ class Bench:
 def _draw_once() -> None:
     """Keep the pages and figures of fits: to draw them again takes longer than all the rest of a case."""
     from ferryid.files import dump_json
-    from ferryid.identify.model import to_json
+    from ferryid.models.model import model_to_json
     from ferryid.report import fit_report
 
     kept: dict[str, Any] = {}
     drawn = fit_report.render
 
     def render(result: Any) -> Any:
-        key = dump_json(to_json(replace(result.model, created="")))
+        key = dump_json(model_to_json(replace(result.model, created="")))
         if key not in kept:
             kept[key] = drawn(result)
         return kept[key]

@@ -41,17 +41,19 @@ def ingest(folder: Path, out: Path) -> None:
 def fit(folder: Path, out: Path) -> None:
     from ferryid.files import dump_json, write_result
     from ferryid.report.fit_report import fit_and_report
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
-    made = fit_and_report([str(LOG)], load_profile("milliampere"), _settings(), out, progress=_quiet)
+    made = fit_and_report([str(LOG)], load_profile("milliampere"), _settings(), RunContext(out))
     write_result(out / "result.json", dump_json(made.json))
 
 
 def archive(folder: Path, out: Path) -> None:
     from ferryid.report.fit_report import fit_archive_and_report
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
-    fit_archive_and_report(load_profile("milliampere"), _settings(), out, progress=_quiet)
+    fit_archive_and_report(load_profile("milliampere"), _settings(), RunContext(out))
 
 
 def archived(folder: Path, out: Path) -> None:

@@ -6,16 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ferryid.identify.cross_products import CrossProducts
-from ferryid.identify.excitation import (
-    excitation,
-    heading_coverage,
-    range_columns,
-    ranges,
-    singular_values,
-    undetermined,
-)
-from ferryid.identify.qr import QrFactor
+from ferryid.identify.excitation import assess_excitation, heading_coverage
+from ferryid.models.validity import range_columns, validity_ranges
+from ferryid.regression.collinearity import singular_values, undetermined_terms
+from ferryid.regression.cross_products import CrossProducts
+from ferryid.regression.qr import QrFactor
 from ferryid.signals.track import Motion
 
 Floats = NDArray[np.float64]
@@ -43,14 +38,14 @@ def test_singular_values_are_those_of_the_correlation_matrix(kind) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_well_excited_basis_is_determined(kind) -> None:
-    assert undetermined(source(kind, independent() * np.geomspace(1.0, 1e8, 5)), TERMS) == {}
+    assert undetermined_terms(source(kind, independent() * np.geomspace(1.0, 1e8, 5)), TERMS) == {}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_constant_duplicate_and_mirrored_terms_are_named(kind) -> None:
     X = independent()
     X[:, 1], X[:, 3], X[:, 4] = 0.1, 7.0 * X[:, 0], -X[:, 2]
-    assert undetermined(source(kind, X), TERMS) == {
+    assert undetermined_terms(source(kind, X), TERMS) == {
         "a": "same column as d in this log",
         "b": "does not vary in this log",
         "c": "same column as minus e in this log",
@@ -63,7 +58,7 @@ def test_constant_duplicate_and_mirrored_terms_are_named(kind) -> None:
 def test_an_exact_dependence_names_all_who_share_it(kind) -> None:
     X = independent()
     X[:, 4] = X[:, 0] - 2.0 * X[:, 2]
-    found = undetermined(source(kind, X), TERMS)
+    found = undetermined_terms(source(kind, X), TERMS)
     assert found == {
         "a": "linear combination of c, e in this log",
         "c": "linear combination of a, e in this log",
@@ -75,7 +70,7 @@ def test_an_exact_dependence_names_all_who_share_it(kind) -> None:
 def test_a_duplicate_is_not_counted_again_in_a_dependence(kind) -> None:
     X = independent()
     X[:, 3], X[:, 4] = X[:, 0], X[:, 0] - 2.0 * X[:, 2]
-    found = undetermined(source(kind, X), TERMS)
+    found = undetermined_terms(source(kind, X), TERMS)
     assert found == {
         "a": "same column as d in this log",
         "c": "linear combination of a, e in this log",
@@ -88,10 +83,10 @@ def test_a_duplicate_is_not_counted_again_in_a_dependence(kind) -> None:
 def test_a_near_dependence_is_named_above_the_limit_alone(kind) -> None:
     X = independent()
     X[:, 4] = X[:, 1] + 1e-3 * X[:, 4]
-    found = undetermined(source(kind, X), TERMS)
+    found = undetermined_terms(source(kind, X), TERMS)
     assert set(found) == {"b", "e"}
     assert found["b"].startswith("nearly a combination of e (condition index ")
-    assert undetermined(source(kind, X), TERMS, limit=1e4) == {}
+    assert undetermined_terms(source(kind, X), TERMS, limit=1e4) == {}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -99,17 +94,17 @@ def test_terms_are_tied_only_where_an_output_may_use_both(kind) -> None:
     X = independent()
     X[:, 4] = X[:, 0]
     apart = np.array([[1, 0], [1, 0], [0, 1], [0, 1], [0, 1]], dtype=bool)
-    assert undetermined(source(kind, X), TERMS, apart) == {}
+    assert undetermined_terms(source(kind, X), TERMS, apart) == {}
     together = apart.copy()
     together[0, 1] = True
-    assert set(undetermined(source(kind, X), TERMS, together)) == {"a", "e"}
+    assert set(undetermined_terms(source(kind, X), TERMS, together)) == {"a", "e"}
 
 
 def test_undetermined_terms_are_those_whose_least_squares_spread_explodes() -> None:
     """Independent check on powers of a speed that hardly changes: variance inflation by plain inversion."""
     u = 1.0 + 0.02 * np.random.default_rng(1).standard_normal(3000)
     X = np.column_stack([u, u**2, u**3, independent(3000, 2)])
-    found = undetermined(source(QrFactor, X), ("u", "u^2", "u^3", "d", "e"))
+    found = undetermined_terms(source(QrFactor, X), ("u", "u^2", "u^3", "d", "e"))
     inflation = np.diag(np.linalg.inv(np.corrcoef(X, rowvar=False)))
     assert set(found) == {
         name for name, factor in zip(("u", "u^2", "u^3", "d", "e"), inflation, strict=True) if factor > 1e3
@@ -119,13 +114,13 @@ def test_undetermined_terms_are_those_whose_least_squares_spread_explodes() -> N
 
 def test_ranges_are_quantiles_in_si() -> None:
     nu = np.column_stack([np.linspace(0.0, 2.0, 1001), np.linspace(-1.0, 1.0, 1001), np.zeros(1001)])
-    found = ranges(nu, 10.0 * nu)
+    found = validity_ranges(nu, 10.0 * nu)
     assert found["u"] == pytest.approx((0.01, 1.99))
     assert found["v_dot"] == pytest.approx((-9.9, 9.9))
     assert found["r"] == (0.0, 0.0)
     assert found["U"][1] == pytest.approx(np.hypot(1.99, 0.99), rel=1e-3)
     assert set(range_columns(nu, nu)) == {"u", "v", "r", "u_dot", "v_dot", "r_dot", "U"}
-    assert np.isnan(ranges(nu[:0], nu[:0])["u"]).all()
+    assert np.isnan(validity_ranges(nu[:0], nu[:0])["u"]).all()
 
 
 def test_heading_coverage_counts_twelve_sectors() -> None:
@@ -147,7 +142,7 @@ def test_excitation_of_masked_logs() -> None:
     mask = np.arange(n) < 120
     cross = CrossProducts.from_rows(np.hstack([nu, nu[:, :1]])[mask], nu[mask])
     vip = np.ones(4)
-    found = excitation(cross, ("u", "v", "r", "w"), vip, [motion, motion], [mask, mask])
+    found = assess_excitation(cross, ("u", "v", "r", "w"), vip, [motion, motion], [mask, mask])
     assert found.heading_coverage == pytest.approx(0.5)
     assert found.ranges["u"][1] == pytest.approx(np.quantile(nu[mask, 0], 0.995), rel=0.05)
     assert set(found.undetermined) == {"u", "w"}

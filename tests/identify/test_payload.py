@@ -16,16 +16,16 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.integrate import solve_ivp
 
-from ferryid.identify.estimate import Estimator
-from ferryid.identify.evaluate import evaluate
-from ferryid.identify.fit import fit
-from ferryid.identify.free_run import free_run
-from ferryid.identify.inertia import effective_mass
-from ferryid.identify.residual import base_force, force_of_motion, residual
+from ferryid.compare.evaluation import evaluate
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
+from ferryid.models.forces.estimator import Estimator, effective_mass
+from ferryid.models.forces.residual import base_force, compute_residual, motion_force
+from ferryid.models.prediction.free_run import run_free
 from ferryid.report.fit_report import fit_and_report
 from ferryid.signals.prepare import prepare
 from ferryid.signals.track import Motion
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Hull
 
@@ -203,8 +203,8 @@ def test_a_payload_takes_exactly_the_force_of_a_heavier_hull() -> None:
     heavier = replace(PROFILE, hull=replace(PROFILE.hull, M=PROFILE.hull.M + more))
     load = np.tile([m, x], (60, 1))
     np.testing.assert_allclose(
-        force_of_motion(PROFILE, {}, nu_dot, nu, psi, payload=load),
-        force_of_motion(heavier, {}, nu_dot, nu, psi),
+        motion_force(PROFILE, {}, nu_dot, nu, psi, payload=load),
+        motion_force(heavier, {}, nu_dot, nu, psi),
         rtol=1e-12,
         atol=1e-8,
     )
@@ -213,29 +213,29 @@ def test_a_payload_takes_exactly_the_force_of_a_heavier_hull() -> None:
 def test_a_payload_is_known_so_that_delta_leaves_it_and_the_measured_force_takes_zeta() -> None:
     nu, nu_dot, load = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), np.array([[200.0, 0.0]])
     scale = {"delta": 0.4, "zeta": 2.0}
-    bare = force_of_motion(PROFILE, scale, nu_dot, nu, np.zeros(1))
-    loaded = force_of_motion(PROFILE, scale, nu_dot, nu, np.zeros(1), payload=load)
+    bare = motion_force(PROFILE, scale, nu_dot, nu, np.zeros(1))
+    loaded = motion_force(PROFILE, scale, nu_dot, nu, np.zeros(1), payload=load)
     np.testing.assert_allclose(loaded - bare, [[100.0, 0.0, 0.0]])
 
 
 def test_a_payload_feels_no_current_and_drifts_without_force(drifted: Trial) -> None:
     motion = drifted.motion()
     # The printed m23 and m32 differ; Kirchhoff's symmetric mean is what turns, as in (2.8).
-    np.testing.assert_allclose(residual(PROFILE, motion, {}), 0.0, atol=1e-8)
-    assert np.abs(residual(PROFILE, replace(motion, current=None), {})).max() > 40.0
+    np.testing.assert_allclose(compute_residual(PROFILE, motion, {}), 0.0, atol=1e-8)
+    assert np.abs(compute_residual(PROFILE, replace(motion, current=None), {})).max() > 40.0
 
 
 @pytest.mark.parametrize("form", ["measured", "parallel"])
 def test_known_it_leaves_nothing_and_unknown_its_mass(boarded: Trial, form: str) -> None:
     motion = boarded.motion()
     away = np.abs(motion.t - BOARDING_S) > 2.0
-    known = residual(PROFILE, motion, {}, form)
+    known = compute_residual(PROFILE, motion, {}, form)
     rows = away & np.isfinite(known).all(axis=1)
     assert rows.sum() > 2000
     np.testing.assert_allclose(known[rows], 0.0, atol=1e-8 if form == "measured" else 1.5)
     # At the boarding itself too.
     assert np.nanmax(np.abs(known)) < 1.5
-    missed = residual(PROFILE, replace(motion, payload=None), {}, form)
+    missed = compute_residual(PROFILE, replace(motion, payload=None), {}, form)
     late = rows & (motion.t > BOARDING_S)
     _, v, r = motion.nu[late].T
     felt = motion.nu_dot[late, 0] - v * r - PLACE_M * r**2
@@ -248,26 +248,26 @@ def test_a_payload_that_is_unknown_for_a_row_gives_no_residual_there(boarded: Tr
     load = motion.payload.copy() if motion.payload is not None else np.empty(0)
     load[500] = np.nan
     holed = replace(motion, payload=load)
-    assert np.flatnonzero(np.isnan(residual(PROFILE, holed, {})).any(axis=1)).tolist() == [500]
-    lost = np.isnan(residual(PROFILE, holed, {}, "parallel")).any(axis=1)
+    assert np.flatnonzero(np.isnan(compute_residual(PROFILE, holed, {})).any(axis=1)).tolist() == [500]
+    lost = np.isnan(compute_residual(PROFILE, holed, {}, "parallel")).any(axis=1)
     assert np.flatnonzero(lost[100:900]).tolist() == list(range(396, 406))
 
 
 def test_runs_free_with_the_payload_that_was_aboard(boarded: Trial, drifted: Trial) -> None:
     for trial in (boarded, drifted):
         motion = trial.motion()
-        run = free_run(Estimator(PROFILE, {}), [motion], [motion.valid])
+        run = run_free(Estimator(PROFILE, {}), [motion], [motion.valid])
         assert run.starts > 10
         assert np.all(run.position_m < 0.05)
         assert np.all(run.heading_rad < 0.01)
-        blind = free_run(Estimator(PROFILE, {}), [replace(motion, payload=None)], [motion.valid])
+        blind = run_free(Estimator(PROFILE, {}), [replace(motion, payload=None)], [motion.valid])
         assert blind.position_m[-1] > 10 * run.position_m[-1]
 
 
 def test_a_force_without_the_payload_argument_still_runs_free(drifted: Trial) -> None:
     motion = replace(drifted.motion(), payload=None, current=None)
     own = Estimator(PROFILE, {})
-    run = free_run(lambda a, b, c, d, e: own(a, b, c, d, e), [motion], [motion.valid])
+    run = run_free(lambda a, b, c, d, e: own(a, b, c, d, e), [motion], [motion.valid])
     assert run.starts > 10
 
 
@@ -287,7 +287,7 @@ SETTINGS = FitSettings(delta=0.6, components=18, window_s=0.5, draws=20)
 def test_a_fit_recovers_the_bare_hull_only_where_the_payload_is_weighed(logs: dict[str, str], tmp_path: Path) -> None:
     masses = {}
     for name in ("boarded", "unweighed"):
-        result = fit([logs[name]], PROFILE, SETTINGS, tmp_path)
+        result = fit_logs([logs[name]], PROFILE, SETTINGS, RunContext(tmp_path))
         masses[name] = effective_mass(PROFILE, result.model.scale, result.model.terms, result.model.theta)
         assert ("payload_kg" in result.model.ranges) == (name == "boarded")
     true = np.diag(PROFILE.hull.M)
@@ -309,11 +309,11 @@ def test_prepared_log_holds_the_messages(logs: dict[str, str], tmp_path: Path, d
 
 def conforms(data: dict, name: str) -> None:
     schema = json.loads(files("ferryid.schemas").joinpath(f"{name}.json").read_text(encoding="utf-8"))
-    jsonschema.validate(json.loads(json.dumps(data)), schema)
+    jsonschema.validate(data, schema)
 
 
 def test_current_and_payload_reach_basis_report_and_json(logs: dict[str, str], tmp_path: Path) -> None:
-    outcome = fit_and_report([logs["drifted"]], PROFILE, SETTINGS, tmp_path)
+    outcome = fit_and_report([logs["drifted"]], PROFILE, SETTINGS, RunContext(tmp_path))
     model = outcome.stored.model
     assert model.settings["basis"] == "modulus+current-thesis"
     assert outcome.accepted
@@ -325,14 +325,14 @@ def test_current_and_payload_reach_basis_report_and_json(logs: dict[str, str], t
     assert "Payload: 250 kg at x = -0.60 m" in page
     assert "current, payload" in page
     assert "<td>payload_kg</td><td>250</td><td>250</td>" in page
-    judged = evaluate(model, [logs["drifted"]], tmp_path, progress=lambda _: None)
+    judged = evaluate(model, [logs["drifted"]], RunContext(tmp_path))
     conforms(judged, "evaluate")
     assert judged["logs"][0]["outside"]["payload_kg"] == 0.0
     assert judged["logs"][0]["normalised_mse"] < 0.01
 
 
 def test_what_is_not_weighed_is_told(logs: dict[str, str], tmp_path: Path) -> None:
-    result = fit([logs["boarded"], logs["unweighed"]], PROFILE, SETTINGS, tmp_path)
+    result = fit_logs([logs["boarded"], logs["unweighed"]], PROFILE, SETTINGS, RunContext(tmp_path))
     assert any("1 of 2 logs has no payload measured" in warning for warning in result.warnings)
-    (entry,) = evaluate(result.model, [logs["unweighed"]], tmp_path, progress=lambda _: None)["logs"]
+    (entry,) = evaluate(result.model, [logs["unweighed"]], RunContext(tmp_path))["logs"]
     assert any("this log has none: it is taken as empty" in warning for warning in entry["warnings"])

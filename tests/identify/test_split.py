@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.split import Split, correlation_time, folds, split
+from ferryid.identify.split import Split, correlation_time, split_rows
 from ferryid.signals.track import Motion
 
 Flags = NDArray[np.bool_]
@@ -70,45 +70,20 @@ def check(parts: Split, logs: list[Motion], window_s: float, guard_s: float) -> 
 @settings(max_examples=40, deadline=None)
 @given(logs=motions(), window_s=st.floats(0, 2), guard_s=st.floats(0, 3))
 def test_blocks_keep_apart(logs: list[Motion], window_s: float, guard_s: float) -> None:
-    parts = unless_too_short(lambda: split(logs, window_s=window_s, guard_s=guard_s))
+    parts = unless_too_short(lambda: split_rows(logs, window_s=window_s, guard_s=guard_s))
     if parts is None:
         return
     check(parts, logs, window_s, guard_s)
-    again = split(logs, window_s=window_s, guard_s=guard_s)
+    again = split_rows(logs, window_s=window_s, guard_s=guard_s)
     for log, one, two in zip(logs, parts.validation, again.validation, strict=True):
         np.testing.assert_array_equal(one, two)
         # Three of ten blocks, one of three; a short log among others is one block.
         assert 0.2 < one.sum() / log.valid.sum() < 0.55 or one.sum() in (0, log.valid.sum())
 
 
-@settings(max_examples=40, deadline=None)
-@given(logs=motions(), k=st.integers(2, 6), window_s=st.floats(0, 2), guard_s=st.floats(0, 3))
-def test_folds_keep_apart_and_validate_every_row_once(
-    logs: list[Motion], k: int, window_s: float, guard_s: float
-) -> None:
-    parts = unless_too_short(lambda: list(folds(logs, k, window_s=window_s, guard_s=guard_s)))
-    if parts is None:
-        assert len(logs) == 1
-        return
-    assert 2 <= len(parts) <= k
-    for part in parts:
-        check(part, logs, window_s, guard_s)
-        assert any(mask.any() for mask in part.validation)
-    for i, log in enumerate(logs):
-        times = np.sum([part.validation[i] for part in parts], axis=0)
-        np.testing.assert_array_equal(times, log.valid.astype(int))
-
-
-def test_folds_within_training_rows_leave_the_validation_rows_alone() -> None:
-    log = motion(np.ones(6000, dtype=bool))
-    outer = split([log], window_s=1.0)
-    for part in folds([log], window_s=1.0, rows=outer.training):
-        assert not np.any((part.training[0] | part.validation[0]) & ~outer.training[0])
-
-
 def test_ten_blocks_of_which_three_validate() -> None:
     log = motion(np.ones(6000, dtype=bool))
-    parts = split([log], window_s=1.0, guard_s=2.0, blocks=10)
+    parts = split_rows([log], window_s=1.0, guard_s=2.0, blocks=10)
     expected = np.zeros(6000, dtype=bool)
     for block in (1, 3, 8):
         expected[600 * block : 600 * block + 600] = True
@@ -121,14 +96,14 @@ def test_ten_blocks_of_which_three_validate() -> None:
 
 @pytest.mark.parametrize(("seconds", "length_s"), [(120, 120 / 9), (720, 40), (1440, 40), (7200, 200)])
 def test_blocks_are_a_manoeuvre_long_and_neither_too_few_nor_too_many(seconds: int, length_s: float) -> None:
-    validation = split([motion(np.ones(10 * seconds, dtype=bool))], window_s=1.0, guard_s=2.0).validation[0]
+    validation = split_rows([motion(np.ones(10 * seconds, dtype=bool))], window_s=1.0, guard_s=2.0).validation[0]
     first = np.flatnonzero(validation)[0]  # the second of the first three blocks
     assert first / 10 == pytest.approx(length_s, abs=0.2)
     assert 0.3 < validation.mean() < 0.37
 
 
 def test_blocks_do_not_keep_step_with_a_trial_that_repeats_itself() -> None:
-    parts = split([motion(np.ones(14400, dtype=bool))], window_s=1.0)
+    parts = split_rows([motion(np.ones(14400, dtype=bool))], window_s=1.0)
     phase = np.arange(14400) // 400 % 3
     for third in range(3):
         # Whatever recurs every three blocks is seen by training and by validation.
@@ -138,7 +113,7 @@ def test_blocks_do_not_keep_step_with_a_trial_that_repeats_itself() -> None:
 
 def test_short_logs_are_blocks_among_themselves() -> None:
     logs = [motion(np.ones(300, dtype=bool), log=name) for name in "abcde"]
-    parts = split([*logs, motion(np.ones(6000, dtype=bool), log="long")], window_s=1.0)
+    parts = split_rows([*logs, motion(np.ones(6000, dtype=bool), log="long")], window_s=1.0)
     assert [mask.all() for mask in parts.validation] == [False, True, False, False, True, False]
     assert [mask.all() for mask in parts.training] == [True, False, True, True, False, False]
     assert parts.validation[-1].sum() == 5 * 400
@@ -148,7 +123,7 @@ def test_short_logs_are_blocks_among_themselves() -> None:
 def test_every_kth_row_leaks_and_says_so() -> None:
     valid = np.ones(100, dtype=bool)
     valid[10:20] = False
-    parts = split([motion(valid)], "every-kth", window_s=1.0, every=3)
+    parts = split_rows([motion(valid)], "every-kth", window_s=1.0, every=3)
     assert parts.validation[0].sum() == 30
     assert parts.training[0].sum() == 60
     np.testing.assert_array_equal(np.flatnonzero(parts.validation[0])[:4], [2, 5, 8, 21])
@@ -158,9 +133,9 @@ def test_every_kth_row_leaks_and_says_so() -> None:
 
 def test_whole_logs() -> None:
     logs = [motion(np.ones(100, dtype=bool), log=name) for name in ("a", "b", "c")]
-    last = split(logs, "logs", window_s=1.0)
+    last = split_rows(logs, "logs", window_s=1.0)
     assert [mask.all() for mask in last.validation] == [False, False, True]
-    named = split(logs, "logs", window_s=1.0, validate=["a"])
+    named = split_rows(logs, "logs", window_s=1.0, validate=["a"])
     assert [mask.all() for mask in named.validation] == [True, False, False]
     assert [mask.all() for mask in named.training] == [False, True, True]
 
@@ -168,18 +143,16 @@ def test_whole_logs() -> None:
 def test_what_cannot_be_split_is_refused_with_a_remedy() -> None:
     short = motion(np.ones(300, dtype=bool))
     with pytest.raises(FerryIdError, match=r"trial: too short for three blocks.*found 30\.0 s.*38\.4 s.*Fix: "):
-        split([short], window_s=1.0)
-    with pytest.raises(FerryIdError, match=r"trial: too short for two folds.*Fix: "):
-        list(folds([motion(np.ones(100, dtype=bool))], window_s=1.0))
+        split_rows([short], window_s=1.0)
     with pytest.raises(FerryIdError, match=r"trial: a split by logs needs at least two.*Fix: "):
-        split([short], "logs", window_s=1.0)
+        split_rows([short], "logs", window_s=1.0)
     logs = [motion(np.ones(300, dtype=bool), log=name) for name in ("first", "second")]
     with pytest.raises(FerryIdError, match=r"no log called 'secnd' to validate on. Did you mean \"second\"\?"):
-        split(logs, "logs", window_s=1.0, validate=["secnd"])
+        split_rows(logs, "logs", window_s=1.0, validate=["secnd"])
     with pytest.raises(FerryIdError, match=r"every log validates.*Fix: "):
-        split(logs, "logs", window_s=1.0, validate=["first", "second"])
+        split_rows(logs, "logs", window_s=1.0, validate=["first", "second"])
     with pytest.raises(FerryIdError, match=r'no split called "block". Did you mean "blocks"\?'):
-        split(logs, "block", window_s=1.0)
+        split_rows(logs, "block", window_s=1.0)
 
 
 def test_the_correlation_time_is_that_of_a_first_order_process() -> None:

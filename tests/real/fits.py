@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ferryid.identify.fit import fit
-from ferryid.identify.result import AXES, FitResult
+from ferryid.identify.outcome import FitOutcome
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.report import figures
 from ferryid.report.page import headline
 from ferryid.report.structure import worst_and_best_minute
+from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile
 from tests.evidence import stamp
 from tests.real.places import DATA, FOLDER, REPORTS
@@ -76,11 +77,11 @@ def write() -> None:
     with tempfile.TemporaryDirectory() as out:
         for case in CASES:
             print(case.name, flush=True)
-            result = fit(
+            result = fit_logs(
                 [str(DATA / log) for log in case.logs],
                 load_profile(case.vessel),
                 FitSettings(split=case.split),
-                Path(out),
+                RunContext(Path(out)),
             )
             sections.append(section(case, result, FOLDER))
     (REPORTS / "real.md").write_text("\n".join(sections), encoding="utf-8")
@@ -102,16 +103,16 @@ an untouched recording is the only fair test of the defaults.
 """
 
 
-def section(case: Case, result: FitResult, folder: Path) -> str:
+def section(case: Case, result: FitOutcome, folder: Path) -> str:
     """Return one vessel's part of the page and write its figures."""
-    scores = result.model.scores
+    scores = result.scores.to_json()
     last = result.logs[-1]
     minutes = worst_and_best_minute(last)
     start = minutes[0] if minutes else None
     (folder / f"{case.name}-forces.svg").write_text(
         figures.forces(last, start, None if start is None else start + 60.0), encoding="utf-8"
     )
-    lines = [f"\n## {case.name}\n", case.about, "", f"**{headline(result)}** {' '.join(result.verdict.reasons)}", ""]
+    lines = [f"\n## {case.name}\n", case.about, "", f"**{headline(result)}** {' '.join(result.acceptance.reasons)}", ""]
     lines += ["| validation | " + " | ".join(AXES) + " |", "|---|" + "---|" * 3]
     for label, part in (("rms force error, base [N, N, N·m]", "base"), ("rms force error, new", "model")):
         lines.append(f"| {label} | " + " | ".join(f"{scores['mse'][part][axis] ** 0.5:.3g}" for axis in AXES) + " |")

@@ -7,21 +7,21 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ferryid.compare.candidates import BASE
+from ferryid.compare.comparison_statements import PairedErrors, comparison_statements, format_probability
 from ferryid.files import finite
-from ferryid.identify.candidates import BASE
-from ferryid.identify.paired import Paired, compare_paired
-from ferryid.identify.verdicts import Judged, chance, verdicts
+from ferryid.regression.resampling.paired_bootstrap import PairedRatios, compare_pairs
 from ferryid.report import comparison_words
 from ferryid.report.comparison_figures import looks, over_reference
 
 HORIZONS = (5.0, 30.0)
 
 
-def paired(size: dict[tuple[int, int], float], p: float, m: int, columns: int) -> Paired:
+def paired(size: dict[tuple[int, int], float], p: float, m: int, columns: int) -> PairedRatios:
     """Return ratios that are the same in all columns, with intervals of ten per cent and one probability."""
     pairs = tuple((i, j) for i in range(m) for j in range(i + 1, m))
     ratio = np.array([[size[pair]] * columns for pair in pairs])
-    return Paired(pairs, ratio, 0.9 * ratio, 1.1 * ratio, np.full(ratio.shape, p))
+    return PairedRatios(pairs, ratio, 0.9 * ratio, 1.1 * ratio, np.full(ratio.shape, p))
 
 
 def result(
@@ -30,14 +30,14 @@ def result(
     """Return a comparison in which every model errs `step` times more than the one before."""
     m = len(labels)
     size = {(i, j): step ** (i - j) for i in range(m) for j in range(i + 1, m)}
-    judged = Judged("log", labels, paired(size, p, m, 3), (paired(size, p, m, 4),) * 2, HORIZONS, 30.0, trained)
+    judged = PairedErrors("log", labels, paired(size, p, m, 3), (paired(size, p, m, 4),) * 2, HORIZONS, 30.0, trained)
     scope = {"rows": 10, "seconds": 1.0, "blocks": 9, "block_s": 30.0, "name": "log", "free_run": {"starts": 3}}
     return finite(
         {
             "models": [{"label": label, "base": label == BASE} for label in labels],
             "logs": [scope],
             "pooled": None,
-            "better": verdicts(judged),
+            "better": comparison_statements(judged),
         }
     )
 
@@ -107,16 +107,22 @@ def test_the_headline_says_who_errs_least_and_how_surely(p: float, told: str) ->
 
 def test_too_few_blocks_are_too_little_data() -> None:
     few = np.random.default_rng(1).gamma(3.0, 1.0, (3, 2, 3))
-    runs = compare_paired([few[:, :, [0, 1, 2, 0]]])
-    judged = Judged("log", ("one", "two"), compare_paired([few]), (runs, runs), HORIZONS, None, frozenset())
-    rows = verdicts(judged)
+    runs = compare_pairs([few[:, :, [0, 1, 2, 0]]])
+    judged = PairedErrors("log", ("one", "two"), compare_pairs([few]), (runs, runs), HORIZONS, None, frozenset())
+    rows = comparison_statements(judged)
     # Without a horizon that has intervals, free runs have no sentence.
     assert [row["what"] for row in rows] == ["surge", "sway", "yaw"]
     assert all(row["says"].startswith("too little data to tell") for row in rows)
 
 
 def test_chances_are_short() -> None:
-    assert [chance(p) for p in (0.0001, 0.0123, 0.049, 0.31, 1.0)] == ["0.0001", "0.01", "0.05", "0.31", "1.00"]
+    assert [format_probability(p) for p in (0.0001, 0.0123, 0.049, 0.31, 1.0)] == [
+        "0.0001",
+        "0.01",
+        "0.05",
+        "0.31",
+        "1.00",
+    ]
 
 
 def test_no_two_of_many_models_look_alike() -> None:

@@ -10,19 +10,22 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.identify.fit import fit
-from ferryid.identify.result import FitResult
+from ferryid.identify.outcome import FitOutcome
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.report.page import headline, render
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> FitResult:
+def result(tmp_path_factory: pytest.TempPathFactory) -> FitOutcome:
     settings = FitSettings(delta=0.4, sigma=0.4, draws=40)
-    return fit([str(FIXTURES / "short.bag")], load_profile("milliampere"), settings, tmp_path_factory.mktemp("out"))
+    return fit_logs(
+        [str(FIXTURES / "short.bag")], load_profile("milliampere"), settings, RunContext(tmp_path_factory.mktemp("out"))
+    )
 
 
 class Structure(HTMLParser):
@@ -46,7 +49,7 @@ class Structure(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_is_well_formed_and_every_figure_has_a_caption(result: FitResult) -> None:
+def test_is_well_formed_and_every_figure_has_a_caption(result: FitOutcome) -> None:
     page, drawings = render(result)
     structure = Structure()
     structure.feed(page)
@@ -54,14 +57,14 @@ def test_is_well_formed_and_every_figure_has_a_caption(result: FitResult) -> Non
     assert structure.figures == structure.captions == len(drawings) >= 9
 
 
-def test_verdict_comes_before_any_figure(result: FitResult) -> None:
+def test_verdict_comes_before_any_figure(result: FitOutcome) -> None:
     page = html.unescape(render(result)[0])
     assert page.index(headline(result)) < page.index("<svg")
-    rejected = replace(result, verdict=replace(result.verdict, accepted=False))
+    rejected = replace(result, acceptance=replace(result.acceptance, accepted=False))
     assert "Not accepted" in render(rejected)[0]
 
 
-def test_names_of_logs_and_warnings_are_escaped(result: FitResult) -> None:
+def test_names_of_logs_and_warnings_are_escaped(result: FitOutcome) -> None:
     log = result.logs[0]
     evil = "<script>alert(1)</script>"
     strange = replace(result, logs=(replace(log, motion=replace(log.motion, log=evil)),), warnings=(evil,))
@@ -70,7 +73,7 @@ def test_names_of_logs_and_warnings_are_escaped(result: FitResult) -> None:
     assert "&lt;script&gt;" in page
 
 
-def test_axes_carry_units(result: FitResult) -> None:
+def test_axes_carry_units(result: FitOutcome) -> None:
     _, drawings = render(result)
     forces = next(svg for name, svg in drawings.items() if name.startswith("forces"))
     for label in ("surge X [N]", "sway Y [N]", "yaw N [N·m]", "time [s]", "measured", "base model", "new model"):
@@ -83,12 +86,12 @@ def test_axes_carry_units(result: FitResult) -> None:
         assert unit in drawings[name]
 
 
-def test_the_same_result_gives_the_same_page(result: FitResult) -> None:
+def test_the_same_result_gives_the_same_page(result: FitOutcome) -> None:
     assert render(result)[0] == render(result)[0]
 
 
-def test_numbers_on_the_page_are_those_of_the_model(result: FitResult) -> None:
+def test_numbers_on_the_page_are_those_of_the_model(result: FitOutcome) -> None:
     page = re.sub(r"<svg.*?</svg>", "", render(result)[0], flags=re.DOTALL)
-    for axis in ("surge", "sway", "yaw"):
-        assert f"<td>{result.model.scores['per_axis'][axis]:.3f}</td>" in page
+    for ratio in result.scores.force.ratio:
+        assert f"<td>{ratio:.3f}</td>" in page
     assert result.model.training[0]["sha256"] in page

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ferryid.identify.result import LogFit
+from ferryid.identify.outcome import LogFit
 from ferryid.report.structure import autocorrelation, envelope, spectrum, worst_and_best_minute
 from ferryid.signals.track import Motion
 

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.compared import StructureSweep, over_base, verdict
-from ferryid.identify.fit import quiet
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.structures import sweep_structures
+from ferryid.identify.sweeps.structure_comparison import StructureSweep, over_base
+from ferryid.identify.sweeps.structure_sweep import sweep_structures
 from ferryid.report.structures_report import render, structures_and_report
+from ferryid.report.structures_text import supported_structure
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -26,7 +27,7 @@ PROFILE = load_profile("milliampere")
 def found(tmp_path_factory: pytest.TempPathFactory) -> StructureSweep:
     logs = [str(FIXTURES / f"short.{suffix}") for suffix in ("bag", "mcap")]
     settings = FitSettings(delta=0.4, sigma=0.4)
-    return sweep_structures(logs, PROFILE, settings, tmp_path_factory.mktemp("out"), progress=quiet)
+    return sweep_structures(logs, PROFILE, settings, RunContext(tmp_path_factory.mktemp("out")))
 
 
 def test_a_forest_plot_for_each_way_of_cutting(found: StructureSweep) -> None:
@@ -73,7 +74,7 @@ def test_every_number_is_on_it(found: StructureSweep) -> None:
             for against in (each.against_best, each.against_simplest):
                 for value, low, high in zip(against.value, against.low, against.high, strict=True):
                     assert f"<td>{value:.3g} [{low:.3g}, {high:.3g}]</td>" in page
-        assert verdict(one) in html.unescape(page)
+        assert supported_structure(one) in html.unescape(page)
     assert page.count('<tr class="chosen">') == 2
     kept = sum(each.kept for one in found.by.values() for each in one.structures)
     assert page.count('<tr class="kept">') == kept - 2
@@ -102,4 +103,4 @@ def test_without_interval_there_is_still_a_page(found: StructureSweep) -> None:
 
 def test_windows_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FerryIdError, match=r"^--windows: bases are compared at one window\. Fix: give --window$"):
-        structures_and_report(["a"], PROFILE, FitSettings(), tmp_path, windows_s=(1.0,), progress=quiet)
+        structures_and_report(["a"], PROFILE, FitSettings(), RunContext(tmp_path), windows_s=(1.0,))

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from ferryid.identify.fit import quiet
 from ferryid.identify.settings import FitSettings
-from ferryid.identify.sweep import Sweep, headline, sweep
+from ferryid.identify.sweeps.settings_sweep import Sweep, sweep_settings
 from ferryid.report.sweep_report import render
+from ferryid.report.sweep_text import headline
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
@@ -23,9 +24,9 @@ WINDOWS_S = {"components": (), "window": (0.5, 1.0, 2.0), "both": (0.5, 1.0, 2.0
 @pytest.fixture(scope="module", params=list(WINDOWS_S))
 def found(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Sweep:
     logs = [str(FIXTURES / f"short.{suffix}") for suffix in ("bag", "mcap")]
-    return sweep(
+    return sweep_settings(
         request.param, logs, load_profile("milliampere"), FitSettings(delta=0.4, sigma=0.4),
-        tmp_path_factory.mktemp("out"), windows_s=WINDOWS_S[request.param], progress=quiet,
+        RunContext(tmp_path_factory.mktemp("out")), windows_s=WINDOWS_S[request.param],
     )  # fmt: skip
 
 

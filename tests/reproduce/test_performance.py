@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ferryid.identify.tracking import signal_power, tracking_error
+from ferryid.compare.tracking import signal_power, tracking_error
 from ferryid.reproduce.performance import performance
 from ferryid.simulate.states import Control, Truth
 

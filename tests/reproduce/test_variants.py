@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.identify.estimate import estimator
-from ferryid.identify.judge import force_mse
+from ferryid.identify.acceptance import force_mse
+from ferryid.models.forces.estimator import model_estimator
 from ferryid.reproduce.flight import Flight, controlled, fly, trial
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, hull_alone, learn, without_wind_areas
 from ferryid.reproduce.studies import calm, flows, guidance, rounds
@@ -52,7 +52,7 @@ def test_a_model_learnt_without_wind_areas_stores_none(flight: Flight) -> None:
     assert bare.wind is None
     assert np.array_equal(bare.hull.M, flight.profile.hull.M)
     assert [one.name for one in bare.actuators] == [one.name for one in flight.profile.actuators]
-    assert estimator(learn([flight.motion(1.0)], bare)).profile.wind is None
+    assert model_estimator(learn([flight.motion(1.0)], bare)).profile.wind is None
 
 
 def test_which_third_functions_of_the_wind_are_odd() -> None:

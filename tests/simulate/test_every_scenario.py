@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.identify.fit import fit
+from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
 from ferryid.simulate import list_scenarios, load_scenario, simulate, write_log
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
 NAMES = tuple(list_scenarios())
@@ -25,12 +26,13 @@ def test_scenario_runs_and_is_fitted(name: str, tmp_path: Path) -> None:
     assert np.isfinite(truth.nu).all()
     log = tmp_path / f"{name}{SUFFIXES[NAMES.index(name) % len(SUFFIXES)]}"
     write_log(simulation, log)
-    result = fit(
-        [str(log)], load_profile(scenario.vessel), FitSettings(delta=0.4, sigma=0.4, draws=20), tmp_path / "out"
+    result = fit_logs(
+        [str(log)],
+        load_profile(scenario.vessel),
+        FitSettings(delta=0.4, sigma=0.4, draws=20),
+        RunContext(tmp_path / "out"),
     )
-    scores = result.model.scores
-    assert scores["rows"] > 0.1 * scenario.duration_s * scenario.sensors.navigation_rate_hz
+    scores = result.scores
+    assert scores.rows > 0.1 * scenario.duration_s * scenario.sensors.navigation_rate_hz
     assert np.isfinite(result.model.theta).all()
-    assert np.isfinite(
-        [scores["mse"][part][axis] for part in ("base", "model") for axis in scores["mse"]["base"]]
-    ).all()
+    assert np.isfinite([scores.force.mse_base, scores.force.mse_model]).all()

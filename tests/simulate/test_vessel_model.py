@@ -9,13 +9,13 @@ import pytest
 
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model
-from ferryid.identify.stored_effect import Conditions, Quantity
+from ferryid.models.model import Model
+from ferryid.models.stored_effect import Conditions, Quantity
 from ferryid.simulate import load_scenario, parse_scenario, simulate
 from ferryid.simulate.vessel_model import sailed_by
 from ferryid.vessel import load_profile
-from tests.identify.test_store import made
-from tests.identify.test_stored_effect import BROKEN, FERRY, FOULED, HERE, WINDY, diagnosed, stored
+from tests.models.test_store import made
+from tests.models.test_stored_effect import BROKEN, FERRY, FOULED, HERE, WINDY, diagnosed, stored
 
 TRIAL = """
 schema = "ferryid.scenario/1"

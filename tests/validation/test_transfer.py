@@ -14,9 +14,9 @@ import pytest
 from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.diagnose.pipeline import diagnose
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model, blank
-from ferryid.identify.predict import Prediction
-from ferryid.identify.stored_effect import Conditions, Quantity, Source, StoredEffect
+from ferryid.models.model import Model, blank_model
+from ferryid.models.prediction.log_prediction import Prediction
+from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect
 from ferryid.signals.prepare import Prepared
 from ferryid.validation.records import TransferResult
 from ferryid.validation.rivals import stepwise
@@ -49,7 +49,7 @@ def _true(first: Prepared) -> Model:
     load = _effect("payload", {"mass": (0.0, "kg"), "x": (0.0, "m")}, replace(source, onset_s=120.0, offset_s=200.0))
     gain = _effect("thruster_gain", {"factor": (1.0, "-")}, replace(source, onset_s=90.0), "thruster1")
     return replace(
-        blank(PROFILE, "true"),
+        blank_model(PROFILE, "true"),
         training=({"name": log, "sha256": sha256},),
         vessel_effects=(gain,),
         conditions=(Conditions(log, sha256, (wind, load)),),
@@ -180,7 +180,7 @@ def test_the_first_log_is_no_second_one(logs: tuple[str, str, Path]) -> None:
 
 
 def test_a_model_of_another_log_is_refused(logs: tuple[str, str, Path]) -> None:
-    model = replace(blank(PROFILE, "other"), training=({"name": "x", "sha256": "0"},))
+    model = replace(blank_model(PROFILE, "other"), training=({"name": "x", "sha256": "0"},))
     with pytest.raises(FerryIdError, match=r"not a model of .*Fix: give the model that the diagnosis"):
         transfer_test(*logs[:2], PROFILE, logs[2], diagnosed=model, rivals={})
 

@@ -11,7 +11,7 @@ from ferryid.counts import counted
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
-from ferryid.identify.pictured import bridged
+from ferryid.effects.measurements import interpolate_gaps
 from ferryid.vessel.profile import Floats
 
 NAMES = ("north", "east", "heading", "surge", "sway", "yaw rate")
@@ -50,7 +50,7 @@ def find(scene: Measurements) -> SensorFinding | None:
     def correct(seen: Measurements) -> Measurements:
         # What was held is bridged: the jump at its end is no motion, and means reach over it.
         both = ((seen.eta, held[:, :3]), (seen.nu_raw, held[:, 3:]))
-        eta, nu_raw = (bridged(np.where(gone, np.nan, now), seen.usable) for now, gone in both)
+        eta, nu_raw = (interpolate_gaps(np.where(gone, np.nan, now), seen.usable) for now, gone in both)
         return replace(seen, eta=eta, nu_raw=nu_raw, usable=seen.usable & ~rows)
 
     return SensorFinding(

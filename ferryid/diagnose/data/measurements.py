@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
 from ferryid.effects.force_model import Measurements
+from ferryid.effects.measurements import actuator_forces, interpolate_gaps
 from ferryid.errors import FerryIdError, did_you_mean
-from ferryid.identify.pictured import bridged, pushes
 from ferryid.signals.align import align
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.prepare import doubts_of
@@ -216,13 +216,13 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         usable &= placed
     else:
         eta = np.column_stack([np.full((len(eta), 2), np.nan), eta[:, 2]])
-    current = None if measured.current is None else bridged(measured.current, usable)
-    eta = np.column_stack([bridged(column[:, None], usable) for column in eta.T])
+    current = None if measured.current is None else interpolate_gaps(measured.current, usable)
+    eta = np.column_stack([interpolate_gaps(column[:, None], usable) for column in eta.T])
     through_water = (
         measured.nu if measured.current is None else measured.nu - current_in_body(measured.current, eta[:, 2])
     )
-    parts, angles = pushes(profile, track.columns, through_water, usable)
-    nu_raw = bridged(measured.nu, usable)
+    parts, angles = actuator_forces(profile, track.columns, through_water, usable)
+    nu_raw = interpolate_gaps(measured.nu, usable)
     return Measurements(
         profile=profile,
         t=measured.t,
@@ -232,7 +232,7 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         parts=parts,
         angles=angles,
         usable=usable,
-        wind=None if measured.wind is None else steady_mean(bridged(measured.wind, usable), rows),
+        wind=None if measured.wind is None else steady_mean(interpolate_gaps(measured.wind, usable), rows),
         current=None if current is None else steady_mean(current, rows),
-        payload=None if measured.payload is None else bridged(measured.payload, usable, held=True),
+        payload=None if measured.payload is None else interpolate_gaps(measured.payload, usable, held=True),
     )

@@ -19,7 +19,7 @@ from ferryid.diagnose.inference.simulation_baseline import (
     simulation_as_json,
 )
 from ferryid.diagnose.inference.stages import AveragedLog, Expectation
-from ferryid.identify.model import Model
+from ferryid.models import Model
 from ferryid.vessel.profile import Profile
 
 

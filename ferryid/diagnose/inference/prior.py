@@ -10,9 +10,10 @@ import numpy as np
 from ferryid.diagnose.data.measurements import BLOCK_COEFFICIENT, WATER_DENSITY, WINDOW_LENGTH_M, dimensions
 from ferryid.diagnose.inference.estimation import HULL_SPREAD
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
+from ferryid.effects.measurements import hull_force_model
 from ferryid.errors import FerryIdError
-from ferryid.identify.model import Model
-from ferryid.identify.pictured import Pictured, bare_picture
+from ferryid.models import Model
+from ferryid.models.forces import ModelForces
 from ferryid.vessel.profile import Floats, Profile
 
 
@@ -21,8 +22,8 @@ def prior_force_model(
 ) -> tuple[ForceModel, Floats]:
     """Return the picture before any candidate, and how far each of its hull's coefficients is believed to be off.
 
-    The air is still where no wind was measured, and the water too. A model is imagined as `Pictured` has it, with its vessel's
-    properties and, in a log that it was diagnosed on, that log's conditions.
+    The air is still where no wind was measured, and the water too. A model is taken as `ModelForces` has it, with its
+    vessel's properties and, in a log that it was diagnosed on, that log's conditions.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def prior_force_model(
     """
     if model is not None:
         return _modelled(scene, profile, model, sha256)
-    bare = bare_picture(scene, hull_of(profile))
+    bare = hull_force_model(scene, hull_of(profile))
     spread = HULL_SPREAD * np.abs(bare.hull) if profile.hull.has_model else default_hull_spread(scene, profile)
     return replace(bare, external=scene.air_load, ambient=lambda now: now.air_load), spread
 
@@ -111,7 +112,7 @@ def default_hull_spread(scene: Measurements, profile: Profile) -> Floats:
 
 
 def _modelled(scene: Measurements, profile: Profile, model: Model, sha256: str) -> tuple[ForceModel, Floats]:
-    known = Pictured(model)
+    known = ModelForces(model)
     if known.force.profile.name != profile.name:
         raise FerryIdError(
             f"{model.label}: a model of {known.force.profile.name} says nothing about {profile.name}. "

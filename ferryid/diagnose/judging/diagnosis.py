@@ -68,7 +68,7 @@ class Diagnosis:
         On held-out rows, without and with the findings:
 
         - ``mse``: force error by axis [N² or N²m²];
-        - ``free_run``: as `ferryid.identify.scores.free_run_plain` gives it, or empty;
+        - ``free_run``: as `ferryid.models.scores.free_run_plain` gives it, or empty;
         - ``rows`` (in `before`, optional): how many rows these are, so that several logs can be pooled;
         - ``window_s`` (in `before`, optional): length of the windows that force is averaged over [s];
         - ``ratio`` (in `after`, optional): `after` over `before` of the force error by axis, each

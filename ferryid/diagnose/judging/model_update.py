@@ -18,12 +18,11 @@ from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.files import alone
-from ferryid.identify.accept import accept
-from ferryid.identify.model import AXES, Model, blank
-from ferryid.identify.pictured import Pictured
-from ferryid.identify.result import Verdict
-from ferryid.identify.store import checked_name, save
-from ferryid.identify.stored_effect import Conditions, Quantity, StoredEffect
+from ferryid.identify import Acceptance, accept
+from ferryid.models import Conditions, Model, ModelScores, Quantity, StoredEffect, blank_model
+from ferryid.models.forces import ModelForces
+from ferryid.models.store import check_name, save
+from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
 
 APART = 0.25
@@ -53,7 +52,7 @@ def store_updated_model(
     FerryIdError
         For a name that a model cannot have, and a folder that cannot be written.
     """
-    made, notes = update_model(diagnoses, profile, model, checked_name(name or (model.name if model else profile.name)))
+    made, notes = update_model(diagnoses, profile, model, check_name(name or (model.name if model else profile.name)))
     if made is None:
         return tuple(diagnoses)
     with alone(out / "models"):
@@ -73,11 +72,11 @@ def update_model(
         return None, ()
     vessel, notes = _properties(logs, profile)
     verdict, scores = _scores([one for one in diagnoses if one.posterior is not None], logs)
-    start = blank(profile, name) if model is None else replace(model, name=name)
+    start = blank_model(profile, name) if model is None else replace(model, name=name)
     hull, covariance = _hull(logs)
     if model is not None and model.vessel_effects:
         # The picture that was refitted had these effects in it, which multiply coefficients and come on top again.
-        known = Pictured(model)
+        known = ModelForces(model)
         factor = np.divide(known.altered_hull(), known.hull, out=np.ones_like(hull), where=known.hull != 0.0)
         hull, covariance = hull / factor, covariance / np.outer(factor, factor)
     diagnosed_from = profile.name if model is None else model.label
@@ -89,7 +88,7 @@ def update_model(
         settings={**start.settings, "diagnosed_from": diagnosed_from},
         ranges=start.ranges or _spanned([one.ranges for one in logs]),
         training=_trained(start, logs),
-        scores=scores,
+        scores=ModelScores.from_json(scores),
         accepted=verdict.accepted and bool(vessel),
         hull=_quantities(hull, covariance),
         vessel_effects=_composed(start.vessel_effects, vessel, profile),
@@ -236,7 +235,7 @@ def _spanned(several: Sequence[Mapping[str, tuple[float, float]]]) -> dict[str, 
     return {name: (min(one[name][0] for one in several), max(one[name][1] for one in several)) for name in several[0]}
 
 
-def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[Verdict, dict[str, Any]]:
+def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[Acceptance, dict[str, Any]]:
     """Return held-out force errors without and with the findings, pooled over logs, as a model file has its scores."""
     weights = np.array([float(one.before.get("rows", 0)) for one in diagnoses])
     weights = weights / weights.sum() if weights.sum() > 0.0 else np.full(len(diagnoses), 1.0 / len(diagnoses))

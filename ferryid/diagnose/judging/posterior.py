@@ -14,8 +14,7 @@ from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, 
 from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects.force_model import COEFFICIENTS
-from ferryid.identify.excitation import ranges
-from ferryid.identify.stored_effect import Quantity, Source, StoredEffect
+from ferryid.models import Quantity, Source, StoredEffect, validity_ranges
 from ferryid.vessel.profile import Floats
 
 IN_THE_HULL = "hull_parameters"
@@ -128,7 +127,7 @@ def posterior_of(
             "seconds": float(rows.sum() / motion.rate_hz),
             "rows": int(rows.sum()),
         },
-        ranges=ranges(motion.nu[rows], motion.nu_dot[rows]),
+        ranges=validity_ranges(motion.nu[rows], motion.nu_dot[rows]),
         before=before,
         spread=spread,
         hull=hull,

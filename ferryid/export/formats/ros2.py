@@ -12,7 +12,7 @@ from ferryid.export.format import Format
 from ferryid.export.names import legal, number, plain
 from ferryid.export.physics import FACTORS, STRIPS_SAY
 from ferryid.export.words import beside, commented, frames, heading, limits
-from ferryid.identify.model import AXES
+from ferryid.types import AXES
 from ferryid.vessel.wind import AIR_DENSITY
 
 _RULES = (

@@ -8,21 +8,15 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.adapt import data_matrix
-from ferryid.identify.cross_products import Rows
-from ferryid.identify.nipals import covariances, nipals
-from ferryid.identify.pca import pca
-from ferryid.identify.qr import factorise
-from ferryid.identify.simpls import simpls
+from ferryid.identify.adaptive import data_matrix
+from ferryid.regression import Rows, component_covariances, factorise, fit_nipals, fit_simpls, principal_components
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS
 from ferryid.reproduce.study import Row, Study, Table, median, number, spread
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 PLACE = 90
 COMPONENTS = 12
@@ -114,20 +108,20 @@ def _compare(folder: Path, seed: int) -> Outcome:
     flight = fly(folder, "training", controlled(trial("experiment-1"), BASE), weather_seed(seed, 1))
     data = data_matrix(flight.profile, [flight.motion(THESIS.window_s)], THESIS)
     X, Y = data.X, data.Y
-    one = simpls(factorise(Rows.of(X, Y)), COMPONENTS)
-    other = nipals(X, Y, COMPONENTS)
-    parts = pca(factorise(Rows.of(X, Y)))
+    one = fit_simpls(factorise(Rows.of(X, Y)), COMPONENTS)
+    other = fit_nipals(X, Y, COMPONENTS)
+    parts = principal_components(factorise(Rows.of(X, Y)))
     explained = np.zeros(SHOWN)
     explained[: min(SHOWN, len(parts.explained))] = parts.explained[:SHOWN]
     deep = min(SHOWN, len(parts.explained))
-    fits = simpls(factorise(Rows.of(X, Y)), deep).coefficients, nipals(X, Y, deep).coefficients
+    fits = fit_simpls(factorise(Rows.of(X, Y)), deep).coefficients, fit_nipals(X, Y, deep).coefficients
     apart = [_apart(*(fit[min(a, deep) - 1] * parts.scale[:, None] for fit in fits)) for a in COMPARED]
     return Outcome(
         (
-            _shortest(lambda: simpls(factorise(Rows.of(X, Y)), COMPONENTS)),
-            _shortest(lambda: nipals(X, Y, COMPONENTS)),
+            _shortest(lambda: fit_simpls(factorise(Rows.of(X, Y)), COMPONENTS)),
+            _shortest(lambda: fit_nipals(X, Y, COMPONENTS)),
         ),
-        np.array([covariances(one.weights[0], X, Y), covariances(other.rotations, X, Y)]),
+        np.array([component_covariances(one.weights[0], X, Y), component_covariances(other.rotations, X, Y)]),
         (apart[0], apart[1], apart[2]),
         explained,
         len(parts.explained),

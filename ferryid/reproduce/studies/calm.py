@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ferryid.compare import MEASURES
 from ferryid.counts import counted
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES, Model
-from ferryid.identify.settings import FitSettings
-from ferryid.identify.tracking import MEASURES
+from ferryid.identify import FitSettings, force_mse
+from ferryid.models import Model
 from ferryid.report.drawing import Drawing
 from ferryid.reproduce.flight import Campaign, Flight, campaign, controlled, fly, master_round, trial, weather_seed
 from ferryid.reproduce.lab import Lab
@@ -22,8 +20,7 @@ from ferryid.reproduce.study import Row, Study, Table, change, changes, number, 
 from ferryid.reproduce.variants import noiseless, prompt
 from ferryid.signals.smooth import moving_mean, odd_rows
 from ferryid.signals.track import Motion
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 12
 ROUNDS = 4

@@ -6,18 +6,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
+from ferryid.identify import force_mse
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
 from ferryid.reproduce.pictures import against
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 from ferryid.simulate.scenario import Scenario
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 40
 STEPS_DEG = (0.0, 1.0, 5.0, 15.0, 45.0)

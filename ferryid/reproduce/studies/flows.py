@@ -7,15 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.adapt import data_matrix
-from ferryid.identify.basis import relative_flow
-from ferryid.identify.cross_products import Rows
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
-from ferryid.identify.qr import factorise
-from ferryid.identify.simpls import simpls
+from ferryid.identify import force_mse
+from ferryid.identify.adaptive import data_matrix
+from ferryid.regression import Rows, factorise, fit_simpls
+from ferryid.regression.bases import relative_flow
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn, without_anemometer, without_wind_areas
@@ -23,9 +19,8 @@ from ferryid.reproduce.study import Row, Study, Table, changes, median, number, 
 from ferryid.signals.track import Motion
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Current
+from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 PLACE = 60
 UNITS = ("N", "N", "N·m")
@@ -252,7 +247,7 @@ def _error(motions: list[Motion], profile: Profile, name: str) -> Floats:
     seen = still if name == "thesis" else motions
     X = data_matrix(bare, seen[:2], settings)
     Y = data_matrix(bare, still[:2], THESIS)
-    fitted = simpls(factorise(Rows.of(X.X, Y.Y)), MOST)
+    fitted = fit_simpls(factorise(Rows.of(X.X, Y.Y)), MOST)
     base = hull_alone(bare, BASE)
     errors, unit = np.zeros(3), np.zeros(3)
     for motion, quiet in zip(seen[2:], still[2:], strict=True):

@@ -8,16 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.identify.model import AXES
-from ferryid.identify.tracking import signal_power
+from ferryid.compare import signal_power
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, learn
 from ferryid.reproduce.pictures import control_shares
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 80
 AFTER_S = 30.0

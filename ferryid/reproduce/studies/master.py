@@ -7,10 +7,8 @@ from math import exp
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
+from ferryid.identify import force_mse
 from ferryid.reproduce.flight import campaign, trial
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, hull_alone
@@ -18,10 +16,9 @@ from ferryid.reproduce.pictures import against
 from ferryid.reproduce.study import Row, Study, Table, change, median, percent, spread
 from ferryid.reproduce.variants import windier
 from ferryid.simulate.scenario import Scenario
+from ferryid.types import AXES, Floats
 from ferryid.vessel.load import load_profile
 from ferryid.vessel.profile import Hull
-
-Floats = NDArray[np.float64]
 
 PLACE = 11
 SPREADS = (0.0, 0.2, 0.4, 0.8)

@@ -6,19 +6,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ferryid.compare import signal_power
 from ferryid.counts import counted
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
-from ferryid.identify.residual import FORMS
-from ferryid.identify.tracking import signal_power
+from ferryid.identify import force_mse
+from ferryid.models.forces import FORMS
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, spread
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 50
 LABELS = {

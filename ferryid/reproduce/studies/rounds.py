@@ -6,21 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.estimate import estimator
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
-from ferryid.identify.tracking import MEASURES
+from ferryid.compare import MEASURES
+from ferryid.identify import force_mse
+from ferryid.models.forces import model_estimator
 from ferryid.report.drawing import Drawing
 from ferryid.reproduce.flight import Flight, campaign, master_round, trial
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, MASTER, THESIS, hull_alone
 from ferryid.reproduce.pictures import control_shares, integrals, model_fit
 from ferryid.reproduce.study import Row, Study, Table, change, changes, median, percent, spread
+from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 PLACE = 10
 ROUNDS = 3
@@ -133,7 +130,7 @@ def _experiment(folder: Path, seed: int) -> Outcome:
     flights = (*flown.flights, compared)
     profile = compared.profile
     motion = flown.flights[2].motion(THESIS.window_s)
-    new, master = estimator(flown.models[1]), hull_alone(profile, MASTER)
+    new, master = model_estimator(flown.models[1]), hull_alone(profile, MASTER)
     labels = ("round 1, base model", "round 2, Model 1", "round 3, Model 2", "Master Model")
     drawings = (
         integrals(

@@ -7,19 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES
-from ferryid.identify.tracking import MEASURES
+from ferryid.compare import MEASURES
+from ferryid.identify import force_mse
 from ferryid.reproduce.flight import campaign, trial
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import MASTER, THESIS, hull_alone
 from ferryid.reproduce.study import Study, Table, change, median, percent, spread
 from ferryid.reproduce.variants import noiseless, prompt, stronger, windier
 from ferryid.simulate.scenario import Scenario
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 13
 THEIRS = (-75.0, -46.0, -57.0, -20.0)

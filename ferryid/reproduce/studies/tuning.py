@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.counts import counted
-from ferryid.identify.estimate import Estimator, estimator
-from ferryid.identify.judge import force_mse
-from ferryid.identify.simpls import simpls, sse
+from ferryid.identify import force_mse
+from ferryid.models.forces import Estimator, model_estimator
+from ferryid.regression import fit_simpls
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import Flight, controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
@@ -23,9 +22,8 @@ from ferryid.reproduce.study import Row, Study, Table, median, number, spread
 from ferryid.reproduce.variants import rougher
 from ferryid.signals.smooth import Measured, moving_mean, smooth_measured
 from ferryid.signals.track import Motion
+from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 PLACE = 20
 WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5)
@@ -222,8 +220,8 @@ def _errors(pair: tuple[Flight, Flight], *, scale: bool) -> Floats:
     judge, unit = products([test], testing.profile), _unit(test, testing.profile)
     errors = []
     for window in WINDOWS_S:
-        fitted = simpls(products([training.motion(window)], training.profile), MOST, scale=scale)
-        errors.append(np.mean(sse(judge, fitted.coefficients, fitted.intercepts) / judge.n / unit, axis=1))
+        fitted = fit_simpls(products([training.motion(window)], training.profile), MOST, scale=scale)
+        errors.append(np.mean(judge.sse(fitted.coefficients, fitted.intercepts) / judge.n / unit, axis=1))
     return np.array(errors)
 
 
@@ -291,7 +289,7 @@ def _pictures(training: Flight, testing: Flight) -> tuple[Drawing, ...]:
                 Panel(
                     "surge X [N]",
                     (
-                        Line("model", test.t[rows], estimator(model).of(test)[rows, 0]),
+                        Line("model", test.t[rows], model_estimator(model).of(test)[rows, 0]),
                         Line("measured", test.t[rows], test.tau[rows, 0]),
                     ),
                     title=f"training log smoothed with {window:g} s",

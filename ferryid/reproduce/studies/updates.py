@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.counts import counted
-from ferryid.identify.adapt import fit_motions, update_axes
-from ferryid.identify.combine import geometric_weights, mean_of_last, weighted
-from ferryid.identify.judge import force_mse, judge
-from ferryid.identify.model import AXES, Model
+from ferryid.identify import accept_on_motions, force_mse
+from ferryid.identify.adaptive import fit_motions, geometric_weights, mean_of_last, update_axes, weighted_mean
+from ferryid.models import Model
 from ferryid.reproduce.flight import controlled, fly, trial, weather_seed
 from ferryid.reproduce.lab import Lab
 from ferryid.reproduce.learning import BASE, THESIS, hull_alone, learn
@@ -20,8 +19,7 @@ from ferryid.reproduce.study import Study, Table, changes, median, number, perce
 from ferryid.signals.track import Motion
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Payload
-
-Floats = NDArray[np.float64]
+from ferryid.types import AXES, Floats
 
 PLACE = 70
 PASSENGERS_KG = 480.0
@@ -121,16 +119,16 @@ def _compare(folder: Path, seed: int) -> Outcome:
     old = learn(motions, profile)
     trip = fly(folder, "crossing", replace(crossing, payload=laden), weather_seed(seed, 4), old).motion(window)
     halves = [trip.t < trip.t[-1] / 2, trip.t >= trip.t[-1] / 2]
-    new = fit_motions(profile, [trip], THESIS, name="reproduction", rows=[halves[0]])
+    new = fit_motions(profile, [trip], THESIS, name="reproduction", rows=[halves[0]]).model
     mean = mean_of_last([*earlier], LAST)
     series = [*earlier, new]
     models = (
         old,
         new,
-        update_axes(old, [trip], axes=("surge",), rows=[halves[0]]),
-        weighted(series, geometric_weights(len(series), FACTOR)),
+        update_axes(old, [trip], axes=("surge",), rows=[halves[0]]).model,
+        weighted_mean(series, geometric_weights(len(series), FACTOR)),
         mean_of_last(series, LAST),
-        fit_motions(profile, [trip], THESIS, name="reproduction", base=mean, rows=[halves[0]]),
+        fit_motions(profile, [trip], THESIS, name="reproduction", base=mean, rows=[halves[0]]).model,
     )
     test = fly(folder, "test", replace(calm, payload=laden), weather_seed(seed, 5), old).motion(window)
     base = hull_alone(profile, BASE)
@@ -143,7 +141,7 @@ def _compare(folder: Path, seed: int) -> Outcome:
         errors(trip, halves[1]),
         errors(test),
         errors(fly(folder, "test-empty", calm, weather_seed(seed, 6), old).motion(window)),
-        tuple(judge(old, model, trip, [halves[1]]).accepted for model in models),
+        tuple(accept_on_motions(old, model, trip, [halves[1]]).accepted for model in models),
         _ise(folder, "crossing", replace(crossing, payload=laden), weather_seed(seed, 7), models),
         _ise(folder, "twelve", replace(calm, payload=laden), weather_seed(seed, 8), models),
     )

@@ -8,14 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.counts import counted
-from ferryid.identify.estimate import estimator
-from ferryid.identify.fit import fit
-from ferryid.identify.judge import force_mse
-from ferryid.identify.model import AXES, Model
-from ferryid.identify.settings import FitSettings
+from ferryid.identify import FitSettings, fit_logs, force_mse
+from ferryid.models import Model
+from ferryid.models.forces import model_estimator
 from ferryid.report.drawing import Drawing, Line, Panel
 from ferryid.reproduce.flight import Flight, campaign, controlled, fly, master_round, trial, weather_seed
 from ferryid.reproduce.lab import Lab
@@ -24,9 +21,8 @@ from ferryid.reproduce.pictures import FORCES, against, control_shares, integral
 from ferryid.reproduce.study import Row, Study, Table, changes, median, number, percent, spread
 from ferryid.reproduce.variants import rougher, windier
 from ferryid.simulate.scenario import Scenario
+from ferryid.types import AXES, Floats, RunContext
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 PLACE = 30
 THEIRS = (217.0, 171.0, 58.0)
@@ -205,13 +201,13 @@ def _sweep(
 
 def _told(folder: Path, log: str, profile: Profile, calm: Flight) -> Told:
     """Return what `ferryid fit` says of one log, with its default settings on the thesis's base model."""
-    result = fit([str(folder / f"{log}.mcap")], profile, FitSettings(delta=0.4, sigma=0.4), folder)
+    result = fit_logs([str(folder / f"{log}.mcap")], profile, FitSettings(delta=0.4, sigma=0.4), RunContext(folder))
     still = calm.motion(float(result.model.settings["window_s"]))
     return Told(
-        result.verdict.accepted,
+        result.acceptance.accepted,
         result.warnings,
         float(np.mean(force_mse(result.model, still) / force_mse(hull_alone(profile, BASE), still))),
-        result.verdict.normalised_mse,
+        result.acceptance.normalised_mse,
     )
 
 
@@ -234,7 +230,7 @@ def _pictures(
             "5-10-model-6",
             "Force in round 7: measured, Model 6 and the Master Model, t = 350 to 430 s, as in figure 5.10.",
             seventh,
-            {"Master Model": master, "Model 6": estimator(models["Model 6"]).of(seventh)},
+            {"Master Model": master, "Model 6": model_estimator(models["Model 6"]).of(seventh)},
             (350.0, 430.0),
         ),
         control_shares(
@@ -244,7 +240,7 @@ def _pictures(
             "5-12-model-2",
             "The same for Model 2, which never saw waves, as in figure 5.12.",
             seventh,
-            {"Master Model": master, "Model 2": estimator(models["Model 2"]).of(seventh)},
+            {"Master Model": master, "Model 2": model_estimator(models["Model 2"]).of(seventh)},
             (350.0, 430.0),
         ),
         control_shares(
@@ -262,7 +258,7 @@ def _feedforwards(models: dict[str, Model], flight: Flight) -> Drawing:
     control = flight.simulation.control
     nu_dot = np.gradient(control.nu_d, control.t, axis=0)
     wanted = {
-        name: estimator(models[name])(nu_dot, control.nu_d, control.eta_d[:, 2], None, None)
+        name: model_estimator(models[name])(nu_dot, control.nu_d, control.eta_d[:, 2], None, None)
         for name in ("Model 2", "Model 6")
     }
     panels = tuple(

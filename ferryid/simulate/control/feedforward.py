@@ -11,19 +11,16 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
-from ferryid.identify.estimate import Estimator
-from ferryid.identify.pictured import acting_estimator
-from ferryid.identify.residual import scaled
-from ferryid.identify.store import load_file
-from ferryid.identify.strips import LEAST
-from ferryid.identify.term import DIMENSIONS
+from ferryid.models.forces import Estimator, acting_estimator, scale_hull
+from ferryid.models.store import load_file
+from ferryid.regression.bases import DIMENSIONS, LEAST_SPEED_MPS
 from ferryid.simulate.plant.hull import Hydrodynamics, hydrodynamics, required_force
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
 from ferryid.vessel.parse_hull import rigid_mass
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
-    from ferryid.identify.model import Model
+    from ferryid.models import Model
     from ferryid.simulate.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -122,7 +119,7 @@ def feedforward_of(
     estimated: Estimator, *, weather: bool = False, flow: bool = False, load: bool = False
 ) -> Feedforward:
     """Return a model as numbers; `weather`, `flow` and `load` say whether wind, current and payload are measured."""
-    hull = scaled(estimated.profile.hull, estimated.scale)
+    hull = scale_hull(estimated.profile.hull, estimated.scale)
     rigid = replace(hull, M=rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z), D={})
     functions = () if estimated.basis is None else estimated.basis.functions
     factors = [[FACTORS.index(name) for name in (*term.factors, "1", "1")[:MOST]] for term in functions]
@@ -215,9 +212,9 @@ def _factors(nu_dot: Triple, nu: Triple, air: Pair, water: Pair, half: float) ->
 
 @borrowing
 def _half_hull(v: float, end: float, half: float) -> Pair:
-    """Return the two integrals of `ferryid.identify.strips.half_hull` for one state."""
+    """Return the two integrals of `ferryid.regression.bases.crossflow_integrals.half_hull` for one state."""
     a, b = abs(v), abs(end)
-    both = a + b + LEAST
+    both = a + b + LEAST_SPEED_MPS
     even = (v + end) / both * (v * v + a * b + end * end) / 3.0
     crossing = 0.5 * (a * b - v * end) / both
     odd = (b * end - a * v) / 6.0 - crossing * crossing * (end - v) / both / 3.0

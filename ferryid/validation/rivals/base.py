@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects.force_model import ForceModel, as_measured, required_force
-from ferryid.identify.model import blank
-from ferryid.identify.pictured import Pictured
-from ferryid.identify.predict import Prediction, force_with, held_in, imagine, smoothed_scene
-from ferryid.identify.scores import usable
+from ferryid.effects.measurements import measurements_of_motion, payload_and_damping
+from ferryid.models import blank_model, usable_rows
+from ferryid.models.forces import ModelForces, force_law
+from ferryid.models.prediction import Prediction, predict_with_effects
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.smooth import odd_rows, steady_mean
 from ferryid.validation.rivals.learner import SMOOTHER, WINDOW_S
@@ -41,7 +41,7 @@ class Base:
     prepared: Prepared
     prediction: Prediction
     picture: ForceModel
-    known: Pictured
+    known: ModelForces
 
     @property
     def residual(self) -> Floats:
@@ -51,7 +51,7 @@ class Base:
     @property
     def rows(self) -> Rows:
         """Rows on which the residual is known, shape (n,)."""
-        return usable(self.prepared.motion, self.prediction.tau)
+        return usable_rows(self.prepared.motion, self.prediction.tau)
 
     @cached_property
     def rates(self) -> Floats:
@@ -74,8 +74,8 @@ class Base:
         """
         motion, seen = self.prepared.motion, self.prediction.motion
         more = picture.external - self.picture.external
-        seen = replace(seen, tau=seen.tau + more, payload=held_in(picture))
-        force = force_with(self.known, picture.hull)
+        seen = replace(seen, tau=seen.tau + more, payload=payload_and_damping(picture))
+        force = force_law(self.known, picture.hull)
         needed = force(seen.nu_dot, seen.nu, seen.eta[:, 2], seen.wind, seen.current, seen.payload)
         return Prediction(motion.tau - (seen.tau - needed), seen, force)
 
@@ -93,11 +93,11 @@ def base_of(prepared: Prepared, profile: Profile) -> Base:
     FerryIdError
         For a log without heading.
     """
-    model = blank(profile, profile.name)
-    prediction = imagine(model, prepared, profile, window_s=WINDOW_S, smoother=SMOOTHER)
+    model = blank_model(profile, profile.name)
+    prediction = predict_with_effects(model, prepared, profile, window_s=WINDOW_S, smoother=SMOOTHER)
     assert prepared.track is not None  # or there was no prediction
-    known, motion = Pictured(model), prepared.motion
-    scene = smoothed_scene(prepared.track, motion, profile)
+    known, motion = ModelForces(model), prepared.motion
+    scene = measurements_of_motion(prepared.track, motion, profile)
     n, k, _ = scene.parts.shape
     parts = steady_mean(scene.parts.reshape(n, 3 * k), odd_rows(WINDOW_S, motion.rate_hz)).reshape(n, k, 3)
     return Base(prepared, prediction, known.plain(replace(scene, parts=parts)), known)

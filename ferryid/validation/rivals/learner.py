@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ferryid.identify.predict import Prediction
+from ferryid.models.prediction import Prediction
 from ferryid.signals.prepare import Prepared
 from ferryid.validation.records import RivalName
 from ferryid.vessel.profile import Profile

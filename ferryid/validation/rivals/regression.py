@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-from ferryid.identify.predict import Prediction
+from ferryid.models.prediction import Prediction
 from ferryid.signals.prepare import Prepared
 from ferryid.validation.records import RivalName
 from ferryid.validation.rivals.base import Base, base_of, prepared_log

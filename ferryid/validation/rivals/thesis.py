@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from ferryid.identify.fit import fit
-from ferryid.identify.predict import Prediction, predict
+from ferryid.identify import fit_logs
+from ferryid.models.prediction import Prediction, predict
 from ferryid.reproduce.learning import THESIS
 from ferryid.signals.prepare import Prepared
+from ferryid.types import RunContext
 from ferryid.validation.rivals.learner import SMOOTHER, WINDOW_S, LearnedModel
 from ferryid.vessel.profile import Profile
 
@@ -33,7 +34,7 @@ def learn(log: str, profile: Profile, out: Path) -> LearnedModel:
     FerryIdError
         For a log that cannot be used.
     """
-    model = fit([log], profile, SETTINGS, out).model
+    model = fit_logs([log], profile, SETTINGS, RunContext(out)).model
 
     def expect(prepared: Prepared) -> Prediction:
         return predict(model, prepared, profile, window_s=WINDOW_S, smoother=SMOOTHER)

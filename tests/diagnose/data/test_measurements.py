@@ -13,9 +13,9 @@ from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.prior import default_hull_spread, prior_force_model
 from ferryid.effects.force_model import COEFFICIENTS, Measurements, acceleration
 from ferryid.errors import FerryIdError
-from ferryid.identify.basis import basis
-from ferryid.identify.estimate import estimator
-from ferryid.identify.model import Model
+from ferryid.models.forces.estimator import model_estimator
+from ferryid.models.model import Model
+from ferryid.regression.bases.basis import make_basis
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
@@ -33,7 +33,7 @@ def short() -> Measurements:
 def model_of(
     structure: str, theta_of: Callable[[tuple[int, int]], np.ndarray], profile_text: str = FERRY.text
 ) -> Model:
-    functions = basis("thesis", structure=structure)
+    functions = make_basis("thesis", structure=structure)
     theta = np.where(functions.mask, theta_of(functions.mask.shape), 0.0)
     k = len(functions.terms)
     return Model(
@@ -55,7 +55,7 @@ def model_of(
         covariance=np.tile(np.eye(k + 1), (3, 1, 1)),
         ranges={},
         training=(),
-        scores={},
+        scores=None,
         accepted=True,
     )
 
@@ -135,7 +135,7 @@ def test_a_model_becomes_a_picture_of_the_same_force(short: Measurements, weathe
     model = model_of("decoupled", around)
     picture, spread = prior_force_model(scene, FERRY, model)
     nu_dot = acceleration(picture)
-    needed = estimator(model)(nu_dot, scene.nu, scene.psi, scene.wind, None)
+    needed = model_estimator(model)(nu_dot, scene.nu, scene.psi, scene.wind, None)
     np.testing.assert_allclose(needed, scene.parts.sum(axis=1), atol=1e-6)
     fitted = dict(zip(COEFFICIENTS, picture.hull, strict=True))
     surge = model.theta[:, 0]

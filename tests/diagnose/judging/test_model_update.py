@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ferryid.compare.candidates import select_candidates
+from ferryid.compare.comparison import compare
+from ferryid.compare.evaluation import evaluate
 from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.data.measurements import Survey, read_measurements, window_lengths
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem, fit
@@ -23,14 +26,13 @@ from ferryid.diagnose.judging.posterior import Posterior, posterior_of
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.effects.force_model import acceleration
-from ferryid.identify.candidates import line_up
-from ferryid.identify.compare import compare
-from ferryid.identify.evaluate import evaluate, render_evaluation
-from ferryid.identify.model import Model
-from ferryid.identify.physics_rows import render_effects
-from ferryid.identify.store import load_file
+from ferryid.models.model import Model
+from ferryid.models.store.versions import load_file
+from ferryid.report.comparison_words import render_effects
+from ferryid.report.evaluation_text import render_evaluation
 from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.simulate.vessel_model import sailed_by
+from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 
@@ -131,7 +133,7 @@ def quiet(stage: str) -> None:
 
 
 def judged(model: Model, log: str, out: Path) -> dict[str, Any]:
-    return evaluate(model, [log], out, progress=quiet)
+    return evaluate(model, [log], RunContext(out))
 
 
 @pytest.fixture(scope="module")
@@ -412,8 +414,8 @@ def test_a_wrong_hull_model_becomes_the_hull(fouled: str) -> None:
 
 def test_compare_tells_the_difference_in_physics(model: Model, fouled: str, folder: Path) -> None:
     clean = replace(model.undiagnosed(), version=7)
-    field = line_up(["clean", "found"], [clean, model])
-    result = compare(field, [fouled], folder / "out", progress=quiet).json
+    field = select_candidates(["clean", "found"], [clean, model])
+    result = compare(field, [fouled], RunContext(folder / "out")).json
     pair = result["logs"][0]["pairs"][-1]
     assert (pair["first"], pair["second"]) == (clean.label, model.label)
     assert pair["mse"]["surge"]["value"] > 1.25

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.identify.basis import basis
-from ferryid.identify.model import Model
+from ferryid.models.model import Model
+from ferryid.regression.bases.basis import make_basis
 from ferryid.simulate.paths import set_points
 from ferryid.simulate.scenario import Scenario
 from ferryid.vessel import load_profile
@@ -31,7 +31,7 @@ def model():
     """Return a function that makes a model of a named basis with random coefficients."""
 
     def made(name, seed=0, **changes):
-        functions = basis(name)
+        functions = make_basis(name)
         K = len(functions.terms)
         rng = np.random.default_rng(seed)
         theta, intercept = 100.0 * rng.normal(size=(K, 3)), 10.0 * rng.normal(size=3)
@@ -54,7 +54,7 @@ def model():
             covariance=np.zeros((3, K + 1, K + 1)),
             ranges={},
             training=(),
-            scores={"normalised_mse": 0.5, "per_axis": {}},
+            scores=None,
             accepted=True,
         )
         return replace(plain, **changes)

@@ -11,10 +11,10 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify.basis import BASES, CURRENT, STRUCTURES, WIND, Basis, basis, sized
-from ferryid.identify.estimate import Estimator, estimator
-from ferryid.identify.model import to_json
-from ferryid.identify.term import DIMENSIONS, Term
+from ferryid.models.forces.estimator import Estimator, model_estimator
+from ferryid.models.model import model_to_json
+from ferryid.regression.bases.basis import BASES, CURRENT, STRUCTURES, WIND, Basis, make_basis, with_hull_length
+from ferryid.regression.bases.term import DIMENSIONS, Term
 from ferryid.simulate.control.feedforward import ahead_of, build_feedforward, feedforward_of
 from ferryid.simulate.sections import Control, Sensors
 from ferryid.vessel import load_profile
@@ -56,7 +56,7 @@ def assert_equal(estimated, measured, seed):
     ("name", "wind", "current", "structure"), [*product(BASES, (None, *WIND), (None, *CURRENT), STRUCTURES)]
 )
 def test_every_basis_gives_the_force_of_its_estimator(name, wind, current, structure):
-    functions = basis(sized(name, 5.0, "test"), wind=wind, current=current, structure=structure)
+    functions = make_basis(with_hull_length(name, 5.0, "test"), wind=wind, current=current, structure=structure)
     rng = np.random.default_rng(3)
     theta = np.where(functions.mask, 100.0 * rng.normal(size=functions.mask.shape), 0.0)
     for seed, (wind_on, current_on, payload_on) in enumerate(product((False, True), repeat=3)):
@@ -66,7 +66,7 @@ def test_every_basis_gives_the_force_of_its_estimator(name, wind, current, struc
 
 
 def test_vessels_without_wind_areas_leave_the_wind_to_the_terms():
-    functions = basis("modulus", wind="paper")
+    functions = make_basis("modulus", wind="paper")
     theta = np.random.default_rng(5).normal(size=functions.mask.shape)
     estimated = Estimator(replace(PROFILE, wind=None), SCALE, functions, theta, np.ones(3))
     assert_equal(estimated, (True, True, True), 1)
@@ -124,12 +124,12 @@ def test_a_motion_mirrored_to_port_takes_a_mirrored_force():
 
 def test_a_scenario_takes_a_model_given_or_named(scenario, model, tmp_path):
     made = model("modulus+wind-paper+current-thesis")
-    (tmp_path / "3.json").write_text(dump_json(to_json(made)))
+    (tmp_path / "3.json").write_text(dump_json(model_to_json(made)))
     sensors = Sensors(wind_rate_hz=5.0, current_rate_hz=1.0, payload_rate_hz=1.0)
     given = build_feedforward(scenario(sensors=sensors), PROFILE, made)
     named = scenario(sensors=sensors, controller=Control(model="3.json"), folder=tmp_path)
     nu_dot, nu, psi, wind, current, payload = states(2, n=1)
-    expected = estimator(made)(nu_dot, nu, psi, wind, current, payload)[0]
+    expected = model_estimator(made)(nu_dot, nu, psi, wind, current, payload)[0]
     for feedforward in (given, build_feedforward(named, PROFILE, None)):
         parts = (
             tuple(part[0]) if part.ndim > 1 else float(part[0]) for part in (nu_dot, nu, psi, wind, current, payload)

@@ -1,0 +1,22 @@
+"""Comparison of models of one vessel on logs, and evaluation of one model."""
+
+from ferryid.compare.candidates import BASE, select_candidates
+from ferryid.compare.coefficient_table import is_of_a_hull
+from ferryid.compare.comparison import ComparedLog, Comparison, compare
+from ferryid.compare.evaluation import evaluate
+from ferryid.compare.tracking import MEASURES, Tracking, cumulative_integral, signal_power, tracking_error
+
+__all__ = [
+    "BASE",
+    "MEASURES",
+    "ComparedLog",
+    "Comparison",
+    "Tracking",
+    "compare",
+    "cumulative_integral",
+    "evaluate",
+    "is_of_a_hull",
+    "select_candidates",
+    "signal_power",
+    "tracking_error",
+]

@@ -1,0 +1,156 @@
+"""Models in physics, side by side: the coefficients of their equations of motion, their terms, and what a diagnosis found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ferryid.compare.candidates import Candidate
+from ferryid.effects.force_model import COEFFICIENTS, LIFT, MASS, UNITS
+from ferryid.models import Model, StoredEffect, effect_to_json
+from ferryid.models.forces import MAPPED, hull_coefficients, hull_contribution, model_estimator
+from ferryid.types import AXES, Floats
+
+Row = dict[str, Any]
+
+PRODUCTS = (
+    ("vr in surge", "vr", 0, "kg"),
+    ("rr in surge", "rr", 0, "kg·m"),
+    ("uv in sway", "uv", 1, "kg/m"),
+    ("ur in sway", "ur", 1, "kg"),
+    ("uv in yaw", "uv", 2, "kg"),
+    ("ur in yaw", "ur", 2, "kg·m"),
+)
+"""Products of two velocities, their term, axis and unit: Coriolis force and lift, which no log can tell apart."""
+CUBES = (("Y_rrr", "r^3", 1, "kg·m·s"), ("N_vvv", "v^3", 2, "kg·s/m"))
+"""Damping that no profile has and a fit may find."""
+CONSTANT = "1"
+"""Name of the constant among the terms, as in a model file."""
+
+
+def coefficient_rows(candidates: Sequence[Candidate]) -> list[Row]:
+    """Return the coefficients of the equations of motion, base model and correction counted together.
+
+    With these the force that a motion takes in still water and without wind is::
+
+        X = m11 u' + (vr) v r + (rr) r² - X_u u - X_|u|u |u| u - X_uuu u³
+        Y = m22 v' + m23 r' + (uv) u v + (ur) u r - Y_v v - Y_|v|v |v| v - Y_|r|v |r| v - Y_vvv v³
+            - Y_r r - Y_|v|r |v| r - Y_|r|r |r| r - Y_rrr r³
+        N = m32 v' + m33 r' + (uv) u v + (ur) u r - N_v v - ... - N_vvv v³ - N_r r - ... - N_rrr r³
+
+    and the terms that are no hull's, such as the constant, come on top. Intervals are 95 %; a base model has none.
+    """
+    known = [_effective(one.model) for one in candidates]
+    rows = []
+    for name, unit in _UNITS.items():
+        values = {one.label: _plain(found[name]) for one, found in zip(candidates, known, strict=True)}
+        if any(value["value"] != 0.0 for value in values.values()):
+            rows.append({"coefficient": name, "unit": unit, "values": values})
+    return rows
+
+
+_HULL = dict(zip(COEFFICIENTS, UNITS, strict=True))
+_UNITS = {
+    **{name: _HULL[name] for name in MASS},
+    **{name: unit for name, _, _, unit in PRODUCTS},
+    **{name: unit for name, unit in _HULL.items() if name not in (*MASS, *LIFT)},
+    **{name: unit for name, _, _, unit in CUBES},
+}
+
+
+def _effective(model: Model) -> dict[str, Floats]:
+    """Return value, low and high of every coefficient, shape (3,) each."""
+    hull, deviation = hull_coefficients(model), np.sqrt(np.maximum(hull_contribution(model)[1], 0.0))
+    found = {name: _interval(hull[k], deviation[k]) for k, name in enumerate(COEFFICIENTS)}
+    for name, told in model.hull.items():
+        found[name] = np.array([told.value, told.low, told.high])
+    force = model_estimator(model)
+    # The Coriolis force is that of the base model's mass: a correction of the inertia does not reach it.
+    M = force.profile.hull.M * force.scale.get("delta", 1.0) / force.scale.get("zeta", 1.0)
+    m11, m22, cross = M[0, 0], M[1, 1], (M[1, 2] + M[2, 1]) / 2.0
+    coriolis = (-m22, -cross, 0.0, m11, m22 - m11, cross)
+    for (name, term, axis, _), turning in zip(PRODUCTS, coriolis, strict=True):
+        lift = f"{'XYN'[axis]}_{term}"
+        found[name] = turning + (_opposite(found[lift]) if lift in LIFT else _term(model, term, axis))
+    for name, term, axis, _ in CUBES:
+        found[name] = _opposite(_term(model, term, axis))
+    return found
+
+
+def _term(model: Model, term: str, axis: int) -> Floats:
+    if term not in model.terms:
+        return np.array([0.0, np.nan, np.nan])
+    k = model.terms.index(term)
+    return _interval(model.theta[k, axis], np.sqrt(max(float(model.covariance[axis, k, k]), 0.0)))
+
+
+def _interval(value: float, deviation: float) -> Floats:
+    reach = 1.96 * deviation if deviation > 0.0 else np.nan
+    return np.array([value, value - reach, value + reach])
+
+
+def _opposite(interval: Floats) -> Floats:
+    """A SNAME coefficient gives the force that the water exerts, a term that which the motion takes."""
+    return -interval[[0, 2, 1]]
+
+
+def _plain(interval: Floats) -> Row:
+    value, low, high = interval.tolist()
+    return {"value": value, "low": low, "high": high}
+
+
+def term_rows(candidates: Sequence[Candidate]) -> list[Row]:
+    """Return the terms of the corrections, on every axis on which a model has them, as they stand in the model files."""
+    rows = []
+    for term in dict.fromkeys((*(term for one in candidates for term in one.model.terms), CONSTANT)):
+        for axis, name in enumerate(AXES):
+            values, unit = {}, ""
+            for one in candidates:
+                found = _raw(one.model, term, axis)
+                if found is not None:
+                    unit, values[one.label] = found
+            if any(value["value"] != 0.0 for value in values.values()):
+                rows.append({"term": term, "axis": name, "unit": unit, "values": values})
+    return rows
+
+
+def _raw(model: Model, term: str, axis: int) -> tuple[str, Row] | None:
+    if term == CONSTANT:
+        interval = (model.intercept[axis], model.intercept_low[axis], model.intercept_high[axis])
+        return ("N·m" if axis == 2 else "N"), _plain(np.array(interval))
+    if term not in model.terms:
+        return None
+    k = model.terms.index(term)
+    return model.units[k][axis], _plain(np.array([model.theta[k, axis], model.low[k, axis], model.high[k, axis]]))
+
+
+def is_of_a_hull(term: str, axis: str) -> bool:
+    """Tell whether a term of a correction is counted in among the coefficients of the equations of motion."""
+    place = (term, AXES.index(axis))
+    mapped = {place for places in MAPPED.values() for place in places}
+    return place in mapped | {(term, axis) for _, term, axis, _ in (*PRODUCTS, *CUBES)}
+
+
+def effect_rows(candidates: Sequence[Candidate]) -> list[Row]:
+    """Return the effects that are not the same in all models: of the vessel, then of the logs that each was diagnosed on."""
+    known = {one.label: _all(one.model) for one in candidates if not one.is_base}
+    rows = []
+    for key in dict.fromkeys(key for effects_of in known.values() for key in effects_of):
+        told = {label: _effect_values(effects_of.get(key)) for label, effects_of in known.items()}
+        if any(value != next(iter(told.values())) for value in told.values()):
+            log, _, effect, instance = key
+            rows.append({"effect": effect, "instance": instance, "log": log or None, "values": told})
+    return rows
+
+
+def _all(model: Model) -> dict[tuple[str, str, str, str | None], StoredEffect]:
+    return {
+        **{("", "", *one.key): one for one in model.vessel_effects},
+        **{(known.log, known.sha256, *one.key): one for known in model.conditions for one in known.effects},
+    }
+
+
+def _effect_values(stored: StoredEffect | None) -> Row | None:
+    return None if stored is None else {"parameters": effect_to_json(stored)["parameters"], "says": stored.says()}

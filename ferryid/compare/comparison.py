@@ -1,0 +1,374 @@
+"""Compare models of one vessel: on logs their errors on the same rows, and the coefficients of their equations of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.compare.candidates import Candidate, CandidateSet
+from ferryid.compare.coefficient_table import coefficient_rows, effect_rows, term_rows
+from ferryid.compare.comparison_statements import PairedErrors, Row, comparison_statements
+from ferryid.compare.evaluation import range_warnings
+from ferryid.compare.tracking import tracking_scores
+from ferryid.counts import counted, verb
+from ferryid.errors import FerryIdError
+from ferryid.identify import check_window
+from ferryid.models import usable_rows
+from ferryid.models.forces import model_estimator
+from ferryid.models.prediction import HORIZONS_S, NO_MASS, Prediction, predict, runs_free, single_runs, starting_points
+from ferryid.regression.resampling import (
+    PairedRatios,
+    compare_pairs,
+    has_enough_blocks,
+    paired_block_seconds,
+    sum_over_blocks,
+)
+from ferryid.signals.prepare import Prepared, prepare
+from ferryid.signals.track import Motion
+from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
+
+STATEMENT_HORIZON_S = 30.0
+"""Sentences on free runs are of this horizon, or of the longest below it that has intervals."""
+MOST_LOST = 0.1
+"""Share of the free runs of a model that may diverge."""
+KEYS = ("position_m", "heading_rad", "speed_mps", "yaw_rate_radps")
+"""Errors of free runs in JSON, in the order of `QUANTITIES`."""
+
+
+@dataclass(frozen=True)
+class ComparedLog:
+    """One log, and what every model makes of it.
+
+    Attributes
+    ----------
+    name, sha256
+        Of the log; the name is unique in a comparison.
+    motion
+        Smoothed motion with the measured force.
+    rows
+        The rows on which measurement and every model's force are known, shape (n,).
+    taus
+        Force that each of m models estimates [N, N, N·m], shape (m, n, 3).
+    sums
+        Squared force errors summed over blocks, shape (blocks, m, 3).
+    block_s
+        Length of a block [s].
+    starts_s
+        When each free run starts [s], shape (s,).
+    errors
+        Absolute errors of the free runs, shape (m, s, horizons, 4); NaN where a run did not get there.
+    reached
+        Horizons that lie within the stretch of a run, shape (s, horizons).
+    warnings
+        What a reader must know of this log.
+    """
+
+    name: str
+    sha256: str
+    motion: Motion
+    rows: Flags
+    taus: Floats
+    sums: Floats
+    block_s: float
+    starts_s: Floats
+    errors: Floats
+    reached: Flags
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The result as one JSON object (schema ``ferryid.compare/1``), and the logs for figures."""
+
+    json: dict[str, Any]
+    logs: tuple[ComparedLog, ...]
+
+
+def compare(
+    field: CandidateSet,
+    logs: Sequence[str],
+    run: RunContext,
+    *,
+    window_s: float = 1.0,
+) -> Comparison:
+    """Compare two or more models, and their base model with them.
+
+    All are judged on the same rows of test data smoothed alike, whatever each was trained with, and run free from the same
+    starts. Ratios of their errors come with 95 % intervals from resampling blocks of each log, in pairs.
+
+    Parameters
+    ----------
+    field
+        The models, from `ferryid.compare.candidates.select_candidates`.
+    logs
+        Paths; parts of one recording joined by ``+``.
+    run
+        Output folder and progress.
+    window_s
+        Smoothing window of the test data [s].
+
+    Raises
+    ------
+    FerryIdError
+        For a log given twice, one that cannot be used, one that lacks what a model needs, or has no row that all can be judged
+        on.
+    """
+    check_window(window_s)
+    compared: list[ComparedLog] = []
+    for path in logs:
+        run.progress(f"comparing on {Path(path).name}")
+        compared.append(_compare_log(field, path, run.out, window_s, compared))
+    run.progress("comparing")
+    runnable, notes = _models_that_run(field.candidates, compared)
+    judged = [_pair_errors(field, [log], runnable) for log in compared]
+    pooled = _pair_errors(field, compared, runnable) if len(compared) > 1 else None
+    every = [*judged, *([pooled] if pooled else [])]
+    result = {
+        "schema": "ferryid.compare/1",
+        "vessel": field.profile.name,
+        "window_s": window_s,
+        "models": [_entry(one) for one in field.candidates],
+        "warnings": [*field.warnings, *notes],
+        "logs": [
+            {
+                "name": log.name,
+                "sha256": log.sha256,
+                "block_s": log.block_s,
+                **_scores(field, [log], one, runnable),
+                "tracking": tracking_scores(log.motion, field.profile.hull.length_m),
+                "warnings": [*log.warnings, *_too_few_blocks(log)],
+            }
+            for log, one in zip(compared, judged, strict=True)
+        ],
+        "pooled": _scores(field, compared, pooled, runnable) if pooled else None,
+        "better": [row for one in every for row in comparison_statements(one)],
+        "coefficients": {"physical": coefficient_rows(field.candidates), "terms": term_rows(field.candidates)},
+        "effects": effect_rows(field.candidates),
+    }
+    run.progress("")
+    return Comparison(result, tuple(compared))
+
+
+def _entry(candidate: Candidate) -> Row:
+    model = candidate.model
+    return {
+        "label": candidate.label,
+        "name": model.name,
+        "version": model.version,
+        "base": candidate.is_base,
+        "accepted": None if candidate.is_base else model.accepted,
+        "basis": str(model.settings["basis"]),
+        "diagnosed": model.diagnosed,
+        "scale": dict(model.scale),
+        "training": [str(log["name"]) for log in model.training],
+        "validation": None if model.scores is None else by_axis(model.scores.force.ratio),
+        "normalised_mse": None if model.scores is None else model.scores.force.normalised_mse,
+    }
+
+
+def _compare_log(
+    field: CandidateSet, path: str, out: Path, window_s: float, before: Sequence[ComparedLog]
+) -> ComparedLog:
+    diagnosed = any(one.model.diagnosed for one in field.candidates)
+    prepared = prepare(path, field.profile, out, window_s=window_s, keep_track=diagnosed)
+    motion, sha256 = prepared.motion, prepared.recording.sha256
+    if sha256 in [other.sha256 for other in before]:
+        raise FerryIdError(f"{path}: the same log as another, which would count twice. Fix: give it once")
+    seen = [_prediction(one, prepared, field, window_s) for one in field.candidates]
+    taus = np.stack([prediction.tau for prediction in seen])
+    rows = _common_rows(field, motion, taus)
+    at = motion.t[rows]
+    with np.errstate(over="ignore"):
+        squares = np.moveaxis((motion.tau - taus) ** 2, 0, 1)[rows]
+    for number, one in enumerate(field.candidates):
+        if not np.isfinite(squares[:, number]).all():
+            raise FerryIdError(
+                f"{one.label}: its force on {path} is too large to be squared. Fix: fit the model again, or restore its file"
+            )
+    block_s, remembered = paired_block_seconds(squares.reshape(len(squares), -1), motion.rate_hz)
+    starts, ends = starting_points(motion, rows, HORIZONS_S[0], HORIZONS_S[-1])
+    steps = np.round(np.array(HORIZONS_S) * motion.rate_hz).astype(int)
+    reached = starts[:, None] + steps < ends[:, None]
+    errors = np.full((len(seen), len(starts), len(HORIZONS_S), len(KEYS)), np.nan)
+    for k, prediction in enumerate(seen):
+        if len(starts) and runs_free(prediction.force, prediction.motion):
+            errors[k] = single_runs(prediction.force, prediction.motion, starts, ends, HORIZONS_S)
+    warnings = [*prepared.doubts, *prepared.left_out]
+    for one in field.candidates:
+        warnings += [f"{one.label}: {caution}" for caution in range_warnings(one.model, motion, rows)]
+        if one.trained_on(sha256):
+            warnings.append(f"{one.label} was trained on this log: its scores here are no evidence")
+    if remembered:
+        warnings.append(
+            f"squared errors stay correlated for longer than blocks of {block_s:.3g} s: its intervals are probably too narrow"
+        )
+    name = motion.log if motion.log not in [other.name for other in before] else f"{motion.log} ({len(before) + 1})"
+    return ComparedLog(
+        name=name,
+        sha256=sha256,
+        motion=motion,
+        rows=rows,
+        taus=taus,
+        sums=sum_over_blocks(squares, at, block_s),
+        block_s=block_s,
+        starts_s=motion.t[starts],
+        errors=errors,
+        reached=reached,
+        warnings=tuple(warnings),
+    )
+
+
+def _prediction(candidate: Candidate, prepared: Prepared, field: CandidateSet, window_s: float) -> Prediction:
+    model, motion = candidate.model, prepared.motion
+    functions = model_estimator(model).basis
+    if functions is not None and not model.diagnosed:
+        for what, needed, measured in (
+            ("wind", functions.needs_wind, motion.wind),
+            ("current", functions.needs_current, motion.current),
+        ):
+            if needed and measured is None:
+                raise FerryIdError(
+                    f"{motion.log}: {candidate.label} needs the {what}, found none measured, or not on enough rows. "
+                    f"Fix: compare on a log that has it, or leave {candidate.label} out"
+                )
+    return predict(model, prepared, field.profile, window_s=window_s, smoother="square")
+
+
+def _common_rows(field: CandidateSet, motion: Motion, taus: Floats) -> Flags:
+    """Return the rows on which measurement and every estimate are known, or say which model has none."""
+    rows = usable_rows(motion, *taus)
+    if rows.any():
+        return rows
+    blind = [one.label for one, tau in zip(field.candidates, taus, strict=True) if not usable_rows(motion, tau).any()]
+    raise FerryIdError(
+        f"{motion.log}: no row on which {', '.join(blind) if blind else 'all models'} can be judged, as something that "
+        "is needed was not measured there. Fix: compare on another log, or leave a model out"
+    )
+
+
+def _models_that_run(candidates: Sequence[Candidate], compared: Sequence[ComparedLog]) -> tuple[Flags, list[str]]:
+    """Return the models whose free runs can be compared, shape (m,), and why others cannot.
+
+    A run that diverges counts for no model, so that all are judged by the same runs; a model of which many diverge is left out
+    instead.
+    """
+    runs, notes = np.ones(len(candidates), dtype=bool), []
+    reached = sum(int(log.reached.sum()) for log in compared)
+    for k, one in enumerate(candidates):
+        came = sum(int(np.isfinite(log.errors[k, :, :, 2])[log.reached].sum()) for log in compared)
+        if not reached:
+            continue
+        lost = 1.0 - came / reached
+        runs[k] = lost <= MOST_LOST
+        if not came:
+            notes.append(f"{one.label} is left out of free runs: {NO_MASS}, or all its runs diverge")
+        elif not runs[k]:
+            notes.append(f"{one.label} is left out of free runs: {lost:.0%} of its runs diverge")
+        elif lost:
+            notes.append(f"{lost:.1%} of the free runs of {one.label} diverge, and count for no model")
+    return runs, notes
+
+
+def _common_runs(log: ComparedLog, runnable: Flags) -> Flags:
+    """Return the errors of free runs that count, as all models that run have them, shape (s, horizons, 4)."""
+    return np.asarray(np.isfinite(log.errors[runnable]).all(axis=0) & runnable.any())
+
+
+def _run_sums(log: ComparedLog, runnable: Flags, h: int) -> Floats:
+    """Return squared errors of free runs at a horizon summed over blocks of starts, shape (blocks, m, 4).
+
+    Runs from starts that are close see the same waves and gusts, so that a block is twice as long as a run.
+    """
+    counted = _common_runs(log, runnable)[:, h]
+    some = counted.any(axis=1)
+    squares = np.where(counted[some, None], np.moveaxis(log.errors[:, :, h], 0, 1)[some] ** 2, 0.0)
+    # A model that does not run has no errors, and no ratio.
+    squares[:, ~runnable] = np.nan
+    return sum_over_blocks(squares, log.starts_s[some], max(log.block_s, 2.0 * HORIZONS_S[h]))
+
+
+def _pair_errors(field: CandidateSet, compared: Sequence[ComparedLog], runnable: Flags) -> PairedErrors:
+    runs, told = [], None
+    for h, horizon in enumerate(HORIZONS_S):
+        sums = [_run_sums(log, runnable, h) for log in compared]
+        runs.append(compare_pairs(sums))
+        if horizon <= STATEMENT_HORIZON_S and has_enough_blocks(sums):
+            told = horizon
+    trained = {one.label for one in field.candidates if any(one.trained_on(log.sha256) for log in compared)}
+    return PairedErrors(
+        on=compared[0].name if len(compared) == 1 else None,
+        labels=field.labels,
+        force=compare_pairs([log.sums for log in compared]),
+        runs=tuple(runs),
+        horizons_s=HORIZONS_S,
+        told_s=told,
+        trained=frozenset(trained),
+    )
+
+
+def _too_few_blocks(log: ComparedLog) -> list[str]:
+    if has_enough_blocks([log.sums]):
+        return []
+    count = len(log.sums)
+    return [
+        f"{counted(count, 'block')} of {log.block_s:.3g} s {verb(count, 'is')} too few for an interval, "
+        "so that nothing is said to be better on this log alone"
+    ]
+
+
+def _scores(field: CandidateSet, compared: Sequence[ComparedLog], judged: PairedErrors, runnable: Flags) -> Row:
+    """Return rows, blocks, errors of every model and ratios of every two, on one log or on several together."""
+    tau = np.concatenate([log.motion.tau[log.rows] for log in compared])
+    mse = np.sum([log.sums.sum(axis=0) for log in compared], axis=0) / len(tau)
+    variance = np.var(tau, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        r2 = np.where(variance > 0.0, 1.0 - mse / variance, np.nan)
+        counted = [_common_runs(log, runnable) for log in compared]
+        squares = np.sum(
+            [np.where(use, log.errors**2, 0.0).sum(axis=1) for log, use in zip(compared, counted, strict=True)],
+            axis=0,
+        )
+        rms = np.sqrt(squares / np.sum([use.sum(axis=0) for use in counted], axis=0))
+    rms[~runnable] = np.nan
+    return {
+        "rows": len(tau),
+        "seconds": float(sum(log.rows.sum() / log.motion.rate_hz for log in compared)),
+        "blocks": sum(len(log.sums) for log in compared),
+        "scores": {
+            label: {
+                "mse": by_axis(mse[k]),
+                "r2": by_axis(r2[k]),
+                "trained": label in judged.trained,
+                "free_run": {key: rms[k, :, c].tolist() for c, key in enumerate(KEYS)},
+            }
+            for k, label in enumerate(field.labels)
+        },
+        "free_run": {
+            "horizons_s": list(HORIZONS_S),
+            "told_s": judged.told_s,
+            "starts": sum(len(log.starts_s) for log in compared),
+            "counted": [int(sum(use[:, h].any(axis=1).sum() for use in counted)) for h in range(len(HORIZONS_S))],
+            "blocks": [sum(len(_run_sums(log, runnable, h)) for log in compared) for h in range(len(HORIZONS_S))],
+        },
+        "pairs": [
+            {
+                "first": field.labels[i],
+                "second": field.labels[j],
+                "mse": {axis: _ratio(judged.force, k, c) for c, axis in enumerate(AXES)},
+                "free_run": {
+                    key: [_ratio(runs, k, c, root=True) for runs in judged.runs] for c, key in enumerate(KEYS)
+                },
+            }
+            for k, (i, j) in enumerate(judged.force.pairs)
+        ],
+    }
+
+
+def _ratio(paired: PairedRatios, k: int, column: int, *, root: bool = False) -> Row:
+    values = np.array([values[k, column] for values in (paired.ratio, paired.low, paired.high)])
+    value, low, high = (np.sqrt(values) if root else values).tolist()
+    return {"value": value, "low": low, "high": high, "p": float(paired.p[k, column])}

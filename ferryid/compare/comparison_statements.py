@@ -1,0 +1,149 @@
+"""Which of two models is better, as sentences, with what the number of comparisons leaves of their certainty."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite, sqrt
+from typing import Any
+
+import numpy as np
+
+from ferryid.regression.resampling import PairedRatios, holm
+from ferryid.types import AXES
+
+Row = dict[str, Any]
+
+ALIKE = 0.005
+"""Two models are alike where their mean squares differ by less than this share, however certain the difference."""
+SIGNIFICANT = 0.05
+LIKELY = 0.5
+"""Corrected probability up to which what is significant by itself may be a difference."""
+QUANTITIES = ("position", "heading", "speed", "yaw rate")
+"""What free runs are judged by, in the order of their errors."""
+TOLD_QUANTITIES = 2
+"""How many of these have sentences; the others follow from them."""
+
+
+@dataclass(frozen=True)
+class PairedErrors:
+    """Force and free runs of some models on one log, or on all (`on` is None then).
+
+    Attributes
+    ----------
+    on
+        Name of the log.
+    labels
+        Names of the models.
+    force
+        On the three axes.
+    runs
+        Free runs at each horizon, with the four columns of `QUANTITIES`.
+    horizons_s
+        Horizons [s].
+    told_s
+        The horizon that sentences are made of, None where no horizon has intervals.
+    trained
+        Names of the models that have learnt from what they are judged on.
+    """
+
+    on: str | None
+    labels: tuple[str, ...]
+    force: PairedRatios
+    runs: tuple[PairedRatios, ...]
+    horizons_s: tuple[float, ...]
+    told_s: float | None
+    trained: frozenset[str]
+
+
+def comparison_statements(judged: PairedErrors) -> list[Row]:
+    """Return one entry for every two models and everything that they are compared by.
+
+    Probabilities are corrected for the number of these entries after Holm; intervals are of each by itself.
+    """
+    cells: list[tuple[str, str, float | None, PairedRatios, int]] = [
+        ("force", axis, None, judged.force, column) for column, axis in enumerate(AXES)
+    ]
+    if judged.told_s is not None:
+        runs = judged.runs[judged.horizons_s.index(judged.told_s)]
+        cells += [("free run", name, judged.told_s, runs, k) for k, name in enumerate(QUANTITIES[:TOLD_QUANTITIES])]
+    corrected = holm(np.column_stack([paired.p[:, column] for *_, paired, column in cells]))
+    rows = []
+    for k, (i, j) in enumerate(judged.force.pairs):
+        for place, (kind, what, horizon, paired, column) in enumerate(cells):
+            if kind == "free run" and not isfinite(paired.ratio[k, column]):
+                continue
+            numbers = [float(values[k, column]) for values in (paired.ratio, paired.low, paired.high)]
+            rows.append(
+                _entry(
+                    judged,
+                    (judged.labels[i], judged.labels[j]),
+                    (kind, what, horizon),
+                    # Errors of free runs are told as such, not squared.
+                    [sqrt(value) if kind == "free run" and value >= 0.0 else value for value in numbers],
+                    (float(paired.p[k, column]), float(corrected[k, place])),
+                )
+            )
+    return rows
+
+
+def _entry(
+    judged: PairedErrors,
+    pair: tuple[str, str],
+    of: tuple[str, str, float | None],
+    numbers: Sequence[float],
+    chances: tuple[float, float],
+) -> Row:
+    kind, what, horizon = of
+    (first, second), (ratio, low, high), (p, corrected) = pair, numbers, chances
+    if ratio > 1.0:
+        first, second, ratio, low, high = second, first, 1.0 / ratio, 1.0 / high, 1.0 / low
+    known, alike = isfinite(low + high) and isfinite(p), 1.0 - ratio < ALIKE
+    clear = known and not alike and corrected <= SIGNIFICANT
+    hint = known and not alike and not clear and p <= SIGNIFICANT and corrected <= LIKELY
+    evidence = not ((clear or hint) and first in judged.trained)
+    error = "MSE" if kind == "force" else f"{what} error"
+    place = f"on {what}" if kind == "force" else f"in {what}, run free for {horizon:g} s"
+    span = f" [{low:.3g}, {high:.3g}]" if known else ""
+    if not isfinite(ratio):
+        says = f"{first} and {second} cannot be compared {place}: one of them makes no error, or there is nothing to judge by"
+    elif alike:
+        says = f"{first} and {second} are alike {place}: their {error} differs by less than {ALIKE:.1%}"
+    elif not known:
+        says = f"too little data to tell {first} from {second} {place}: {error} {ratio:.3g} of the other's"
+    elif clear:
+        says = f"{first} is better than {second} {place} (p {format_probability(corrected)}): "
+        says += f"its {error} is {ratio:.3g} of the other's{span}"
+    elif hint:
+        alone, among = format_probability(p), format_probability(corrected)
+        says = f"{first} may be better than {second} {place} (p {alone} by itself, {among} among all): "
+        says += f"its {error} is {ratio:.3g} of the other's{span}"
+    else:
+        says = (
+            f"no difference shown between {first} and {second} {place} (p {format_probability(corrected)}): "
+            f"{error} of the first {ratio:.3g} of the other's{span}"
+        )
+    if not evidence:
+        says += f"; no evidence, as {first} has learnt from {'this log' if judged.on else 'some of these logs'}"
+    return {
+        "on": judged.on,
+        "kind": kind,
+        "what": what,
+        "horizon_s": horizon,
+        "first": first,
+        "second": second,
+        "ratio": ratio,
+        "low": low,
+        "high": high,
+        "p": p,
+        "p_corrected": corrected,
+        "better": first if clear else None,
+        "perhaps": first if hint else None,
+        "evidence": evidence,
+        "says": says,
+    }
+
+
+def format_probability(p: float) -> str:
+    """Return a probability as people write it."""
+    return f"{p:.1g}" if p < 0.1 else f"{p:.2f}"

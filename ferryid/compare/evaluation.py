@@ -1,0 +1,144 @@
+"""Judge a stored model on other logs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ferryid.identify import check_window
+from ferryid.models import RANGE_UNITS, Model, StoredEffect, force_scores, outside_ranges, usable_rows
+from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
+from ferryid.signals.prepare import prepare
+from ferryid.signals.track import Motion
+from ferryid.types import Flags, RunContext
+from ferryid.vessel.profile import Profile
+
+OUTSIDE_WARNING = 0.05
+"""Share of rows outside a range of validity from which on a warning is given."""
+
+
+def evaluate(
+    model: Model,
+    logs: Sequence[str],
+    run: RunContext,
+    *,
+    profile: Profile | None = None,
+    window_s: float | None = None,
+) -> dict[str, Any]:
+    """Compare a model's and its base model's force with the measured one, and run both free.
+
+    The base of a model that a diagnosis has changed is the model before it.
+
+    Parameters
+    ----------
+    model
+        The model.
+    logs
+        Paths; parts of one recording joined by ``+``.
+    run
+        Output folder and progress.
+    profile
+        Signal map of the logs; the profile inside the model where None.
+    window_s
+        Smoothing window of the test data [s]; the model's own where None.
+
+    Returns
+    -------
+    dict
+        Schema ``ferryid.evaluate/1``.
+    """
+    profile = signal_map(model, profile)
+    check_window(window_s)
+    window = float(model.settings["window_s"]) if window_s is None else window_s
+    smoother = str(model.settings.get("smoother", "square"))
+    entries, parts = [], []
+    for path in logs:
+        run.progress(f"evaluating on {Path(path).name}")
+        prepared = prepare(
+            path,
+            profile,
+            run.out,
+            window_s=window,
+            smoother=smoother,
+            rate_hz=model.settings.get("rate_hz"),
+            keep_track=model.diagnosed,
+        )
+        motion = prepared.motion
+        new = predict(model, prepared, profile, window_s=window, smoother=smoother)
+        old = predict_base(model, prepared, profile, window_s=window, smoother=smoother)
+        tau_base, tau_model = old.tau, new.tau
+        rows = usable_rows(motion, tau_model)
+        parts.append((motion.tau[rows], tau_base[rows], tau_model[rows]))
+        entries.append(
+            {
+                "name": motion.log,
+                "sha256": prepared.recording.sha256,
+                "rows": int(rows.sum()),
+                "seconds": float(rows.sum() / motion.rate_hz),
+                **force_scores(motion.tau, tau_base, tau_model, rows).to_json(),
+                "free_run": {
+                    "base": old.free_run(rows).to_json(),
+                    "model": new.free_run(rows).to_json(),
+                },
+                **({"effects": _list_effects(new, prepared.recording.sha256)} if model.diagnosed else {}),
+                "outside": outside_ranges(model.ranges, motion, rows),
+                "warnings": [
+                    *prepared.doubts,
+                    *_warnings(prepared.recording.sha256, model, motion, rows),
+                    *prepared.left_out,
+                ],
+                "data_quality": prepared.quality,
+            }
+        )
+    run.progress("")
+    tau, base_all, model_all = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return {
+        "schema": "ferryid.evaluate/1",
+        "model": {
+            "name": model.name,
+            "version": model.version,
+            "accepted": model.accepted,
+            **({"base": "the model before its diagnosis"} if model.diagnosed else {}),
+        },
+        "window_s": window,
+        "logs": entries,
+        "pooled": force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)).to_json(),
+    }
+
+
+def _list_effects(found: Prediction, sha256: str) -> dict[str, Any]:
+    """Return the effects that act on a log, and why others do not."""
+
+    def told(several: Iterable[StoredEffect]) -> list[dict[str, Any]]:
+        return [{"effect": one.effect, "instance": one.instance, "says": one.says(sha256)} for one in several]
+
+    return {
+        "vessel": told(found.vessel),
+        "conditions": told(found.conditions),
+        "left_out": list(found.idle),
+    }
+
+
+def range_warnings(model: Model, motion: Motion, rows: Flags) -> list[str]:
+    """Say where the marked rows of a log are not what a model was made for."""
+    warnings = []
+    if motion.payload is None and "payload_kg" in model.ranges:
+        warnings.append("the model was trained with the payload known, and this log has none: it is taken as empty")
+    for name, share in outside_ranges(model.ranges, motion, rows).items():
+        if share > OUTSIDE_WARNING:
+            low, high = model.ranges[name]
+            warnings.append(
+                f"{share:.0%} of the rows have {name} outside the model's range of validity, {low:.3g} to {high:.3g} "
+                f"{RANGE_UNITS[name]}"
+            )
+    return warnings
+
+
+def _warnings(sha256: str, model: Model, motion: Motion, rows: Flags) -> list[str]:
+    warnings = range_warnings(model, motion, rows)
+    if any(log["sha256"] == sha256 for log in model.training):
+        warnings.append("the model was trained on this log: its scores here are no evidence")
+    return warnings

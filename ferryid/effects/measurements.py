@@ -1,0 +1,101 @@
+"""Scenes from logs: forces of the actuators, and signals bridged where nothing was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.effects.force_model import ForceModel, Measurements, aboard
+from ferryid.signals.track import Motion, Track
+from ferryid.types import Flags, Floats
+from ferryid.vessel import actuator_columns, applied_force
+from ferryid.vessel.hull import current_in_body
+from ferryid.vessel.profile import Profile
+
+
+def hull_force_model(scene: Measurements, hull: Floats) -> ForceModel:
+    """Return the picture of a hull in a scene, in the water and with the payload that were measured, and no air."""
+    load = None if scene.payload is None else aboard(scene.payload)
+    return ForceModel(scene, hull, scene.parts, scene.angles, np.zeros((len(scene.t), 3)), scene.current, load)
+
+
+def actuator_forces(
+    profile: Profile, columns: Mapping[str, Floats], through_water: Floats, usable: Flags
+) -> tuple[Floats, Floats]:
+    """Return the force of every actuator and the angles of azimuth thrusters on every row, bridged over gaps.
+
+    Parameters
+    ----------
+    profile, columns
+        The vessel, and the aligned signals of a log.
+    through_water
+        Velocities through the water, shape (n, 3).
+    usable
+        Rows on which everything was measured, shape (n,).
+
+    Returns
+    -------
+    tuple
+        Forces [N, N, N·m], shape (n, k, 3), and angles [rad], NaN for other actuators, shape (n, k).
+    """
+    chosen, _ = actuator_columns(profile, columns)
+    parts, angles = [], []
+    for actuator in profile.actuators:
+        alone = replace(profile, actuators=(actuator,))
+        parts.append(interpolate_gaps(applied_force(alone, columns, through_water)[0], usable))
+        if actuator.kind == "azimuth":
+            angle = columns[chosen[actuator.name, "angle"]]
+            angles.append(interpolate_gaps(angle[:, None], usable)[:, 0])
+        else:
+            angles.append(np.full(len(usable), np.nan))
+    return np.stack(parts, axis=1), np.column_stack(angles)
+
+
+def interpolate_gaps(values: Floats, usable: Flags, *, held: bool = False) -> Floats:
+    """Return values with NaN replaced by what lies between, or was last, on usable rows; all NaN stays so."""
+    result = values.copy()
+    rows = np.arange(len(values))
+    for column in result.T:
+        missing = ~np.isfinite(column)
+        known = np.flatnonzero(usable & ~missing)
+        if not missing.any() or known.size == 0:
+            continue
+        if held:
+            column[missing] = column[known[np.maximum(np.searchsorted(known, rows[missing]) - 1, 0)]]
+        else:
+            column[missing] = np.interp(rows[missing], known, column[known])
+    return result
+
+
+def measurements_of_motion(track: Track, motion: Motion, profile: Profile) -> Measurements:
+    """Return a smoothed log as a scene, bridged where nothing was measured."""
+    rows = motion.valid
+    over_ground = motion.raw_nu
+    through_water = (
+        over_ground if motion.current is None else over_ground - current_in_body(motion.current, motion.eta[:, 2])
+    )
+    parts, angles = actuator_forces(profile, track.columns, through_water, np.ones_like(rows))
+    return Measurements(
+        profile=profile,
+        t=motion.t,
+        eta=interpolate_gaps(motion.eta, rows),
+        nu_raw=interpolate_gaps(motion.raw_nu, rows),
+        nu=interpolate_gaps(motion.nu, rows),
+        parts=parts,
+        angles=angles,
+        usable=rows,
+        wind=None if motion.wind is None else interpolate_gaps(motion.wind, rows),
+        current=None if motion.current is None else interpolate_gaps(motion.current, rows),
+        payload=None if motion.payload is None else interpolate_gaps(motion.payload, rows, held=True),
+    )
+
+
+def payload_and_damping(picture: ForceModel) -> Floats | None:
+    """Return load and factor on the damping on every row, shape (n, 6), where there is either."""
+    if picture.load is None and picture.damping_factor is None:
+        return None
+    n = len(picture.scene.t)
+    load = np.zeros((n, 5)) if picture.load is None else picture.load
+    return np.column_stack([load, np.ones(n) if picture.damping_factor is None else picture.damping_factor])

@@ -1,0 +1,167 @@
+"""Whether a new model may replace the old one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ferryid.errors import FerryIdError
+from ferryid.models import Model, mean_square, usable_rows
+from ferryid.models.forces import Estimator, model_estimator
+from ferryid.signals.track import Motion
+from ferryid.types import AXES, Flags, Floats
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """Whether a model is accepted and why, in sentences that a person can act on."""
+
+    accepted: bool
+    normalised_mse: float
+    """Validation MSE over the base model's, averaged over the three axes."""
+    per_axis: Mapping[str, float]
+    """The same per axis."""
+    reasons: tuple[str, ...]
+
+
+IMPROVEMENT = 0.05
+"""Fraction by which the mean normalised MSE must fall, thesis 3.2.4."""
+WORSENING = 0.05
+"""Fraction by which any one axis may get worse."""
+_ROUNDING = 1e-12
+_NOTHING = 1e-9
+"""Root-mean-square error [N, N·m] that counts as none: rounding of forces of thousands of newtons is below it."""
+NOT_JUDGED = Acceptance(False, float("nan"), dict.fromkeys(AXES, float("nan")), ("Not judged: no data were held out.",))
+"""Acceptance of a model that was fitted to all rows there are."""
+
+
+def accept(base_mse: Floats, model_mse: Floats) -> Acceptance:
+    """Judge a model by its force error on validation rows against the base model's.
+
+    Accepted when the MSE of the estimated applied force, normalised per axis by the base model's and averaged over the
+    three axes, falls by 5 % or more, and no axis gets worse by more than 5 % (thesis 3.2.4). An axis on which
+    the base model makes no error at all has nothing to divide by: its ratio is 1 where the new model makes none
+    either, and infinite otherwise. An error that is not a finite number rejects the model.
+
+    Parameters
+    ----------
+    base_mse, model_mse
+        Validation MSE in surge, sway [N²] and yaw [N²·m²], shape (3,).
+
+    Returns
+    -------
+    Acceptance
+        With one sentence for the mean and one for every axis that stands in the way or needs an explanation.
+    """
+    base, model = np.asarray(base_mse, dtype=float), np.asarray(model_mse, dtype=float)
+    ratios = np.full(3, np.nan)
+    reasons: list[str] = []
+    obstacles: list[str] = []
+    for i, axis in enumerate(AXES):
+        unit = "N·m" if axis == "yaw" else "N"
+        if not np.isfinite(base[i]) or not np.isfinite(model[i]):
+            which = "base" if not np.isfinite(base[i]) else "new"
+            obstacles.append(
+                f"Rejected: the {which} model's validation error in {axis} is not a finite number; "
+                "are there validation rows on which everything was measured?"
+            )
+            continue
+        if base[i] <= _NOTHING**2:
+            spotless = model[i] <= _NOTHING**2
+            ratios[i] = 1.0 if spotless else np.inf
+            if spotless:
+                reasons.append(f"In {axis} both models are without error, so that axis decides nothing.")
+            else:
+                obstacles.append(
+                    f"Rejected: in {axis} the base model makes no error and the new one "
+                    f"{np.sqrt(model[i]):.3g} {unit} RMS."
+                )
+            continue
+        ratios[i] = model[i] / base[i]
+        if ratios[i] > 1.0 + WORSENING:
+            obstacles.append(
+                f"Rejected: {axis} gets worse, {_change(ratios[i])} in MSE "
+                f"({np.sqrt(base[i]):.3g} to {np.sqrt(model[i]):.3g} {unit} RMS); "
+                f"{100 * WORSENING:.0f} % is allowed."
+            )
+    mean = float(np.mean(ratios))
+    if np.isfinite(mean):
+        enough = mean <= 1.0 - IMPROVEMENT + _ROUNDING
+        sentence = (
+            f"On held-out data the force error (MSE relative to the base model, mean of three axes) "
+            f"changes by {_change(mean)}: surge {_change(ratios[0])}, sway {_change(ratios[1])}, yaw {_change(ratios[2])}."
+        )
+        if not enough:
+            obstacles.insert(0, f"Rejected: a fall of {100 * IMPROVEMENT:.0f} % or more is needed. {sentence}")
+        else:
+            reasons.insert(0, sentence)
+    per_axis = {axis: float(ratio) for axis, ratio in zip(AXES, ratios, strict=True)}
+    return Acceptance(not obstacles, mean, per_axis, (*obstacles, *reasons))
+
+
+def _change(ratio: float) -> str:
+    """Return a ratio as a signed change in per cent."""
+    return f"{100.0 * (ratio - 1.0):+.1f} %"
+
+
+def force_mse(
+    model: Model | Estimator, motions: Motion | Sequence[Motion], rows: Sequence[Flags] | None = None
+) -> Floats:
+    """Return the mean square of measured less estimated force per axis, shape (3,) [N², N², (N·m)²].
+
+    Parameters
+    ----------
+    model
+        A model, or an estimator such as ``Estimator(profile, scale)`` for a base model alone.
+    motions
+        One or several motions, whose rows count alike.
+    rows
+        Rows to use, one mask a motion, shape (n,); None: all. Rows on which force or estimate are not known are
+        left out; NaN where none remains.
+    """
+    force = _force(model)
+    motions = [motions] if isinstance(motions, Motion) else list(motions)
+    estimates = [force.of(motion) for motion in motions]
+    masks = [
+        usable_rows(motion, estimate) & wanted
+        for motion, estimate, wanted in zip(motions, estimates, wanted_rows(motions, rows), strict=True)
+    ]
+    return mean_square(
+        np.concatenate([motion.tau for motion in motions]), np.concatenate(estimates), np.concatenate(masks)
+    )
+
+
+def accept_on_motions(
+    old: Model | Estimator,
+    new: Model | Estimator,
+    motions: Motion | Sequence[Motion],
+    rows: Sequence[Flags] | None = None,
+) -> Acceptance:
+    """Say whether a new model may replace the old one, by the updating criterion of thesis 3.2.4; see `accept`.
+
+    Both are judged on the same rows: those of motions that neither was fitted to, on which both can be evaluated.
+    """
+    motions = [motions] if isinstance(motions, Motion) else list(motions)
+    known = [
+        usable_rows(motion, _force(old).of(motion), _force(new).of(motion)) & wanted
+        for motion, wanted in zip(motions, wanted_rows(motions, rows), strict=True)
+    ]
+    return accept(force_mse(old, motions, known), force_mse(new, motions, known))
+
+
+def wanted_rows(motions: Sequence[Motion], rows: Sequence[Flags] | None) -> list[Flags]:
+    """Return the mask asked for of every motion."""
+    if rows is None:
+        return [np.ones(len(motion.t), dtype=bool) for motion in motions]
+    if [len(mask) for mask in rows] != [len(motion.t) for motion in motions]:
+        raise FerryIdError(
+            f"rows: every motion needs one mask of its own length, found lengths {[len(mask) for mask in rows]} for "
+            f"{[len(motion.t) for motion in motions]} rows. Fix: pass one mask a motion"
+        )
+    return [np.asarray(mask, dtype=bool) for mask in rows]
+
+
+def _force(model: Model | Estimator) -> Estimator:
+    return model_estimator(model) if isinstance(model, Model) else model

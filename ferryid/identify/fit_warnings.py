@@ -1,0 +1,125 @@
+"""What a reader must know before trusting a fit: doubts about data, verdict and free runs, as sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ferryid.counts import counted, verb
+from ferryid.identify.outcome import Excitation
+from ferryid.identify.settings import FitSettings
+from ferryid.identify.split import Split
+from ferryid.models import ModelScores
+from ferryid.models.prediction import FreeRun
+from ferryid.signals.prepare import Prepared
+from ferryid.signals.track import Motion
+from ferryid.types import AXES
+
+LEAST_VALIDATION_S = 60.0
+MANY_MOVED = 20
+MOST_LOGS_SAID = 10
+"""Logs of an archive whose own warnings are repeated for all of it."""
+USELESS_RAD, USELESS_S = 0.5, 10.0
+"""A heading lost by this much within this time says that a model does not describe the turning at all."""
+
+
+def fit_warnings(
+    settings: FitSettings,
+    parts: Split,
+    known: Excitation,
+    prepared: Sequence[Prepared],
+    motions: Sequence[Motion],
+    scores: ModelScores,
+) -> tuple[str, ...]:
+    """Return what a reader must know before trusting the verdict."""
+    warnings = []
+    if parts.kind == "every-kth":
+        warnings.append("Validation rows share smoothing windows with training rows: the error is told too small.")
+    warnings += general_warnings(settings, known, scores, len(prepared))
+    weighed = [motion.payload is not None for motion in motions]
+    without = len(weighed) - sum(weighed)
+    if any(weighed) and without:
+        warnings.append(
+            f"{without} of {counted(len(weighed), 'log')} {verb(without, 'has')} no payload measured and "
+            f"{verb(without, 'is')} taken as "
+            "empty: a load aboard there ends up in the coefficients."
+        )
+    for one in prepared:
+        warnings += log_warnings([(one.recording.name, (*one.doubts, *one.left_out))])
+        moved = max((s.clock.out_of_order + s.clock.duplicates for s in one.recording.streams.values()), default=0)
+        if moved >= MANY_MOVED:
+            warnings.append(
+                f"{one.recording.name}: up to {counted(moved, 'row')} of a topic were out of order or "
+                "repeated a time, as when a clock "
+                "is set back during the recording: stretches may lie over one another."
+            )
+    return tuple(warnings)
+
+
+def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScores, logs: int) -> list[str]:
+    """Return what scores and excitation alone tell a reader to mind."""
+    warnings = []
+    if np.isfinite(known.heading_coverage) and known.heading_coverage < 0.5:
+        warnings.append(
+            f"Headings cover only {known.heading_coverage:.0%} of the compass: a steady wind or current could not be told "
+            "from the hull."
+        )
+    if known.undetermined:
+        terms = list(known.undetermined)
+        named = ", ".join(terms[:6]) + (f" and {len(terms) - 6} more" if len(terms) > 6 else "")
+        which = "These logs" if logs > 1 else "This log"
+        warnings.append(f"{which} cannot determine {len(terms)} of the terms: {named}.")
+    if scores.seconds < LEAST_VALIDATION_S:
+        warnings.append(f"Only {scores.seconds:.0f} s validate: the verdict rests on little data.")
+    if settings.residual == "commanded":
+        warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
+    for axis, share in zip(AXES, scores.force.r2_model.tolist(), strict=True):
+        if np.isfinite(share) and share < 0.0:
+            warnings.append(
+                f"In {axis} the model explains the measured force worse than its mean does (R² {share:.2f}): hardly any force "
+                "varies there, or something else moves the vessel."
+            )
+    return warnings
+
+
+def log_warnings(told: Sequence[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
+    """Return what is told of single logs with their names, of the first `MOST_LOGS_SAID` that have anything to tell.
+
+    Parameters
+    ----------
+    told
+        Name of every log, and sentences.
+    """
+    those = [(name, sentences) for name, sentences in told if sentences]
+    said = [f"{name}: {sentence}" for name, sentences in those[:MOST_LOGS_SAID] for sentence in sentences]
+    if (others := len(those) - MOST_LOGS_SAID) > 0:
+        said.append(f"{counted(others, 'more log')} {verb(others, 'has')} such warnings, see the JSON.")
+    return tuple(said)
+
+
+def free_run_warnings(base: FreeRun, new: FreeRun) -> tuple[str, ...]:
+    """Say where the new model runs free badly, or worse than the base model, which its force error does not show."""
+    if base.starts and not new.starts:
+        return (f"The new model cannot be run free: {new.note}.",)
+    warnings = []
+    turned = np.flatnonzero((new.heading_rad > USELESS_RAD) & (new.horizons_s <= USELESS_S))
+    if turned.size:
+        k = int(turned[0])
+        warnings.append(
+            f"Run free for {new.horizons_s[k]:g} s the model's heading is off by {np.degrees(new.heading_rad[k]):.0f}° (rms): "
+            "it does not describe how this vessel turns. Was anything else moving it, or an actuator not engaged?"
+        )
+    for name, label, unit, factor in (
+        ("position_m", "position", "m", 1.0),
+        ("heading_rad", "heading", "deg", float(np.degrees(1.0))),
+    ):
+        before, after = getattr(base, name), getattr(new, name)
+        worse = np.flatnonzero(after > 1.05 * before)
+        if worse.size:
+            k = int(worse[-1])
+            warnings.append(
+                f"Run free for {new.horizons_s[k]:g} s the new model's {label} is worse than the base model's "
+                f"({after[k] * factor:.3g} against {before[k] * factor:.3g} {unit}): do not simulate with it unchecked."
+            )
+    return tuple(warnings)

@@ -1,0 +1,27 @@
+"""The logs that a fit or a sweep starts from: read, aligned, and each given once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ferryid.identify.settings import FitSettings
+from ferryid.signals.prepare import Opened, open_track, refuse_twice
+from ferryid.types import RunContext
+from ferryid.vessel.profile import Profile
+
+
+def read_logs(paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext) -> list[Opened]:
+    """Read several logs and align their signals, before smoothing.
+
+    Raises
+    ------
+    FerryIdError
+        For a log that cannot be used, and one that is given twice.
+    """
+    opened = []
+    for path in paths:
+        run.progress(f"reading {Path(path).name}")
+        opened.append(open_track(path, profile, run.out, rate_hz=settings.rate_hz, verify=run.verify))
+    refuse_twice(opened)
+    return opened

@@ -1,0 +1,151 @@
+"""What a fit hands on to the report, the JSON output and the notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ferryid.identify.acceptance import Acceptance
+from ferryid.models import Model, ModelScores
+from ferryid.models.prediction import FreeRun
+from ferryid.signals.track import Motion
+from ferryid.types import Flags, Floats, by_axis
+
+
+@dataclass(frozen=True)
+class ComponentCurve:
+    """MSE against the number of components, normalised per axis by the base model's.
+
+    Attributes
+    ----------
+    components
+        1..A, shape (A,).
+    training, validation
+        Normalised MSE, shape (A, 3).
+    chosen
+        The number of components in the model.
+    explained_x, explained_y
+        Cumulative fraction of variance explained, shape (A,) and (A, 3).
+    """
+
+    components: NDArray[np.int64]
+    training: Floats
+    validation: Floats
+    chosen: int
+    explained_x: Floats
+    explained_y: Floats
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What a log can and cannot determine.
+
+    Attributes
+    ----------
+    singular_values
+        Of the standardised basis, descending, shape (K,).
+    ranges
+        ``{"u": (low, high), "v": ..., "r": ..., "u_dot": ..., "v_dot": ..., "r_dot": ..., "U": ...}`` in SI, from the
+        0.5 % and 99.5 % quantiles of the training rows.
+    heading_coverage
+        Fraction of twelve 30° heading sectors with at least 1 % of the rows, 0..1; NaN without heading.
+    undetermined
+        Term names that the log cannot determine, with the reason: ``{"uv": "same column as ..."}``.
+    vip
+        Variable importance in projection, shape (K,), terms in basis order.
+    """
+
+    singular_values: Floats
+    ranges: Mapping[str, tuple[float, float]]
+    heading_coverage: float
+    undetermined: Mapping[str, str]
+    vip: Floats
+
+
+@dataclass(frozen=True)
+class LogFit:
+    """One log in a fit: its motion, which rows trained and which validated, and the forces estimated for it.
+
+    Attributes
+    ----------
+    motion
+        Smoothed motion, n rows.
+    training, validation
+        Row masks, shape (n,); rows in neither were invalid or purged.
+    tau_base, tau_model
+        Applied force as estimated by base and new model [N, N, N·m], shape (n, 3).
+    data_quality
+        The log's part of the `inspect` output: topics used, clocks, losses, repairs.
+    """
+
+    motion: Motion
+    training: Flags
+    validation: Flags
+    tau_base: Floats
+    tau_model: Floats
+    data_quality: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class ArchivedLog:
+    """One log in a fit to sums: its rows, its validation MSE over the base model's per axis, shape (3,), and warnings."""
+
+    name: str
+    files: tuple[str, ...]
+    sha256: str
+    rows: int
+    validation_rows: int
+    mse_ratio: Floats
+    warnings: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the log as plain values."""
+        return {
+            "name": self.name,
+            "files": list(self.files),
+            "sha256": self.sha256,
+            "rows": self.rows,
+            "validation_rows": self.validation_rows,
+            "per_axis": by_axis(self.mse_ratio),
+            "warnings": list(self.warnings),
+        }
+
+
+@dataclass(frozen=True)
+class FitOutcome:
+    """Everything that one fit found out: a fit to logs, to an archive or to motions in memory.
+
+    Attributes
+    ----------
+    model, acceptance
+        The model, not stored yet, and whether it may replace the base model.
+    scores
+        The model's scores.
+    curve
+        Force error against the number of components.
+    excitation
+        What the training rows determine.
+    free_run_base, free_run_model
+        Free runs on validation rows.
+    warnings
+        What to know before trusting the model, as sentences.
+    logs
+        The logs of a fit to rows.
+    archive
+        The logs of a fit to sums.
+    """
+
+    model: Model
+    acceptance: Acceptance
+    scores: ModelScores
+    curve: ComponentCurve
+    excitation: Excitation
+    free_run_base: FreeRun
+    free_run_model: FreeRun
+    warnings: tuple[str, ...]
+    logs: tuple[LogFit, ...] = ()
+    archive: tuple[ArchivedLog, ...] = ()

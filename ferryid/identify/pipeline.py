@@ -1,0 +1,197 @@
+"""A fit from logs to a model: read, align, residual, split, estimate, accept.
+
+A fit to an archive or to motions in memory begins with its own data and ends with the same `estimate_correction` and
+`accept_estimate`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from ferryid import __version__
+from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, accept
+from ferryid.identify.estimation import estimate_correction
+from ferryid.identify.fit_data import Coefficients, Estimate, FitData
+from ferryid.identify.fit_warnings import free_run_warnings
+from ferryid.identify.inputs import read_logs
+from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
+from ferryid.identify.model_selection import Selection, select_model, windows_to_try
+from ferryid.identify.motion_data import compute_residuals, numbered_names
+from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome
+from ferryid.identify.rows import basis_for
+from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
+from ferryid.identify.split import Split, split_rows
+from ferryid.models import Model, ModelScores
+from ferryid.models.store import check_name
+from ferryid.regression.bases import Basis
+from ferryid.signals.prepare import Opened, smoothed
+from ferryid.signals.smooth import smooth_measured
+from ferryid.types import Flags, RunContext
+from ferryid.vessel.profile import Profile
+
+
+def fit_logs(
+    paths: Sequence[str], profile: Profile, settings: FitSettings, run: RunContext, *, name: str = ""
+) -> FitOutcome:
+    """Fit a correction of the base model to one or more logs and judge it on rows it did not see.
+
+    Parameters
+    ----------
+    paths
+        Logs; parts of one recording joined by ``+``.
+    profile
+        The vessel.
+    settings
+        How to fit.
+    run
+        Output folder, progress, and whether to check every checksum of the logs.
+    name
+        Name of the model; the profile's where empty.
+
+    Raises
+    ------
+    FerryIdError
+        For input that cannot be used, with file, cause and remedy.
+    """
+    name, settings = check_name(name or profile.name), settings.on(profile)
+    # Read, align.
+    opened = read_logs(paths, profile, settings, run)
+    parts = None
+    if settings.windows_s:
+        run.progress("choosing the window")
+        settings, parts = _select_window(profile, settings, opened)
+    prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
+    run.progress("computing the residual")
+    data = compute_residuals(profile, settings, prepared)
+    if parts is None:
+        parts = split_rows(data.motions, settings.split, window_s=settings.window_s)
+    data = replace(data, split=parts.within([motion.valid for motion in data.motions]))
+    run.progress("fitting")
+    components = settings.components
+    if components == "auto":
+        windows_s = (settings.window_s,)
+        components = _select(profile, settings, data.functions, opened, windows_s, parts.training).components
+    estimate = estimate_correction(data, int(components), settings.draws, run.progress)
+    return accept_estimate(data, estimate, name, run)
+
+
+def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContext) -> FitOutcome:
+    """Judge an estimated correction, and return it as a model with all that was found out about it."""
+    run.progress("judging")
+    found = data.combined(estimate.coefficients)
+    logs = data.log_fits(found)
+    scores = data.scores(found, logs)
+    acceptance = accept(scores.force.mse_base, scores.force.mse_model) if data.held_out else NOT_JUDGED
+    excitation = data.excitation(estimate)
+    free_base, free_new = data.free_runs(found, run.progress)
+    return FitOutcome(
+        model=_model(data, estimate, found, name, scores, acceptance, excitation),
+        acceptance=acceptance,
+        scores=scores,
+        curve=_component_curve(data, estimate, scores),
+        excitation=excitation,
+        free_run_base=free_base,
+        free_run_model=free_new,
+        warnings=(
+            *estimate.held,
+            *data.warnings(excitation, scores),
+            *free_run_warnings(free_base, free_new),
+            *estimate.notes,
+        ),
+        logs=logs,
+        archive=data.archived_logs(found),
+    )
+
+
+def _model(
+    data: FitData,
+    estimate: Estimate,
+    found: Coefficients,
+    name: str,
+    scores: ModelScores,
+    acceptance: Acceptance,
+    excitation: Excitation,
+) -> Model:
+    return Model(
+        name=name,
+        version=0,
+        created=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        ferryid_version=__version__,
+        profile_text=data.profile.text,
+        scale=data.settings.scale,
+        settings={
+            **data.settings.plain(),
+            "basis": data.functions.name,
+            "components": estimate.components,
+            **data.model_settings(estimate),
+        },
+        terms=data.functions.terms,
+        units=data.functions.units,
+        theta=found.theta,
+        intercept=found.intercept,
+        low=found.low,
+        high=found.high,
+        intercept_low=found.intercept_low,
+        intercept_high=found.intercept_high,
+        covariance=found.covariance,
+        ranges=data.ranges(excitation),
+        training=data.training_logs(),
+        scores=scores,
+        accepted=acceptance.accepted,
+    )
+
+
+def _component_curve(data: FitData, estimate: Estimate, scores: ModelScores) -> ComponentCurve:
+    """Return errors for every number of components over the base model's error on the validation rows."""
+    unit = np.where(scores.force.mse_base > 0, scores.force.mse_base, 1.0)
+    regression = estimate.regression
+    training, validation = (
+        source.sse(regression.coefficients, regression.intercepts) / max(source.n, 1) / unit
+        for source in (data.training, data.validation)
+    )
+    return ComponentCurve(
+        np.arange(1, len(regression.coefficients) + 1),
+        training,
+        validation,
+        estimate.components,
+        regression.explained_x,
+        regression.explained_y,
+    )
+
+
+def _select_window(profile: Profile, settings: FitSettings, opened: Sequence[Opened]) -> tuple[FitSettings, Split]:
+    """Return the settings with the window, and where that is asked for the component count, that cross-validation chose.
+
+    Its split is to be kept: another, made for the window chosen, would validate on rows that took part in the choice.
+    """
+    windows_s = windows_to_try(
+        settings.windows_s, [one.measured for one in opened], in_blocks=settings.split == "blocks"
+    )
+    motions = numbered_names([smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
+    functions = basis_for(settings, motions)
+    check_components(settings.components, functions)
+    parts = split_rows(motions, settings.split, window_s=max(TEST_WINDOW_S, *windows_s))
+    choice = _select(profile, settings, functions, opened, windows_s, parts.training)
+    return replace(settings, window_s=choice.window_s, components=choice.components), parts
+
+
+def _select(
+    profile: Profile,
+    settings: FitSettings,
+    functions: Basis,
+    opened: Sequence[Opened],
+    windows_s: Sequence[float],
+    wanted: Sequence[Flags],
+) -> Selection:
+    """Return window and component count by cross-validation within the training rows."""
+    logs = [
+        sum_log(profile, settings, functions, one.measured, windows_s, wanted=rows)
+        for one, rows in zip(opened, wanted, strict=True)
+    ]
+    return select_model(
+        profile, settings, functions, windows_s, folds_by_blocks(logs), force_free_axes(logs), where=logs[0].log
+    )

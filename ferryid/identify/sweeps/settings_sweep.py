@@ -1,0 +1,239 @@
+"""Settings swept: cross-validated error of every smoothing window and component count, and which to choose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ferryid.counts import counted
+from ferryid.effects.wording import listed
+from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.archive import archive_folds
+from ferryid.identify.fit_warnings import log_warnings
+from ferryid.identify.inputs import read_logs
+from ferryid.identify.log_sums import LogSums, folds_by_blocks, folds_by_logs, force_free_axes, sum_log
+from ferryid.identify.model_selection import Selection, select_model, windows_to_try
+from ferryid.identify.rows import basis_for
+from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, WINDOWS_S, FitSettings
+from ferryid.regression.bases import Basis
+from ferryid.regression.cross_validation import Folds
+from ferryid.signals.prepare import Opened
+from ferryid.signals.smooth import smooth_measured
+from ferryid.types import AXES, Flags, RunContext
+from ferryid.vessel.profile import Profile
+
+KINDS = ("components", "window", "both")
+
+SCHEMA = "ferryid.sweep/1"
+BY = {"blocks": "contiguous stretches of every log", "logs": "whole logs"}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What a sweep found.
+
+    Attributes
+    ----------
+    what
+        One of `KINDS`.
+    vessel, logs
+        Name of the vessel; of each log its name, SHA-256, seconds, rows and warnings.
+    settings
+        How was fitted; its basis is the one that all logs allow.
+    windows_s
+        Windows that were tried [s].
+    by
+        Cross-validation by contiguous stretches of every log (``"blocks"``) and, of several logs, by whole ones (``"logs"``).
+    notes
+        What a reader must know, as sentences.
+    """
+
+    what: str
+    vessel: str
+    logs: tuple[Mapping[str, Any], ...]
+    settings: FitSettings
+    windows_s: tuple[float, ...]
+    by: Mapping[str, Selection]
+    notes: tuple[str, ...]
+
+    @property
+    def choice(self) -> Selection:
+        """What to fit with: the choice by stretches, which every set of logs has."""
+        return self.by["blocks"]
+
+
+def sweep_settings(
+    what: str,
+    logs: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    run: RunContext,
+    *,
+    windows_s: Sequence[float] = (),
+    folds: int = FOLDS,
+    archive: bool = False,
+) -> Sweep:
+    """Cross-validate logs over smoothing windows and component counts.
+
+    Parameters
+    ----------
+    what
+        ``"components"``: at the settings' window. ``"window"``: at the settings' component count, or the best of each
+        window. ``"both"``: every combination.
+    logs
+        Paths; parts of one recording joined by ``+``.
+    profile, settings
+        The vessel and how to fit.
+    run
+        Output folder and progress.
+    windows_s
+        Windows to try [s]; the usual ones where none is given.
+    folds
+        Number of folds by stretches, 2 to 20.
+    archive
+        True: take what is kept of the logs that were ingested to the output folder, all of them where `logs` is empty.
+
+    Raises
+    ------
+    FerryIdError
+        For input that cannot be used, with file, cause and remedy.
+    """
+    if what not in KINDS:
+        raise FerryIdError(
+            f'sweep: there is nothing called "{what}" to sweep.{did_you_mean(what, (*KINDS, "basis"))} Fix: choose one of '
+            f"{', '.join(KINDS)} or basis"
+        )
+    check_folds(folds)
+    if what == "components" and windows_s:
+        raise FerryIdError("--windows: components are swept at one window. Fix: give --window, or sweep both")
+    if what != "components" and settings.smoother == "kalman":
+        raise FerryIdError(
+            "--smoother: the Kalman smoother finds its window by likelihood, so that windows cannot be swept. "
+            "Fix: sweep components, or take another --smoother"
+        )
+    settings = replace(settings, windows_s=tuple(windows_s)).on(profile)
+    if what != "window":
+        settings = replace(settings, components="auto")
+    fixed = (settings.window_s,) if what == "components" else tuple(windows_s)
+    if archive:
+        windows = fixed or WINDOWS_S
+        functions, free, cuts, told = archive_folds(profile, settings, run, windows, logs, folds)
+    else:
+        windows, functions, free, cuts, told = _from_logs(logs, profile, settings, run, fixed, folds)
+    if what != "components" and len(windows) < 2:
+        raise FerryIdError(
+            f"{told[0]['name']}: nothing to compare, as all windows come to {windows[0]:g} s at this log's rate. "
+            "Fix: give --windows that are apart, or a higher --rate"
+        )
+    run.progress("cross-validating")
+    by = {
+        key: select_model(profile, settings, functions, windows, cut, free, where=str(told[0]["name"]))
+        for key, cut in cuts.items()
+    }
+    return Sweep(
+        what,
+        profile.name,
+        tuple(told),
+        replace(settings, basis=functions.name),
+        windows,
+        by,
+        (*_notes(by, windows, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
+    )
+
+
+def _from_logs(
+    logs: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    run: RunContext,
+    windows_s: Sequence[float],
+    folds: int,
+) -> tuple[tuple[float, ...], Basis, Flags, dict[str, Folds], list[dict[str, Any]]]:
+    """Return windows, basis, axes without force, folds by stretches and whole logs, and what is told of the logs."""
+    opened = read_logs(logs, profile, settings, run)
+    windows = windows_to_try(windows_s, [one.measured for one in opened])
+    functions = basis_for(settings, [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened])
+    pieces = []
+    for one in opened:
+        run.progress(f"cutting {one.recording.name} into pieces")
+        pieces.append(sum_log(profile, settings, functions, one.measured, windows, blocks=folds))
+    cuts = {"blocks": folds_by_blocks(pieces, folds)} | ({"logs": folds_by_logs(pieces)} if len(pieces) > 1 else {})
+    told = [log_json(one, log) for one, log in zip(opened, pieces, strict=True)]
+    return windows, functions, force_free_axes(pieces), cuts, told
+
+
+def check_folds(folds: int) -> None:
+    """Refuse what is no number of folds."""
+    if not 2 <= folds <= 20:
+        raise FerryIdError(f"--folds: {folds} is no number of folds. Fix: give 2 to 20, {FOLDS} is usual")
+
+
+def log_json(one: Opened, log: LogSums) -> dict[str, Any]:
+    """Return name, hash, length and warnings of a log."""
+    rows = int(log.test.n.sum())
+    return {
+        "name": one.recording.name,
+        "sha256": one.recording.sha256,
+        "seconds": rows / one.measured.rate_hz,
+        "rows": rows,
+        "warnings": [*one.doubts, *one.left_out],
+    }
+
+
+def _notes(by: Mapping[str, Selection], windows_s: Sequence[float], settings: FitSettings) -> list[str]:
+    notes = []
+    blocks, logs = by["blocks"], by.get("logs")
+    if logs is not None and (blocks.window_s, blocks.components) != (logs.window_s, logs.components):
+        notes.append(
+            f"By whole logs the choice is {logs.title}. Take it where the model is for other days than those of these logs."
+        )
+    for key, one in by.items():
+        if one.held.any():
+            axes = listed([axis for axis, held in zip(AXES, one.held, strict=True) if held])
+            notes.append(f"By {BY[key]} the base model's inertia was held in {axes}, as a fit does.")
+        if one.curves.folds < FOLDS:
+            notes.append(
+                f"Only {counted(one.curves.folds, 'fold')} by {BY[key]}: their scatter, and so the choice, is rough."
+            )
+    if len(windows_s) > 1 and blocks.window_s in (windows_s[0], windows_s[-1]):
+        end = "shortest" if blocks.window_s == windows_s[0] else "longest"
+        notes.append(f"The window chosen is the {end} that was tried.")
+    if settings.residual != "measured":
+        notes.append(f"Fitted to the {settings.residual} residual, tested against measured force.")
+    return notes
+
+
+def sweep_json(found: Sweep, report: str | None = None) -> dict[str, Any]:
+    """Return a sweep in the form of schema ``ferryid.sweep/1``."""
+    return {
+        "schema": SCHEMA,
+        "what": found.what,
+        "vessel": found.vessel,
+        "logs": [dict(log) for log in found.logs],
+        "settings": {**found.settings.plain(), **found.settings.scale},
+        "windows_s": list(found.windows_s),
+        "components": list(range(1, found.choice.curves.mse.shape[1] + 1)),
+        "test_window_s": TEST_WINDOW_S,
+        "by": {key: _choice_json(choice) for key, choice in found.by.items()},
+        "choice": {"window_s": found.choice.window_s, "components": found.choice.components},
+        "notes": list(found.notes),
+        "report": report,
+    }
+
+
+def _choice_json(choice: Selection) -> dict[str, Any]:
+    curves = choice.curves
+    score, band = curves.normalised()
+    axes = list(enumerate(AXES))
+    return {
+        "folds": curves.folds,
+        "rows": curves.rows,
+        "base_mse": {axis: float(curves.base[j]) for j, axis in axes},
+        "mse": {axis: curves.mse[:, :, j].tolist() for j, axis in axes},
+        "standard_error": {axis: curves.standard_error[:, :, j].tolist() for j, axis in axes},
+        "score": score.tolist(),
+        "score_standard_error": band.tolist(),
+        "choice": {"window_s": choice.window_s, "components": choice.components},
+        "held_inertia": [axis for j, axis in axes if choice.held[j]],
+    }

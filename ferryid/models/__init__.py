@@ -1,0 +1,28 @@
+"""Models of the applied force: the model file, its scores, ranges of validity and stored effects."""
+
+from ferryid.models.model import Model, blank_model, model_from_json, model_to_json
+from ferryid.models.scores import ForceScores, ModelScores, force_scores, mean_square, usable_rows
+from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect, effect_to_json
+from ferryid.models.validity import RANGE_UNITS, outside_ranges, payload_kg, span_ranges, validity_ranges
+
+__all__ = [
+    "RANGE_UNITS",
+    "Conditions",
+    "ForceScores",
+    "Model",
+    "ModelScores",
+    "Quantity",
+    "Source",
+    "StoredEffect",
+    "blank_model",
+    "effect_to_json",
+    "force_scores",
+    "mean_square",
+    "model_from_json",
+    "model_to_json",
+    "outside_ranges",
+    "payload_kg",
+    "span_ranges",
+    "usable_rows",
+    "validity_ranges",
+]

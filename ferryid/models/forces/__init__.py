@@ -1,0 +1,32 @@
+"""Forces of models: the base model, the lack-of-fit residual, and the force that a model estimates from motion."""
+
+from ferryid.models.forces.estimator import (
+    ACCELERATIONS,
+    Estimator,
+    effective_mass,
+    hull_coefficients,
+    model_estimator,
+    replace_hull_coefficients,
+)
+from ferryid.models.forces.hull_terms import MAPPED, hull_contribution, unmapped_terms
+from ferryid.models.forces.model_forces import ModelForces, acting_estimator, force_law
+from ferryid.models.forces.residual import FORMS, base_force, compute_residual, scale_hull
+
+__all__ = [
+    "ACCELERATIONS",
+    "FORMS",
+    "MAPPED",
+    "Estimator",
+    "ModelForces",
+    "acting_estimator",
+    "base_force",
+    "compute_residual",
+    "effective_mass",
+    "force_law",
+    "hull_coefficients",
+    "hull_contribution",
+    "model_estimator",
+    "replace_hull_coefficients",
+    "scale_hull",
+    "unmapped_terms",
+]

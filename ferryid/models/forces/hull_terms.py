@@ -1,0 +1,66 @@
+"""Which of a fitted model's terms stand for which of the hull's coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ferryid.effects.force_model import COEFFICIENTS
+from ferryid.models.model import Model
+from ferryid.types import Floats
+
+MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {
+    "X_u": (("u", 0),),
+    "X_|u|u": (("|u|u", 0), ("sgn(u)u^2", 0)),
+    "X_uuu": (("u^3", 0),),
+    "Y_v": (("v", 1),),
+    "Y_|v|v": (("|v|v", 1), ("sgn(v)v^2", 1)),
+    "Y_|r|v": (("|r|v", 1),),
+    "Y_vvv": (("v^3", 1),),
+    "Y_r": (("r", 1),),
+    "Y_|v|r": (("|v|r", 1),),
+    "Y_|r|r": (("|r|r", 1), ("sgn(r)r^2", 1)),
+    "N_v": (("v", 2),),
+    "N_|v|v": (("|v|v", 2), ("sgn(v)v^2", 2)),
+    "N_|r|v": (("|r|v", 2),),
+    "N_r": (("r", 2),),
+    "N_|v|r": (("|v|r", 2),),
+    "N_|r|r": (("|r|r", 2), ("sgn(r)r^2", 2)),
+    "N_rrr": (("r^3", 2),),
+    "Y_uv": (("uv", 1),),
+    "Y_ur": (("ur", 1),),
+    "N_uv": (("uv", 2),),
+    "N_ur": (("ur", 2),),
+    "m11": (("u_dot", 0),),
+    "m22": (("v_dot", 1),),
+    "m23": (("r_dot", 1),),
+    "m32": (("v_dot", 2),),
+    "m33": (("r_dot", 2),),
+}
+"""The terms of a fitted model, with their axes, that stand for each of the hull's coefficients."""
+
+
+def hull_contribution(model: Model) -> tuple[Floats, Floats]:
+    """Return what a model's terms add to the hull's coefficients, and its variance, shape (26,) each."""
+    part, variance = np.zeros(len(COEFFICIENTS)), np.zeros(len(COEFFICIENTS))
+    for index, name in enumerate(COEFFICIENTS):
+        picked = [(model.terms.index(term), axis) for term, axis in MAPPED[name] if term in model.terms]
+        if not picked:
+            continue
+        rows, axis = np.array([row for row, _ in picked]), picked[0][1]
+        # Mass takes force to accelerate; a SNAME coefficient gives the force that the water exerts.
+        part[index] = (1.0 if name.startswith("m") else -1.0) * float(model.theta[rows, axis].sum())
+        variance[index] = float(model.covariance[axis][np.ix_(rows, rows)].sum())
+    return part, variance
+
+
+def unmapped_terms(model: Model) -> tuple[str, ...]:
+    """Return the terms, and the constant, that no coefficient of a hull stands for and that are not zero."""
+    taken = {place for places in MAPPED.values() for place in places}
+    left = [
+        term
+        for k, term in enumerate(model.terms)
+        if any(model.theta[k, axis] != 0.0 and (term, axis) not in taken for axis in range(3))
+    ]
+    return (*left, *(("the constant",) if np.any(model.intercept != 0.0) else ()))

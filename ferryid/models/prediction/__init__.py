@@ -1,0 +1,27 @@
+"""Predictions of a log by a model: the applied force, and free runs."""
+
+from ferryid.models.prediction.free_run import (
+    HORIZONS_S,
+    NO_MASS,
+    FreeRun,
+    run_free,
+    runs_free,
+    single_runs,
+    starting_points,
+)
+from ferryid.models.prediction.log_prediction import Prediction, predict, predict_base, predict_with_effects, signal_map
+
+__all__ = [
+    "HORIZONS_S",
+    "NO_MASS",
+    "FreeRun",
+    "Prediction",
+    "predict",
+    "predict_base",
+    "predict_with_effects",
+    "run_free",
+    "runs_free",
+    "signal_map",
+    "single_runs",
+    "starting_points",
+]

@@ -1,0 +1,279 @@
+"""Free-run prediction: a model integrated with the measured forces, against what the vessel did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ferryid.counts import counted, verb
+from ferryid.models.forces.estimator import ForceLaw
+from ferryid.signals.track import Motion
+from ferryid.types import Flags, Floats, Ints
+
+HORIZONS_S = (5.0, 10.0, 20.0, 30.0, 60.0)
+MAX_STARTS = 60
+STEP_S = 0.2
+NO_MASS = "the model's effective mass matrix is not positive definite: it cannot be run free"
+LEAP_MPS = 5.0
+"""Added to twice the greatest speed: a position that moves faster has jumped."""
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """Free-run (open-loop) prediction error of a model against horizon, on held-out stretches.
+
+    Attributes
+    ----------
+    horizons_s
+        Prediction horizons [s], shape (H,).
+    position_m, heading_rad, speed_mps, yaw_rate_radps
+        Root-mean-square error at each horizon, shape (H,); NaN where a run diverged or no stretch was long enough.
+    starts
+        Number of starting points.
+    example
+        ``{"t": (n,), "measured": (n, 3), "predicted": (n, 3)}`` of `nu` over one stretch, for a figure.
+    note
+        Why there is no prediction, or an empty string.
+    diverged
+        Number of runs that diverged, which the means leave out.
+    """
+
+    horizons_s: Floats
+    position_m: Floats
+    heading_rad: Floats
+    speed_mps: Floats
+    yaw_rate_radps: Floats
+    starts: int
+    example: Mapping[str, Floats]
+    note: str = ""
+    diverged: int = 0
+
+    @classmethod
+    def not_run(cls, note: str) -> FreeRun:
+        """Return the result of no run at all, and why there is none."""
+        nothing = np.zeros(0)
+        return cls(nothing, nothing, nothing, nothing, nothing, starts=0, example={}, note=note)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the free run as plain values."""
+        return {
+            "horizons_s": self.horizons_s.tolist(),
+            "position_m": self.position_m.tolist(),
+            "heading_rad": self.heading_rad.tolist(),
+            "speed_mps": self.speed_mps.tolist(),
+            "yaw_rate_radps": self.yaw_rate_radps.tolist(),
+            "starts": self.starts,
+            "note": self.note,
+        }
+
+
+def run_free(
+    force: ForceLaw,
+    motions: Sequence[Motion],
+    rows: Sequence[Flags],
+    horizons_s: Sequence[float] = HORIZONS_S,
+) -> FreeRun:
+    """Predict position and velocity from many starting points and compare them with the measurement.
+
+    From each start the model takes the measured state once, and after it only the measured actuator force (and wind,
+    current and payload where they are measured), integrated with Runge-Kutta 4. A wind, current or payload that
+    was not measured is part of the error.
+
+    Parameters
+    ----------
+    force
+        Inverse dynamics of the model.
+    motions, rows
+        Logs, and for each the rows on which the run may be judged, shape (n,); runs stay within unbroken stretches.
+    horizons_s
+        Horizons [s] at which the error is taken.
+
+    Returns
+    -------
+    FreeRun
+        Root-mean-square errors over all starts; NaN at horizons that no stretch is long enough for.
+    """
+    horizons = np.asarray(horizons_s, dtype=float)
+    errors: list[Floats] = []
+    longest: tuple[int, dict[str, Floats]] = (0, {})
+    diverged = 0
+    if not runs_free(force, motions[0]):
+        return _without(horizons, NO_MASS)
+    for motion, allowed in zip(motions, rows, strict=True):
+        starts, ends = starting_points(motion, allowed, float(horizons[0]), float(horizons[-1]))
+        if starts.size == 0:
+            continue
+        path, stride = _integrate(force, motion, starts, float(horizons[-1]))
+        error = _errors(path, stride, motion, starts, ends, horizons)
+        reached = (starts + np.round(horizons[:, None] * motion.rate_hz).astype(int)) < ends
+        diverged += int(np.any(reached.T & np.isnan(error[:, :, 2]), axis=1).sum())
+        errors.append(error)
+        length = min(int(horizons[-1] * motion.rate_hz), int((ends - starts).max()) - 1)
+        if length > longest[0]:
+            best = int(np.argmax(ends - starts))
+            longest = (length, _example(path[best], stride, motion, int(starts[best]), length))
+    if not errors:
+        return _without(horizons, f"no unbroken held-out stretch of {horizons[0]:g} s")
+    every = np.concatenate(errors)
+    counts = np.sum(np.isfinite(every[:, :, 2]), axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rms = np.sqrt(np.nansum(every**2, axis=0) / counts[:, None])
+    blind = np.all(np.isnan(every[:, :, 0]), axis=0)
+    rms[blind, 0] = np.nan
+    note = (
+        f"{diverged} of {counted(len(every), 'run')} diverged and {verb(diverged, 'is')} left out of the means"
+        if diverged
+        else ""
+    )
+    return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note, diverged)
+
+
+def runs_free(force: ForceLaw, motion: Motion) -> bool:
+    """Tell whether a model can be run free: its effective mass matrix has to be positive definite."""
+    return _is_positive(_masses(force, replace(motion, payload=None))[0])
+
+
+def single_runs(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horizons_s: Sequence[float]) -> Floats:
+    """Return the error of every run by itself at every horizon, shape (starts, horizons, 4).
+
+    Absolute errors of position [m], heading [rad], speed [m/s] and yaw rate [rad/s]; NaN where a run has diverged, or does
+    not reach the horizon within its stretch. Parameters as of `run_free`, and starts and ends as of `starting_points`.
+    """
+    horizons = np.asarray(horizons_s, dtype=float)
+    path, stride = _integrate(force, motion, starts, float(horizons[-1]))
+    return _errors(path, stride, motion, starts, ends, horizons)
+
+
+def _masses(force: ForceLaw, motion: Motion) -> Floats:
+    """Return the effective mass, the derivative of the force by the acceleration, for every row: (n, 3, 3), or (1, 3, 3)."""
+    if motion.payload is None:
+        return _masses_with(force, motion, None)
+    # A payload stays the same for many rows: each of its values is asked for once.
+    values, which = np.unique(motion.payload, axis=0, return_inverse=True)
+    return _masses_with(force, motion, values)[which.reshape(-1)]
+
+
+def _masses_with(force: ForceLaw, motion: Motion, payloads: Floats | None) -> Floats:
+    count = 1 if payloads is None else len(payloads)
+    at_rest = np.zeros((4 * count, 3))
+    nu_dot = np.tile(np.vstack([np.zeros(3), np.eye(3)]), (count, 1))
+    still = np.zeros((4 * count, 2))
+    tau = force(
+        nu_dot,
+        at_rest,
+        np.zeros(4 * count),
+        still if motion.wind is not None else None,
+        still if motion.current is not None else None,
+        *(() if payloads is None else (np.repeat(payloads, 4, axis=0),)),
+    ).reshape(count, 4, 3)
+    return np.asarray((tau[:, 1:] - tau[:, :1]).transpose(0, 2, 1))
+
+
+def _is_positive(mass: Floats) -> bool:
+    return bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0))
+
+
+def starting_points(motion: Motion, allowed: Flags, shortest_s: float, longest_s: float) -> tuple[Ints, Ints]:
+    """Return start rows and the end of the unbroken stretch that each lies in."""
+    good = allowed & motion.valid & np.isfinite(motion.nu).all(axis=1) & np.isfinite(motion.tau).all(axis=1)
+    good = good & ~_jumps(motion)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
+    spacing = max(1, round(max(shortest_s, good.sum() / motion.rate_hz / MAX_STARTS) * motion.rate_hz))
+    needed = round(shortest_s * motion.rate_hz) + 1
+    starts, ends = [], []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        # The first starts of a stretch see the longest horizons; the stride keeps the starts apart.
+        for start in range(int(first), int(last) - needed + 1, spacing):
+            starts.append(start)
+            ends.append(int(last))
+    return np.array(starts, dtype=int), np.array(ends, dtype=int)
+
+
+def _jumps(motion: Motion) -> Flags:
+    """Return the rows at which the measured position leaps farther than the vessel can have gone; runs end there."""
+    step = np.hypot(*np.diff(motion.eta[:, :2], axis=0).T)
+    fastest = np.nanmax(np.hypot(motion.raw_nu[:, 0], motion.raw_nu[:, 1]), initial=0.0)
+    leaps = np.zeros(len(motion.t), dtype=bool)
+    leaps[1:] = step > (2.0 * fastest + LEAP_MPS) / motion.rate_hz
+    return leaps
+
+
+def _integrate(force: ForceLaw, motion: Motion, starts: Ints, horizon_s: float) -> tuple[Floats, int]:
+    """Return states (starts, steps + 1, 6) of position, heading, velocity, and the rows per step."""
+    stride = max(1, int(STEP_S * motion.rate_hz))
+    substeps = max(1, int(np.ceil(1.0 / (STEP_S * motion.rate_hz))))
+    dt = stride / motion.rate_hz / substeps
+    steps = int(np.ceil(horizon_s * motion.rate_hz / stride))
+    last = len(motion.t) - 1
+    masses = _masses(force, motion)
+    inverses = np.linalg.inv(np.where(np.isfinite(masses), masses, np.eye(3)))
+    limit = 10.0 * np.nanmax(np.abs(motion.nu), axis=0) + 1e-3
+
+    position = np.where(np.isfinite(motion.eta[starts]), motion.eta[starts], 0.0)
+    state = np.hstack([position, motion.nu[starts]])
+    path = np.empty((len(starts), steps + 1, 6))
+    path[:, 0] = state
+
+    def derivative(at: Floats, rows: Ints, following: Ints, part: float) -> Floats:
+        psi, nu = at[:, 2], at[:, 3:]
+        tau = _between(motion.tau, rows, following, part)
+        wind = None if motion.wind is None else _between(motion.wind, rows, following, part)
+        current = None if motion.current is None else _between(motion.current, rows, following, part)
+        # Held over the step, as it was measured: half a passenger never came aboard.
+        payload = () if motion.payload is None else (motion.payload[rows],)
+        rest = force(np.zeros_like(nu), nu, psi, wind, current, *payload)
+        inverse = inverses[rows] if payload else inverses[0]
+        nu_dot = np.einsum("nij,nj->ni", inverse, tau - rest) if payload else (tau - rest) @ inverse.T
+        c, s = np.cos(psi), np.sin(psi)
+        eta_dot = np.column_stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1], nu[:, 2]])
+        return np.hstack([eta_dot, nu_dot])
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(steps):
+            rows = np.minimum(starts + k * stride, last)
+            following = np.minimum(rows + stride, last)
+            for i in range(substeps):
+                a, b = i / substeps, (i + 1) / substeps
+                k1 = derivative(state, rows, following, a)
+                k2 = derivative(state + dt / 2 * k1, rows, following, (a + b) / 2)
+                k3 = derivative(state + dt / 2 * k2, rows, following, (a + b) / 2)
+                k4 = derivative(state + dt * k3, rows, following, b)
+                state = state + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            state[np.any(np.abs(state[:, 3:]) > limit, axis=1)] = np.nan
+            path[:, k + 1] = state
+    return path, stride
+
+
+def _between(values: Floats, rows: Ints, following: Ints, part: float) -> Floats:
+    result: Floats = (1.0 - part) * values[rows] + part * values[following]
+    return result
+
+
+def _errors(path: Floats, stride: int, motion: Motion, starts: Ints, ends: Ints, horizons: Floats) -> Floats:
+    """Return |error| of position, heading, speed and yaw rate, shape (starts, horizons, 4)."""
+    error = np.full((len(starts), len(horizons), 4), np.nan)
+    for h, horizon in enumerate(horizons):
+        step = round(horizon * motion.rate_hz / stride)
+        rows = starts + step * stride
+        inside = rows < ends
+        at, now = rows[inside], path[inside, step]
+        error[inside, h, 0] = np.hypot(*(now[:, :2] - motion.eta[at, :2]).T)
+        turned = now[:, 2] - motion.eta[at, 2]
+        error[inside, h, 1] = np.abs((turned + np.pi) % (2 * np.pi) - np.pi)
+        error[inside, h, 2] = np.hypot(*(now[:, 3:5] - motion.nu[at, :2]).T)
+        error[inside, h, 3] = np.abs(now[:, 5] - motion.nu[at, 2])
+    return error
+
+
+def _example(path: Floats, stride: int, motion: Motion, start: int, length: int) -> dict[str, Floats]:
+    steps = np.arange(length // stride + 1)
+    rows = start + steps * stride
+    return {"t": motion.t[rows], "measured": motion.nu[rows], "predicted": path[steps, 3:]}
+
+
+def _without(horizons: Floats, note: str) -> FreeRun:
+    nothing = np.full(len(horizons), np.nan)
+    return FreeRun(horizons, nothing, nothing, nothing, nothing, 0, {}, note)

@@ -1,0 +1,139 @@
+"""Force errors of models per axis, the same for fit, evaluate and compare."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ferryid.signals.track import Motion
+from ferryid.types import AXES, Flags, Floats, by_axis
+
+
+@dataclass(frozen=True, eq=False)
+class ForceScores:
+    """Errors of the applied force that a base model and a model estimate, on the same rows.
+
+    Attributes
+    ----------
+    mse_base, mse_model
+        Mean square error in surge, sway [N²] and yaw [N²·m²], shape (3,).
+    r2_base, r2_model
+        Coefficient of determination, shape (3,); NaN where the force never varies.
+    ratio
+        MSE of the model over the base model's, shape (3,); NaN where the base model makes no error.
+    normalised_mse
+        Mean of the ratios that are known.
+    """
+
+    mse_base: Floats
+    mse_model: Floats
+    r2_base: Floats
+    r2_model: Floats
+    ratio: Floats
+    normalised_mse: float
+
+    @classmethod
+    def of(cls, mse_base: Floats, mse_model: Floats, variance: Floats) -> ForceScores:
+        """Return the scores of mean square errors and the variance of the measured force, shape (3,) each."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(mse_base > 0, mse_model / mse_base, np.nan)
+            r2 = [np.where(variance > 0, 1.0 - mse / variance, np.nan) for mse in (mse_base, mse_model)]
+        known = ratio[np.isfinite(ratio)]
+        return cls(mse_base, mse_model, r2[0], r2[1], ratio, float(known.mean()) if known.size else math.nan)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the scores as plain values by the names of the axes."""
+        return {
+            "mse": {"base": by_axis(self.mse_base), "model": by_axis(self.mse_model)},
+            "r2": {"base": by_axis(self.r2_base), "model": by_axis(self.r2_model)},
+            "per_axis": by_axis(self.ratio),
+            "normalised_mse": self.normalised_mse,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class ModelScores:
+    """Scores in a model file.
+
+    Attributes
+    ----------
+    force
+        Force errors.
+    rows, seconds
+        How many rows they are of, and their length [s].
+    split
+        How these rows were set apart; ``"none"`` where nothing was held out.
+    split_notes
+        The same in sentences.
+    """
+
+    force: ForceScores
+    rows: int
+    seconds: float
+    split: str
+    split_notes: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the scores as a model file has them."""
+        return {
+            **self.force.to_json(),
+            "rows": self.rows,
+            "seconds": self.seconds,
+            "split": self.split,
+            "split_notes": list(self.split_notes),
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> ModelScores:
+        """Return the scores of a model file.
+
+        Raises
+        ------
+        KeyError, TypeError or ValueError
+            Where a part is missing, or of another kind.
+        """
+
+        def axes(values: Mapping[str, float | None]) -> Floats:
+            return np.array([math.nan if values[axis] is None else values[axis] for axis in AXES], dtype=np.float64)
+
+        mean = data["normalised_mse"]
+        return cls(
+            ForceScores(
+                mse_base=axes(data["mse"]["base"]),
+                mse_model=axes(data["mse"]["model"]),
+                r2_base=axes(data["r2"]["base"]),
+                r2_model=axes(data["r2"]["model"]),
+                ratio=axes(data["per_axis"]),
+                normalised_mse=math.nan if mean is None else float(mean),
+            ),
+            rows=int(data["rows"]),
+            seconds=float(data["seconds"]),
+            split=str(data["split"]),
+            split_notes=tuple(str(note) for note in data["split_notes"]),
+        )
+
+
+def usable_rows(motion: Motion, *estimates: Floats) -> Flags:
+    """Return the rows on which force and every estimate are known, shape (n,)."""
+    rows: Flags = motion.valid & np.isfinite(motion.tau).all(axis=1)
+    for estimate in estimates:
+        rows = rows & np.isfinite(estimate).all(axis=1)
+    return rows
+
+
+def mean_square(tau: Floats, estimate: Floats, rows: Flags) -> Floats:
+    """Return the mean square of ``tau - estimate`` over `rows` per axis, shape (3,) [N², N², (N·m)²]."""
+    if not rows.any():
+        return np.full(3, np.nan)
+    result: Floats = np.mean((tau[rows] - estimate[rows]) ** 2, axis=0)
+    return result
+
+
+def force_scores(tau: Floats, base: Floats, model: Floats, rows: Flags) -> ForceScores:
+    """Return MSE and R² of base and model over `rows` per axis, their ratio, and its mean over the axes that can be judged."""
+    variance = np.var(tau[rows], axis=0) if rows.any() else np.full(3, np.nan)
+    return ForceScores.of(mean_square(tau, base, rows), mean_square(tau, model, rows), variance)

@@ -1,0 +1,61 @@
+"""Regression: cross-products of basis and residual, SIMPLS, NIPALS, principal components and QR.
+
+Modules are imported when a name of theirs is first asked for: `ferryid --help` lists the bases and needs no numpy.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ferryid.lazy import import_on_demand
+
+if TYPE_CHECKING:
+    from ferryid.regression.collinearity import singular_values, undetermined_terms
+    from ferryid.regression.cross_products import CrossProducts, Rows
+    from ferryid.regression.nipals import component_covariances, fit_nipals
+    from ferryid.regression.pca import principal_components
+    from ferryid.regression.qr import QrFactor, factorise
+    from ferryid.regression.simpls import Simpls, fit_simpls, total
+
+__all__ = [
+    "CrossProducts",
+    "QrFactor",
+    "Rows",
+    "Simpls",
+    "component_covariances",
+    "factorise",
+    "fit_nipals",
+    "fit_simpls",
+    "principal_components",
+    "singular_values",
+    "total",
+    "undetermined_terms",
+]
+
+__getattr__ = import_on_demand(
+    __name__,
+    {
+        "collinearity": (
+            "singular_values",
+            "undetermined_terms",
+        ),
+        "cross_products": (
+            "CrossProducts",
+            "Rows",
+        ),
+        "nipals": (
+            "component_covariances",
+            "fit_nipals",
+        ),
+        "pca": ("principal_components",),
+        "qr": (
+            "QrFactor",
+            "factorise",
+        ),
+        "simpls": (
+            "Simpls",
+            "fit_simpls",
+            "total",
+        ),
+    },
+)

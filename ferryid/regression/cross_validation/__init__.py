@@ -1,0 +1,13 @@
+"""Cross-validation from cross-products of blocks."""
+
+from ferryid.regression.cross_validation.block_sums import BlockSums, block_edges, unpurged_parts
+from ferryid.regression.cross_validation.folds import Curves, Folds, FoldSums
+
+__all__ = [
+    "BlockSums",
+    "Curves",
+    "FoldSums",
+    "Folds",
+    "block_edges",
+    "unpurged_parts",
+]

@@ -1,0 +1,109 @@
+"""Stored models as text: the list of versions, and one model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ferryid.counts import counted
+from ferryid.models import Model, model_to_json
+from ferryid.types import AXES
+
+
+def render_listing(result: dict[str, Any], out: Path) -> str:
+    """Return the list as text."""
+    if not result["models"]:
+        return f"no models under {out}. Make one with: ferryid fit LOG --vessel PROFILE --out {out}"
+    lines = [f"  {'model':<28}{'verdict':<12}{'MSE/base':>9}  {'created':<22}trained on"]
+    for model in result["models"]:
+        mark = "*" if model["current"] else " "
+        score = model["normalised_mse"]
+        lines.append(
+            f"{mark} {model['name'] + '@' + str(model['version']):<28}"
+            f"{_state(model):<12}"
+            f"{'-' if score is None else format(score, '9.3f'):>9}  {model['created']:<22}{_some(model['logs'])}"
+        )
+        if "unreadable" in model:
+            lines.append(f"      {model['unreadable']}")
+        lines += [f"      vessel: {told}" for told in model.get("vessel_effects", ())]
+        for log, shown in model.get("conditions", {}).items():
+            lines += [f"      {_some([log])}: {told}" for told in shown]
+    if any(model["current"] for model in result["models"]):
+        lines.append("* current")
+    lines += [
+        f"{problem}. Fix: fit again, a model that is accepted becomes the current one"
+        for problem in result.get("problems", ())
+    ]
+    return "\n".join(lines)
+
+
+def _state(row: dict[str, Any]) -> str:
+    if "unreadable" in row:
+        return "unreadable"
+    return "accepted" if row["accepted"] else "diagnosed" if "conditions" in row else "rejected"
+
+
+def _some(names: Sequence[str]) -> str:
+    """Name the first two logs, each cut to 40 characters, and count the others."""
+    shown = [name if len(name) <= 40 else "…" + name[-39:] for name in names[:2]]
+    return ", ".join(shown) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
+
+
+def render_model(model: Model) -> str:
+    """Return one model as text: verdict, scores, and coefficients with their intervals."""
+    data = model_to_json(model)
+    settings = model.settings
+    force = None if model.scores is None else model.scores.force
+    mean, ratio = (None, [None] * 3) if force is None else (force.normalised_mse, force.ratio.tolist())
+    wide = max([14, *(len(term) + 2 for axis in AXES for term in data["coefficients"][axis])])
+    lines = [
+        f"{model.name}@{model.version}  {_verdict(model)}  {model.created}",
+        f"a diagnosis of {settings.get('diagnosed_from')}, without terms of a fit"
+        if model.diagnosed and not model.terms
+        else describe_settings(model),
+        f"trained on {', '.join(str(log['name']) for log in model.training)}",
+        f"validation force MSE over the base model's: {_number(mean)} ("
+        + ", ".join(f"{axis} {_number(value)}" for axis, value in zip(AXES, ratio, strict=True))
+        + ")",
+        "",
+        f"{'term':<{wide}}{'axis':<7}{'value':>13}{'low':>13}{'high':>13}  unit",
+    ]
+    for axis in AXES:
+        for term, entry in data["coefficients"][axis].items():
+            if entry["value"] == 0.0 and entry["low"] == 0.0 and entry["high"] == 0.0:
+                continue
+            lines.append(
+                f"{term:<{wide}}{axis:<7}{entry['value']:>13.5g}{entry['low']:>13.5g}{entry['high']:>13.5g}  {entry['unit']}"
+            )
+    if model.hull:
+        lines += ["", f"{'hull':<14}{'value':>20}{'low':>13}{'high':>13}  unit"]
+        for name, one in model.hull.items():
+            lines.append(f"{name:<14}{one.value:>20.5g}{one.low:>13.5g}{one.high:>13.5g}  {one.unit}")
+    for stored in model.vessel_effects:
+        lines += ["", f"vessel: {stored.says()}", f"  found in {', '.join(one.log for one in stored.sources)}"]
+    for known in model.conditions:
+        lines += ["", f"only in {known.log}:", *(f"  {stored.says(known.sha256)}" for stored in known.effects)]
+    return "\n".join(lines)
+
+
+def describe_settings(model: Model) -> str:
+    """Return basis, structure, components and window of a fit, those that were chosen for it as well."""
+    settings = model.settings
+    count: Any = settings.get("components")
+    return (
+        f"basis {settings.get('basis')}, {settings.get('structure')}, {counted(count, 'component')}, "
+        f"window {settings.get('window_s')} s"
+    )
+
+
+def _verdict(model: Model) -> str:
+    if model.accepted:
+        return "accepted"
+    # It holds for its own log; whether it does for others is not known.
+    return "diagnosed" if model.diagnosed else "REJECTED"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None or not math.isfinite(value) else f"{value:.3f}"

@@ -1,0 +1,65 @@
+"""A sweep of settings as text for a terminal."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.identify import Selection
+from ferryid.identify.sweeps import BY, Sweep
+from ferryid.types import AXES
+
+
+def render_sweep(found: Sweep) -> str:
+    """Return a sweep for a terminal."""
+    lines = [headline(found), ""]
+    for key, choice in found.by.items():
+        title = f"by {BY[key]}, {counted(choice.curves.folds, 'fold')}, {counted(choice.curves.rows, 'row')}"
+        lines += [title, *(_matrix(found, choice) if found.what == "both" else _table(found, choice)), ""]
+    lines += [f"note: {note}" for note in found.notes]
+    return "\n".join(lines).rstrip()
+
+
+def headline(found: Sweep) -> str:
+    """Return the choice in one sentence."""
+    choice = found.choice
+    ratio = choice.over_base[choice.window, choice.components - 1]
+    told = ", ".join(f"{axis} {value:.3g}" for axis, value in zip(AXES, ratio, strict=True) if np.isfinite(value))
+    return f"Choice: {choice.title}. Cross-validated force MSE over the base model's: {told}."
+
+
+def _table(found: Sweep, choice: Selection) -> list[str]:
+    """Return a line for each component count, or for each window: MSE per axis over the base model's, and the score."""
+    score, band = choice.curves.normalised()
+    windows, counts = range(len(found.windows_s)), range(score.shape[1])
+    if found.what == "window":
+        cells = [(window, choice.components - 1, f"{found.windows_s[window]:g} s") for window in windows]
+    else:
+        cells = [(choice.window, count, f"{count + 1}") for count in counts]
+    title = "window" if found.what == "window" else "components"
+    lines = [f"  {title:<12}" + "".join(f"{axis:>10}" for axis in AXES) + f"{'score':>10}"]
+    for window, count, name in cells:
+        ratios = "".join(f"{value:>10.4g}" for value in choice.over_base[window, count])
+        chosen = (window, count) == (choice.window, choice.components - 1)
+        lines.append(
+            f"{'*' if chosen else ' '} {name:<12}{ratios}{score[window, count]:>10.4f} ± {band[window, count]:.4f}"
+        )
+    lines.append("  axes: MSE over the base model's; score: each axis over its least MSE, mean; * the choice")
+    return lines
+
+
+def _matrix(found: Sweep, choice: Selection) -> list[str]:
+    """Return a line for each component count, a column for each window."""
+    score, band = choice.curves.normalised()
+    best = np.unravel_index(int(np.argmin(score)), score.shape)
+    near = score <= score[best] + band[best]
+    lines = ["  components" + "".join(f"{window_s:>9g} s" for window_s in found.windows_s)]
+    for count in range(score.shape[1]):
+        cells = []
+        for window in range(len(found.windows_s)):
+            chosen = (window, count) == (choice.window, choice.components - 1)
+            mark = "*" if chosen else "·" if near[window, count] else " "
+            cells.append(f"{score[window, count]:>10.4f}{mark}")
+        lines.append(f"  {count + 1:<10}" + "".join(cells))
+    lines.append("  each axis over its least MSE, mean; · within one standard error of the least; * the choice")
+    return lines

@@ -1,0 +1,34 @@
+"""Cautions about free runs: told when useless, told when worse than before, silent otherwise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ferryid.identify.fit_warnings import free_run_warnings
+from ferryid.models.prediction.free_run import FreeRun
+
+
+def run(position: float, heading: float, starts: int = 5, note: str = "") -> FreeRun:
+    horizons = np.array([5.0, 10.0, 60.0])
+    grow = horizons / 5.0
+    return FreeRun(horizons, position * grow, heading * grow, 0 * grow, 0 * grow, starts, {}, note)
+
+
+def test_a_better_free_run_needs_no_caution() -> None:
+    assert free_run_warnings(run(2.0, 0.2), run(1.0, 0.1)) == ()
+
+
+def test_a_lost_heading_is_told_even_where_the_base_model_is_as_bad() -> None:
+    (told,) = free_run_warnings(run(2.0, 1.6), run(1.0, 1.6))
+    assert told.startswith("Run free for 5 s the model's heading is off by 92°")
+
+
+def test_worse_than_the_base_model_is_told_with_both_numbers() -> None:
+    (told,) = free_run_warnings(run(1.0, 0.1), run(1.5, 0.1))
+    assert "position is worse than the base model's (18 against 12 m)" in told
+
+
+def test_a_model_that_cannot_run_is_told() -> None:
+    assert free_run_warnings(run(1.0, 0.1), run(1.0, 0.1, 0, "no mass")) == (
+        "The new model cannot be run free: no mass.",
+    )

@@ -1,0 +1,198 @@
+"""Model files and the store: nothing is lost, nothing is overwritten, and wrong files are told in one line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.errors import FerryIdError
+from ferryid.models.model import Model, model_to_json
+from ferryid.models.scores import ForceScores, ModelScores
+from ferryid.models.store.listing import list_versions
+from ferryid.models.store.versions import StoredModel, list_models, load, load_file, save
+from ferryid.regression.bases.basis import make_basis
+from ferryid.report.model_text import render_listing
+from ferryid.vessel import load_profile
+
+
+def made(accepted: bool = True, seed: int = 0) -> Model:
+    functions = make_basis("modulus")
+    K = len(functions.terms)
+    rng = np.random.default_rng(seed)
+    theta = rng.normal(size=(K, 3)) * 1e3 / 7
+    covariance = rng.normal(size=(3, K + 1, K + 1))
+    return Model(
+        name="boat",
+        version=0,
+        created="2026-01-01T00:00:00Z",
+        ferryid_version="0.1.0",
+        profile_text=load_profile("milliampere").text,
+        scale={"delta": 0.4, "sigma": 0.4, "zeta": 1.0},
+        settings={"basis": "modulus", "structure": "coupled", "components": 7, "window_s": 1.0},
+        terms=functions.terms,
+        units=functions.units,
+        theta=theta,
+        intercept=rng.normal(size=3),
+        low=theta - 1,
+        high=theta + 1,
+        intercept_low=rng.normal(size=3),
+        intercept_high=rng.normal(size=3),
+        covariance=covariance,
+        ranges={"u": (-0.5, 1.25)},
+        training=({"name": "log", "files": ["log.bag"], "sha256": "ab", "seconds": 60.0, "rows": 1200},),
+        scores=ModelScores(
+            ForceScores.of(np.ones(3), np.array([0.4, 0.5, 0.6]), 2.0 * np.ones(3)), 60, 6.0, "blocks", ()
+        ),
+        accepted=accepted,
+    )
+
+
+def test_a_model_comes_back_to_the_last_digit(tmp_path: Path) -> None:
+    stored = save(made(), tmp_path)
+    again = load_file(stored.path)
+    for name in ("theta", "intercept", "low", "high", "intercept_low", "intercept_high", "covariance"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(stored.model, name))
+    assert model_to_json(again) == model_to_json(stored.model)
+
+
+def test_current_moves_only_on_acceptance(tmp_path: Path) -> None:
+    assert save(made(), tmp_path).current
+    rejected = save(made(accepted=False, seed=1), tmp_path)
+    assert (rejected.model.version, rejected.current) == (2, False)
+    assert load("boat", tmp_path).version == 1
+    assert save(made(seed=2), tmp_path).current
+    assert load("boat", tmp_path).version == 3
+    stored = [one for one in list_models(tmp_path) if isinstance(one, StoredModel)]
+    assert [(s.model.version, s.model.accepted, s.current) for s in stored] == [
+        (1, True, False),
+        (2, False, False),
+        (3, True, True),
+    ]
+
+
+def test_the_same_model_at_another_time_is_the_same_version(tmp_path: Path) -> None:
+    first = save(made(), tmp_path)
+    before = first.path.read_bytes()
+    again = save(replace(made(), created="2030-01-01T00:00:00Z"), tmp_path)
+    assert again.model.version == first.model.version
+    assert first.path.read_bytes() == before
+    assert len(list_models(tmp_path)) == 1
+
+
+def test_a_name_without_an_accepted_version_gives_the_newest(tmp_path: Path) -> None:
+    save(made(accepted=False), tmp_path)
+    save(made(accepted=False, seed=1), tmp_path)
+    assert load("boat", tmp_path).version == 2
+    assert load("boat@1", tmp_path).version == 1
+
+
+@pytest.mark.parametrize(
+    ("reference", "told"),
+    [
+        ("baot", 'Did you mean "boat"'),
+        ("boat@7", "there are 1"),
+        ("boat@first", "there are 1"),
+        ("nowhere/m.json", "no such model file"),
+    ],
+)
+def test_a_wrong_reference_is_told(tmp_path: Path, reference: str, told: str) -> None:
+    save(made(), tmp_path)
+    with pytest.raises(FerryIdError, match=told):
+        load(reference, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda data: data.update(schema="ferryid.model/9", ferryid_version="3.2"), r"ferryid>=3\.2"),
+        (lambda data: data.update(schema="something"), "not a ferryid model"),
+        (lambda data: data.pop("coefficients"), "coefficients"),
+        (lambda data: data["coefficients"]["yaw"].pop("u"), "missing or wrong"),
+        (lambda data: data.update(schema="ferryid.model/0"), "not a ferryid model"),
+        (lambda data: data["coefficients"]["yaw"]["u"].update(value=10**400), "missing or wrong"),
+        (lambda data: data["coefficients"]["yaw"]["u"].update(value=float("inf")), "not finite"),
+    ],
+)
+def test_a_damaged_or_newer_file_is_told(tmp_path: Path, change, told: str) -> None:
+    path = save(made(), tmp_path).path
+    data = json.loads(path.read_text(encoding="utf-8"))
+    change(data)
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(FerryIdError, match=told) as caught:
+        load_file(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_cut_file_is_told(tmp_path: Path) -> None:
+    path = save(made(), tmp_path).path
+    path.write_text(path.read_text(encoding="utf-8")[:500], encoding="utf-8")
+    with pytest.raises(FerryIdError, match="not readable as a model file"):
+        load_file(path)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"version": ' + "9" * 5000 + "}"])
+def test_what_breaks_the_json_reader_is_told(tmp_path: Path, text: str) -> None:
+    (tmp_path / "model.json").write_text(text, encoding="utf-8")
+    with pytest.raises(FerryIdError, match="not readable as a model file"):
+        load_file(tmp_path / "model.json")
+
+
+DAMAGE = {
+    "empty": lambda data: b"",
+    "zeros": lambda data: bytes(len(data)),
+    "cut": lambda data: data[: len(data) // 2],
+    "binary": lambda data: bytes(range(256)),
+    "no object": lambda data: b"[]",
+    "other schema": lambda data: data.replace(b"ferryid.model/1", b"ferryid.fit/1"),
+    "newer": lambda data: data.replace(b"ferryid.model/1", b"ferryid.model/9"),
+    "profile": lambda data: data.replace(b"[hull]", b"[[[hull]"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_version_is_a_row_and_keeps_its_number(tmp_path: Path, damage: str) -> None:
+    save(made(), tmp_path)
+    path = save(made(seed=1), tmp_path).path
+    before = path.read_bytes()
+    path.write_bytes(DAMAGE[damage](before))
+    assert path.read_bytes() != before
+    result = list_versions(tmp_path)
+    first, second = result["models"]
+    assert (first["version"], "unreadable" in first) == (1, False)
+    assert (second["name"], second["version"], second["current"]) == ("boat", 2, True)
+    assert str(path) in second["unreadable"]
+    assert "Fix: " in second["unreadable"]
+    assert "unreadable" in render_listing(result, tmp_path).splitlines()[2]
+    assert load("boat@1", tmp_path).version == 1
+    assert save(made(seed=2), tmp_path).model.version == 3
+    assert save(made(), tmp_path).model.version == 1
+    with pytest.raises(FerryIdError, match="Did you mean"):
+        load("baot", tmp_path)
+
+
+def test_a_folder_in_place_of_the_current_version_is_reported_with_a_remedy(tmp_path: Path) -> None:
+    save(made(), tmp_path)
+    current = tmp_path / "models" / "boat" / "current"
+    current.unlink()
+    current.mkdir()
+    assert "holds no number" in render_listing(list_versions(tmp_path), tmp_path).splitlines()[-1]
+    with pytest.raises(FerryIdError, match=r"current: the number .*, found a folder\. Fix: move or delete that folder"):
+        save(made(seed=1), tmp_path)
+    assert load("boat@1", tmp_path).version == 1
+
+
+@pytest.mark.parametrize(("text", "told"), [("", "no number"), ("x\n", "no number"), ("7\n", "names version 7")])
+def test_a_damaged_note_of_the_current_version_is_told(tmp_path: Path, text: str, told: str) -> None:
+    save(made(), tmp_path)
+    (tmp_path / "models" / "boat" / "current").write_text(text, encoding="utf-8")
+    with pytest.raises(FerryIdError, match=rf"current: .*{told}.* Fix: give a version as boat@NUMBER, there are 1"):
+        load("boat", tmp_path)
+    assert load("boat@1", tmp_path).version == 1
+    assert told in render_listing(list_versions(tmp_path), tmp_path).splitlines()[-1]
+    save(made(seed=1), tmp_path)
+    assert load("boat", tmp_path).version == 2
