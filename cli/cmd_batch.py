@@ -37,12 +37,13 @@ def command(
     json: Json = None,
 ) -> None:
     """Fit, evaluate and diagnose every log of an archive; what is done stays done, whatever interrupts it."""
-    from ferryid.batch.run import batch, render_batch
+    from ferryid import api
 
-    result = batch(
+    outcome = api.batch(
         logs, out, vessel=vessel, recipe=recipe, processes=processes, dask=dask, memory_limit=memory, again=again,
         progress=progress, tell=tell,
     )  # fmt: skip
-    emit(result, render_batch(result), json)
-    if not result["counts"]["done"] + result["counts"]["partly"]:
+    emit(outcome, json)
+    counts = outcome.json["counts"]
+    if not counts["done"] + counts["partly"]:
         raise typer.Exit(2)

@@ -47,15 +47,10 @@ def command(
     free. A ratio comes with a 95 % interval and a probability p: how likely a ratio this far from one is if both err alike,
     from resampling blocks of 30 s or more of each log, in pairs, and corrected for the number of comparisons (Holm).
     """
-    from ferryid.compare import compare, select_candidates
-    from ferryid.models.store import load
-    from ferryid.report.comparison_report import report
-    from ferryid.types import RunContext
-    from ferryid.vessel import load_profile
+    from ferryid import api
 
-    field = select_candidates(models, [load(name, out) for name in models], load_profile(vessel) if vessel else None)
-    comparison = compare(field, on or [], RunContext(out, progress), window_s=window)
-    progress("writing the report")
-    outcome = report(comparison, out, ("ferryid", *sys.argv[1:]))
-    progress("")
-    emit(outcome.json, outcome.text, json)
+    words = ("ferryid", *sys.argv[1:])
+    outcome = api.compare(
+        models, on or (), out, vessel=vessel or None, window_s=window, command=words, progress=progress
+    )
+    emit(outcome, json)

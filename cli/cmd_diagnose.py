@@ -36,12 +36,12 @@ def command(
     json: Json = None,
 ) -> None:
     """Say which physics a model left out of a recording, and what shows it."""
+    from ferryid import api
     from ferryid.diagnose import DiagnosisSettings
-    from ferryid.report.diagnosis_report import diagnose_and_report, patient
 
-    profile, examined = patient(vessel, model, out)
-    settings = DiagnosisSettings(examined, against, together, tuple(withhold or ()), verify)
+    settings = DiagnosisSettings(None, against, together, tuple(withhold or ()), verify)
     words = ("ferryid", *sys.argv[1:])
-    outcome = diagnose_and_report(logs, profile, out, settings, tables=out, name=name, command=words, progress=progress)
-    progress("")
-    emit(outcome.json, outcome.text, json)
+    outcome = api.diagnose(
+        logs, vessel, out, model=model, settings=settings, name=name, command=words, progress=progress
+    )
+    emit(outcome, json)

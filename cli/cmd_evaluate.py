@@ -21,12 +21,6 @@ def command(
     json: Json = None,
 ) -> None:
     """Judge a model on other logs: force MSE and R² per axis, free-run error."""
-    from ferryid.compare import evaluate
-    from ferryid.models.store import load
-    from ferryid.report.evaluation_text import render_evaluation
-    from ferryid.types import RunContext
-    from ferryid.vessel import load_profile
+    from ferryid import api
 
-    profile = load_profile(vessel) if vessel else None
-    result = evaluate(load(model, out), logs, RunContext(out, progress), profile=profile, window_s=window)
-    emit(result, render_evaluation(result), json)
+    emit(api.evaluate(model, logs, out, vessel=vessel or None, window_s=window, progress=progress), json)

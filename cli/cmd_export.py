@@ -27,13 +27,13 @@ def command(
     json: Json = None,
 ) -> None:
     """Write a model as code or parameters for other programs, or with --mcap a log and its forces for a viewer."""
-    from ferryid.export.commands import export, notes, render_export
+    from ferryid import api
+    from ferryid.export.commands import notes
 
-    result = export(
+    outcome = api.export(
         what, out, to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis, overwrite=overwrite,
         json=None if json in (None, "-") else Path(json), progress=progress,
     )  # fmt: skip
-    progress("")
-    for note in notes(result):
+    for note in notes(outcome.json):
         tell(f"ferryid: {note}")
-    emit(result, render_export(result), json)
+    emit(outcome, json)

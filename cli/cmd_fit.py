@@ -61,20 +61,15 @@ def command(
     json: Json = None,
 ) -> None:
     """Fit a model to one or more logs, validate it, store it and write a report."""
+    from ferryid import api
     from ferryid.identify import FitSettings, parse_window
-    from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
-    from ferryid.types import RunContext
-    from ferryid.vessel import load_profile
 
     settings = FitSettings(
         basis=basis, structure=structure, components=components, **parse_window(window), smoother=smoother, residual=residual,
         split=split, inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
     )  # fmt: skip
-    profile, run = load_profile(vessel), RunContext(out, progress, verify)
-    if archive:
-        outcome = fit_archive_and_report(profile, settings, run, logs or (), name=name)
-    else:
-        outcome = fit_and_report(given(logs), profile, settings, run, name=name)
-    emit(outcome.json, outcome.text, json)
+    chosen = logs or () if archive else given(logs)
+    outcome = api.fit(chosen, vessel, settings, out, name=name, archive=archive, verify=verify, progress=progress)
+    emit(outcome, json)
     if require_accept and not outcome.accepted:
         raise typer.Exit(3)

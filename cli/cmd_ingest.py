@@ -8,8 +8,6 @@ from ferryid.cli.output import emit, progress
 
 def command(logs: Logs, vessel: Vessel, out: Out = OUT, verify: Verify = False, json: Json = None) -> None:
     """Read logs into Parquet tables with SNAME column names, SI units and provenance."""
-    from ferryid.signals.ingest import ingest, render_ingest
-    from ferryid.vessel import load_profile
+    from ferryid import api
 
-    result = ingest(logs, load_profile(vessel), out, verify=verify, progress=progress)
-    emit(result, render_ingest(result), json)
+    emit(api.ingest(logs, vessel, out, verify=verify, progress=progress), json)

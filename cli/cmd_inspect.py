@@ -17,8 +17,6 @@ def command(
     json: Json = None,
 ) -> None:
     """Show topics, types, counts, rates, gaps, clocks, and the signals that a vessel profile finds."""
-    from ferryid.signals.inspect import inspect, render_inspect
-    from ferryid.vessel import load_profile
+    from ferryid import api
 
-    result = inspect(log, load_profile(vessel) if vessel else None, verify=verify)
-    emit(result, render_inspect(result, text_width()), json)
+    emit(api.inspect(log, vessel or None, verify=verify, width=text_width()), json)

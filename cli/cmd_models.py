@@ -16,13 +16,6 @@ def command(
     json: Json = None,
 ) -> None:
     """List the stored models and which is current, or show one."""
-    from ferryid.models import model_to_json
-    from ferryid.models.store import list_versions, load
-    from ferryid.report.model_text import render_listing, render_model
+    from ferryid import api
 
-    if model:
-        loaded = load(model, out)
-        emit(model_to_json(loaded), render_model(loaded), json)
-    else:
-        result = list_versions(out)
-        emit(result, render_listing(result, out), json)
+    emit(api.show_model(model, out) if model else api.models(out), json)

@@ -40,13 +40,11 @@ def command(
         cases = verified_answers(check)["cases"]
         typer.echo(f"{check}: the answers to {len(cases)} cases match their commitment")
         return
-    from ferryid.validation.evaluators import pipeline
-    from ferryid.validation.run import render_summary, run_validation
+    from ferryid import api
 
     cells = tuple(name.strip() for name in only.split(",") if name.strip())
-    result = run_validation(
+    outcome = api.prove(
         out,
-        pipeline(),
         seed=seed,
         runs=runs,
         only=cells,
@@ -55,4 +53,4 @@ def command(
         progress=progress,
         announce=tell,
     )
-    emit(result, render_summary(result), json)
+    emit(outcome, json)

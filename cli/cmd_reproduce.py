@@ -39,7 +39,7 @@ def command(
     json: Json = None,
 ) -> None:
     """Fly published trials again in the simulator and set the results side by side."""
-    from ferryid.reproduce.run import render_reproduction, reproduce
+    from ferryid import api
 
-    result = reproduce(what, out, only=only or (), repetitions=seeds, processes=processes, progress=progress)
-    emit(result, render_reproduction(result), json)
+    outcome = api.reproduce(what, out, only=only or (), repetitions=seeds, processes=processes, progress=progress)
+    emit(outcome, json)

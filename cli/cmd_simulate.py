@@ -37,26 +37,25 @@ def command(
     json: Json = None,
 ) -> None:
     """Simulate a trial and write a log like a recording."""
-    from ferryid.models.store import load
-    from ferryid.simulate import render_scenarios, render_simulation, run_scenario, scenario_listing
+    from ferryid import api
 
     if list_:
-        listing = scenario_listing()
-        emit(listing, render_scenarios(listing), json)
+        emit(api.scenarios(), json)
         return
     if not scenario:
         raise typer.BadParameter("give a scenario, or --list")
-    result = run_scenario(
+    outcome = api.simulate(
         scenario,
         out,
         log=log,
         storage=storage,
         truth=truth,
         seed=seed,
-        model=load(model, models or out) if model else None,
+        model=model or None,
+        models=models,
         conditions=conditions,
         overwrite=overwrite,
         json=None if json in (None, "-") else Path(json),
         progress=progress,
     )
-    emit(result, render_simulation(result), json)
+    emit(outcome, json)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Annotated
 
 import typer
@@ -58,24 +57,23 @@ def command(
     json: Json = None,
 ) -> None:
     """Cross-validate smoothing windows, component counts, or all bases in both structures, and mark which to fit with."""
+    from ferryid import api
     from ferryid.identify import FitSettings, parse_windows
-    from ferryid.report.structures_report import structures_and_report
-    from ferryid.report.sweep_report import sweep_and_report
-    from ferryid.types import RunContext
-    from ferryid.vessel import load_profile
 
     settings = FitSettings(
         basis=basis, structure=structure, components=components, window_s=window, smoother=smoother, residual=residual,
         inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta,
     )  # fmt: skip
-    run = structures_and_report if what == "basis" else partial(sweep_and_report, what)
-    outcome = run(
-        logs or [] if archive else given(logs),
-        load_profile(vessel),
+    chosen = logs or () if archive else given(logs)
+    outcome = api.sweep(
+        what,
+        chosen,
+        vessel,
         settings,
-        RunContext(out, progress),
+        out,
         windows_s=parse_windows(windows),
         folds=folds,
         archive=archive,
+        progress=progress,
     )
-    emit(outcome.json, outcome.text, json)
+    emit(outcome, json)

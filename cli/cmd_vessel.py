@@ -18,17 +18,11 @@ File = Annotated[str, typer.Argument(help="Path of a profile (TOML), or the name
 @app.command()
 def check(file: File, json: Json = None) -> None:
     """Explain every fault of a profile with its line; warnings alone do not fail it."""
-    from ferryid.vessel import check_profile
+    from ferryid import api
 
-    faults = check_profile(file)
-    result = {
-        "schema": "ferryid.vessel-check/1",
-        "file": file,
-        "faults": [{"line": fault.line, "message": fault.message, "warning": fault.warning} for fault in faults],
-    }
-    lines = [f"{file}:{fault.line}: {'warning: ' if fault.warning else ''}{fault.message}" for fault in faults]
-    emit(result, "\n".join(lines) if lines else f"{file}: no faults", json)
-    if any(not fault.warning for fault in faults):
+    outcome = api.check_vessel(file)
+    emit(outcome, json)
+    if any(not fault["warning"] for fault in outcome.json["faults"]):
         raise typer.Exit(2)
 
 
@@ -49,11 +43,6 @@ def show(
 @app.command("list")
 def list_(json: Json = None) -> None:
     """List the bundled profiles."""
-    from ferryid.vessel import bundled, load_profile
+    from ferryid import api
 
-    profiles = [load_profile(name) for name in bundled()]
-    result = {
-        "schema": "ferryid.vessels/1",
-        "vessels": [{"name": one.name, "title": one.title, "source": one.source} for one in profiles],
-    }
-    emit(result, "\n".join(f"{one.name:<18} {one.title}" for one in profiles), json)
+    emit(api.vessels(), json)

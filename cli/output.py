@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from ferryid.errors import one_line, printable
 
+if TYPE_CHECKING:
+    from ferryid.report.outcome import Outcome
 
-def emit(result: Mapping[str, Any], text: str, json: str | None) -> None:
-    """Print `text`, or with ``--json -`` the JSON object instead; with ``--json FILE`` also write the object there."""
+
+def emit(outcome: Outcome, json: str | None) -> None:
+    """Print a result as text, or with ``--json -`` as JSON instead; with ``--json FILE`` also write the JSON there."""
     from ferryid.files import dump_json, write_result
 
     if json == "-":
-        typer.echo(dump_json(dict(result)), nl=False)
+        typer.echo(dump_json(outcome.json), nl=False)
         return
     if json is not None:
-        write_result(Path(json), dump_json(dict(result)))
-    typer.echo(printable(text, keep="\n"))
+        write_result(Path(json), dump_json(outcome.json))
+    typer.echo(printable(outcome.text, keep="\n"))
 
 
 def text_width() -> int:

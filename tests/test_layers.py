@@ -36,6 +36,7 @@ ORDER = (
     "reproduce",
     "batch",
     "validation",
+    "api",
     "cli",
 )
 HOMES = {

@@ -6,7 +6,6 @@ import hashlib
 import re
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,21 +16,13 @@ from ferryid.files import dump_json, finite, replacing
 from ferryid.report import comparison_words
 from ferryid.report.comparison_page import render
 from ferryid.report.comparison_words import render_effects
+from ferryid.report.outcome import Report
 
 NAMED = 2
 """Models and logs that the folder's name holds; a sum stands for the others."""
 
 
-@dataclass(frozen=True)
-class ComparisonReport:
-    """The page, and the same as JSON and as text for a terminal."""
-
-    report: Path
-    json: dict[str, Any]
-    text: str
-
-
-def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> ComparisonReport:
+def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Report:
     """Write page, figures and JSON to a folder in ``reports``; a later comparison of the same models and logs replaces it.
 
     `command` are the words that the comparison was asked for with; the page repeats them.
@@ -57,7 +48,7 @@ def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Co
         for name, drawing in drawings.items():
             (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "compare.json").write_text(dump_json(plain), encoding="utf-8")
-    return ComparisonReport(file, plain, f"{as_text(plain)}\n\nreport  {file}")
+    return Report(plain, f"{as_text(plain)}\n\nreport  {file}", file)
 
 
 def as_text(result: dict[str, Any]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
@@ -18,21 +17,15 @@ from ferryid.files import dump_json, finite, replacing
 from ferryid.models import Model
 from ferryid.models.store import load
 from ferryid.report.diagnosis_page import as_text, render
+from ferryid.report.outcome import Report
 from ferryid.vessel import load_profile, parse_profile
 from ferryid.vessel.profile import Profile
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """The page, and the same as JSON and as text for a terminal."""
-
-    report: Path
-    json: dict[str, Any]
-    text: str
-
-
-def patient(vessel: str | None, model: str | None, out: Path) -> tuple[Profile, Model | None]:
+def patient(vessel: str | Path | Profile | None, model: str | None, out: Path) -> tuple[Profile, Model | None]:
     """Return the profile, and the model where one is to be examined; its own profile serves where no vessel is given.
+
+    `vessel` is a profile, or the name or path of one.
 
     Raises
     ------
@@ -46,15 +39,19 @@ def patient(vessel: str | None, model: str | None, out: Path) -> tuple[Profile, 
                 "diagnose: the log alone does not say whose it is, --vessel and --model are both left out. "
                 "Fix: give --vessel a bundled profile's name or a TOML file"
             )
-        return load_profile(vessel), None
+        return _profile(vessel), None
     own = parse_profile(loaded.profile_text, loaded.name)
-    profile = load_profile(vessel) if vessel else own
+    profile = _profile(vessel) if vessel else own
     if profile.name != own.name:
         raise FerryIdError(
             f"{loaded.name}@{loaded.version}: a model of {own.name} does not apply to {profile.name}. "
             "Fix: give a model and logs of one vessel"
         )
     return profile, loaded
+
+
+def _profile(vessel: str | Path | Profile) -> Profile:
+    return vessel if isinstance(vessel, Profile) else load_profile(vessel)
 
 
 def diagnose_and_report(
@@ -67,7 +64,7 @@ def diagnose_and_report(
     name: str = "",
     command: Sequence[str] = (),
     progress: Callable[[str], None],
-) -> Outcome:
+) -> Report:
     """Diagnose logs, store the model that the findings lead to, and write the report.
 
     Parameters
@@ -87,7 +84,7 @@ def diagnose_and_report(
     return report(diagnoses, out, command)
 
 
-def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = ()) -> Outcome:
+def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = ()) -> Report:
     """Write page, figures and JSON to a folder of their own in ``reports``; a later diagnosis of the same logs replaces it.
 
     `command` are the words that the diagnosis was asked for with; the page repeats them.
@@ -115,7 +112,7 @@ def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = (
         for name, drawing in drawings.items():
             (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "diagnosis.json").write_text(dump_json(plain), encoding="utf-8")
-    return Outcome(file, plain, f"{as_text(diagnoses)}\nreport  {file}")
+    return Report(plain, f"{as_text(diagnoses)}\nreport  {file}", file)
 
 
 def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:

@@ -13,19 +13,17 @@ from ferryid.files import alone, dump_json, replacing
 from ferryid.identify import FitOutcome, FitSettings, fit_archive, fit_logs
 from ferryid.models.store import StoredModel, assign_version, plan, save
 from ferryid.report.model_text import describe_settings
+from ferryid.report.outcome import Report
 from ferryid.report.page import headline, render
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
 
 @dataclass(frozen=True)
-class FitReport:
-    """What a fit leaves: the stored model, the report, and the same as JSON and as text for a terminal."""
+class FitReport(Report):
+    """What a fit leaves: its report, and the stored model."""
 
     stored: StoredModel
-    report: Path
-    json: dict[str, Any]
-    text: str
 
     @property
     def accepted(self) -> bool:
@@ -97,7 +95,8 @@ def _reported(result: FitOutcome, run: RunContext) -> FitReport:
             # Last before the report takes its place: a full disk or an interrupt leaves neither without the other.
             save(result.model, out)
     run.progress("")
-    return FitReport(stored, folder / "report.html", plain, as_text(result, stored, folder / "report.html"))
+    report = folder / "report.html"
+    return FitReport(plain, as_text(result, stored, report), report, stored)
 
 
 def as_json(result: FitOutcome, stored: StoredModel, report: Path) -> dict[str, Any]:

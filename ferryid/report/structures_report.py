@@ -17,9 +17,10 @@ from ferryid.identify.sweeps import (
     sweep_structures,
 )
 from ferryid.report.html import template
+from ferryid.report.outcome import Report
 from ferryid.report.structures_figures import forest
 from ferryid.report.structures_text import count_terms, render_structures, supported_structure
-from ferryid.report.sweep_report import SweepReport, leave
+from ferryid.report.sweep_report import leave
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
 
@@ -33,7 +34,7 @@ def structures_and_report(
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
     archive: bool = False,
-) -> SweepReport:
+) -> Report:
     """Compare structures and write the page; arguments and errors are those of `sweep_structures`."""
     if archive:
         raise FerryIdError("--archive: what is kept of a log is of one basis. Fix: name the logs to compare bases on")

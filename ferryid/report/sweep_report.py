@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from ferryid.files import dump_json, replacing
 from ferryid.identify import FOLDS, TEST_WINDOW_S, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
 from ferryid.report.html import template
+from ferryid.report.outcome import Report
 from ferryid.report.sweep_figures import curves, heat_map
 from ferryid.report.sweep_text import headline, render_sweep
 from ferryid.types import AXES, RunContext
 from ferryid.vessel.profile import Profile
-
-
-@dataclass(frozen=True)
-class SweepReport:
-    """What a sweep leaves: its page, and the same as JSON and as text for a terminal."""
-
-    report: Path
-    json: dict[str, Any]
-    text: str
 
 
 def sweep_and_report(
@@ -37,7 +27,7 @@ def sweep_and_report(
     windows_s: Sequence[float] = (),
     folds: int = FOLDS,
     archive: bool = False,
-) -> SweepReport:
+) -> Report:
     """Sweep settings over logs and write the page; arguments and errors are those of `sweep_settings`."""
     found = sweep_settings(what, logs, profile, settings, run, windows_s=windows_s, folds=folds, archive=archive)
     run.progress("writing the report")
@@ -53,7 +43,7 @@ def leave(
     drawings: Mapping[str, str],
     json_of: Callable[[str], dict[str, Any]],
     text: str,
-) -> SweepReport:
+) -> Report:
     """Write page, drawings and JSON of a sweep into its folder; `json_of` returns the JSON for the page's path."""
     first = str(logs[0]["name"])
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
@@ -66,7 +56,7 @@ def leave(
             (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "sweep.json").write_text(dump_json(plain), encoding="utf-8")
     run.progress("")
-    return SweepReport(report, plain, f"{text}\nreport  {report}")
+    return Report(plain, f"{text}\nreport  {report}", report)
 
 
 def render(found: Sweep) -> tuple[str, dict[str, str]]:

@@ -1,0 +1,472 @@
+"""The public Python API: one call for each command, with its settings as typed arguments and its result as an `Outcome`.
+
+```python
+from ferryid import api
+
+fit = api.fit("bag.mcap", "milliampere")
+print(fit)              # as the terminal shows it; a notebook shows the report
+fit.json["scores"]      # as --json writes it
+fit.stored.model        # the model itself
+```
+
+The commands call these functions and nothing else. Each raises `ferryid.errors.FerryIdError`, with the file, the cause and
+the remedy, for input that cannot be used; nothing half-written is left. Importing this module imports nothing heavy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from ferryid.diagnose import DiagnosisSettings
+    from ferryid.identify import FitSettings
+    from ferryid.models import Model
+    from ferryid.report.fit_report import FitReport
+    from ferryid.report.outcome import Outcome, Report
+    from ferryid.types import RunContext
+    from ferryid.vessel.profile import Profile
+
+__all__ = [
+    "batch",
+    "check_vessel",
+    "compare",
+    "diagnose",
+    "evaluate",
+    "export",
+    "fit",
+    "ingest",
+    "inspect",
+    "models",
+    "prove",
+    "reproduce",
+    "scenarios",
+    "show_model",
+    "simulate",
+    "sweep",
+    "vessels",
+]
+
+OUT = Path("ferryid-out")
+"""The output folder of every call: its ``logs`` keep ingested tables, ``models`` the model store, ``reports`` the pages."""
+
+Logs = str | Path | Sequence[str | Path]
+"""Bags, MCAP files, tables or folders; parts of one recording joined by ``+``."""
+Progress = Callable[[str], None]
+"""Called with the name of each stage, and with an empty one at the end."""
+
+
+def _quiet(_line: str) -> None:
+    """Show nothing."""
+
+
+def _paths(logs: Logs) -> list[str]:
+    return [str(logs)] if isinstance(logs, str | Path) else [str(log) for log in logs]
+
+
+def _profile(vessel: str | Path | Profile) -> Profile:
+    from ferryid.vessel import load_profile
+    from ferryid.vessel.profile import Profile
+
+    return vessel if isinstance(vessel, Profile) else load_profile(str(vessel))
+
+
+def _model(model: str | Path | Model, out: Path) -> Model:
+    from ferryid.models import Model
+    from ferryid.models.store import load
+
+    return model if isinstance(model, Model) else load(str(model), out)
+
+
+def _context(out: str | Path, progress: Progress, verify: bool = False) -> RunContext:
+    from ferryid.types import RunContext
+
+    return RunContext(Path(out), progress, verify)
+
+
+def _outcome(result: Mapping[str, Any], text: str) -> Outcome:
+    from ferryid.report.outcome import Outcome
+
+    return Outcome(dict(result), text)
+
+
+def inspect(
+    log: str | Path, vessel: str | Path | Profile | None = None, *, verify: bool = False, width: int = 160
+) -> Outcome:
+    """Return topics, types, counts, rates, gaps and clocks of a log, and the signals that a vessel's profile finds in it.
+
+    Parameters
+    ----------
+    log
+        Path; parts of one recording joined by ``+``.
+    vessel
+        Name of a bundled profile, the path of a TOML file, or a profile.
+    verify
+        Read the whole file and check every checksum.
+    width
+        Of the text, in characters.
+    """
+    from ferryid.signals.inspect import inspect as inspect_log
+    from ferryid.signals.inspect import render_inspect
+
+    result = inspect_log(str(log), None if vessel is None else _profile(vessel), verify=verify)
+    return _outcome(result, render_inspect(result, width))
+
+
+def ingest(
+    logs: Logs,
+    vessel: str | Path | Profile,
+    out: str | Path = OUT,
+    *,
+    verify: bool = False,
+    progress: Progress = _quiet,
+) -> Outcome:
+    """Read logs into Parquet tables with SNAME column names, SI units and provenance."""
+    from ferryid.signals.ingest import ingest as ingest_logs
+    from ferryid.signals.ingest import render_ingest
+
+    result = ingest_logs(_paths(logs), _profile(vessel), Path(out), verify=verify, progress=progress)
+    return _outcome(result, render_ingest(result))
+
+
+def fit(
+    logs: Logs,
+    vessel: str | Path | Profile,
+    settings: FitSettings | None = None,
+    out: str | Path = OUT,
+    *,
+    name: str = "",
+    archive: bool = False,
+    verify: bool = False,
+    progress: Progress = _quiet,
+) -> FitReport:
+    """Fit a model to logs, validate it, store it and write its report.
+
+    Parameters
+    ----------
+    logs
+        What to fit to; with `archive`, which of the ingested logs, all where empty.
+    vessel
+        Name of a bundled profile, the path of a TOML file, or a profile.
+    settings
+        How to fit: `ferryid.identify.FitSettings`, its defaults where None.
+    out
+        Output folder.
+    name
+        Name of the model in the store; the vessel's where empty.
+    archive
+        Fit to the sums kept of ingested logs; no log is read.
+    verify
+        Read whole files and check every checksum.
+    """
+    from ferryid.identify import FitSettings
+    from ferryid.report.fit_report import fit_and_report, fit_archive_and_report
+
+    settings, run = settings or FitSettings(), _context(out, progress, verify)
+    if archive:
+        return fit_archive_and_report(_profile(vessel), settings, run, _paths(logs), name=name)
+    return fit_and_report(_paths(logs), _profile(vessel), settings, run, name=name)
+
+
+def evaluate(
+    model: str | Path | Model,
+    logs: Logs,
+    out: str | Path = OUT,
+    *,
+    vessel: str | Path | Profile | None = None,
+    window_s: float | None = None,
+    progress: Progress = _quiet,
+) -> Outcome:
+    """Judge a model on other logs: mean square of the force errors and R² per axis, errors of free runs.
+
+    `window_s` is the smoothing window of the test data [s], the model's own where None; `vessel` reads logs whose topics are
+    not those of the model's profile.
+    """
+    from ferryid.compare import evaluate as evaluate_model
+    from ferryid.report.evaluation_text import render_evaluation
+
+    run, profile = _context(out, progress), None if vessel is None else _profile(vessel)
+    result = evaluate_model(_model(model, run.out), _paths(logs), run, profile=profile, window_s=window_s)
+    return _outcome(result, render_evaluation(result))
+
+
+def compare(
+    models: Sequence[str],
+    on: Logs = (),
+    out: str | Path = OUT,
+    *,
+    vessel: str | Path | Profile | None = None,
+    window_s: float = 1.0,
+    command: Sequence[str] = (),
+    progress: Progress = _quiet,
+) -> Report:
+    """Compare models on the same rows of logs, and by their coefficients; without logs by their coefficients alone.
+
+    Parameters
+    ----------
+    models
+        Each a path, name or name@version.
+    on
+        Logs.
+    out
+        Output folder.
+    vessel
+        In place of the models' own profile.
+    window_s
+        Smoothing window of the logs [s].
+    command
+        The words that the page says it was asked for with.
+    """
+    from ferryid.compare import compare as compare_models
+    from ferryid.compare import select_candidates
+    from ferryid.models.store import load
+    from ferryid.report.comparison_report import report
+
+    run = _context(out, progress)
+    profile = None if vessel is None else _profile(vessel)
+    field = select_candidates(models, [load(name, run.out) for name in models], profile)
+    comparison = compare_models(field, _paths(on), run, window_s=window_s)
+    progress("writing the report")
+    outcome = report(comparison, run.out, command)
+    progress("")
+    return outcome
+
+
+def sweep(
+    what: Literal["components", "window", "both", "basis"] | str,
+    logs: Logs,
+    vessel: str | Path | Profile,
+    settings: FitSettings | None = None,
+    out: str | Path = OUT,
+    *,
+    windows_s: Sequence[float] = (),
+    folds: int | None = None,
+    archive: bool = False,
+    progress: Progress = _quiet,
+) -> Report:
+    """Cross-validate component counts, smoothing windows [s], or bases and structures, and mark which to fit with."""
+    from ferryid.identify import FOLDS, FitSettings
+    from ferryid.report.structures_report import structures_and_report
+    from ferryid.report.sweep_report import sweep_and_report
+
+    arguments = (_paths(logs), _profile(vessel), settings or FitSettings(), _context(out, progress))
+    given = {"windows_s": windows_s, "folds": FOLDS if folds is None else folds, "archive": archive}
+    if what == "basis":
+        return structures_and_report(*arguments, **given)  # type: ignore[arg-type]
+    return sweep_and_report(what, *arguments, **given)  # type: ignore[arg-type]
+
+
+def diagnose(
+    logs: Logs,
+    vessel: str | Path | Profile | None = None,
+    out: str | Path = OUT,
+    *,
+    model: str | None = None,
+    settings: DiagnosisSettings | None = None,
+    name: str = "",
+    command: Sequence[str] = (),
+    progress: Progress = _quiet,
+) -> Report:
+    """Say which physics a model left out of recordings, what shows it, and store the model that has it.
+
+    Parameters
+    ----------
+    logs
+        Recordings of one vessel.
+    vessel
+        Its profile; that of `model` where None.
+    out
+        Output folder.
+    model
+        The model to examine: path, name or name@version; the profile's hull where None.
+    settings
+        Against a simulated log, one hull for all logs, signals to withhold: `ferryid.diagnose.DiagnosisSettings`. Its model
+        is `model`.
+    name
+        Name of the model with the findings.
+    command
+        The words that the page says it was asked for with.
+    """
+    from ferryid.diagnose import DiagnosisSettings
+    from ferryid.report.diagnosis_report import diagnose_and_report, patient
+
+    out = Path(out)
+    profile, examined = patient(vessel, model, out)
+    settings = replace(settings or DiagnosisSettings(), model=examined)
+    outcome = diagnose_and_report(
+        _paths(logs), profile, out, settings, tables=out, name=name, command=command, progress=progress
+    )
+    progress("")
+    return outcome
+
+
+def batch(
+    logs: Logs,
+    out: str | Path = OUT,
+    *,
+    vessel: str | None = None,
+    recipe: Path | None = None,
+    processes: int = 2,
+    dask: str | None = None,
+    memory_limit: str = "4G",
+    again: bool = False,
+    progress: Progress = _quiet,
+    tell: Progress = _quiet,
+) -> Outcome:
+    """Fit, evaluate and diagnose every log of an archive; what is done stays done. See `ferryid.batch.run.batch`."""
+    from ferryid.batch.run import batch as run_batch
+    from ferryid.batch.run import render_batch
+
+    result = run_batch(
+        _paths(logs), Path(out), vessel=vessel, recipe=recipe, processes=processes, dask=dask, memory_limit=memory_limit,
+        again=again, progress=progress, tell=tell,
+    )  # fmt: skip
+    return _outcome(result, render_batch(result))
+
+
+def export(
+    what: str | Path,
+    out: str | Path = OUT,
+    *,
+    to: str | None = None,
+    file: Path | None = None,
+    mcap: Path | None = None,
+    model: str | None = None,
+    vessel: str | None = None,
+    diagnosis: Path | None = None,
+    overwrite: bool = False,
+    json: Path | None = None,
+    progress: Progress = _quiet,
+) -> Outcome:
+    """Write a model as code or parameters for other programs, or with `mcap` a log and its forces for a viewer.
+
+    See `ferryid.export.commands.export` for the arguments.
+    """
+    from ferryid.export.commands import export as write_export
+    from ferryid.export.commands import render_export
+
+    result = write_export(
+        str(what), Path(out), to=to, file=file, mcap=mcap, model=model, vessel=vessel, diagnosis=diagnosis,
+        overwrite=overwrite, json=json, progress=progress,
+    )  # fmt: skip
+    progress("")
+    return _outcome(result, render_export(result))
+
+
+def models(out: str | Path = OUT) -> Outcome:
+    """Return the stored models, and which of each name is current."""
+    from ferryid.models.store import list_versions
+    from ferryid.report.model_text import render_listing
+
+    result = list_versions(Path(out))
+    return _outcome(result, render_listing(result, Path(out)))
+
+
+def show_model(model: str | Path | Model, out: str | Path = OUT) -> Outcome:
+    """Return one model: its coefficients with their intervals, scores and settings."""
+    from ferryid.models import model_to_json
+    from ferryid.report.model_text import render_model
+
+    loaded = _model(model, Path(out))
+    return _outcome(model_to_json(loaded), render_model(loaded))
+
+
+def scenarios() -> Outcome:
+    """Return the bundled scenarios of the simulator."""
+    from ferryid.simulate import render_scenarios, scenario_listing
+
+    listing = scenario_listing()
+    return _outcome(listing, render_scenarios(listing))
+
+
+def simulate(
+    scenario: str | Path,
+    out: str | Path = OUT,
+    *,
+    log: Path | None = None,
+    storage: str = "sqlite3",
+    truth: Path | None = None,
+    seed: int | None = None,
+    model: str | Path | Model | None = None,
+    models: str | Path | None = None,
+    conditions: str = "",
+    overwrite: bool = False,
+    json: Path | None = None,
+    progress: Progress = _quiet,
+) -> Outcome:
+    """Simulate a trial and write a log like a recording. See `ferryid.simulate.commands.run_scenario` for the arguments.
+
+    `models` is the output folder in whose store `model` is looked for, `out` where None.
+    """
+    from ferryid.simulate import render_simulation, run_scenario
+
+    result = run_scenario(
+        str(scenario), Path(out), log=log, storage=storage, truth=truth, seed=seed,
+        model=None if model is None else _model(model, Path(models or out)), conditions=conditions, overwrite=overwrite,
+        json=json, progress=progress,
+    )  # fmt: skip
+    return _outcome(result, render_simulation(result))
+
+
+def vessels() -> Outcome:
+    """Return the bundled vessel profiles."""
+    from ferryid.vessel import bundled, load_profile
+
+    profiles = [load_profile(name) for name in bundled()]
+    listed = [{"name": one.name, "title": one.title, "source": one.source} for one in profiles]
+    text = "\n".join(f"{one.name:<18} {one.title}" for one in profiles)
+    return _outcome({"schema": "ferryid.vessels/1", "vessels": listed}, text)
+
+
+def check_vessel(file: str | Path) -> Outcome:
+    """Return every fault of a vessel profile with its line; ``json["faults"]`` is empty where there is none."""
+    from ferryid.vessel import check_profile
+
+    faults = check_profile(str(file))
+    lines = [f"{file}:{fault.line}: {'warning: ' if fault.warning else ''}{fault.message}" for fault in faults]
+    result = {"schema": "ferryid.vessel-check/1", "file": str(file), "faults": [asdict(fault) for fault in faults]}
+    return _outcome(result, "\n".join(lines) if lines else f"{file}: no faults")
+
+
+def reproduce(
+    what: str,
+    out: str | Path = OUT,
+    *,
+    only: Sequence[str] = (),
+    repetitions: int = 7,
+    processes: int = 2,
+    progress: Progress = _quiet,
+) -> Outcome:
+    """Fly published trials again in the simulator and set the results side by side. See `ferryid.reproduce.run.reproduce`."""
+    from ferryid.reproduce.run import render_reproduction
+    from ferryid.reproduce.run import reproduce as fly_again
+
+    result = fly_again(what, Path(out), only=only, repetitions=repetitions, processes=processes, progress=progress)
+    return _outcome(result, render_reproduction(result))
+
+
+def prove(
+    out: str | Path = OUT,
+    *,
+    seed: int | None = None,
+    runs: float = 1.0,
+    only: Sequence[str] = (),
+    processes: int = 1,
+    dask: str | None = None,
+    progress: Progress = _quiet,
+    announce: Progress = _quiet,
+) -> Outcome:
+    """Inject effects into simulated trials, diagnose them blind and score what is found.
+
+    See `ferryid.validation.run.run_validation` for the arguments.
+    """
+    from ferryid.validation.evaluators import pipeline
+    from ferryid.validation.run import render_summary, run_validation
+
+    result = run_validation(
+        Path(out), pipeline(), seed=seed, runs=runs, only=only, processes=processes, dask=dask, progress=progress,
+        announce=announce,
+    )  # fmt: skip
+    return _outcome(result, render_summary(result))

@@ -1,0 +1,46 @@
+"""What a command leaves: its result as JSON and as text, and the page of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+LARGEST_SHOWN = 8 << 20
+"""A page beyond this many bytes is linked in a notebook, not shown: the notebook would keep all of it."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of a command; a notebook shows its text.
+
+    Attributes
+    ----------
+    json
+        The result as ``--json`` writes it; its key ``schema`` names its form.
+    text
+        The result as a terminal shows it.
+    """
+
+    json: dict[str, Any]
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.text)}</pre>"
+
+
+@dataclass(frozen=True)
+class Report(Outcome):
+    """A result with a page, which a notebook shows in its place."""
+
+    report: Path
+
+    def _repr_html_(self) -> str:
+        if self.report.stat().st_size > LARGEST_SHOWN:
+            return f"{super()._repr_html_()}<p><a href='{escape(self.report.resolve().as_uri())}'>report</a></p>"
+        page = escape(self.report.read_text(encoding="utf-8"))
+        return f'<iframe srcdoc="{page}" style="width: 100%; height: 40em; border: 1px solid #ccc"></iframe>'

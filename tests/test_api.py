@@ -1,0 +1,81 @@
+"""The public Python API: a call for each command, which the commands go through, and results that show themselves."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ferryid import api
+from ferryid.errors import FerryIdError
+from ferryid.identify import FitSettings
+from ferryid.report import outcome as outcome_module
+from ferryid.vessel import load_profile
+
+ROOT = Path(__file__).resolve().parents[1]
+SHORT = ROOT / "fixtures" / "short.mcap"
+
+
+def test_every_call_has_a_command_that_makes_it() -> None:
+    calls = {
+        node.func.attr
+        for path in (ROOT / "cli").glob("cmd_*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and ast.unparse(node.func.value) == "api"
+    }
+    assert calls == set(api.__all__)
+
+
+def test_every_call_is_typed_and_documented() -> None:
+    for name in api.__all__:
+        call = getattr(api, name)
+        assert inspect.getdoc(call), name
+        assert all(one.annotation is not one.empty for one in inspect.signature(call).parameters.values()), name
+        assert inspect.signature(call).return_annotation in ("Outcome", "Report", "FitReport"), name
+
+
+def test_importing_it_imports_nothing_heavy() -> None:
+    code = "import sys, ferryid.api; print([name for name in ('numpy', 'pandas', 'typer') if name in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_from_a_log_to_a_comparison(tmp_path: Path) -> None:
+    seen = api.inspect(SHORT, "milliampere")
+    assert seen.json["schema"] == "ferryid.inspect/1"
+    stages: list[str] = []
+    fitted = api.fit(SHORT, "milliampere", out=tmp_path, progress=stages.append)
+    assert fitted.json["scores"]["normalised_mse"] == fitted.stored.model.scores.to_json()["normalised_mse"]
+    assert fitted.report == tmp_path / "reports" / "milliampere-v1" / "report.html"
+    assert str(fitted) == fitted.text
+    assert stages[-1] == ""
+    assert "milliampere" in str(api.models(tmp_path))
+    # A model in hand, and its name in the store.
+    by_name, by_model = (
+        api.evaluate(model, [SHORT], tmp_path).json["logs"] for model in ("milliampere", fitted.stored.model)
+    )
+    assert by_name == by_model
+    assert api.show_model("milliampere@1", tmp_path).json == api.show_model(fitted.stored.model, tmp_path).json
+    api.fit([SHORT], load_profile("milliampere"), FitSettings(window_s=2.0), tmp_path)
+    compared = api.compare(["milliampere@1", "milliampere@2"], SHORT, tmp_path)
+    assert compared.report.exists()
+
+
+def test_a_notebook_shows_the_page_or_the_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert outcome_module.Outcome({}, "a < b")._repr_html_() == "<pre>a &lt; b</pre>"
+    page = tmp_path / "report.html"
+    page.write_text('<p title="x">page</p>', encoding="utf-8")
+    made = outcome_module.Report({}, "a < b", page)
+    assert 'srcdoc="&lt;p title=&quot;x&quot;&gt;page&lt;/p&gt;"' in made._repr_html_()
+    monkeypatch.setattr(outcome_module, "LARGEST_SHOWN", 3)
+    assert "srcdoc" not in made._repr_html_()
+    assert page.as_uri() in made._repr_html_()
+
+
+def test_what_cannot_be_used_is_refused_as_by_the_commands(tmp_path: Path) -> None:
+    with pytest.raises(FerryIdError, match="no such file or folder"):
+        api.fit(tmp_path / "missing.mcap", "milliampere", out=tmp_path)
+    assert not any(tmp_path.iterdir())
