@@ -19,7 +19,7 @@ from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.files import alone
 from ferryid.identify import Acceptance, accept
-from ferryid.models import Conditions, Model, ModelScores, Quantity, StoredEffect, blank_model
+from ferryid.models import Conditions, ForceScores, Model, ModelScores, Quantity, StoredEffect, blank_model
 from ferryid.models.forces import ModelForces
 from ferryid.models.store import check_name, save
 from ferryid.types import AXES
@@ -88,7 +88,7 @@ def update_model(
         settings={**start.settings, "diagnosed_from": diagnosed_from},
         ranges=start.ranges or _spanned([one.ranges for one in logs]),
         training=_trained(start, logs),
-        scores=ModelScores.from_json(scores),
+        scores=scores,
         accepted=verdict.accepted and bool(vessel),
         hull=_quantities(hull, covariance),
         vessel_effects=_composed(start.vessel_effects, vessel, profile),
@@ -235,7 +235,7 @@ def _spanned(several: Sequence[Mapping[str, tuple[float, float]]]) -> dict[str, 
     return {name: (min(one[name][0] for one in several), max(one[name][1] for one in several)) for name in several[0]}
 
 
-def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[Acceptance, dict[str, Any]]:
+def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[Acceptance, ModelScores]:
     """Return held-out force errors without and with the findings, pooled over logs, as a model file has its scores."""
     weights = np.array([float(one.before.get("rows", 0)) for one in diagnoses])
     weights = weights / weights.sum() if weights.sum() > 0.0 else np.full(len(diagnoses), 1.0 / len(diagnoses))
@@ -244,18 +244,13 @@ def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[
         for part in ("before", "after")
     )
     verdict = accept(before, after)
-    unknown = dict.fromkeys(AXES, nan)
-    scores = {
-        "mse": {
-            "base": dict(zip(AXES, before.tolist(), strict=True)),
-            "model": dict(zip(AXES, after.tolist(), strict=True)),
-        },
-        "r2": {"base": unknown, "model": unknown},
-        "per_axis": dict(verdict.per_axis),
-        "normalised_mse": verdict.normalised_mse,
-        "rows": sum(int(one.before.get("rows", 0)) for one in diagnoses),
-        "seconds": sum(float(str(log.training["seconds"])) for log in logs),
-        "split": "blocks",
-        "split_notes": ["Of windows of the weak form, held out in contiguous blocks; with the conditions of each log."],
-    }
+    unknown = np.full(len(AXES), nan)
+    ratio = np.array([verdict.per_axis[axis] for axis in AXES])
+    scores = ModelScores(
+        ForceScores(before, after, unknown, unknown, ratio, verdict.normalised_mse),
+        rows=sum(int(one.before.get("rows", 0)) for one in diagnoses),
+        seconds=sum(float(str(log.training["seconds"])) for log in logs),
+        split="blocks",
+        split_notes=("Of windows of the weak form, held out in contiguous blocks; with the conditions of each log.",),
+    )
     return verdict, scores

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ferryid.identify.adaptive.averaging import unknown_scores
 from ferryid.models.model import Model
 from ferryid.regression.bases.basis import make_basis
 from ferryid.simulate.paths import set_points
@@ -54,7 +55,7 @@ def model():
             covariance=np.zeros((3, K + 1, K + 1)),
             ranges={},
             training=(),
-            scores=None,
+            scores=unknown_scores(),
             accepted=True,
         )
         return replace(plain, **changes)
