@@ -12,14 +12,8 @@ import numpy as np
 
 from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.judging.sparse_regression import nuisance_columns
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.vessel.profile import Floats
-
-SHARE = 0.6
-"""Share of what an effect does on an axis that is not there, as of which it is not the effect."""
-SURE = 2.0
-"""Standard errors, as they are told, by which it has to be shown that some is missing."""
-ACTS = 0.1
-"""Share of an effect's whitened work as of which it acts on an axis."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +28,13 @@ class AxisConsistency:
     def inconsistent(self) -> bool:
         """Whether most of it is missing on an axis where it acts."""
         missing = -self.beyond
-        return bool(np.any((self.acts > ACTS) & (missing > SHARE) & (missing - SURE * self.errors > 0.0)))
+        return bool(
+            np.any(
+                (self.acts > JUDGING.acting_share)
+                & (missing > JUDGING.missing_share)
+                & (missing - JUDGING.missing_errors * self.errors > 0.0)
+            )
+        )
 
 
 def check_axis_consistency(problem: EstimationProblem, kept: Fit, index: int) -> AxisConsistency:

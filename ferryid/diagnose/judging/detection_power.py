@@ -22,15 +22,11 @@ from ferryid.diagnose.inference.estimation import (
 )
 from ferryid.diagnose.inference.search import ODDS
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, titled
 from ferryid.vessel.profile import Floats
-
-SEEN = 0.5
-"""An effect of usual size that a log would show with less than this chance counts as one that it could not show."""
-LEARNT = 0.5
-"""An axis is excited if some combination of its coefficients is known to this share of what was known before the log."""
 
 AXES = {
     axis: tuple(k for k, name in enumerate(COEFFICIENTS) if name.startswith(begins))
@@ -118,14 +114,14 @@ def unexcited_axes(problem: EstimationProblem) -> tuple[str, ...]:
     found = []
     for axis, places in AXES.items():
         most = float(np.linalg.eigvalsh(information[np.ix_(places, places)])[-1])
-        if 1.0 / sqrt(1.0 + max(most, 0.0)) > LEARNT:
+        if 1.0 / sqrt(1.0 + max(most, 0.0)) > JUDGING.excited_share:
             found.append(axis)
     return tuple(found)
 
 
 def is_testable(every: Sequence[DetectionPower], axes: Sequence[str]) -> bool:
     """Tell whether a log in which nothing was found can be said to match: more than half of the effects would have shown."""
-    return 2 * sum(one.chance >= SEEN for one in every) > len(every) and len(axes) < len(AXES)
+    return 2 * sum(one.chance >= JUDGING.detection_chance for one in every) > len(every) and len(axes) < len(AXES)
 
 
 def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> list[str]:
@@ -139,7 +135,7 @@ def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> li
         )
     by_manoeuvre: dict[str, dict[str, list[str]]] = {}
     for one in every:
-        if one.chance < SEEN:
+        if one.chance < JUDGING.detection_chance:
             known = by_manoeuvre.setdefault(SHOWS.get(one.candidate.effect.id, OTHERWISE), {})
             known.setdefault(one.candidate.effect.title.lower(), []).extend(filter(None, [one.candidate.instance]))
     if by_manoeuvre:

@@ -16,15 +16,10 @@ from ferryid.diagnose.inference.stochastic_disturbance import WORTH, Disturbance
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
-
-ABOUT_PEAK = 0.1
-"""Share of its peak's power down to which a disturbance is compared with the velocities: a navigation that smooths them shifts
-a peak a little, and a narrow one then misses itself."""
-PASSED = 1e-2
-"""Share of the power that windows must let through for a frequency to be shown."""
 
 
 def disturbance_claims(
@@ -66,7 +61,7 @@ def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[
     turns = np.exp(-2j * np.pi * np.outer(frequency, step_s * np.arange(len(short.weight))))
     passed = np.abs(turns @ short.weight * step_s) ** 2
     # A mean is no part of what comes and goes, and what the windows stop tells nothing.
-    seen = (frequency > 0.0) & (passed > PASSED)
+    seen = (frequency > 0.0) & (passed > JUDGING.passed_power)
     pushed = sum(
         (np.mean(one.force[:, axis] ** 2) * density(one, frequency) for one in pushes), np.zeros_like(frequency)
     )
@@ -125,5 +120,5 @@ def _power_in_velocities(evidence: Mapping[str, Floats]) -> float:
 
     It was found in positions, whose errors in a narrow band look like a force; a force moves velocities as well.
     """
-    strong = evidence["explained"] >= ABOUT_PEAK * evidence["explained"].max()
+    strong = evidence["explained"] >= JUDGING.peak_share * evidence["explained"].max()
     return float(evidence["before"][strong].sum() / max(evidence["explained"][strong].sum(), 1e-300))

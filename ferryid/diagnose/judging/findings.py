@@ -26,9 +26,10 @@ from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import figure_columns, figure_regressor
-from ferryid.diagnose.judging.finding import NEAR, Finding, Rival
+from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
@@ -69,7 +70,9 @@ def _force_claim(
     rivals = tuple(
         Rival(one.candidate.effect.id, one.candidate.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
     )
-    unresolved = tuple(dict.fromkeys(one.candidate.effect.id for one in standing.rivals if one.gain > -NEAR))
+    unresolved = tuple(
+        dict.fromkeys(one.candidate.effect.id for one in standing.rivals if one.gain > -JUDGING.unresolved_evidence)
+    )
     # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
     bare = replace(
         kept,

@@ -17,8 +17,9 @@ from ferryid.diagnose.inference.estimation import (
     fit,
 )
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.error_profiles import FEWEST, in_words, profile_of
+from ferryid.diagnose.judging.error_profiles import in_words, profile_of
 from ferryid.diagnose.judging.locate import locate, whitened
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import Parameter, effects
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
 from ferryid.vessel import load_profile
@@ -181,7 +182,7 @@ def test_a_profile_of_noise_is_even_and_counts_every_window() -> None:
 
 
 def test_bins_with_too_few_windows_are_not_judged() -> None:
-    value = np.concatenate([np.full(50, 0.5), np.full(FEWEST - 1, 1.5), np.full(50, 2.5)])
+    value = np.concatenate([np.full(50, 0.5), np.full(JUDGING.bin_windows - 1, 1.5), np.full(50, 2.5)])
     white = np.random.default_rng(0).standard_normal((len(value), 3))
     one = profile_of("speed", "m/s", value, np.array([0.0, 1.0, 2.0, 3.0]), white, white, white)
     assert np.isnan(one.excess[1]).all()
