@@ -113,11 +113,14 @@ class SignalThresholds:
     position_step_m: float = threshold(
         1.0,
         "m",
-        "step of a position that is plausible at any interval",
+        "step of a position that is plausible at any interval, and least jump",
         "convention: wrong on a 1 m model and on a ferry",
     )
     position_rate_mps: float = threshold(
-        15.0, "m/s", "and besides, per second of interval", "convention: beyond the speed of a ferry"
+        15.0,
+        "m/s",
+        "added to `position_step_m` per second of interval, and highest speed of a jump",
+        "convention: beyond the speed of a ferry",
     )
     attitude_step_rad: float = threshold(
         0.15,
@@ -126,7 +129,10 @@ class SignalThresholds:
         "convention: wrong on a 1 m model and on a ferry",
     )
     attitude_rate_radps: float = threshold(
-        2.0, "rad/s", "and besides, per second of interval", "convention: beyond the yaw rate of a 1 m model"
+        2.0,
+        "rad/s",
+        "added to `attitude_step_rad` per second of interval, and highest rate of a heading's jump",
+        "convention: beyond the yaw rate of a 1 m model",
     )
     velocity_step_mps: float = threshold(
         0.3,
@@ -135,7 +141,10 @@ class SignalThresholds:
         "convention: wrong on a 1 m model and on a ferry",
     )
     velocity_rate_mps2: float = threshold(
-        3.0, "m/s²", "and besides, per second of interval", "convention: beyond the acceleration of a 1 m model"
+        3.0,
+        "m/s²",
+        "added to `velocity_step_mps` per second of interval",
+        "convention: beyond the acceleration of a 1 m model",
     )
     yaw_rate_step_radps: float = threshold(
         0.1,
@@ -144,13 +153,16 @@ class SignalThresholds:
         "convention: wrong on a 1 m model and on a ferry",
     )
     yaw_rate_rate_radps2: float = threshold(
-        1.0, "rad/s²", "and besides, per second of interval", "convention: beyond the acceleration of a 1 m model"
+        1.0,
+        "rad/s²",
+        "added to `yaw_rate_step_radps` per second of interval",
+        "convention: beyond the acceleration of a 1 m model",
     )
     wind_step_mps: float = threshold(
         10.0, "m/s", "step of a wind that is plausible at any interval", "convention: the largest gust"
     )
     wind_rate_mps2: float = threshold(
-        10.0, "m/s²", "and besides, per second of interval", "convention: the largest gust within a second"
+        10.0, "m/s²", "added to `wind_step_mps` per second of interval", "convention: the largest gust within a second"
     )
     current_step_mps: float = threshold(
         0.5,
@@ -159,7 +171,10 @@ class SignalThresholds:
         "convention: a strong current comes into view",
     )
     current_rate_mps2: float = threshold(
-        1.0, "m/s²", "and besides, per second of interval", "convention: a strong current within a second"
+        1.0,
+        "m/s²",
+        "added to `current_step_mps` per second of interval",
+        "convention: a strong current within a second",
     )
     actuator_step: float = threshold(
         0.25,

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.sparse_regression import nuisance_columns
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.vessel.profile import Floats
@@ -63,5 +64,5 @@ def check_axis_consistency(problem: EstimationProblem, kept: Fit, index: int) ->
     bend = A.T @ A + np.eye(A.shape[1])
     slope = A.T @ problem.noise.white(here, runs) + np.concatenate([centre, np.zeros(c)])
     covariance = np.linalg.inv(bend)
-    errors = WIDER * np.sqrt(np.diag(covariance))[-c:]
+    errors = INFERENCE.posterior_factor * np.sqrt(np.diag(covariance))[-c:]
     return AxisConsistency(-(covariance @ slope)[-c:], errors, work / max(float(work.sum()), 1e-12))

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.candidate_terms import Term, terms_of
-from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fit
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit
 from ferryid.diagnose.inference.folds import Folds
-from ferryid.diagnose.inference.search import VOID
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.held_out import compare_held_out, held_out
 from ferryid.diagnose.judging.sparse_regression import Law, law_candidate, linearise_terms
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -116,7 +116,9 @@ class VesselLaw:
 
         What is wrong in the same way in all logs, such as the arithmetic, holds in all of them but moves it by next to nothing.
         """
-        return bool(self.able.sum() >= 2 and (self.gains[self.able] > 0.0).all() and (self.moves >= VOID).all())
+        return bool(
+            self.able.sum() >= 2 and (self.gains[self.able] > 0.0).all() and (self.moves >= INFERENCE.void_share).all()
+        )
 
 
 @dataclass(frozen=True)
@@ -237,6 +239,6 @@ def _fitted(said: Sequence[LogInformation], terms: tuple[Term, ...]) -> VesselLa
     # What each log would gain by coefficients of its own, over the common ones, is chi-squared if only noise parts them.
     own = np.array([0.5 * g @ np.linalg.pinv(N, hermitian=True) @ g for N, g in zip(normal, slope, strict=True)])
     apart = 2.0 * float(own.sum() - 0.5 * b @ values) / (len(terms) * (len(said) - 1))
-    errors = WIDER * np.sqrt(np.diag(inverse) * max(1.0, apart))
+    errors = INFERENCE.posterior_factor * np.sqrt(np.diag(inverse) * max(1.0, apart))
     most = np.array([max(one.move(term) for one in said) for term in terms])
     return VesselLaw(terms, values, errors, elsewhere, gains, expected, np.abs(values) * most)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.inference.onset_estimation import LEAST_BLOCKS
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -150,7 +150,7 @@ def improves_no_claimed_axis(finding: Finding, context: Context, threshold: floa
     )
 
 
-@rule(LEAST_BLOCKS, "held-out blocks")
+@rule(INFERENCE.span_blocks, "held-out blocks")
 def too_brief(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what acts for less than this: a fit that is judged on one part of it must have seen another."""
     if not _brief(context.own, threshold):
@@ -178,7 +178,7 @@ def place_visited_once(finding: Finding, context: Context, _threshold: float) ->
 @rule(JUDGING.least_passing, "times what hull and formulas may be off by in a part of the manoeuvres")
 def passes_by_little(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what both begins and ends within the log and is smaller than this; what is too brief has its own rule."""
-    if context.own.passes >= threshold or _brief(context.own, LEAST_BLOCKS):
+    if context.own.passes >= threshold or _brief(context.own, INFERENCE.span_blocks):
         return finding, ""
     return _because(finding, "it comes and goes, by less than hull and formulas may be off in a part of the manoeuvres")
 

@@ -20,7 +20,7 @@ from ferryid.diagnose.inference.estimation import (
     effect_slopes,
     fitted_force_model,
 )
-from ferryid.diagnose.inference.search import ODDS
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
@@ -55,8 +55,8 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
 
     With d the change of the whitened prediction errors that the effect makes at its usual size, less what hull and findings
     can imitate, and S the information on its parameters, the logarithm of the evidence is normal about ``½ d'd - ½ z'z - ½ log
-    det(1 + S)`` with a variance of ``d'd``; z are the parameters in their sizes. It has to exceed `ODDS`. Of effects that may
-    go either way the less visible one counts.
+    det(1 + S)`` with a variance of ``d'd``; z are the parameters in their sizes. It has to exceed
+    `INFERENCE.prior_odds`. Of effects that may go either way the less visible one counts.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
             strength = float(change @ change)
             occam = float(np.linalg.slogdet(np.eye(len(size)) + information)[1])
             evidence = 0.5 * (strength - len(size) - occam)
-            chance = min(chance, 0.5 * (1.0 + erf((evidence - ODDS) / sqrt(2.0 * max(strength, 1.0)))))
+            chance = min(chance, 0.5 * (1.0 + erf((evidence - INFERENCE.prior_odds) / sqrt(2.0 * max(strength, 1.0)))))
         else:
             made.append(DetectionPower(candidate, chance))
     return tuple(made)

@@ -12,7 +12,8 @@ from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import fine_windows, spectrum_of
-from ferryid.diagnose.inference.stochastic_disturbance import WORTH, DisturbanceState
+from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.finding import Finding
@@ -97,7 +98,7 @@ def _claim(
     finding = Finding(
         effect=candidate.effect.id,
         instance=None,
-        probability=1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0))),
+        probability=1.0 / (1.0 + exp(min(INFERENCE.disturbance_gain - state.gain, 50.0))),
         parameters=parameters,
         axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
         intervals=((float(scene.t[0]), float(scene.t[-1])),),

@@ -11,7 +11,6 @@ import numpy as np
 
 from ferryid.diagnose.data.estimate import AXES, Estimate
 from ferryid.diagnose.inference.estimation import (
-    WIDER,
     Candidate,
     EstimationProblem,
     Fit,
@@ -22,6 +21,7 @@ from ferryid.diagnose.inference.estimation import (
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
 from ferryid.diagnose.inference.profile_likelihood import intervals
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.experiment_design import manoeuvre
@@ -222,7 +222,7 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
     # Each moment stands for the time about it; the posterior is as much wider as that of other parameters.
     edges = np.concatenate([moments[:1], 0.5 * (moments[1:] + moments[:-1]), moments[-1:]])
     edges[[0, -1]] += np.array([-0.5, 0.5]) * TIME_FINE_S
-    log_weights = np.array([tried[time] for time in moments.tolist()]) / WIDER**2
+    log_weights = np.array([tried[time] for time in moments.tolist()]) / INFERENCE.posterior_factor**2
     weights = np.exp(log_weights - log_weights.max()) * np.diff(edges)
     shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
     low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise, fit_autoregression
 from ferryid.diagnose.inference.candidate_terms import Term, terms_of
-from ferryid.diagnose.inference.estimation import WIDER, Candidate, EstimationProblem, Fit, fit, fitted_force_model
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds
-from ferryid.diagnose.inference.search import VOID
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.held_out import Improvement, compare_held_out, held_out
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Effect, Parameter
@@ -138,7 +138,15 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
     better = compare_held_out(seen, folds, before, after)
     if better.score_low <= 0.0:
         return None
-    return Law(tuple(chosen), made, seen, better, *gains[0], made.values[-1], WIDER * made.errors(len(kept.candidates)))
+    return Law(
+        tuple(chosen),
+        made,
+        seen,
+        better,
+        *gains[0],
+        made.values[-1],
+        INFERENCE.posterior_factor * made.errors(len(kept.candidates)),
+    )
 
 
 def _unlike(problem: EstimationProblem, kept: Fit, terms: Sequence[Term], moved: Floats) -> list[Term]:
@@ -193,7 +201,7 @@ def _void(problem: EstimationProblem, made: Fit) -> bool:
     without = replace(made, candidates=made.candidates[:-1], values=made.values[:-1])
     moved = seen.gap(fitted_force_model(problem.plain, made)) - seen.gap(fitted_force_model(problem.plain, without))
     size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
-    return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
+    return bool((np.sqrt(np.mean(moved**2, axis=0)) < INFERENCE.void_share * size).all())
 
 
 def _best(

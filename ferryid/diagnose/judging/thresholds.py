@@ -188,7 +188,7 @@ class JudgingThresholds:
         0.5,
         "-",
         "posterior over prior standard deviation of some combination of coefficients below which an axis is excited",
-        "convention: the log tells as much as twice the prior",
+        "convention: the log has three times the information of the prior",
     )
     bin_windows: int = threshold(
         4, "windows", "least windows in a bin of an error profile", "convention: fewer have no scatter to judge by"

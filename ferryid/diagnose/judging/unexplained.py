@@ -18,8 +18,8 @@ from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds, folds_of
 from ferryid.diagnose.inference.onset_estimation import brief
-from ferryid.diagnose.inference.search import ODDS
 from ferryid.diagnose.inference.spectra import BURST_HZ, Band, Burst, bursts_of
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_laws import CampaignLaws
 from ferryid.diagnose.judging.claims import Claim, Figures, OtherLogs
 from ferryid.diagnose.judging.figure_data import figure_columns
@@ -126,8 +126,8 @@ def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) 
     with_law = fit(fair, [*rest, told], [*start, coefficients]).evidence
     with_effect = fit(fair, [*rest, candidate], [*start, values]).evidence
     with_both = fit(fair, [*rest, told, candidate], both.values).evidence
-    better = with_law - with_effect > max(ODDS, candidate.effect.form * (with_law - with_neither))
-    return better and with_both - with_law < ODDS
+    better = with_law - with_effect > max(INFERENCE.prior_odds, candidate.effect.form * (with_law - with_neither))
+    return better and with_both - with_law < INFERENCE.prior_odds
 
 
 def _lawful(law: Law, kept: Fit, scene: Measurements, whose: str) -> Finding:

@@ -8,14 +8,8 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.change_points import MOST_BREAKS, _breaks, active_intervals
-from ferryid.diagnose.inference.estimation import (
-    HULL_SPREAD,
-    Candidate,
-    EstimationProblem,
-    Fit,
-    estimation_problem,
-    fit,
-)
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, estimation_problem, fit
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.error_profiles import in_words, profile_of
 from ferryid.diagnose.judging.locate import locate, whitened
@@ -54,7 +48,7 @@ def trial_on(push: Floats | None = None) -> EstimationProblem:
     scene = replace(seen, parts=parts)
     cut = windows(scene, 8.0, 2.0)
     plain = ForceModel(cut.scene, hull_of(FERRY), cut.scene.parts, cut.scene.angles, np.zeros((len(cut.scene.t), 3)))
-    return estimation_problem(cut, plain, HULL_SPREAD * np.abs(plain.hull))
+    return estimation_problem(cut, plain, INFERENCE.hull_spread * np.abs(plain.hull))
 
 
 def pushed(shape: Floats) -> Candidate:
