@@ -20,9 +20,10 @@ test: $(VENV)/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy & $(BIN)/pytest $(SPREAD) --durations=25; code=$$?; wait $$! && exit $$code
 
-# The documents as a site, in build/site; a broken link is an error.
+# The documents as a site, in build/site, with the pages that are made from the code; a broken link is an error.
 docs: $(VENV)/installed
 	$(BIN)/python -m tests.docs.drawing
+	$(BIN)/python -m tests.docs.thresholds
 	$(BIN)/mkdocs build --strict
 
 # Which pages in reports/ are older than the sources that they were made from.

@@ -21,6 +21,7 @@ ORDER = (
     "compiled",
     "lazy",
     "types",
+    "thresholds",
     "ingest",
     "vessel",
     "signals",

@@ -14,7 +14,7 @@ import numpy as np
 
 from ferryid.batch.summary import found_in, parameters_of
 from ferryid.counts import counted, verb
-from ferryid.diagnose import HINT
+from ferryid.diagnose import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.types import Floats
@@ -87,7 +87,7 @@ def _trend(
     places = [place for place, _ in seen]
     kind, change = trend([value for _, value in seen])
     unit = points[0]["unit"]
-    hints = sum(point["probability"] <= HINT for point in points)
+    hints = sum(point["probability"] <= JUDGING.hint_probability for point in points)
     doubt = f" ({hints} of {counted(len(points), 'finding')} {verb(hints, 'is')} hints)" if hints else ""
     what = f"{vessel}: {title}, {name.replace('_', ' ')}"
     return {

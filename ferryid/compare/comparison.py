@@ -13,6 +13,7 @@ from ferryid.compare.candidates import Candidate, CandidateSet
 from ferryid.compare.coefficient_table import coefficient_rows, effect_rows, term_rows
 from ferryid.compare.comparison_statements import PairedErrors, Row, comparison_statements
 from ferryid.compare.evaluation import range_warnings
+from ferryid.compare.thresholds import COMPARE
 from ferryid.compare.tracking import tracking_scores
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
@@ -31,10 +32,6 @@ from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.track import Motion
 from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
 
-STATEMENT_HORIZON_S = 30.0
-"""Sentences on free runs are of this horizon, or of the longest below it that has intervals."""
-MOST_LOST = 0.1
-"""Share of the free runs of a model that may diverge."""
 KEYS = ("position_m", "heading_rad", "speed_mps", "yaw_rate_radps")
 """Errors of free runs in JSON, in the order of `QUANTITIES`."""
 
@@ -263,7 +260,7 @@ def _models_that_run(candidates: Sequence[Candidate], compared: Sequence[Compare
         if not reached:
             continue
         lost = 1.0 - came / reached
-        runs[k] = lost <= MOST_LOST
+        runs[k] = lost <= COMPARE.diverged
         if not came:
             notes.append(f"{one.label} is left out of free runs: {NO_MASS}, or all its runs diverge")
         elif not runs[k]:
@@ -296,7 +293,7 @@ def _pair_errors(field: CandidateSet, compared: Sequence[ComparedLog], runnable:
     for h, horizon in enumerate(HORIZONS_S):
         sums = [_run_sums(log, runnable, h) for log in compared]
         runs.append(compare_pairs(sums))
-        if horizon <= STATEMENT_HORIZON_S and has_enough_blocks(sums):
+        if horizon <= COMPARE.statement_s and has_enough_blocks(sums):
             told = horizon
     trained = {one.label for one in field.candidates if any(one.trained_on(log.sha256) for log in compared)}
     return PairedErrors(

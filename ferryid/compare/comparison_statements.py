@@ -9,16 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.compare.thresholds import COMPARE
 from ferryid.regression.resampling import PairedRatios, holm
 from ferryid.types import AXES
 
 Row = dict[str, Any]
 
-ALIKE = 0.005
-"""Two models are alike where their mean squares differ by less than this share, however certain the difference."""
-SIGNIFICANT = 0.05
-LIKELY = 0.5
-"""Corrected probability up to which what is significant by itself may be a difference."""
 QUANTITIES = ("position", "heading", "speed", "yaw rate")
 """What free runs are judged by, in the order of their errors."""
 TOLD_QUANTITIES = 2
@@ -98,9 +94,9 @@ def _entry(
     (first, second), (ratio, low, high), (p, corrected) = pair, numbers, chances
     if ratio > 1.0:
         first, second, ratio, low, high = second, first, 1.0 / ratio, 1.0 / high, 1.0 / low
-    known, alike = isfinite(low + high) and isfinite(p), 1.0 - ratio < ALIKE
-    clear = known and not alike and corrected <= SIGNIFICANT
-    hint = known and not alike and not clear and p <= SIGNIFICANT and corrected <= LIKELY
+    known, alike = isfinite(low + high) and isfinite(p), 1.0 - ratio < COMPARE.alike
+    clear = known and not alike and corrected <= COMPARE.significance
+    hint = known and not alike and not clear and p <= COMPARE.significance and corrected <= COMPARE.maybe
     evidence = not ((clear or hint) and first in judged.trained)
     error = "MSE" if kind == "force" else f"{what} error"
     place = f"on {what}" if kind == "force" else f"in {what}, run free for {horizon:g} s"
@@ -108,7 +104,7 @@ def _entry(
     if not isfinite(ratio):
         says = f"{first} and {second} cannot be compared {place}: one of them makes no error, or there is nothing to judge by"
     elif alike:
-        says = f"{first} and {second} are alike {place}: their {error} differs by less than {ALIKE:.1%}"
+        says = f"{first} and {second} are alike {place}: their {error} differs by less than {COMPARE.alike:.1%}"
     elif not known:
         says = f"too little data to tell {first} from {second} {place}: {error} {ratio:.3g} of the other's"
     elif clear:

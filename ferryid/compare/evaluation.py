@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.compare.thresholds import COMPARE
 from ferryid.identify import check_window
 from ferryid.models import RANGE_UNITS, Model, StoredEffect, force_scores, outside_ranges, usable_rows
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
@@ -15,9 +16,6 @@ from ferryid.signals.prepare import prepare
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, RunContext
 from ferryid.vessel.profile import Profile
-
-OUTSIDE_WARNING = 0.05
-"""Share of rows outside a range of validity from which on a warning is given."""
 
 
 def evaluate(
@@ -128,7 +126,7 @@ def range_warnings(model: Model, motion: Motion, rows: Flags) -> list[str]:
     if motion.payload is None and "payload_kg" in model.ranges:
         warnings.append("the model was trained with the payload known, and this log has none: it is taken as empty")
     for name, share in outside_ranges(model.ranges, motion, rows).items():
-        if share > OUTSIDE_WARNING:
+        if share > COMPARE.outside:
             low, high = model.ranges[name]
             warnings.append(
                 f"{share:.0%} of the rows have {name} outside the model's range of validity, {low:.3g} to {high:.3g} "

@@ -4,16 +4,15 @@ from ferryid.diagnose.data.estimate import AXES, Estimate
 from ferryid.diagnose.data.measurements import check_withheld
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, to_json
 from ferryid.diagnose.judging.error_profiles import Profiled
-from ferryid.diagnose.judging.finding import HINT, NEAR, UNKNOWN, Finding
-from ferryid.diagnose.judging.verdict import CHANGED, campaign_verdict, error_ratio, worse_axes
+from ferryid.diagnose.judging.finding import UNKNOWN, Finding
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
 
 __all__ = [
     "AXES",
-    "CHANGED",
-    "HINT",
-    "NEAR",
+    "JUDGING",
     "SCHEMA",
     "UNKNOWN",
     "Diagnosis",

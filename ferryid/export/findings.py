@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose import HINT, SCHEMA
+from ferryid.diagnose import JUDGING, SCHEMA
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 from ferryid.errors import FerryIdError
@@ -128,7 +128,7 @@ def _finding(finding: Mapping[str, Any], end_s: float) -> Iterator[Told]:
     instance, effect = finding["instance"], effects().get(str(finding["effect"]))
     name = f"ferryid: {titled(effect.title if effect else str(finding['effect']), instance)}"
     probability, says = finding["probability"], str(finding["says"])
-    hint = probability is not None and float(probability) <= HINT
+    hint = probability is not None and float(probability) <= JUDGING.hint_probability
     values = tuple(_values(finding))
     for first, last in _spans(finding["where"], end_s):
         yield Told(first, OK if hint else WARN, name, f"A hint only: {says}" if hint else says, values)

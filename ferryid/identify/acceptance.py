@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ferryid.errors import FerryIdError
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import Model, mean_square, usable_rows
 from ferryid.models.forces import Estimator, model_estimator
 from ferryid.signals.track import Motion
@@ -26,10 +27,6 @@ class Acceptance:
     reasons: tuple[str, ...]
 
 
-IMPROVEMENT = 0.05
-"""Fraction by which the mean normalised MSE must fall, thesis 3.2.4."""
-WORSENING = 0.05
-"""Fraction by which any one axis may get worse."""
 _ROUNDING = 1e-12
 _NOTHING = 1e-9
 """Root-mean-square error [N, N·m] that counts as none: rounding of forces of thousands of newtons is below it."""
@@ -80,21 +77,21 @@ def accept(base_mse: Floats, model_mse: Floats) -> Acceptance:
                 )
             continue
         ratios[i] = model[i] / base[i]
-        if ratios[i] > 1.0 + WORSENING:
+        if ratios[i] > 1.0 + IDENTIFY.worsening:
             obstacles.append(
                 f"Rejected: {axis} gets worse, {_change(ratios[i])} in MSE "
                 f"({np.sqrt(base[i]):.3g} to {np.sqrt(model[i]):.3g} {unit} RMS); "
-                f"{100 * WORSENING:.0f} % is allowed."
+                f"{100 * IDENTIFY.worsening:.0f} % is allowed."
             )
     mean = float(np.mean(ratios))
     if np.isfinite(mean):
-        enough = mean <= 1.0 - IMPROVEMENT + _ROUNDING
+        enough = mean <= 1.0 - IDENTIFY.improvement + _ROUNDING
         sentence = (
             f"On held-out data the force error (MSE relative to the base model, mean of three axes) "
             f"changes by {_change(mean)}: surge {_change(ratios[0])}, sway {_change(ratios[1])}, yaw {_change(ratios[2])}."
         )
         if not enough:
-            obstacles.insert(0, f"Rejected: a fall of {100 * IMPROVEMENT:.0f} % or more is needed. {sentence}")
+            obstacles.insert(0, f"Rejected: a fall of {100 * IDENTIFY.improvement:.0f} % or more is needed. {sentence}")
         else:
             reasons.insert(0, sentence)
     per_axis = {axis: float(ratio) for axis, ratio in zip(AXES, ratios, strict=True)}

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.identify.outcome import Excitation
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import payload_kg, validity_ranges
 from ferryid.regression import CrossProducts, QrFactor, singular_values, undetermined_terms
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
 
 SECTORS = 12
-_SECTOR_SHARE = 0.01
 
 
 def assess_excitation(
@@ -69,4 +69,4 @@ def heading_sectors(psi: Floats) -> NDArray[np.int64]:
 def sector_coverage(rows: NDArray[np.int64]) -> float:
     """Return the fraction of sectors that hold at least 1 % of the rows, counted in each (12,); NaN without rows."""
     total = int(rows.sum())
-    return float(np.mean(rows >= _SECTOR_SHARE * total)) if total else float("nan")
+    return float(np.mean(rows >= IDENTIFY.sector_share * total)) if total else float("nan")

@@ -10,18 +10,15 @@ from ferryid.counts import counted, verb
 from ferryid.identify.outcome import Excitation
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import Split
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import ModelScores
 from ferryid.models.prediction import FreeRun
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.track import Motion
 from ferryid.types import AXES
 
-LEAST_VALIDATION_S = 60.0
-MANY_MOVED = 20
 MOST_LOGS_SAID = 10
 """Logs of an archive whose own warnings are repeated for all of it."""
-USELESS_RAD, USELESS_S = 0.5, 10.0
-"""A heading lost by this much within this time says that a model does not describe the turning at all."""
 
 
 def fit_warnings(
@@ -48,7 +45,7 @@ def fit_warnings(
     for one in prepared:
         warnings += log_warnings([(one.recording.name, (*one.doubts, *one.left_out))])
         moved = max((s.clock.out_of_order + s.clock.duplicates for s in one.recording.streams.values()), default=0)
-        if moved >= MANY_MOVED:
+        if moved >= IDENTIFY.moved_rows:
             warnings.append(
                 f"{one.recording.name}: up to {counted(moved, 'row')} of a topic were out of order or "
                 "repeated a time, as when a clock "
@@ -70,7 +67,7 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
         named = ", ".join(terms[:6]) + (f" and {len(terms) - 6} more" if len(terms) > 6 else "")
         which = "These logs" if logs > 1 else "This log"
         warnings.append(f"{which} cannot determine {len(terms)} of the terms: {named}.")
-    if scores.seconds < LEAST_VALIDATION_S:
+    if scores.seconds < IDENTIFY.validation_s:
         warnings.append(f"Only {scores.seconds:.0f} s validate: the verdict rests on little data.")
     if settings.residual == "commanded":
         warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")
@@ -103,7 +100,7 @@ def free_run_warnings(base: FreeRun, new: FreeRun) -> tuple[str, ...]:
     if base.starts and not new.starts:
         return (f"The new model cannot be run free: {new.note}.",)
     warnings = []
-    turned = np.flatnonzero((new.heading_rad > USELESS_RAD) & (new.horizons_s <= USELESS_S))
+    turned = np.flatnonzero((new.heading_rad > IDENTIFY.useless_rad) & (new.horizons_s <= IDENTIFY.useless_s))
     if turned.size:
         k = int(turned[0])
         warnings.append(
@@ -115,7 +112,7 @@ def free_run_warnings(base: FreeRun, new: FreeRun) -> tuple[str, ...]:
         ("heading_rad", "heading", "deg", float(np.degrees(1.0))),
     ):
         before, after = getattr(base, name), getattr(new, name)
-        worse = np.flatnonzero(after > 1.05 * before)
+        worse = np.flatnonzero(after > (1.0 + IDENTIFY.free_run_worsening) * before)
         if worse.size:
             k = int(worse[-1])
             warnings.append(

@@ -11,27 +11,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.parse_hull import rigid_mass
 from ferryid.vessel.profile import Hull, Profile
 
-LEAST_INERTIA, MOST_INERTIA = 0.8, 5.0
-"""Parts of the rigid body's inertia between which a fitted one is believed. Added mass can only add, and no hull carries four
-times its own; noise in the derivative takes some per cent, which the lower limit allows for."""
-NO_FORCE = 1e-6
-"""An axis is without actuators when its force varies less than this part of what the base model needs."""
-
 
 def axes_without_force(tau: Floats, base: Floats) -> Flags:
     """Return the axes on which no actuator acts, shape (3,), from standard deviations of measured and base force, (3,)."""
-    return np.asarray(tau <= NO_FORCE * base)
+    return np.asarray(tau <= IDENTIFY.no_force * base)
 
 
 def implausible_inertia(profile: Profile, mass: Floats) -> Flags:
     """Return the axes whose effective inertia cannot be right, shape (3,); all of them where the matrix as a whole is."""
     share = np.diag(mass) / np.diag(_rigid(profile.hull))
-    wrong = (share < LEAST_INERTIA) | (share > MOST_INERTIA)
+    wrong = (share < IDENTIFY.least_inertia) | (share > IDENTIFY.most_inertia)
     positive = bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0.0))
     return wrong if wrong.any() or positive else np.ones(3, dtype=bool)
 

@@ -11,6 +11,7 @@ from ferryid.counts import counted
 from ferryid.identify.inertia import implausible_inertia, without_inertia
 from ferryid.identify.settings import WINDOWS_S, FitSettings, check_window
 from ferryid.identify.split import block_number, purge_seconds
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models.forces import effective_mass
 from ferryid.regression import fit_simpls, total
 from ferryid.regression.bases import Basis
@@ -18,9 +19,6 @@ from ferryid.regression.cross_validation import Curves, Folds
 from ferryid.signals.smooth import Measured, longest_stretch_s, odd_rows
 from ferryid.types import Flags, Floats
 from ferryid.vessel.profile import Profile
-
-_STRETCHES = 10.0
-"""A window is tried where the longest unbroken stretch of every log is so many times as long."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,7 @@ def windows_to_try(
     for window_s in windows_s:
         check_window(window_s)
     if tuple(windows_s) in ((), WINDOWS_S):
-        longest_s = min(longest_stretch_s(one) for one in measured) / _STRETCHES
+        longest_s = min(longest_stretch_s(one) for one in measured) / IDENTIFY.window_stretches
         windows_s = [w for w in WINDOWS_S if w <= longest_s]
         if in_blocks:
             windows_s = [w for w in windows_s if any(_divides(one, w) for one in measured)]

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.regression.bases import Basis, make_basis, with_hull_length
 from ferryid.vessel.profile import Profile
 
@@ -23,10 +24,6 @@ TEST_WINDOW_S = 1.0
 """Smoothing window of test rows [s], whatever window is tried."""
 WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
 """Smoothing windows that are usually tried [s]."""
-SHORTEST_WINDOW_S = 0.01
-"""A shorter window [s] holds a single sample at any usual rate and smooths nothing, which 0 asks for openly."""
-LEAST_FACTOR = 1e-3
-"""A smaller factor on the base model than this is no factor but its absence, and the inverse of one overflows."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +106,8 @@ class FitSettings:
             raise FerryIdError(f"--seed: {self.seed} is no seed. Fix: give a whole number from 0 on")
         for key in ("delta", "sigma", "zeta"):
             value = getattr(self, key)
-            if not LEAST_FACTOR <= value <= 100.0 and not (key == "sigma" and value == 0.0):
-                least = f"{'0, or ' if key == 'sigma' else ''}{LEAST_FACTOR:g} to 100"
+            if not IDENTIFY.least_factor <= value <= 100.0 and not (key == "sigma" and value == 0.0):
+                least = f"{'0, or ' if key == 'sigma' else ''}{IDENTIFY.least_factor:g} to 100"
                 raise FerryIdError(f"--{key}: {value} is no usable factor. Fix: give {least}, near 1 as a rule")
 
     @property
@@ -153,10 +150,10 @@ def check_components(components: str | int, functions: Basis) -> None:
 
 def check_window(window_s: float | None) -> None:
     """Refuse what is no smoothing window; None stands for a default."""
-    if window_s is not None and window_s != 0.0 and not SHORTEST_WINDOW_S <= window_s <= 60.0:
+    if window_s is not None and window_s != 0.0 and not IDENTIFY.shortest_window_s <= window_s <= 60.0:
         raise FerryIdError(
             f"--window: {window_s} s is no smoothing window. "
-            f"Fix: give {SHORTEST_WINDOW_S:g} to 60 s, 1.0 is usual, or 0 for none"
+            f"Fix: give {IDENTIFY.shortest_window_s:g} to 60 s, 1.0 is usual, or 0 for none"
         )
 
 

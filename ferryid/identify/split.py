@@ -10,22 +10,14 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
 
 KINDS = ("blocks", "logs", "every-kth")
-BLOCK_S = 40.0
-"""Usual length of a block: a manoeuvre or two, so that training and validation rows both see every kind of them."""
-FEWEST_BLOCKS, MOST_BLOCKS = 9, 36
-"""A short log has shorter blocks, a long one longer: slow vessels make long logs, and their manoeuvres last."""
 EVERY = 4
-GUARD_S = 2.0
-"""Purged on top of one window, for disturbances that outlast it; pass `correlation_time` of a residual for better."""
 
-_VALIDATES_EVERY = 3
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
-_LEAST_PURGES = 4.0
-"""A block is at least this many purge gaps long, so that more rows are used than purged."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +62,7 @@ def split_rows(
     kind: str = "blocks",
     *,
     window_s: float,
-    guard_s: float = GUARD_S,
+    guard_s: float = IDENTIFY.guard_s,
     blocks: int | None = None,
     every: int = EVERY,
     validate: Sequence[str] = (),
@@ -90,7 +82,7 @@ def split_rows(
     guard_s
         Time [s] purged in addition to one window.
     blocks
-        Number of blocks a log; None takes as many as are `BLOCK_S` long, 9 to 36 of them. Fewer where
+        Number of blocks a log; None takes as many as are `IDENTIFY.block_s` long, 9 to 36 of them. Fewer where
         blocks would be shorter than four purge gaps. Among several logs, one too short for three blocks is a block
         itself, and of such logs the second, fifth ... validate.
     every
@@ -152,7 +144,7 @@ def correlation_time(values: Floats, valid: Flags, rate_hz: float, longest_s: fl
     return float(longest)
 
 
-def purge_seconds(rate_hz: float, window_s: float, guard_s: float = GUARD_S) -> float:
+def purge_seconds(rate_hz: float, window_s: float, guard_s: float = IDENTIFY.guard_s) -> float:
     """Return the time [s] within which two rows at a rate share what was smoothed over `window_s`, and a guard."""
     # The derivative reaches one row further than the window on both sides.
     return window_s + 2.0 / rate_hz + guard_s
@@ -185,11 +177,11 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
         number = block_number(seconds, purge_s, blocks)
         if number < 3 and len(motions) == 1:
             raise _too_short(
-                motion, motion.valid, 3 * _LEAST_PURGES * purge_s, "three blocks and the gaps between them"
+                motion, motion.valid, 3 * IDENTIFY.block_purges * purge_s, "three blocks and the gaps between them"
             )
         if number < 3:
             # A log too short for blocks of its own is one block among those of its kind.
-            validates = np.full(motion.valid.size, short % _VALIDATES_EVERY == 1)
+            validates = np.full(motion.valid.size, short % IDENTIFY.validates_every == 1)
             number, short = 1, short + 1
         else:
             validates = validation_blocks(number)[_number(motion.valid, number)]
@@ -209,8 +201,8 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
 
 def block_number(seconds: float, purge_s: float, wanted: int | None = None) -> int:
     """Return the number of blocks of a log of `seconds`, none shorter than four purge gaps; see `split_rows`."""
-    usual = wanted or min(max(round(seconds / BLOCK_S), FEWEST_BLOCKS), MOST_BLOCKS)
-    return min(usual, int(seconds / (_LEAST_PURGES * purge_s)))
+    usual = wanted or min(max(round(seconds / IDENTIFY.block_s), IDENTIFY.fewest_blocks), IDENTIFY.most_blocks)
+    return min(usual, int(seconds / (IDENTIFY.block_purges * purge_s)))
 
 
 def validation_blocks(number: int) -> Flags:
@@ -219,10 +211,10 @@ def validation_blocks(number: int) -> Flags:
     Which of the three follows multiples of the golden ratio. Always the same one would keep step with a trial that
     repeats itself, and validation would see manoeuvres that training never does.
     """
-    triples = np.arange((number + 1) // _VALIDATES_EVERY)
+    triples = np.arange((number + 1) // IDENTIFY.validates_every)
     chosen = np.zeros(number, dtype=bool)
-    place = ((triples * _GOLDEN + 0.5) % 1.0 * _VALIDATES_EVERY).astype(np.int64)
-    chosen[np.minimum(_VALIDATES_EVERY * triples + place, number - 1)] = True
+    place = ((triples * _GOLDEN + 0.5) % 1.0 * IDENTIFY.validates_every).astype(np.int64)
+    chosen[np.minimum(IDENTIFY.validates_every * triples + place, number - 1)] = True
     return chosen
 
 

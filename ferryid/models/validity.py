@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ferryid.models.thresholds import MODELS
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
 
-_QUANTILES = (0.005, 0.995)
 RANGE_UNITS = {
     **dict.fromkeys(("u", "v", "U"), "m/s"),
     "r": "rad/s",
@@ -24,7 +24,7 @@ def validity_ranges(nu: Floats, nu_dot: Floats, payload: Floats | None = None) -
     """0.5 % and 99.5 % quantiles of what `range_columns` gives."""
     found = {}
     for name, values in range_columns(nu, nu_dot, payload).items():
-        low, high = np.quantile(values, _QUANTILES) if len(values) else (np.nan, np.nan)
+        low, high = np.quantile(values, MODELS.range_quantiles) if len(values) else (np.nan, np.nan)
         found[name] = (float(low), float(high))
     return found
 

@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from ferryid.regression.pca import principal_components
     from ferryid.regression.qr import QrFactor, factorise
     from ferryid.regression.simpls import Simpls, fit_simpls, total
+    from ferryid.regression.thresholds import REGRESSION
 
 __all__ = [
+    "REGRESSION",
     "CrossProducts",
     "QrFactor",
     "Rows",
@@ -57,5 +59,6 @@ __getattr__ = import_on_demand(
             "fit_simpls",
             "total",
         ),
+        "thresholds": ("REGRESSION",),
     },
 )

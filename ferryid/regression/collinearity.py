@@ -9,17 +9,8 @@ from numpy.typing import NDArray
 
 from ferryid.regression.cross_products import CrossProducts
 from ferryid.regression.qr import QrFactor, standard_deviations
+from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Flags, Floats
-
-COLLINEAR = 100.0
-"""Condition index from which on a direction counts as not determined.
-
-Belsley, Kuh and Welsch (1980) call 30 strong and 100 severe.
-"""
-_SHARE = 0.5
-"""A term belongs to a weak direction when this part of its coefficient's variance comes from it (Belsley et al.)."""
-_SAME = 1e-10
-"""Columns whose correlation lies this close to one are the same column."""
 
 
 def singular_values(source: CrossProducts | QrFactor) -> Floats:
@@ -36,7 +27,10 @@ def singular_values(source: CrossProducts | QrFactor) -> Floats:
 
 
 def undetermined_terms(
-    source: CrossProducts | QrFactor, terms: Sequence[str], allowed: Flags | None = None, limit: float = COLLINEAR
+    source: CrossProducts | QrFactor,
+    terms: Sequence[str],
+    allowed: Flags | None = None,
+    limit: float = REGRESSION.condition_index,
 ) -> Mapping[str, str]:
     """Name the terms whose coefficients the rows cannot determine, and why.
 
@@ -85,7 +79,7 @@ def _tied(
     correlation = correlation / np.outer(norm, norm)
     keep = list(range(len(columns)))
     for j in range(len(columns)):
-        same = [i for i in keep if i < j and abs(correlation[i, j]) > 1.0 - _SAME]
+        same = [i for i in keep if i < j and abs(correlation[i, j]) > 1.0 - REGRESSION.same_column]
         if same:
             i = same[0]
             sign = "" if correlation[i, j] > 0.0 else "minus "
@@ -105,7 +99,7 @@ def _tied(
         reasons.setdefault(int(single[i]), f"linear combination of {others} in this log")
     weak = index >= limit
     share = within[:, weak].sum(axis=1) / within.sum(axis=1)
-    for i in np.flatnonzero((share >= _SHARE) & ~lost).tolist():
+    for i in np.flatnonzero((share >= REGRESSION.variance_share) & ~lost).tolist():
         direction = int(np.argmax(np.where(weak, within[i], 0.0)))
         part = np.abs(vectors[:, direction])
         others = ", ".join(terms[single[j]] for j in np.argsort(-part) if j != i and part[j] >= 0.2 * part.max())

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
+from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Flags, Floats
-
-NULL_EIGENVALUE = 1e-13
-"""Eigenvalues of X'X below this part of the largest are rounding noise: X's condition is known up to 3e6 only."""
 
 CHUNK_ROWS = 8192
 """Rows in the scratch: 1.6 MB at 25 columns, so that it is still in the cache when it is multiplied."""
@@ -119,13 +117,13 @@ class CrossProducts:
     ) -> tuple[Floats, Floats, Floats]:
         """Return eigenvalues (r,), eigenvectors (k, r) and rotated covariance (r, g) of the scaled columns.
 
-        Only eigenvalues above `NULL_EIGENVALUE` of the largest are returned: below it lies rounding noise.
+        Only eigenvalues above `REGRESSION.null_eigenvalue` of the largest are returned: below it lies rounding noise.
         """
         Sxx, Sxy = self.centred()[:2]
         d, e = scale[columns], scale[self.K + outputs]
         C = Sxx[np.ix_(columns, columns)] / np.outer(d, d)
         eigenvalues, vectors = np.linalg.eigh((C + C.T) / 2.0)
-        kept = eigenvalues > NULL_EIGENVALUE * max(eigenvalues[-1], 0.0) if len(columns) else slice(0)
+        kept = eigenvalues > REGRESSION.null_eigenvalue * max(eigenvalues[-1], 0.0) if len(columns) else slice(0)
         eigenvalues, vectors = eigenvalues[kept][::-1], vectors[:, kept][:, ::-1]
         return eigenvalues, vectors, vectors.T @ (Sxy[np.ix_(columns, outputs)] / np.outer(d, e))
 

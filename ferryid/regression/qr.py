@@ -10,15 +10,9 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.regression.cross_products import CHUNK_ROWS, LARGEST, CrossProducts, Rows, not_finite
+from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Flags, Floats
 
-NULL_SINGULAR = 1e-14
-"""Singular values below this part of the largest are rounding noise."""
-CONDITION_FOR_QR = 1e3
-"""Condition of the standardised basis above which `factorise` goes over the rows again by QR.
-
-Cross-products determine coefficients to about ``2e-16 · condition²``, so 2e-10 here; QR to ``2e-16 · condition``.
-"""
 _BLOCK_ROWS = 256
 """Rows factorised at once: they stay in the innermost caches, 2.5 times as fast as 1024 and more."""
 
@@ -118,7 +112,7 @@ class QrFactor:
         if not len(columns):
             return np.zeros(0), np.zeros((0, 0)), np.zeros((0, len(outputs)))
         left, singular, right = np.linalg.svd(inner[:, columns], full_matrices=False)
-        kept = singular > NULL_SINGULAR * singular[0]
+        kept = singular > REGRESSION.null_singular * singular[0]
         singular = singular[kept]
         rotated = left[:, kept].T @ inner[:, self.K + outputs]
         return singular**2, right[kept].T, singular[:, None] * rotated
@@ -164,7 +158,7 @@ def factorise(*parts: Rows, names: Sequence[str] = (), where: str = "fit") -> Cr
     """Cross-products of the rows, or their QR factor where `condition` says that cross-products would lose digits.
 
     The rows are gone over a second time only when the condition of the standardised basis exceeds
-    `CONDITION_FOR_QR`, or when a linear dependence shows that is neither a constant nor a duplicate column.
+    `REGRESSION.condition_for_qr`, or when a linear dependence shows that is neither a constant nor a duplicate column.
 
     Raises
     ------
@@ -173,7 +167,7 @@ def factorise(*parts: Rows, names: Sequence[str] = (), where: str = "fit") -> Cr
     """
     cross = CrossProducts.of(*parts, names=names, where=where)
     number, unexplained = condition(cross)
-    if number <= CONDITION_FOR_QR and not unexplained:
+    if number <= REGRESSION.condition_for_qr and not unexplained:
         return cross
     return QrFactor.of(*parts, names=names, where=where)
 

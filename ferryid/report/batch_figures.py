@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MaxNLocator
 
-from ferryid.diagnose import HINT
+from ferryid.diagnose import JUDGING
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, UNITS, canvas, svg_text
 from ferryid.types import AXES
 
@@ -33,8 +33,8 @@ def findings(trends: Sequence[Mapping[str, Any]]) -> str:
         figure, every = canvas(len(trends), 1.0 + PANEL * len(trends))
         dated = bool(trends[0]["dated"])
         for ax, one in zip(every, trends, strict=True):
-            sure = [point for point in one["points"] if point["probability"] > HINT]
-            hints = [point for point in one["points"] if point["probability"] <= HINT]
+            sure = [point for point in one["points"] if point["probability"] > JUDGING.hint_probability]
+            hints = [point for point in one["points"] if point["probability"] <= JUDGING.hint_probability]
             _points(ax, sure, dated, "found", NEW)
             _points(ax, hints, dated, "a hint", "white")
             if one["neutral"] is not None:

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from ferryid.counts import counted
-from ferryid.diagnose import HINT
+from ferryid.diagnose import JUDGING
 from ferryid.report import batch_figures
 from ferryid.report.diagnosis_words import title
 from ferryid.report.html import template
@@ -99,7 +99,7 @@ def _headline(counts: Mapping[str, int]) -> str:
 def _row(row: Mapping[str, Any]) -> dict[str, Any]:
     fit, evaluation, diagnosis = row["fit"], row["evaluate"], row["diagnose"]
     findings = diagnosis["findings"] if diagnosis else []
-    sure = [one for one in findings if one["probability"] > HINT]
+    sure = [one for one in findings if one["probability"] > JUDGING.hint_probability]
     links = [
         (name, quote(f"{row['folder']}/{made[key]}"))
         for name, made, key in (

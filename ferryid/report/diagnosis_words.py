@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ferryid.counts import counted
-from ferryid.diagnose import AXES, CHANGED, NEAR, UNKNOWN, Diagnosis, Estimate, Finding, error_ratio, worse_axes
+from ferryid.diagnose import AXES, JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, error_ratio, worse_axes
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, timed, titled
@@ -111,8 +111,10 @@ def fitted(diagnosis: Diagnosis) -> bool:
 
 def changed(shares: Mapping[str, float]) -> str:
     """Return by how much the squared force error falls or rises, from the share removed on each axis."""
-    falls = [f"{_percent(shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) >= CHANGED]
-    rises = [f"{_percent(-shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) <= -CHANGED]
+    falls = [f"{_percent(shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) >= JUDGING.reported_change]
+    rises = [
+        f"{_percent(-shares[axis])} in {axis}" for axis in AXES if shares.get(axis, 0.0) <= -JUDGING.reported_change
+    ]
     parts = [f"{word} by {listed(axes)}" for word, axes in (("falls", falls), ("rises", rises)) if axes]
     return " and ".join(parts) if parts or not shares else "stays as it was"
 
@@ -236,7 +238,11 @@ def _meant(finding: Finding, name: str) -> list[str]:
     """Return what an effect that is not told apart is called: of the finding's own it is that of another thruster."""
     if name != finding.effect:
         return [title(name)]
-    others = [title(name, one.instance) for one in finding.rivals if one.effect == name and one.delta_score > -NEAR]
+    others = [
+        title(name, one.instance)
+        for one in finding.rivals
+        if one.effect == name and one.delta_score > -JUDGING.unresolved_evidence
+    ]
     return others or [title(name)]
 
 

@@ -18,6 +18,7 @@ from ferryid.signals.poses import step_doubts
 from ferryid.signals.quality import NAVIGATION, POSE, REFERENCE, is_actuator, is_order
 from ferryid.signals.sampling import check_advancing, single_rows
 from ferryid.signals.source import Held, Source
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import LeftOut, Track
 from ferryid.vessel import actuator_columns, resolve, resolve_notes
 from ferryid.vessel.profile import Profile
@@ -30,15 +31,7 @@ Flags = NDArray[np.bool_]
 
 RATE_LIMIT_HZ = 20.0
 _VELOCITY = ("u", "vel_N", "x", "psi")
-MOST_EMPTY_ROWS, MOST_SPARSE = 2_000_000, 50
-"""A grid beyond both limits, the second in rows per sample, comes of wrong times, not of gaps."""
-_ENDS_S = 2.0
-"""Rows at either end of the common time that lack a signal count as left out from this length [s] on."""
 HELD = "velocity repeats an old value, or stays at one while the pose moves"
-_PAUSE_SHARE = 0.5
-"""A pause that is this share of a log is what makes it too long; otherwise its times are wrong."""
-_HEADING_SHARE = 0.8
-"""A heading that was measured on this share of the rows is needed; one that was measured on fewer is left out by others."""
 
 
 def align(recording: Recording, profile: Profile, rate_hz: float | None = None, faults: Faults | None = None) -> Track:
@@ -92,7 +85,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
     first = int(lead.time_ns[min(int(np.searchsorted(lead.time_ns, start)), len(lead.time_ns) - 1)])
     t0_ns = max(start, first)
     count = int((end - t0_ns) * 1e-9 * rate + EXACT_S) + 1
-    if count < 2 or count > max(MOST_EMPTY_ROWS, MOST_SPARSE * len(lead.time_ns)):
+    if count < 2 or count > max(SIGNALS.most_grid_rows, SIGNALS.most_rows_per_sample * len(lead.time_ns)):
         raise FerryIdError(_spread(recording.name, lead, max(0.0, (end - t0_ns) * 1e-9)))
     t = np.arange(count) / rate
     columns: dict[str, Floats] = {}
@@ -121,7 +114,7 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
     lost = ~measured & ~wrong
     for side in (slice(0, kept.start), slice(kept.stop, None)):
         # Topics never begin and end with the same row; more than that is a loss.
-        if np.count_nonzero(lost[side]) < _ENDS_S * rate:
+        if np.count_nonzero(lost[side]) < SIGNALS.unmeasured_end_s * rate:
             lost[side] = False
     first_row = kept.start
     lacking = _Lacking(profile, columns)
@@ -182,7 +175,7 @@ def _spread(log: str, lead: Source, seconds: float) -> str:
     """Return the message on a velocity whose samples are far apart: a long pause, or wrong times."""
     pause = np.diff(lead.time_ns).max() * 1e-9 if lead.time_ns.size > 1 else 0.0
     found = f"{counted(len(lead.time_ns), 'sample')} of the velocity over {seconds:.4g} s"
-    if pause < _PAUSE_SHARE * seconds:
+    if pause < SIGNALS.pause_share * seconds:
         return (
             f"{log}: its times cannot be right, found {found}. "
             "Fix: look for wrong clocks with ferryid inspect, or cut the log"
@@ -228,7 +221,7 @@ def _measured(log: str, profile: Profile, columns: Mapping[str, Floats], wrong: 
         valid &= finite
     psi = columns.get("psi")
     known = np.isfinite(psi[valid & ~wrong]) if psi is not None else np.empty(0, dtype=bool)
-    if psi is not None and known.size and known.mean() >= _HEADING_SHARE:
+    if psi is not None and known.size and known.mean() >= SIGNALS.heading_share:
         # Without it neither wind nor current can be turned to the vessel, and no pose can be predicted.
         valid &= np.isfinite(psi) | wrong
     return valid

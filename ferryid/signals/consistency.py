@@ -16,6 +16,7 @@ from scipy.special import stdtrit
 
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.quality import IMPLAUSIBLE
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Doubt, Track
 
 Floats = NDArray[np.float64]
@@ -29,19 +30,19 @@ def cross_checks(track: Track) -> tuple[Doubt, ...]:
     Nothing is corrected here.
     """
     columns = track.columns
-    span = max(2, round(_SPAN_S * track.rate_hz))
+    span = max(2, round(SIGNALS.gain_span_s * track.rate_hz))
     said: list[Doubt] = []
     if "psi" in columns and "r" in columns:
         turned = _changes("psi", np.diff(columns["psi"]), columns["r"], track, span)
-        said += _compare("yaw rate", "heading", turned, 0.035, _YAW_RATE_GAINS)
+        said += _compare("yaw rate", "heading", turned, SIGNALS.least_turn_rad, _YAW_RATE_GAINS)
     if {"x", "y", "psi", "u", "v"} <= set(columns):
         north, east = np.diff(columns["x"]), np.diff(columns["y"])
         psi = (columns["psi"][1:] + columns["psi"][:-1]) / 2
         c, s = np.cos(psi), np.sin(psi)
         ahead = _changes("x", c * north + s * east, columns["u"], track, span)
         aside = _changes("y", c * east - s * north, columns["v"], track, span)
-        speeds = _compare("surge velocity", "position", ahead, 0.2, _SPEED_GAINS)
-        speeds += _compare("sway velocity", "position", aside, 0.2, _SPEED_GAINS)
+        speeds = _compare("surge velocity", "position", ahead, SIGNALS.least_way_m, _SPEED_GAINS)
+        speeds += _compare("sway velocity", "position", aside, SIGNALS.least_way_m, _SPEED_GAINS)
         if not any(doubt.certain for doubt in speeds):
             pose, velocity = (np.column_stack([columns[name] for name in names]) for names in (("x", "y", "psi"), "uv"))
             _, says = mirrored(pose, velocity, track.valid, track.rate_hz)
@@ -50,8 +51,6 @@ def cross_checks(track: Track) -> tuple[Doubt, ...]:
     return tuple(said)
 
 
-_CERTAIN = 0.9
-"""Correlation above which a wrong sign or unit is beyond doubt."""
 _YAW_RATE_GAINS = (
     (np.pi / 180, "degrees per second look read as rad/s, or a heading in radians as degrees"),
     (180 / np.pi, "rad/s look read as degrees per second, or a heading in degrees as radians"),
@@ -61,16 +60,6 @@ _SPEED_GAINS = (
     (1 / 0.514444, "m/s look read as knots"),
     (1 / 3.6, "km/h look read as m/s"),
 )
-
-
-_LEAST = 0.05
-"""A gain nearer to one than this is no contradiction, however certain."""
-_BLOCK_S, _FEWEST_BLOCKS = 30.0, 8
-"""Length of the blocks whose scatter gives standard errors [s], longer than errors are remembered; shorter in short logs."""
-_QUANTILE = 0.995
-"""Of Student's t for the ends of a gain's interval, 99 %: every log has three of them."""
-_SPAN_S = 2.0
-_FEWEST = 10
 
 
 @dataclass(frozen=True)
@@ -84,24 +73,24 @@ class _Changes:
 
 def _compare(rate: str, of: str, seen: _Changes, least: float, known: tuple[tuple[float, str], ...]) -> list[Doubt]:
     change, integral = seen.change, seen.integral
-    if change.size < _FEWEST or np.sqrt(np.mean(change**2)) < least or not np.any(integral):
+    if change.size < SIGNALS.gain_spans or np.sqrt(np.mean(change**2)) < least or not np.any(integral):
         return []
     both = float(change @ integral)
     if float(integral @ integral) < 1e-200:
         return []
     gain = both / float(integral @ integral)
     correlation = both / float(np.sqrt((change @ change) * (integral @ integral)))
-    if abs(correlation) < 0.5:
+    if abs(correlation) < SIGNALS.related_correlation:
         numbers = f"gain {gain:.3g}, correlation {correlation:.2f}"
         return [Doubt(f"The {rate} does not follow the {of} ({numbers}): check topic, frame and clocks.", False)]
     low, high = _range(seen)
     numbers = f"gain {gain:.3g} [{low:.3g}, {high:.3g}], correlation {correlation:.2f}"
-    size = next((text for value, text in known if abs(abs(gain) / value - 1.0) < 0.15), "")
-    certain = abs(correlation) > _CERTAIN
+    size = next((text for value, text in known if abs(abs(gain) / value - 1.0) < SIGNALS.unit_gain), "")
+    certain = abs(correlation) > SIGNALS.certain_correlation
     if gain < 0:
         says = f"The {rate} has the wrong sign against the {of} ({numbers})" + (f", and {size}." if size else ".")
         return [Doubt(says, certain)]
-    if (low > 1.0 or high < 1.0) and abs(gain - 1.0) > _LEAST:
+    if (low > 1.0 or high < 1.0) and abs(gain - 1.0) > SIGNALS.gain_error:
         remedy = size or (
             f"check the scale of the {rate} in the profile"
             + (", and the lever arm of what is measured away from the body origin" if of == "position" else "")
@@ -116,7 +105,13 @@ def _range(seen: _Changes) -> tuple[float, float]:
     From the direct and the inverse regression, each with its standard error from sums over blocks, in which neighbouring
     errors are counted as one.
     """
-    length = max(1, min(round(_BLOCK_S / _SPAN_S), int(seen.number[-1] - seen.number[0]) // _FEWEST_BLOCKS))
+    length = max(
+        1,
+        min(
+            round(SIGNALS.gain_block_s / SIGNALS.gain_span_s),
+            int(seen.number[-1] - seen.number[0]) // SIGNALS.gain_blocks,
+        ),
+    )
     _, block = np.unique(seen.number // length, return_inverse=True)
     ends = []
     for y, x in ((seen.change, seen.integral), (seen.integral, seen.change)):
@@ -124,7 +119,7 @@ def _range(seen: _Changes) -> tuple[float, float]:
         sums = np.bincount(block, x * (y - slope * x))
         count = sums.size
         error = float(np.sqrt(np.sum(sums**2) * count / max(count - 1, 1))) / float(x @ x)
-        half = float(stdtrit(max(count - 1, 1), _QUANTILE)) * error
+        half = float(stdtrit(max(count - 1, 1), SIGNALS.gain_quantile)) * error
         ends.append((slope - half, slope + half))
     (low, high), (least, most) = ends
     # The inverse regression gives one over the gain; its interval may reach zero, and then the gain has no end.

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.signals.pose_limits import Samples
-from ferryid.signals.poses import MARGIN_S, USED, PoseFault, pose_faults, pose_reason, pose_sentences
+from ferryid.signals.poses import USED, PoseFault, pose_faults, pose_reason, pose_sentences
 from ferryid.signals.quality import is_load
 from ferryid.signals.source import Held, Source, source_of
 from ferryid.signals.stream import Recording, Stream
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.velocities import held_reason, held_sentences, held_velocities
 
 _SIGNALS = {"position": ("x", "y"), "heading": ("psi",)}
@@ -41,8 +42,8 @@ class Faults:
     remarks: tuple[str, ...]
 
     def wrong_poses(self) -> tuple[Held, ...]:
-        """Return the stretches around wrong poses, `MARGIN_S` on either side, with their signals and reasons."""
-        margin_ns = round(MARGIN_S * 1e9)
+        """Return the stretches around wrong poses, `SIGNALS.pose_margin_s` on either side, with their signals and reasons."""
+        margin_ns = round(SIGNALS.pose_margin_s * 1e9)
         return tuple(
             Held(_SIGNALS[one.signal], one.start_ns - margin_ns, one.end_ns + margin_ns, pose_reason(one))
             for one in self.poses

@@ -7,19 +7,18 @@ from numpy.typing import NDArray
 
 from ferryid.signals.quality import is_load, is_order
 from ferryid.signals.source import Source
+from ferryid.signals.thresholds import SIGNALS
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_AVERAGED_ABOVE = 1.9
-"""Streams this many times faster than the grid are averaged over each grid interval instead of sampled."""
 EXACT_S = 1e-6
 
 
 def on_grid(source: Source, t0_ns: int, t: Floats, rate: float, repairs: list[str]) -> dict[str, Floats]:
     # Times relative to the grid's start keep nanoseconds exact in floating point.
     time_s = np.asarray((source.time_ns - t0_ns) * 1e-9, dtype=np.float64)
-    averaged = not source.on_change and source.period_s * rate * _AVERAGED_ABOVE < 1.0
+    averaged = not source.on_change and source.period_s * rate * SIGNALS.decimation_ratio < 1.0
     if averaged:
         repairs.append(
             f"{source.topic}: {1 / source.period_s:.3g} Hz, averaged over the intervals of the {rate:g} Hz grid."

@@ -10,17 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.signals.pose_limits import Floats, Samples, integral
-
-LEAST_RAD = float(np.radians(5.0))
-"""Smaller steps are not looked for: a compass errs by as much from one heading to the next."""
-_NOISES = 10.0
-"""A step is beyond this many usual differences between heading and integrated yaw rate over the same time."""
-_SIDE_S = 3.0
-"""The heading is compared before and after over this [s], so that a spike is no step."""
-_WITHIN_S = 0.5
-"""A step is over within this [s]; what takes longer may be an error of the yaw rate."""
-_SHARE = 0.7
-_FEWEST = 20
+from ferryid.signals.thresholds import SIGNALS
 
 
 def heading_steps(samples: Samples) -> tuple[tuple[int, int, float], ...]:
@@ -38,11 +28,11 @@ def heading_steps(samples: Samples) -> tuple[tuple[int, int, float], ...]:
     apart = psi - turning(np.asarray(time_ns * 1e-9, dtype=np.float64))[0].real
     known = np.isfinite(apart)
     time_ns, apart = time_ns[known], apart[known]
-    if time_ns.size < _FEWEST:
+    if time_ns.size < SIGNALS.step_samples:
         return ()
     time_s = (time_ns - time_ns[0]) * 1e-9
     period = float(np.median(np.diff(time_s)))
-    side, within = max(3, round(_SIDE_S / period)), max(1, round(_WITHIN_S / period))
+    side, within = max(3, round(SIGNALS.step_side_s / period)), max(1, round(SIGNALS.step_within_s / period))
     if time_s.size < 4 * side + within:
         return ()
     # The place between rows k - 1 and k, for k in `place`; a window of `within` rows on it holds the step.
@@ -53,7 +43,7 @@ def heading_steps(samples: Samples) -> tuple[tuple[int, int, float], ...]:
     whole = time_s[place + within + side - 1] - time_s[place - side] < 2.0 * (2 * side + within) * period
     change = np.where(whole, change, 0.0)
     noise = 1.4826 * float(np.median(np.abs(change[whole]))) if whole.any() else 0.0
-    large = np.abs(change) > max(LEAST_RAD, _NOISES * noise)
+    large = np.abs(change) > max(SIGNALS.step_rad, SIGNALS.step_noises * noise)
     found = []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], large, [False]]).astype(np.int8)))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
@@ -61,7 +51,7 @@ def heading_steps(samples: Samples) -> tuple[tuple[int, int, float], ...]:
         size = float(change[peak])
         inside = slice(int(place[peak]) - 1, int(place[peak]) + within + 1)
         steps = np.diff(apart[inside])
-        if abs(float(steps.sum())) < _SHARE * abs(size):
+        if abs(float(steps.sum())) < SIGNALS.step_share * abs(size):
             continue
         rows = np.flatnonzero(np.abs(steps) > 0.1 * abs(size)) + inside.start
         if rows.size:

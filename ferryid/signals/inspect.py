@@ -29,6 +29,7 @@ from ferryid.signals.faults import find_faults
 from ferryid.signals.prepare import track_of
 from ferryid.signals.recording import log_name, make_recording, selected
 from ferryid.signals.render import render_inspect
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import LeftOut
 from ferryid.vessel.load import bundled, load_profile
 from ferryid.vessel.profile import Profile
@@ -38,8 +39,6 @@ __all__ = ["inspect", "render_inspect"]
 
 SCHEMA = "ferryid.inspect/1"
 _BULKY = ("uint8", "int8", "byte", "char", "octet", "float32", "float64", "uint16", "int16", "bytes")
-_EPOCH_NS = 10**17
-"""Times below (1973) are counted from the start of the log, not from 1970."""
 
 
 def inspect(path: str | Path, profile: Profile | None = None, *, verify: bool = False) -> dict[str, Any]:
@@ -270,6 +269,6 @@ def _size(path: Path) -> int:
 
 def _clock_time(time_ns: int) -> str | None:
     """A time since 1970 as ISO 8601 in UTC; None for one that is counted from the start of a log."""
-    if time_ns < _EPOCH_NS:
+    if time_ns < SIGNALS.epoch_ns:
         return None
     return f"{np.datetime64(time_ns, 'ns')}Z"

@@ -10,15 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.signals.thresholds import SIGNALS
+
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-SPAN_S = 4.0
-FEWEST = 15
-LEAST_M = 0.2
-"""Root mean square of the way made good in `SPAN_S`; less is lost in noise."""
-FITS, BETTER = 0.95, 10.0
-"""A frame is wrong beyond doubt if its mirror image correlates so well, and leaves so many times less unexplained."""
 
 SAYS = {
     "position": "The positions are mirrored against heading and velocity, as with north and east exchanged",
@@ -43,17 +39,17 @@ def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float)
     rate_hz
         Rows per second.
     """
-    span = max(2, round(SPAN_S * rate_hz))
+    span = max(2, round(SIGNALS.mirror_span_s * rate_hz))
     good = usable & np.isfinite(eta).all(axis=1) & np.isfinite(nu[:, :2]).all(axis=1)
     starts = np.arange(0, len(good) - span, span)
     starts = starts[[bool(good[start : start + span + 1].all()) for start in starts]]
-    if len(starts) < FEWEST:
+    if len(starts) < SIGNALS.mirror_spans:
         return "", ""
     # Sums run over the whole log: what was not measured counts as nothing there, and no span holds any of it.
     eta, nu = np.where(good[:, None], eta, 0.0), np.where(good[:, None], nu[:, :2], 0.0)
     place = eta[:, 0] + 1j * eta[:, 1]
     way = place[starts + span] - place[starts]
-    if np.sqrt(np.mean(np.abs(way) ** 2)) < LEAST_M:
+    if np.sqrt(np.mean(np.abs(way) ** 2)) < SIGNALS.mirror_way_m:
         return "", ""
     body = nu[:, 0] + 1j * nu[:, 1]
     pointing, mirrored_pointing = np.exp(1j * eta[:, 2]), np.exp(-1j * eta[:, 2])
@@ -63,7 +59,7 @@ def mirrored(eta: Floats, nu: Floats, usable: NDArray[np.bool_], rate_hz: float)
     free = np.column_stack([np.ones(len(starts)), pointing[starts + span] - pointing[starts]])
     fits = {name: _fit(way, _summed(values, starts, span), free) for name, values in every.items()}
     best = max(fits, key=lambda name: fits[name])
-    if fits[best] < FITS or BETTER * (1.0 - fits[best] ** 2) > 1.0 - fits[""] ** 2:
+    if fits[best] < SIGNALS.mirror_correlation or SIGNALS.mirror_ratio * (1.0 - fits[best] ** 2) > 1.0 - fits[""] ** 2:
         return "", ""
     return best, f"{SAYS[best]} (correlation {fits[best]:.2f} so, {fits['']:.2f} as declared)."
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.vessel.frames import to_world, wrap
 
 Floats = NDArray[np.float64]
@@ -17,18 +18,6 @@ Samples = Mapping[str, tuple[Nanoseconds, Floats]]
 """Canonical name to times [ns] and cleaned values, NaN where missing."""
 Path = Callable[[Floats], tuple[Complex, Floats]]
 """Times [s] to the integral of the velocity, and to the integral of its size."""
-
-_NOISES = 10.0
-"""Steps beyond this many usual ones are jumps, if no motion explains them."""
-_SPEEDS = 3.0
-"""And beyond this many times the vessel's highest usual speed."""
-_QUANTILE = 0.98
-_BACK = 0.4
-"""A pose is back if it misses its place by less than this share of the jump, and the vessel has not moved farther itself."""
-_DRIFT = 0.2
-"""Where the velocity is measured, this share of the way is uncertain."""
-STEPS_HELD = 5.0
-"""A fix that repeats too long was lost if the vessel is this many usual steps further afterwards."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +36,10 @@ class Limits:
     def of(time_s: Floats, values: Complex, path: Path | None, start_ns: int, *, angle: bool) -> Limits:
         fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
         interval = np.diff(time_s[fixes])
-        floor, most, least = (0.35, 2.0, 0.5) if angle else (1.0, 15.0, 1.5)
+        if angle:
+            floor, most, least = SIGNALS.heading_jump_rad, SIGNALS.attitude_rate_radps, SIGNALS.least_rate_radps
+        else:
+            floor, most, least = SIGNALS.position_step_m, SIGNALS.position_rate_mps, SIGNALS.least_speed_mps
         if interval.size == 0:
             return Limits(angle, int(start_ns), float("inf"), 0.0, most, floor, path)
         move = np.abs(difference(values[fixes], angle=angle))
@@ -57,24 +49,26 @@ class Limits:
         lasts = time_s[later] - time_s
         way = np.abs(between(values, np.arange(time_s.size), later, angle=angle))
         whole = (lasts > 0.5) & (lasts < 2.0)
-        speed = float(np.quantile(way[whole] / lasts[whole], _QUANTILE)) if whole.any() else most
+        speed = float(np.quantile(way[whole] / lasts[whole], SIGNALS.speed_quantile)) if whole.any() else most
         return Limits(
             angle,
             int(start_ns),
             period,
             float(np.median(move)),
-            float(np.clip(_SPEEDS * speed, least, most)),
+            float(np.clip(SIGNALS.jump_speeds * speed, least, most)),
             floor,
             path,
         )
 
     def jump(self, move: Floats, lasts: Floats) -> NDArray[np.bool_]:
         """True where a pose moves farther than the vessel can."""
-        return np.asarray(move > np.maximum(_NOISES * self.step, self.floor + self.speed * lasts), dtype=bool)
+        return np.asarray(
+            move > np.maximum(SIGNALS.jump_noises * self.step, self.floor + self.speed * lasts), dtype=bool
+        )
 
     def elsewhere(self, move: float) -> bool:
         """True where a pose is not where noise and a usual interval may bring it."""
-        return move > max(STEPS_HELD * self.step, self.speed * self.period_s)
+        return move > max(SIGNALS.held_steps * self.step, self.speed * self.period_s)
 
     def known(self, at_s: Floats) -> bool:
         """True where the velocity is measured throughout."""
@@ -109,12 +103,12 @@ class Limits:
         """
         lasts = last_s - first_s
         known = None if self.path is None else self.path(np.array([first_s, last_s]) + self.start_ns * 1e-9)
-        way, reach = 0j, self.speed / _SPEEDS * lasts
+        way, reach = 0j, self.speed / SIGNALS.jump_speeds * lasts
         if known is not None and np.isfinite(known[0]).all():
-            way, reach = complex(known[0][1] - known[0][0]), _DRIFT * float(known[1][1] - known[1][0])
+            way, reach = complex(known[0][1] - known[0][0]), SIGNALS.drift_share * float(known[1][1] - known[1][0])
         miss = move - way
         away = abs(float(wrap(np.array([miss.real]))[0])) if self.angle else abs(miss)
-        return away <= _BACK * jump and reach <= _BACK * jump
+        return away <= SIGNALS.return_share * jump and reach <= SIGNALS.return_share * jump
 
 
 def mean_interval(interval: Floats) -> float:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ferryid.counts import counted
 from ferryid.signals.heading_steps import heading_steps
 from ferryid.signals.pose_limits import (
-    STEPS_HELD,
     Complex,
     Floats,
     Limits,
@@ -31,30 +30,14 @@ from ferryid.signals.pose_limits import (
     integral,
     way_over_ground,
 )
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Doubt
 from ferryid.vessel.frames import wrap
 
-MARGIN_S = 0.5
-"""So much on either side of a bad pose is left out too: filters of the sender carry a jump on, and the grid interpolates."""
 USED = ("x", "y", "psi", "u", "v", "r", "vel_N", "vel_E")
 
-_FEWEST = 20
-_JUMPS_AT_MOST = 0.02
-"""With a larger share of jumps the signal is noise, and none of them is known to be wrong."""
 _AHEAD = 24
 """So many jumps are looked past for the place where the pose comes back."""
-_WAYS = 2.0
-"""A jump is farther than this many times the way that the measured velocity accounts for."""
-_ORIGIN_S = 10.0
-"""A stretch after a jump is kept as one with another origin if it is longer [s], or than a quarter of the log."""
-_KEPT_AT_LEAST = 0.4
-"""Where less than this share fits together, no part is known to be the right one, and only the jumps are left out."""
-_HELD_WAY = 0.25
-"""A fix that repeats was lost only if the measured velocity, where there is one, accounts for this share of the step."""
-_PERIODS_HELD, _LEAST_HELD_S = 4.0, 0.5
-_CLEAR, _CANCEL, _CANCEL_S = 2.0, 0.1, 120.0
-"""A jump this many times the limit, undone by the next but for this share and within this [s], leads away and back."""
-_FLIP = np.radians(20.0)
 _STEPS_SAID = 3
 """Steps of the heading of which each has a sentence."""
 
@@ -183,7 +166,7 @@ def pose_sentences(faults: Sequence[PoseFault]) -> tuple[str, ...]:
                 text += (
                     f", at most for {max(fault.seconds for fault in those):.2f} s, {counted(count, 'sample')} in all"
                 )
-            said.append(f"{text}; left out with {MARGIN_S:g} s on either side.")
+            said.append(f"{text}; left out with {SIGNALS.pose_margin_s:g} s on either side.")
     return tuple(said)
 
 
@@ -202,7 +185,7 @@ _SAYS = {
 
 def _faults(signal: str, time_ns: Nanoseconds, values: Complex, path: Path | None) -> list[PoseFault]:
     """Return the faults of one signal; a heading is a complex number without imaginary part here."""
-    if time_ns.size < _FEWEST:
+    if time_ns.size < SIGNALS.pose_fixes:
         return []
     angle = signal == "heading"
     time_s = (time_ns - time_ns[0]) * 1e-9
@@ -254,19 +237,19 @@ def _zeros(values: Complex, limits: Limits) -> list[tuple[int, int]]:
 def _held(time_s: Floats, values: Complex, limits: Limits) -> list[tuple[int, int]]:
     """Return runs of repeats that last longer than usual and after which the vessel is further on at once."""
     same = np.concatenate([[False], np.diff(values) == 0.0])
-    longest = max(_PERIODS_HELD * limits.period_s, _LEAST_HELD_S)
+    longest = max(SIGNALS.held_periods * limits.period_s, SIGNALS.held_s)
     found = []
     for first, last in _runs(same):
         if time_s[last] - time_s[first - 1] <= longest:
             continue
         if last + 1 == values.size:
-            lost = limits.travelled(float(time_s[first - 1]), float(time_s[last])) > STEPS_HELD * limits.floor
+            lost = limits.travelled(float(time_s[first - 1]), float(time_s[last])) > SIGNALS.held_steps * limits.floor
         else:
             step = abs(complex(difference(values[last : last + 2], angle=limits.angle)[0]))
             lost = time_s[last + 1] - time_s[last] <= longest and limits.elsewhere(step)
             if lost and limits.path is not None:
                 sides = time_s[[first - 1, last + 1]]
-                lost = not limits.known(sides) or limits.travelled(*map(float, sides)) >= _HELD_WAY * step
+                lost = not limits.known(sides) or limits.travelled(*map(float, sides)) >= SIGNALS.held_way_share * step
         if lost:
             found.append((first, last))
     return found
@@ -279,7 +262,7 @@ def _jumps(time_s: Floats, values: Complex, limits: Limits) -> list[tuple[str, i
     come as one, whose indices are those of the first and the last.
     """
     fixes = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
-    if fixes.size < _FEWEST:
+    if fixes.size < SIGNALS.pose_fixes:
         return []
     move = difference(values[fixes], angle=limits.angle)
     # What a slow receiver repeats was measured at its first sample, but not what repeats far beyond the usual.
@@ -287,26 +270,26 @@ def _jumps(time_s: Floats, values: Complex, limits: Limits) -> list[tuple[str, i
     places = np.flatnonzero(limits.jump(np.abs(move), lasts))
     way = limits.ways(time_s[fixes[places]], time_s[fixes[places + 1]])
     # What the measured velocity explains is no jump, however fast.
-    unexplained = np.abs(move[places]) > limits.floor + _WAYS * np.abs(way)
+    unexplained = np.abs(move[places]) > limits.floor + SIGNALS.measured_ways * np.abs(way)
     places, way = places[unexplained], way[unexplained]
     if places.size == 0:
         return []
-    if places.size > max(2, _JUMPS_AT_MOST * fixes.size):
+    if places.size > max(2, SIGNALS.jump_share * fixes.size):
         first, last = int(fixes[places[0] + 1]), int(fixes[places[-1] + 1])
         return [("frequent", first, last, float(np.abs(move[places]).max()))] * int(places.size)
     starts = np.concatenate([[0], fixes[places + 1]])
     ends = np.concatenate([starts[1:] - 1, [values.size - 1]])
     off = move[places] - way
-    clear = limits.jump(np.abs(off) / _CLEAR, lasts[places])
+    clear = limits.jump(np.abs(off) / SIGNALS.clear_jump, lasts[places])
     stretches = _Stretches(time_s, values, limits, starts, ends, off, clear)
     links = stretches.kept()
-    if sum(int(ends[k] - starts[k]) + 1 for k in links) < _KEPT_AT_LEAST * values.size:
+    if sum(int(ends[k] - starts[k]) + 1 for k in links) < SIGNALS.consistent_share * values.size:
         links = list(range(len(starts)))  # no part is known to be the right one
     sizes = np.abs(wrap(off.real)) if limits.angle else np.abs(off)
     found = []
     for before, after in pairwise([-1, *links, len(starts)]):
         size = float(sizes[before if before >= 0 else after - 1]) if after < len(starts) or before < after - 1 else 0.0
-        flip = limits.angle and abs(size - np.pi) < _FLIP
+        flip = limits.angle and abs(size - np.pi) < SIGNALS.flip_rad
         if after - before > 1:
             inside = before >= 0 and after < len(starts)
             kind = ("flip" if inside else "turned") if flip else ("away" if inside else "off")
@@ -339,11 +322,15 @@ class _Stretches:
     def kept(self) -> list[int]:
         """Return the stretches whose samples are the most, of those that fit each other or are long on their own.
 
-        A stretch that does not fit the one before costs `_ORIGIN_S`, that of a heading turned by 180° cannot follow at all.
+        A stretch that does not fit the one before costs `SIGNALS.origin_s`, that of a heading turned by 180°
+        cannot follow at all.
         A return to where the vessel must be is worth as much as what is left out before it, up to what agrees on both sides.
         """
         size = (self.ends - self.starts + 1).astype(np.float64)
-        cost = min(_ORIGIN_S * self.values.size / max(float(self.time_s[-1]), 1e-9), 0.25 * self.values.size)
+        cost = min(
+            SIGNALS.origin_s * self.values.size / max(float(self.time_s[-1]), 1e-9),
+            SIGNALS.origin_share * self.values.size,
+        )
         total = np.concatenate([[0.0], np.cumsum(size)])
         long = np.concatenate([[0], np.cumsum(size > cost)])
         origin = np.concatenate([[0.0 + 0j], np.cumsum(self.off)])
@@ -355,13 +342,13 @@ class _Stretches:
                 if best[i] + size[j] + credit <= best[j]:
                     continue
                 apart = self._turn(origin[j] - origin[i])
-                flips = self.limits.angle and abs(self._turn(self.off[i]) - np.pi) < _FLIP
+                flips = self.limits.angle and abs(self._turn(self.off[i]) - np.pi) < SIGNALS.flip_rad
                 value = best[i] + size[j]
                 # Of many origins, some agree by chance.
                 near = flips or long[j] - long[i + 1] <= 1
                 if j > i + 1 and near and self._fits(i, j, apart, flips=flips):
                     value += 0.0 if flips else credit
-                elif self.limits.angle and abs(apart - np.pi) < _FLIP:
+                elif self.limits.angle and abs(apart - np.pi) < SIGNALS.flip_rad:
                     continue
                 else:
                     value -= cost
@@ -382,8 +369,8 @@ class _Stretches:
         last, first = int(self.ends[i]), int(self.starts[j])
         lasts = float(self.time_s[first] - self.time_s[last])
         if flips:
-            return bool(apart < _FLIP)
-        if self.clear[i] and apart <= _CANCEL * jump and lasts <= _CANCEL_S:
+            return bool(apart < SIGNALS.flip_rad)
+        if self.clear[i] and apart <= SIGNALS.cancel_share * jump and lasts <= SIGNALS.cancel_s:
             return True
         move = complex(between(self.values, np.array([last]), np.array([first]), angle=self.limits.angle)[0])
         return self.limits.back(jump, move, float(self.time_s[last]), float(self.time_s[first]))

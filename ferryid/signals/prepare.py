@@ -17,11 +17,9 @@ from ferryid.signals.quality import POSE
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, smooth_measured
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel.profile import Profile
-
-SHORT_OVERLAP_NS = 2_000_000_000
-"""Recorders start and stop topics within this time of each other [ns]; more is reported."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ def _overlap(recording: Recording, track: Track) -> list[str]:
     ):
         topic = min(near, key=lambda name: near[name])
         # Rows that lack a value at either end are counted with all others that do.
-        if cut_ns > SHORT_OVERLAP_NS > near[topic]:
+        if cut_ns > SIGNALS.overlap_ns > near[topic]:
             sides.append(f"the {where} {cut_ns * 1e-9:.1f} s, as {topic} {verb}")
     if not sides:
         return []

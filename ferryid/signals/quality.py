@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Track
 from ferryid.vessel.frames import wrap
 
@@ -26,39 +27,33 @@ REFERENCE = ("x_d", "y_d", "psi_d")
 _ACTUATOR = ("n_", "alpha_", "delta_", "F_")
 _ORDER = tuple(f"{prefix}cmd_" for prefix in _ACTUATOR)
 
-_SPIKE_NOISES = 8.0
-"""A spike stands out by this many robust standard deviations of the step from sample to sample."""
-_SPIKES_AT_MOST = 0.01
-"""With more spikes than this fraction of the samples, the signal is noisy rather than spiked, and is left alone."""
 _MEDIAN_OF = 50_000
-_TURN_STEP = 0.2
-_TURN_SAMPLES = 5
-_TURN_MISSES = 0.6
-"""A resampled wrap: steps above this [rad], at most so many of them, and a full turn but for this [rad]."""
-_REPEATS_AT_MOST = 0.2
-"""With more repeats than this the signal is slow or coarse, and a long run of them says nothing."""
 
 # Steps that no vessel takes from one sample to the next: at any interval, and per second of interval. Generous on
 # purpose: what is removed here must be wrong on a 1 m model and on a ferry.
+_POSITION = (SIGNALS.position_step_m, SIGNALS.position_rate_mps)
+_ATTITUDE = (SIGNALS.attitude_step_rad, SIGNALS.attitude_rate_radps)
+_SPEED = (SIGNALS.velocity_step_mps, SIGNALS.velocity_rate_mps2)
+_YAW_RATE = (SIGNALS.yaw_rate_step_radps, SIGNALS.yaw_rate_rate_radps2)
+_WIND = (SIGNALS.wind_step_mps, SIGNALS.wind_rate_mps2)
+_CURRENT = (SIGNALS.current_step_mps, SIGNALS.current_rate_mps2)
 IMPLAUSIBLE: Mapping[str, tuple[float, float]] = {
-    "x": (1.0, 15.0),
-    "y": (1.0, 15.0),
-    "psi": (0.15, 2.0),
-    "phi": (0.15, 2.0),
-    "theta": (0.15, 2.0),
-    "u": (0.3, 3.0),
-    "v": (0.3, 3.0),
-    "vel_N": (0.3, 3.0),
-    "vel_E": (0.3, 3.0),
-    "r": (0.1, 1.0),
-    "wind_speed": (10.0, 10.0),
-    "wind_N": (10.0, 10.0),
-    "wind_E": (10.0, 10.0),
-    "current_N": (0.5, 1.0),
-    "current_E": (0.5, 1.0),
+    "x": _POSITION,
+    "y": _POSITION,
+    "psi": _ATTITUDE,
+    "phi": _ATTITUDE,
+    "theta": _ATTITUDE,
+    "u": _SPEED,
+    "v": _SPEED,
+    "vel_N": _SPEED,
+    "vel_E": _SPEED,
+    "r": _YAW_RATE,
+    "wind_speed": _WIND,
+    "wind_N": _WIND,
+    "wind_E": _WIND,
+    "current_N": _CURRENT,
+    "current_E": _CURRENT,
 }
-_IMPLAUSIBLE_SHARE = 0.25
-"""For actuators, whose size is not known here: the share of the signal's own range."""
 
 
 @dataclass(frozen=True)
@@ -252,7 +247,7 @@ def stuck(time_s: Floats, values: Floats, longest_s: float) -> Flags:
 def _long_runs(time_s: Floats, repeats: Flags, at_rest: Flags, longest_s: float) -> Flags:
     """Return the samples of long runs of repeats, their first excepted; none where repeats are usual."""
     old = np.zeros(time_s.size, dtype=bool)
-    if not repeats.any() or repeats.mean() > _REPEATS_AT_MOST:
+    if not repeats.any() or repeats.mean() > SIGNALS.repeat_share:
         return old
     edges = np.flatnonzero(np.diff(np.concatenate([[False], repeats & ~at_rest, [False]]).astype(np.int8)))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
@@ -295,12 +290,12 @@ def _through_wrap(times: Floats, angle: Floats) -> NDArray[np.int64]:
     """Return the samples inside a full turn that takes a few samples: 359°, 240°, 120°, 1° is a turn of 2° resampled."""
     step = np.diff(angle)
     edges = np.flatnonzero(
-        np.diff(np.concatenate([[0.0], np.where(np.abs(step) > _TURN_STEP, np.sign(step), 0.0), [0.0]]))
+        np.diff(np.concatenate([[0.0], np.where(np.abs(step) > SIGNALS.wrap_step_rad, np.sign(step), 0.0), [0.0]]))
     )
     inside: list[int] = []
     for first, last in pairwise(edges):
         turned = abs(float(angle[last] - angle[first]))
-        if 2 <= last - first <= _TURN_SAMPLES and abs(turned - 2 * np.pi) < _TURN_MISSES:
+        if 2 <= last - first <= SIGNALS.wrap_samples and abs(turned - 2 * np.pi) < SIGNALS.wrap_rest_rad:
             rate = IMPLAUSIBLE["psi"][1]
             if times[last] - times[first] < 2 * np.pi / rate:
                 inside.extend(range(int(first) + 1, int(last)))
@@ -327,11 +322,11 @@ def _spikes(name: str, times: Floats, known: Floats, step: Floats) -> tuple[NDAr
         floor, per_second = IMPLAUSIBLE[name]
     else:
         low, high = np.quantile(known[::stride], [0.01, 0.99])
-        floor, per_second = _IMPLAUSIBLE_SHARE * float(high - low), 0.0
+        floor, per_second = SIGNALS.actuator_step * float(high - low), 0.0
         if floor == 0.0:
             return np.empty(0, dtype=np.int64), 0
     stretch = np.maximum(1.0, interval / usual) if usual > 0 else np.ones_like(interval)
-    limit = np.maximum(_SPIKE_NOISES * noise * stretch, floor + per_second * interval)
+    limit = np.maximum(SIGNALS.spike_noises * noise * stretch, floor + per_second * interval)
     large = np.abs(step) > limit
     if not large.any():
         return np.empty(0, dtype=np.int64), 0
@@ -341,7 +336,7 @@ def _spikes(name: str, times: Floats, known: Floats, step: Floats) -> tuple[NDAr
     peaks = np.flatnonzero(large[:-1] & large[1:] & returns) + 1
     apart = np.diff(peaks, prepend=-10, append=known.size + 10) > 3
     single = peaks[apart[:-1] & apart[1:]]
-    if single.size > _SPIKES_AT_MOST * known.size and single.size > 1:
+    if single.size > SIGNALS.spike_share * known.size and single.size > 1:
         single = single[:0]
     if is_actuator(name) or is_load(name):
         # These may well step; only what comes straight back is implausible.

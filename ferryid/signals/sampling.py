@@ -12,17 +12,12 @@ from ferryid.counts import counted
 from ferryid.errors import FerryIdError
 from ferryid.signals.quality import NAVIGATION, is_actuator, is_order
 from ferryid.signals.stream import Recording, Stream
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.vessel.profile import Profile
 
 GRAVITY = 9.81
-_SLOWEST_PERIOD = 2.0
-"""Longest sampling period in parts of sqrt(L/g): sway and yaw of a vessel of length L settle within several of these."""
 _LEAD = ("u", "vel_N", "x", "psi")
 _UNITS = (("ms", "milliseconds", 1e3), ("us", "microseconds", 1e6), ("ns", "nanoseconds", 1e9))
-_SURE_S = 20.0
-"""Rows further apart than this are of another unit of time rather than recorded so slowly."""
-_USUAL_HZ = (0.5, 2000.0)
-"""Rates at which logs are recorded."""
 
 
 def check_sampling(recording: Recording, profile: Profile) -> None:
@@ -40,9 +35,9 @@ def check_sampling(recording: Recording, profile: Profile) -> None:
         return
     period_s = float(np.median(np.diff(lead.time_ns))) * 1e-9
     length_m = _length(profile)
-    if period_s <= _SLOWEST_PERIOD * sqrt(length_m / GRAVITY):
+    if period_s <= SIGNALS.slowest_period * sqrt(length_m / GRAVITY):
         return
-    least_hz = 1.0 / (_SLOWEST_PERIOD * sqrt(length_m / GRAVITY))
+    least_hz = 1.0 / (SIGNALS.slowest_period * sqrt(length_m / GRAVITY))
     raise FerryIdError(
         f"{_file(recording)}: the motion is sampled too slowly for a fit, found a row of {lead.topic} every "
         f"{period_s:.4g} s, where a vessel of {length_m:.3g} m needs at least {least_hz:.2g} Hz. "
@@ -79,9 +74,9 @@ def _remedy(recording: Recording, lead: Stream, period_s: float) -> str:
     is_table = any(topic.encoding == "table" and topic.name == lead.topic for topic in recording.topics)
     if is_table:
         for unit, name, scale in _UNITS:
-            if _USUAL_HZ[0] <= scale / period_s <= _USUAL_HZ[1]:
+            if SIGNALS.lowest_usual_hz <= scale / period_s <= SIGNALS.highest_usual_hz:
                 setting = f'set time_unit = "{unit}" under [table] in the profile'
-                if period_s < _SURE_S:
+                if period_s < SIGNALS.unit_period_s:
                     return f"record the navigation at a higher rate, or {setting} if these are {name}"
                 return f"these look like {name}, so {setting}"
     return "record the navigation at a higher rate"

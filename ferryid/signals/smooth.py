@@ -11,6 +11,7 @@ from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.kalman import fit_levels, smooth_runs
 from ferryid.signals.quality import REFERENCE, require_excited
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import LeftOut, Motion, Track, segments
 from ferryid.vessel import applied_force, speed_doubts
 from ferryid.vessel.hull import current_in_body
@@ -21,10 +22,6 @@ Flags = NDArray[np.bool_]
 
 SMOOTHERS = ("square", "savgol", "kalman")
 _POLYNOMIAL = 3
-_WEATHER_SHARE = 0.8
-"""Wind, current or payload is used where it was measured on this share of the rows; fewer, and it is left out."""
-LEAST_PAYLOAD, MOST_PAYLOAD = -0.5, 10.0
-"""Parts of the hull's own mass between which a payload is believed. A scale errs below zero, and a pontoon carries much."""
 
 
 @dataclass(frozen=True)
@@ -360,7 +357,7 @@ def _payload(track: Track, profile: Profile, usable: Flags, repairs: list[str]) 
     if payload is not None and usable.any():
         (least, aft), (most, fore) = payload[usable].min(axis=0), payload[usable].max(axis=0)
         hull_kg = profile.hull.mass_kg
-        if least < LEAST_PAYLOAD * hull_kg or most > MOST_PAYLOAD * hull_kg:
+        if least < SIGNALS.least_payload * hull_kg or most > SIGNALS.most_payload * hull_kg:
             raise FerryIdError(
                 f"{track.log}: the payload cannot be right, found {least:.5g} to {most:.5g} kg on a vessel of "
                 f"{hull_kg:.5g} kg. Fix: correct unit, sign or offset of signals.payload in the profile"
@@ -380,7 +377,7 @@ def _known(
     pair = np.column_stack([first, second])
     known: Flags = np.all(np.isfinite(pair), axis=1)
     share = float(np.mean(known[track.valid])) if track.valid.any() else 0.0
-    if share < _WEATHER_SHARE:
+    if share < SIGNALS.weather_share:
         repairs.append(f"The {what} was measured on {100 * share:.0f} % of the rows only and is left out.")
         return None
     lost = int(np.count_nonzero(usable & ~known))

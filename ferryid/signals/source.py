@@ -11,18 +11,12 @@ from numpy.typing import NDArray
 from ferryid.counts import counted, verb
 from ferryid.signals.quality import VELOCITY, clean, is_actuator, is_load, is_order, stale, stuck
 from ferryid.signals.stream import Stream
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import segments
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Nanoseconds = NDArray[np.int64]
-
-GAP_PERIODS = 3.0
-GAP_LEAST_S = 0.5
-"""A stretch without samples is a gap when longer than three periods of its stream and than this [s]."""
-
-STUCK_PERIODS = 10.0
-"""A velocity that repeats itself for longer than a gap and than this many periods was not measured meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +79,7 @@ def source_of(stream: Stream) -> Source:
     time_ns = np.asarray(stream.time_ns)
     time_s = (time_ns - time_ns[0]) * 1e-9
     period = _usual_period(time_s)
-    bridge = max(GAP_PERIODS * period, GAP_LEAST_S)
+    bridge = max(SIGNALS.gap_periods * period, SIGNALS.gap_s)
     columns: dict[str, Floats] = {}
     taken_out: list[str] = []
     remarks: list[str] = []
@@ -104,7 +98,7 @@ def source_of(stream: Stream) -> Source:
             f"{verb(int(old.sum()), 'repeats')} an old measurement for more than "
             f"{bridge:.2f} s; taken as missing."
         )
-    frozen = max(bridge, STUCK_PERIODS * period)
+    frozen = max(bridge, SIGNALS.stuck_periods * period)
     for name in VELOCITY:
         if name in columns and (same := stuck(time_s, stream.columns[name], frozen) & ~old).any():
             columns[name][same] = np.nan
@@ -153,7 +147,7 @@ def _usual_period(time_s: Floats) -> float:
         return 1.0
     period = float(interval.mean())
     for _ in range(5):
-        within = interval <= max(GAP_PERIODS * period, GAP_LEAST_S)
+        within = interval <= max(SIGNALS.gap_periods * period, SIGNALS.gap_s)
         if not within.any():
             break
         shorter = float(interval[within].mean())
@@ -170,8 +164,8 @@ def _on_change(time_s: Floats, columns: Mapping[str, Floats]) -> bool:
     if not all(is_actuator(name) or is_order(name) for name in columns) or time_s.size < 3:
         return False
     interval = np.diff(time_s)
-    irregular = float(np.mean(interval > GAP_PERIODS * np.median(interval)))
+    irregular = float(np.mean(interval > SIGNALS.gap_periods * np.median(interval)))
     new = np.zeros(interval.size, dtype=bool)
     for values in columns.values():
         new |= np.diff(values) != 0.0
-    return irregular > 0.1 and float(new.mean()) > 0.9
+    return irregular > SIGNALS.irregular_share and float(new.mean()) > SIGNALS.new_share

@@ -16,22 +16,9 @@ from numpy.typing import NDArray
 from ferryid.counts import counted
 from ferryid.signals.pose_limits import Floats, Nanoseconds, Samples, mean_interval
 from ferryid.signals.poses import PoseFault
+from ferryid.signals.thresholds import SIGNALS
 from ferryid.vessel.frames import to_body
 
-_PERIODS_HELD, _LEAST_HELD_S = 10.0, 0.5
-"""A value is held when it stays for longer than so many times the usual, and than this [s]."""
-_WINDOW_S = 5.0
-"""Speeds by the pose are means over this [s], in which the noise of positions weighs little."""
-_USUAL = 0.25
-"""Share of the axis's usual speed (root mean square) by which the pose must move otherwise than the velocity says."""
-_LEAST_M, _LEAST_RAD = 0.5, 0.1
-_STEPS = 5.0
-"""And by how far: this distance or angle, and so many usual steps of the pose."""
-_NOISES = 3.0
-"""And by how fast: so many times what velocity and pose usually disagree by (standard deviation, from the median)."""
-_DEAD_BAND = 0.01
-"""Quantile of the sizes of a velocity that are not zero, below which it may read zero."""
-_FEWEST_POSES = 3
 _AXES = {
     "u": ("surge velocity", "position", "m/s", "m"),
     "v": ("sway velocity", "position", "m/s", "m"),
@@ -135,7 +122,7 @@ def _path(samples: Samples, name: str) -> tuple[Floats, Floats] | None:
     time_ns, x, y = samples["x"][0], samples["x"][1], samples["y"][1]
     both = np.isfinite(x) & np.isfinite(y)
     time_s = _seconds(time_ns[both])
-    if time_s.size < _FEWEST_POSES:
+    if time_s.size < SIGNALS.moved_poses:
         return None
     pointing = np.interp((time_s[1:] + time_s[:-1]) / 2, *psi)
     ahead, aside = to_body(np.diff(x[both]), np.diff(y[both]), pointing)
@@ -147,7 +134,7 @@ def _known(samples: Samples, name: str) -> tuple[Floats, Floats] | None:
         return None
     time_ns, values = samples[name]
     finite = np.isfinite(values)
-    return (_seconds(time_ns[finite]), values[finite]) if np.count_nonzero(finite) >= _FEWEST_POSES else None
+    return (_seconds(time_ns[finite]), values[finite]) if np.count_nonzero(finite) >= SIGNALS.moved_poses else None
 
 
 def _seconds(time_ns: Nanoseconds) -> Floats:
@@ -158,21 +145,24 @@ def _held(
     name: str, time_ns: Nanoseconds, values: Floats, path_s: Floats, path: Floats, wrong: Sequence[PoseFault]
 ) -> list[HeldVelocity]:
     known = np.flatnonzero(np.isfinite(values))
-    if known.size < _FEWEST_POSES:
+    if known.size < SIGNALS.moved_poses:
         return []
     time_s, value = _seconds(time_ns[known]), values[known]
     step = np.diff(value)
     fresh = time_s[np.concatenate([[True], step != 0.0])]
-    if fresh.size < _FEWEST_POSES:
+    if fresh.size < SIGNALS.moved_poses:
         return []  # a constant, which is refused as one
-    longest = max(_PERIODS_HELD * mean_interval(np.diff(fresh)), _LEAST_HELD_S)
+    longest = max(SIGNALS.moved_periods * mean_interval(np.diff(fresh)), SIGNALS.moved_s)
     usual = _speed(path_s, path)
     moves = np.abs(np.diff(path))
     if not moves.any():
         return []
-    least = max(_LEAST_RAD if name == "r" else _LEAST_M, _STEPS * float(np.median(moves[moves > 0.0])))
+    least = max(
+        SIGNALS.moved_rad if name == "r" else SIGNALS.moved_m,
+        SIGNALS.moved_steps * float(np.median(moves[moves > 0.0])),
+    )
     resolution = float(np.median(np.abs(step[step != 0.0])))
-    band = float(np.quantile(np.abs(value[value != 0.0]), _DEAD_BAND))
+    band = float(np.quantile(np.abs(value[value != 0.0]), SIGNALS.dead_band))
     same = np.concatenate([[False], (step == 0.0) & (np.diff(time_s) <= longest), [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))
     noise = _disagreement(time_s, value, path_s, path)
@@ -184,12 +174,14 @@ def _held(
         if any(fault.start_ns * 1e-9 < last_s and fault.end_ns * 1e-9 > first_s for fault in wrong):
             continue
         inside = (path_s >= first_s) & (path_s <= last_s)
-        if np.count_nonzero(inside) < _FEWEST_POSES:
+        if np.count_nonzero(inside) < SIGNALS.moved_poses:
             continue
         away = path[inside] - at * path_s[inside]
         moved = float(np.ptp(away))
         slack = max(resolution, band) if at == 0.0 else resolution
-        if moved <= least or _speed(path_s[inside], away) <= max(slack + _NOISES * noise, _USUAL * usual):
+        if moved <= least or _speed(path_s[inside], away) <= max(
+            slack + SIGNALS.moved_noises * noise, SIGNALS.moved_share * usual
+        ):
             continue
         # A value that is not zero was measured once.
         first = int(before) + (at != 0.0)
@@ -203,22 +195,22 @@ def _held(
 
 
 def _disagreement(time_s: Floats, value: Floats, path_s: Floats, path: Floats) -> float:
-    """Return by how much a velocity and that of the pose usually differ, in means over `_WINDOW_S`."""
+    """Return by how much a velocity and that of the pose usually differ, in means over `SIGNALS.moved_window_s`."""
     way = np.concatenate([[0.0], np.cumsum((value[1:] + value[:-1]) / 2 * np.diff(time_s))])
     first, last = max(time_s[0], path_s[0]), min(time_s[-1], path_s[-1])
-    edges = np.arange(first, last, _WINDOW_S)
-    if edges.size < _FEWEST_POSES:
+    edges = np.arange(first, last, SIGNALS.moved_window_s)
+    if edges.size < SIGNALS.moved_poses:
         return 0.0
-    apart = np.diff(np.interp(edges, path_s, path) - np.interp(edges, time_s, way)) / _WINDOW_S
+    apart = np.diff(np.interp(edges, path_s, path) - np.interp(edges, time_s, way)) / SIGNALS.moved_window_s
     return 1.4826 * float(np.median(np.abs(apart)))
 
 
 def _speed(time_s: Floats, path: Floats) -> float:
-    """Return the root-mean-square speed along a path, in means over `_WINDOW_S` or the whole of it."""
+    """Return the root-mean-square speed along a path, in means over `SIGNALS.moved_window_s` or the whole of it."""
     length = float(time_s[-1] - time_s[0])
     if length <= 0.0:
         return 0.0
-    parts = max(1, int(length / _WINDOW_S))
+    parts = max(1, int(length / SIGNALS.moved_window_s))
     edges = np.linspace(time_s[0], time_s[-1], parts + 1)
     way: NDArray[np.float64] = np.diff(np.interp(edges, time_s, path)) * (parts / length)
     return float(np.sqrt(np.mean(way**2)))

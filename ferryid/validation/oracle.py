@@ -19,7 +19,7 @@ from ferryid.counts import counted
 from ferryid.diagnose.checks import refilter_velocity
 from ferryid.diagnose.data import read_measurements, window_lengths
 from ferryid.diagnose.inference import (
-    FEWEST_WINDOWS,
+    INFERENCE,
     Candidate,
     EstimationProblem,
     Windows,
@@ -108,7 +108,7 @@ class _Log:
     def too_short(self) -> str:
         """Why nothing can be fitted; empty where it can."""
         found = len(self.windows.starts)
-        return f"only {counted(found, 'stretch')} without a gap" if found < FEWEST_WINDOWS else ""
+        return f"only {counted(found, 'stretch')} without a gap" if found < INFERENCE.fewest_windows else ""
 
 
 def _sensor_oracles() -> dict[str, Callable[[Measurements], SensorEstimate]]:

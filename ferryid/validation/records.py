@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ferryid.diagnose import HINT, Estimate
+from ferryid.diagnose import JUDGING, Estimate
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.json_record import Record
 
@@ -57,7 +57,7 @@ class Finding(Record):
     @property
     def hint(self) -> bool:
         """Whether it is no more likely than not."""
-        return self.probability <= HINT
+        return self.probability <= JUDGING.hint_probability
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import pytest
 import ferryid.diagnose.inference.search as search_module
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.search import list_candidates, search
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.held_out import HEADING, held_out_evidence
 from ferryid.effects.force_model import COEFFICIENTS, Measurements
 from tests.diagnose.trials import FERRY, OFF, sailed, trial_on
@@ -80,7 +81,7 @@ def test_trap_3_what_hides_in_a_product_is_found_and_sized(inflow: EstimationPro
     # Every effect among all the others: tests/effects/test_every_effect.py.
     made = fit(inflow, [candidate(inflow, "thrust_inflow_loss")])
     assert made.values[0][0] == pytest.approx(0.3, abs=0.05)
-    assert gain(inflow, made) > 5.0 * search_module.ODDS
+    assert gain(inflow, made) > 5.0 * INFERENCE.prior_odds
 
 
 def test_trap_4_gains_and_hull_free_at_once_do_not_shrink(clean: EstimationProblem) -> None:
@@ -92,7 +93,7 @@ def test_trap_4_gains_and_hull_free_at_once_do_not_shrink(clean: EstimationProbl
 
 def test_trap_4_a_mass_that_would_cancel_the_acceleration_explains_nothing(clean: EstimationProblem) -> None:
     one = candidate(clean, "payload")
-    assert gain(clean, fit(clean, [one])) < search_module.ODDS
+    assert gain(clean, fit(clean, [one])) < INFERENCE.prior_odds
     # The more mass, the less acceleration does the picture have; what was measured stays.
     left = [float(np.sum(clean.white(one.act(clean.plain, np.array([mass, 0.0]))) ** 2)) for mass in (0.0, 2e3, 2e4)]
     assert left[0] < left[1] < left[2]
@@ -116,9 +117,9 @@ def test_trap_6_what_is_certain_but_void_is_no_finding(
     little = wind.act(clean.plain, np.array([-0.24, 0.16]))
     calm = replace(clean, plain=replace(clean.plain, external=2.0 * clean.plain.external - little.external))
     result = search(calm, lambda stage: None, known=[wind])
-    assert result.rounds[0].ranked[0].gain > search_module.ODDS
+    assert result.rounds[0].ranked[0].gain > INFERENCE.prior_odds
     assert result.fit.candidates == ()
-    monkeypatch.setattr(search_module, "VOID", 0.0)
+    monkeypatch.setattr(search_module, "INFERENCE", replace(INFERENCE, void_share=0.0))
     assert [one.key for one in search(calm, lambda stage: None, known=[wind]).fit.candidates] == [wind.key]
 
 

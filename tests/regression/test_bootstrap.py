@@ -10,7 +10,6 @@ from scipy.signal import lfilter
 from ferryid.errors import FerryIdError
 from ferryid.regression.cross_products import CrossProducts, Rows
 from ferryid.regression.resampling.bootstrap import (
-    FEWEST_BLOCKS,
     Blocks,
     Bootstrap,
     block_seconds,
@@ -18,6 +17,7 @@ from ferryid.regression.resampling.bootstrap import (
     correlated_rows,
 )
 from ferryid.regression.simpls import fit_simpls
+from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Flags
 
 Floats = NDArray[np.float64]
@@ -159,10 +159,10 @@ def test_a_log_too_short_for_its_memory_is_told() -> None:
     X = rng.standard_normal((200, 2))
     Y = X[:, :1] + np.sin(3.0 * drift) + 0.01 * rng.standard_normal((200, 1))
     length, notes = block_seconds([Rows.of(X, Y)], [10.0], np.array([[1.0], [0.0]]), np.zeros(1))
-    assert length == pytest.approx(20.0 / FEWEST_BLOCKS)
+    assert length == pytest.approx(20.0 / REGRESSION.fewest_blocks)
     assert "probably too narrow" in notes[0]
     got = bootstrap_rows(X, Y, 10.0, 2, draws=20)
-    assert got.blocks == FEWEST_BLOCKS
+    assert got.blocks == REGRESSION.fewest_blocks
     assert got.block_s == length
     assert len(got.notes) == 2
     assert "Only 10 independent stretches" in got.notes[1]

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError
 from ferryid.regression import cross_products
 from ferryid.regression.cross_products import Accumulator, CrossProducts, Rows
-from ferryid.regression.qr import CONDITION_FOR_QR, QrFactor, condition, factorise
+from ferryid.regression.qr import QrFactor, condition, factorise
+from ferryid.regression.thresholds import REGRESSION
 
 Floats = NDArray[np.float64]
 KINDS = (CrossProducts, QrFactor)
@@ -176,7 +177,7 @@ def test_qr_is_chosen_by_condition_alone() -> None:
     assert chosen(np.hstack([X, X[:, :2], np.full((400, 1), 7.0)])) is CrossProducts  # duplicates and a constant
     assert chosen(np.hstack([X, X[:, :1] + X[:, 1:2]])) is QrFactor  # exactly dependent: only QR can tell
     near = np.hstack([X, X[:, :1] + 1e-4 * rng.standard_normal((400, 1))])
-    assert condition(CrossProducts.from_rows(near, Y))[0] > CONDITION_FOR_QR
+    assert condition(CrossProducts.from_rows(near, Y))[0] > REGRESSION.condition_for_qr
     assert chosen(near) is QrFactor
     assert chosen(np.zeros((400, 3))) is CrossProducts
 

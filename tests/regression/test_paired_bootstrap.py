@@ -7,13 +7,13 @@ import pytest
 from scipy.signal import lfilter
 
 from ferryid.regression.resampling.paired_bootstrap import (
-    FEWEST_BLOCKS,
     compare_pairs,
     has_enough_blocks,
     holm,
     paired_block_seconds,
     sum_over_blocks,
 )
+from ferryid.regression.thresholds import REGRESSION
 
 RATE_HZ = 2.0
 DRAWS = 499
@@ -135,12 +135,12 @@ def test_the_same_model_is_no_better_and_what_never_errs_has_no_ratio() -> None:
 
 
 def test_too_few_blocks_give_no_interval() -> None:
-    many, few = np.ones((FEWEST_BLOCKS, 2, 1)), np.ones((FEWEST_BLOCKS - 1, 2, 1))
+    many, few = np.ones((REGRESSION.paired_fewest_blocks, 2, 1)), np.ones((REGRESSION.paired_fewest_blocks - 1, 2, 1))
     assert has_enough_blocks([many])
     assert not has_enough_blocks([few])
     # Short logs are blocks of one another.
-    assert has_enough_blocks([many[:1]] * FEWEST_BLOCKS)
-    assert not has_enough_blocks([many[:1]] * (FEWEST_BLOCKS - 1))
+    assert has_enough_blocks([many[:1]] * REGRESSION.paired_fewest_blocks)
+    assert not has_enough_blocks([many[:1]] * (REGRESSION.paired_fewest_blocks - 1))
     assert np.isnan(compare_pairs([few]).p).all()
 
 
@@ -162,7 +162,7 @@ def test_blocks_are_as_long_as_errors_are_remembered() -> None:
     # Errors that only grow are remembered throughout.
     cut, told = paired_block_seconds(np.linspace(1.0, 2.0, int(360 * RATE_HZ))[:, None], RATE_HZ)
     assert told
-    assert cut == pytest.approx(360.0 / FEWEST_BLOCKS)
+    assert cut == pytest.approx(360.0 / REGRESSION.paired_fewest_blocks)
 
 
 def test_holm_against_a_hand_computation() -> None:

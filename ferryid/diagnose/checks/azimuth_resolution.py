@@ -12,22 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
-LEAST = 0.02
-"""Error across the thrust, as a share of it, from which on a step matters: that of steps of four degrees."""
-HELD = 0.1
-"""Share of the rows in which a rounded angle stays as it is from row to row at least; one that is not rounded never does."""
-ON_GRID = 0.95
-"""Share of these that have to be multiples of the step."""
-CLOSE = 0.01
-"""How near a multiple a reading has to be, in steps."""
 TURNS = np.arange(-2, 3)
 """Whole turns after which an angle may have been rounded that is written within half a turn."""
-SLEW_DEGPS = 30.0
-"""Speed at which azimuth thrusters turn where they do: a reading that lasts longer than a step then takes is the angle."""
 
 
 def step_of(angle: Floats) -> float:
@@ -36,7 +27,7 @@ def step_of(angle: Floats) -> float:
         return 0.0
     still = np.abs(np.diff(angle)) < 1e-9
     held = np.flatnonzero(still[1:] & still[:-1])
-    if held.size < HELD * len(angle):
+    if held.size < CHECKS.azimuth_held * len(angle):
         return 0.0
     readings = np.degrees(angle[held])
     readings = readings - 360.0 * np.round(readings / 360.0)
@@ -47,7 +38,11 @@ def step_of(angle: Floats) -> float:
     # Half a turn need not be a multiple: next to it readings may lie closer than a step.
     gaps, counts = np.unique(np.round(apart, 4), return_counts=True)
     step = float(np.median(apart[np.abs(apart - gaps[np.argmax(counts)]) < 1e-3]))
-    return step if float(np.mean(off_grid(readings, step) < CLOSE * step)) >= ON_GRID else 0.0
+    return (
+        step
+        if float(np.mean(off_grid(readings, step) < CHECKS.azimuth_close * step)) >= CHECKS.azimuth_on_grid
+        else 0.0
+    )
 
 
 def off_grid(readings: Floats, step_deg: float) -> Floats:
@@ -58,7 +53,7 @@ def off_grid(readings: Floats, step_deg: float) -> Floats:
 
 def estimate(step_deg: float) -> Estimate:
     """Return a step with its interval: it is known as well as multiples of it are recognised."""
-    return Estimate(step_deg, (1.0 - CLOSE) * step_deg, (1.0 + CLOSE) * step_deg, "deg")
+    return Estimate(step_deg, (1.0 - CHECKS.azimuth_close) * step_deg, (1.0 + CHECKS.azimuth_close) * step_deg, "deg")
 
 
 def restored(angle: Floats, step_deg: float, step_s: float) -> Floats:
@@ -79,7 +74,7 @@ def restored(angle: Floats, step_deg: float, step_s: float) -> Floats:
     k = np.searchsorted(at, row)
     since = np.where(k > 0, row - at[np.maximum(k - 1, 0)], np.inf)
     until = np.where(k < len(at), at[np.minimum(k, len(at) - 1)] - row, np.inf)
-    back = np.clip(np.minimum(since, until) * step_s * SLEW_DEGPS / step_deg, 0.0, 1.0)
+    back = np.clip(np.minimum(since, until) * step_s * CHECKS.azimuth_slew_degps / step_deg, 0.0, 1.0)
     return np.asarray((1.0 - back) * straight + back * level)
 
 
@@ -117,7 +112,7 @@ def find(scene: Measurements) -> SensorFinding | None:
     steps = [step_of(angle) for angle in scene.angles.T]
     step = max(steps, default=0.0)
     error = error_of(step)
-    if error < LEAST:
+    if error < CHECKS.least_azimuth_error:
         return None
     k = int(np.argmax(steps))
 

@@ -11,17 +11,16 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import LATE, kinematics
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_body, to_world
 from ferryid.vessel.profile import Floats
-
-LEAST_S = 0.1
 
 
 def find(scene: Measurements) -> SensorFinding | None:
     """Return how late the positions are."""
     found = kinematics(scene)
-    if found is None or not found.found(LATE, LEAST_S):
+    if found is None or not found.found(LATE, CHECKS.least_delay_s):
         return None
     late = found.solution.estimate(LATE, "s")
     word = "later" if late.value > 0.0 else "earlier"

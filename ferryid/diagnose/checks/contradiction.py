@@ -15,27 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 
-SPAN_S = 4.0
-"""Length of a window: long against noise, short against manoeuvres."""
-FEWEST = 60
-"""Windows below which nothing is certain."""
-LEAST, MOST = 0.2, 5.0
-"""Parts of one over the mass between which the coefficient of a force lies."""
-TURNED_DEG = 30.0
-"""How far the coefficient is from being real at most."""
-LEFT, BETTER = 0.3, 3.0
-"""A change is believed that leaves at most this share of the accelerations unexplained, and so many times less than without."""
 MOST_ACTUATORS = 6
 """Actuators whose signs are tried in all combinations."""
 SHIFTS_S = np.arange(-60.0, 61.0)
-SHORTEST_S = 4.0
-"""Clock offset [s] beyond what the effect of a delay is for."""
-ALONE = 10.0
-"""Every other shift leaves so many times more, if clocks are apart."""
-NOTHING = 1e-6
-"""Share of a push below which drag and lift have taken all of it."""
 
 
 def opposed(scene: Measurements) -> str:
@@ -48,7 +33,7 @@ def opposed(scene: Measurements) -> str:
     """
     force = np.nan_to_num(scene.parts[:, :, 0] + 1j * scene.parts[:, :, 1]) / scene.profile.hull.mass_kg
     declared = _left(scene, force.sum(axis=1)) if force.any() else 0.0
-    if declared < LEFT or len(scene.names) > MOST_ACTUATORS:
+    if declared < CHECKS.opposed_left or len(scene.names) > MOST_ACTUATORS:
         return ""
     azimuths = np.array([actuator.kind == "azimuth" for actuator in scene.profile.actuators])
     mirrored = np.where(azimuths, np.conj(force), force)
@@ -67,7 +52,7 @@ def opposed(scene: Measurements) -> str:
             (left, f"{abs(late_s):.0f} s {'later' if late_s > 0.0 else 'earlier'} than the force recorded for it")
         )
     best, says = min(tried)
-    if not says or best > LEFT or BETTER * best > declared:
+    if not says or best > CHECKS.opposed_left or CHECKS.opposed_ratio * best > declared:
         return ""
     not_so = f"{100.0 * (1.0 - declared):.0f} %" if declared < 1.0 else "it does not even push that way"
     return f"The vessel moves {says} (that explains {100.0 * (1.0 - best):.0f} % of its accelerations; as declared {not_so})."
@@ -84,8 +69,8 @@ def _apart(scene: Measurements, force: NDArray[np.complexfloating[Any, Any]]) ->
         moved = replace(scene, usable=scene.usable & np.roll(scene.usable, rows) & _inside(len(scene.t), rows))
         left[late_s] = _left(moved, np.roll(force, rows))
     best = min(left, key=lambda late_s: left[late_s])
-    others = min(share for late_s, share in left.items() if abs(late_s - best) > SPAN_S)
-    alone = abs(best) >= SHORTEST_S and others >= ALONE * left[best]
+    others = min(share for late_s, share in left.items() if abs(late_s - best) > CHECKS.opposed_span_s)
+    alone = abs(best) >= CHECKS.apart_s and others >= CHECKS.apart_ratio * left[best]
     return (left[best], best) if alone else None
 
 
@@ -104,11 +89,11 @@ def _left(scene: Measurements, push: NDArray[np.complexfloating[Any, Any]]) -> f
 
     Shares are of what drag, a steady push and the lift of a turning hull leave: that lift is against a stern thruster's force.
     """
-    span = max(2, round(SPAN_S / scene.step_s))
+    span = max(2, round(CHECKS.opposed_span_s / scene.step_s))
     starts = np.arange(0, len(scene.t) - span, span)
     gone = np.concatenate([[0], np.cumsum(~scene.usable)])
     starts = starts[gone[starts + span + 1] == gone[starts]]
-    if len(starts) < FEWEST:
+    if len(starts) < CHECKS.opposed_windows:
         return 1.0
     turn = np.exp(1j * scene.psi)
     u, v, r = scene.nu_raw.T
@@ -123,9 +108,11 @@ def _left(scene: Measurements, push: NDArray[np.complexfloating[Any, Any]]) -> f
     both = np.column_stack([means[:, 0], change])
     felt, rest = (both - means[:, 1:] @ np.linalg.lstsq(means[:, 1:], both, rcond=None)[0]).T
     size, spread = float(np.linalg.norm(felt)), float(np.linalg.norm(rest))
-    if size <= NOTHING * float(np.linalg.norm(means[:, 0])) or spread == 0.0:
+    if size <= CHECKS.no_push * float(np.linalg.norm(means[:, 0])) or spread == 0.0:
         return 1.0
     gain = complex(np.vdot(felt, rest)) / size**2
-    if not LEAST < abs(gain) < MOST or abs(np.angle(gain)) > np.radians(TURNED_DEG):
+    if not CHECKS.least_inertia < abs(gain) < CHECKS.most_inertia or abs(np.angle(gain)) > np.radians(
+        CHECKS.inertia_angle_deg
+    ):
         return 1.0
     return float(np.linalg.norm(rest - gain * felt) / spread) ** 2

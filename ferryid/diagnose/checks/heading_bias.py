@@ -13,15 +13,14 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import ANGLE, kinematics
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
-
-LEAST_DEG = 1.0
 
 
 def find(scene: Measurements) -> SensorFinding | None:
     """Return the heading's bias against the velocity's axes, positive where the heading measured is too large."""
     found = kinematics(scene)
-    if found is None or not found.found(ANGLE, np.radians(LEAST_DEG)):
+    if found is None or not found.found(ANGLE, np.radians(CHECKS.least_angle_deg)):
         return None
     angle = found.solution.estimate(ANGLE, "deg", degrees(1.0))
     side = "clockwise" if angle.value > 0.0 else "anticlockwise"

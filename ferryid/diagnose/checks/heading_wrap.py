@@ -10,15 +10,11 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import wrap
 from ferryid.vessel.profile import Floats
-
-FAST_RADPS = 1.5
-"""What heading and yaw rate may differ by."""
-NEAR_RAD = 0.5
-"""How near a heading is to the wrap before and after, and to what the yaw rate makes of it."""
 
 
 def find(scene: Measurements) -> SensorFinding | None:
@@ -45,7 +41,7 @@ def repaired(scene: Measurements) -> tuple[NDArray[np.bool_], Floats]:
     """Return which headings are false, and all headings with these interpolated the short way."""
     psi, dt = scene.psi.copy(), scene.step_s
     rate = np.where(np.isfinite(scene.nu_raw[:, 2]), scene.nu_raw[:, 2], 0.0)
-    odd = np.abs(np.diff(psi) - 0.5 * dt * (rate[1:] + rate[:-1])) > FAST_RADPS * dt
+    odd = np.abs(np.diff(psi) - 0.5 * dt * (rate[1:] + rate[:-1])) > CHECKS.wrap_rate_radps * dt
     inside = np.zeros(len(psi), dtype=np.bool_)
     # A step that looks right between two that do not is part of the same turn.
     odd[1:-1] |= odd[:-2] & odd[2:]
@@ -54,9 +50,14 @@ def repaired(scene: Measurements) -> tuple[NDArray[np.bool_], Floats]:
         before, after = float(psi[first]), float(psi[last])
         short = float(wrap(np.array(after - before)))
         turned = float(rate[first : last + 1].mean()) * (last - first) * dt
-        at_wrap = max(abs(float(wrap(np.array(value - pi)))) for value in (before, after)) < NEAR_RAD
+        at_wrap = max(abs(float(wrap(np.array(value - pi)))) for value in (before, after)) < CHECKS.wrap_near_rad
         away = float(np.abs(psi[first : last + 1] - before).max())
-        if last - first < 2 or not at_wrap or abs(short - turned) > NEAR_RAD or away < 2.0 * NEAR_RAD:
+        if (
+            last - first < 2
+            or not at_wrap
+            or abs(short - turned) > CHECKS.wrap_near_rad
+            or away < 2.0 * CHECKS.wrap_near_rad
+        ):
             continue
         inside[first + 1 : last] = True
         psi[last:] += before + short - after

@@ -9,27 +9,13 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import interpolate_gaps
 from ferryid.vessel.profile import Floats
 
 NAMES = ("north", "east", "heading", "surge", "sway", "yaw rate")
-USUAL = 4.0
-"""Runs this many times as long as the usual one are not explained by the sensor's rate."""
-SHORTEST_ROWS, SHORTEST_S = 5, 0.4
-COARSE = 0.1
-"""A sensor whose changes are so few different ones has a resolution that makes repeats."""
-STRAIGHT = 0.2
-"""A channel in which such a share of the rows lies exactly between its neighbours was interpolated before it was recorded:
-two equal readings of its sensor are a repeat then."""
-JUMP = 4.0
-"""Repeats of either kind are a hold only if they end in a jump of so many usual changes."""
-MISSED, AROUND = 0.5, 20
-"""A hold ends in such a share, at least, of what the channel usually moves in as long, at times around it that are so many
-times as long; repeats that do not are a slow motion under the sensor's resolution."""
-LEAST_SHARE, LEAST_S, LEAST_OF_LONG = 0.005, 2.0, 0.001
-"""Holds that are neither this share of the log nor one as long as this, with the other share, do no harm."""
 
 
 def find(scene: Measurements) -> SensorFinding | None:
@@ -42,7 +28,7 @@ def find(scene: Measurements) -> SensorFinding | None:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8))).reshape(-1, 2)
     share = float(rows.sum()) / max(int(scene.usable.sum()), 1)
     longest = float((edges[:, 1] - edges[:, 0]).max(initial=0)) * scene.step_s
-    if share < (LEAST_OF_LONG if longest >= LEAST_S else LEAST_SHARE):
+    if share < (CHECKS.long_held_share if longest >= CHECKS.long_held_s else CHECKS.least_held_share):
         return None
     names = [name for name, column in zip(NAMES, held.T, strict=True) if column.any()]
     percent = 100.0 * share
@@ -74,12 +60,16 @@ def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArr
     edges = np.flatnonzero(np.diff(np.concatenate([[False], repeat, [False]]).astype(np.int8))).reshape(-1, 2)
     lengths = edges[:, 1] - edges[:, 0] + 1
     usual = float(np.median(np.concatenate([lengths, np.ones(max(len(changes) - len(lengths), 0))])))
-    long = lengths > max(USUAL * usual, SHORTEST_ROWS, SHORTEST_S / step_s)
-    coarse = np.unique(np.round(changes, 9)).size < COARSE * len(changes)
-    jump = JUMP * float(np.median(changes)) if coarse or _interpolated(values, usable) else 0.0
+    long = lengths > max(CHECKS.held_runs * usual, CHECKS.held_rows, CHECKS.held_s / step_s)
+    coarse = np.unique(np.round(changes, 9)).size < CHECKS.coarse_share * len(changes)
+    jump = CHECKS.held_jump * float(np.median(changes)) if coarse or _interpolated(values, usable) else 0.0
     for first, last in edges[long].tolist():
         missed = abs(float(values[min(last + 1, len(values) - 1)] - values[last]))
-        if values[first] != 0.0 and missed > jump and missed >= MISSED * _usual(values, usable, first, last):
+        if (
+            values[first] != 0.0
+            and missed > jump
+            and missed >= CHECKS.held_missed * _usual(values, usable, first, last)
+        ):
             held[first + 1 : last + 1] = True
     return held
 
@@ -87,7 +77,9 @@ def held_rows(values: Floats, usable: NDArray[np.bool_], step_s: float) -> NDArr
 def _usual(values: Floats, usable: NDArray[np.bool_], first: int, last: int) -> float:
     """Return how far a channel usually moves in as long as some rows, at times around them."""
     rows = last + 1 - first
-    some = np.arange(max(0, first - AROUND * rows), min(len(values) - rows, last + AROUND * rows))
+    some = np.arange(
+        max(0, first - CHECKS.held_around * rows), min(len(values) - rows, last + CHECKS.held_around * rows)
+    )
     some = some[(some + rows <= first) | (some > last)]
     some = some[usable[some] & usable[some + rows]]
     return float(np.median(np.abs(values[some + rows] - values[some]))) if some.size else 0.0
@@ -100,7 +92,7 @@ def _interpolated(values: Floats, usable: NDArray[np.bool_]) -> bool:
     if not moving.any():
         return False
     bend, size = np.abs(np.diff(slope))[moving], np.abs(slope[1:])[moving]
-    return bool(np.mean(bend <= 1e-3 * size + 1e-12) > STRAIGHT)
+    return bool(np.mean(bend <= 1e-3 * size + 1e-12) > CHECKS.straight_share)
 
 
 CHECK = Check("held_samples", "Values held without a measurement", find, place=5)

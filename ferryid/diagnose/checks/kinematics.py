@@ -23,6 +23,7 @@ from scipy.signal import savgol_filter
 
 from ferryid.diagnose.checks.regression import Solution, step
 from ferryid.diagnose.checks.spans import Spans, spans
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_body, to_world
 from ferryid.vessel.profile import Floats
@@ -33,12 +34,6 @@ NEUTRAL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 SIZE = np.array([0.5, 0.5, 10.0, 10.0, 2.0, 1.0, 1.0])
 TINY = np.array([1e-4, 1e-4, 1e-2, 1e-2, 1e-2, 1e-3, 1e-3])
 STEPS = 12
-GROSS = 0.2
-"""A factor or an angle that is so far off is let in from the start: no first step would be short enough."""
-OUTLIER = 6.0
-"""Windows whose residual is this many times the usual one are left out: a position that jumps says nothing of velocities."""
-SLOW_MPS = 0.02
-"""Below this root mean square of the speed, positions and velocities are compared in vain."""
 DERIVATIVE_S = 2.0
 
 
@@ -159,7 +154,7 @@ def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
     if len(problem.starts) < 8:
         return None
     eta, velocity = both[:, :3], both[:, 3:]
-    if np.sqrt(2.0 * np.mean(problem.rate(eta[:, :2]) ** 2)) < SLOW_MPS:
+    if np.sqrt(2.0 * np.mean(problem.rate(eta[:, :2]) ** 2)) < CHECKS.slow_mps:
         return None
     m = 2 * max(2, round(0.5 * DERIVATIVE_S / problem.step_s)) + 1
     pulled = np.asarray(savgol_filter(eta[:, :2], m, 2, deriv=1, delta=problem.step_s, axis=0))
@@ -170,7 +165,7 @@ def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
     if searched is None:
         return None
     size = np.abs(data.residual(searched[0])).max(axis=1)
-    data = _Data(problem.only(size <= OUTLIER * max(float(np.median(size)), 1e-9)), eta, velocity, pulled)
+    data = _Data(problem.only(size <= CHECKS.outlier * max(float(np.median(size)), 1e-9)), eta, velocity, pulled)
     searched = _search(data, p, active)
     if searched is None:
         return None
@@ -191,7 +186,7 @@ def _start(data: _Data) -> tuple[Floats, NDArray[np.bool_]]:
     start, active = NEUTRAL.copy(), np.zeros(7, dtype=np.bool_)
     active[NORTH:] = True
     scale, angle = abs(product) / power, float(np.angle(product))
-    if scale > 0.1 and max(abs(scale - 1.0), abs(angle)) > GROSS:
+    if scale > 0.1 and max(abs(scale - 1.0), abs(angle)) > CHECKS.gross:
         start[SCALE], start[ANGLE] = scale, angle
         active[[SCALE, ANGLE]] = True
     return start, active

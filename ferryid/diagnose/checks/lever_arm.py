@@ -12,17 +12,15 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import X, Y, kinematics
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_world
-
-LEAST_M = 0.15
-LEAST_OF_LENGTH = 0.02
 
 
 def least_m(scene: Measurements) -> float:
     """Return the least lever arm along an axis that is worth a name [m]."""
     length = scene.profile.hull.length_m
-    return max(LEAST_M, LEAST_OF_LENGTH * length) if np.isfinite(length) else LEAST_M
+    return max(CHECKS.least_arm_m, CHECKS.least_arm_share * length) if np.isfinite(length) else CHECKS.least_arm_m
 
 
 def find(scene: Measurements) -> SensorFinding | None:

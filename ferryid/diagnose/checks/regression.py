@@ -11,15 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.vessel.profile import Floats
-
-FALSE_ALARM = 1e-4
-"""Probability at which a value that is not neutral counts as one, before the practical threshold."""
-
-
-MEMORY = 15
-"""Residuals of windows that are as many strides apart are taken as independent."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +44,7 @@ class Solution:
 
     def certain(self, index: int, neutral: float = 0.0) -> bool:
         """Return whether a parameter is not neutral, beyond reasonable doubt."""
-        return self.score(index, neutral) > float(student.ppf(1.0 - 0.5 * FALSE_ALARM, self.freedom))
+        return self.score(index, neutral) > float(student.ppf(1.0 - 0.5 * CHECKS.false_alarm, self.freedom))
 
 
 def step(Z: Floats, J: Floats, e: Floats, place: NDArray[np.int64], size: Floats, away: Floats) -> Solution | None:
@@ -72,7 +66,7 @@ def step(Z: Floats, J: Floats, e: Floats, place: NDArray[np.int64], size: Floats
     away
         How far the parameters are from their neutral values already, shape (q,).
     """
-    block = np.unique(place // MEMORY, return_inverse=True)[1]
+    block = np.unique(place // CHECKS.independent_strides, return_inverse=True)[1]
     count, (m, c, q) = int(block.max(initial=-1)) + 1, J.shape
     freedom = count - q
     if freedom < 3:
@@ -91,11 +85,15 @@ def step(Z: Floats, J: Floats, e: Floats, place: NDArray[np.int64], size: Floats
     all_Z, all_left, known = np.zeros((len(whole), c, q)), np.zeros((len(whole), c)), np.zeros(len(whole))
     all_Z[row], all_left[row], known[row] = Z, left, 1.0
     even = np.zeros((q, q))
-    for lag in range(min(MEMORY, len(whole) - 1)):
+    for lag in range(min(CHECKS.independent_strides, len(whole) - 1)):
         pairs = c * float(known[lag:] @ known[: len(whole) - lag])
         if pairs == 0.0:
             continue
-        covariance = float(np.sum(all_left[lag:] * all_left[: len(whole) - lag])) / pairs * (1.0 - lag / MEMORY)
+        covariance = (
+            float(np.sum(all_left[lag:] * all_left[: len(whole) - lag]))
+            / pairs
+            * (1.0 - lag / CHECKS.independent_strides)
+        )
         product = np.einsum("ncq,ncp->qp", all_Z[lag:], all_Z[: len(whole) - lag])
         even += covariance * (product if lag == 0 else product + product.T)
     prior = variance**2 * np.eye(q)

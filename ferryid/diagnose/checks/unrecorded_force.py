@@ -13,19 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.signals.smooth import moving_mean, odd_rows
-
-SHORTEST_S = 3.0
-STEADY_S = 1.0
-"""The surge velocity is averaged over this before its slope is taken over as long."""
-LEAST_GAIN_MPS = 0.5
-"""Gain in speed along the bow: an idle vessel in a gale drifts as fast."""
-LEAST_SHARE = 0.25
-"""Force of the acceleration over the largest force recorded."""
-IDLE = 1e-3
-"""An actuator is idle below this share of the largest force."""
 
 
 def find(scene: Measurements) -> SensorFinding | None:
@@ -37,13 +28,13 @@ def find(scene: Measurements) -> SensorFinding | None:
     largest = float(np.quantile(ahead[scene.usable], 0.95))
     if largest <= 0.0:
         return None
-    idle = scene.usable & (size < IDLE * float(size[scene.usable].max()))
+    idle = scene.usable & (size < CHECKS.idle_share * float(size[scene.usable].max()))
     rows = np.zeros(len(scene.t), dtype=np.bool_)
     hardest = 0.0
     for first, end in _stretches(idle):
         slope, gain = _speeding(scene, first, end)
         force = scene.profile.hull.mass_kg * slope
-        if gain > LEAST_GAIN_MPS and force > LEAST_SHARE * largest:
+        if gain > CHECKS.idle_gain_mps and force > CHECKS.idle_force * largest:
             rows[first:end] = True
             hardest = max(hardest, force)
     if not rows.any():
@@ -71,8 +62,8 @@ def _stretches(idle: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def _speeding(scene: Measurements, first: int, end: int) -> tuple[float, float]:
     """Return how fast the bow's speed grows at most [m/s²], astern or ahead, and by how much in all [m/s]."""
-    width = odd_rows(STEADY_S, 1.0 / scene.step_s)
-    if (end - first) * scene.step_s < SHORTEST_S or end - first < 3 * width:
+    width = odd_rows(CHECKS.idle_mean_s, 1.0 / scene.step_s)
+    if (end - first) * scene.step_s < CHECKS.idle_s or end - first < 3 * width:
         return 0.0, 0.0
     speed = moving_mean(np.abs(scene.nu_raw[first:end, :1]), width)[:, 0]
     speed = speed[np.isfinite(speed)]

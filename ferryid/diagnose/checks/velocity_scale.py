@@ -8,11 +8,9 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import SCALE, kinematics
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 
-LEAST = 0.03
-NARROW = 0.25
-"""An interval that is wider than this share of its factor says nothing of units."""
 UNITS = {
     1.0 / 0.514444: "knots read as m/s",
     0.514444: "m/s read as knots",
@@ -25,10 +23,10 @@ UNITS = {
 def find(scene: Measurements) -> SensorFinding | None:
     """Return the factor, measured over true, where speed over ground is not what positions give."""
     found = kinematics(scene)
-    if found is None or not found.found(SCALE, LEAST):
+    if found is None or not found.found(SCALE, CHECKS.least_scale):
         return None
     factor = found.solution.estimate(SCALE, "-")
-    narrow = factor.high - factor.low < NARROW * factor.value
+    narrow = factor.high - factor.low < CHECKS.unit_width * factor.value
     unit = [(value, text) for value, text in UNITS.items() if narrow and factor.low <= value <= factor.high]
     right = unit[0][0] if unit else factor.value
     scale = np.array([right, right, 1.0])

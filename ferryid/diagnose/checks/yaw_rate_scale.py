@@ -12,18 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
-from ferryid.diagnose.checks.kinematics import OUTLIER
-from ferryid.diagnose.checks.regression import MEMORY, Solution, step
+from ferryid.diagnose.checks.regression import Solution, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
+from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
-LEAST = 0.02
-FILTERED = 0.001
-"""Standard deviation of the factor by what filters between sensors and log leave: a heading that was steadied by the gyro has a
-little of its error, too. No scatter tells of it."""
-SLOW_RADPS = 0.003
-"""Below this root mean square of the rate, heading and rate are compared in vain."""
 OVERLAP = LENGTH_S / STRIDE_S
 """Windows that have one stretch of time in common: only every so many are independent."""
 NEUTRAL, SIZE = np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.1, 2.0])
@@ -69,14 +63,14 @@ def compared(scene: Measurements) -> Rates | None:
     if len(problem.starts) < 8:
         return None
     rate, bend, measured = problem.rate(both[:, 0]), problem.curvature(both[:, 0]), problem.mean(both[:, 1])
-    if np.std(rate) < SLOW_RADPS:
+    if np.std(rate) < CHECKS.slow_radps:
         return None
     J = -np.column_stack([rate, np.ones_like(rate), -bend])
     first = _step(J, J, measured, problem)
     if first is None:
         return None
     left = np.abs(measured + J @ first.values)
-    kept = left <= OUTLIER * max(float(np.median(left)), 1e-9)
+    kept = left <= CHECKS.outlier * max(float(np.median(left)), 1e-9)
     problem, J, rate, measured = problem.only(kept), J[kept], rate[kept], measured[kept]
     solved = _step(J, J, measured, problem)
     Z = np.column_stack([-measured, J[:, 1:]])
@@ -95,7 +89,7 @@ def corrected(scene: Measurements, factor: float) -> Measurements:
 def find(scene: Measurements) -> SensorFinding | None:
     """Return the factor of the yaw rate, measured over true."""
     rates = compared(scene)
-    if rates is None or rates.off < LEAST or not rates.solution.certain(0, 1.0):
+    if rates is None or rates.off < CHECKS.least_rate_scale or not rates.solution.certain(0, 1.0):
         return None
     factor = rates.solution.estimate(0, "-")
     sign = " with its sign turned round," if factor.value < 0.0 else ""
@@ -119,18 +113,20 @@ def _step(Z: Floats, J: Floats, measured: Floats, problem: Spans) -> Solution | 
     known, even, weighed = (np.zeros((int(row[-1]) + 1, k)) for k in (1, 1, 3))
     known[row], even[row, 0], weighed[row] = 1.0, left / size, Z * size[:, None]
     middle = np.zeros((3, 3))
-    for lag in range(min(MEMORY, len(known) - 1)):
+    for lag in range(min(CHECKS.independent_strides, len(known) - 1)):
         pairs = float(np.sum(known[lag:] * known[: len(known) - lag]))
         if pairs == 0.0:
             continue
-        covariance = float(np.sum(even[lag:] * even[: len(even) - lag])) / pairs * (1.0 - lag / MEMORY)
+        covariance = (
+            float(np.sum(even[lag:] * even[: len(even) - lag])) / pairs * (1.0 - lag / CHECKS.independent_strides)
+        )
         product = weighed[lag:].T @ weighed[: len(weighed) - lag]
         middle += covariance * (product if lag == 0 else product + product.T)
     scaled = (Z * SIZE).T @ (J * SIZE) + float(np.mean(left**2)) * np.eye(3)
     inverse = SIZE[:, None] * np.linalg.inv(scaled) * SIZE
     errors = np.sqrt(np.maximum(np.diag(inverse @ middle @ inverse.T), 0.0))
     freedom = max(solved.freedom, int(len(left) / OVERLAP) - len(NEUTRAL))
-    errors[0] = np.hypot(errors[0], FILTERED)
+    errors[0] = np.hypot(errors[0], CHECKS.filtered_scale)
     return Solution(solved.values, errors, freedom)
 
 

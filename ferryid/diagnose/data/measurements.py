@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
+from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import actuator_forces, interpolate_gaps
 from ferryid.errors import FerryIdError, did_you_mean
@@ -36,7 +37,6 @@ WITHHELD = {
 WINDOW_S, WINDOW_LENGTH_M = 8.0, 5.0
 """Length of the weak form's windows for a vessel of this length; slower for longer ones, by Froude's law of time."""
 STRIDES = 4
-_POSITION_SHARE = 0.8
 WATER_DENSITY = 1000.0
 BLOCK_COEFFICIENT = 0.7
 """Usual part of the box around a hull that it fills."""
@@ -212,7 +212,7 @@ def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) 
         )
     eta = measured.eta
     placed: Flags = np.asarray(np.isfinite(eta[:, :2]).all(axis=1))
-    if float(np.mean(placed[usable])) >= _POSITION_SHARE:
+    if float(np.mean(placed[usable])) >= DATA.position_share:
         usable &= placed
     else:
         eta = np.column_stack([np.full((len(eta), 2), np.nan), eta[:, 2]])

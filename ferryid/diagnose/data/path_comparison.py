@@ -6,16 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import wrap
 from ferryid.vessel.profile import Floats
 
 RATE_HZ = 2.0
-MOST_SHIFT_S = 60.0
-SAME_LENGTH = 0.2
-"""Logs whose lengths differ by more than this share are not of the same manoeuvre."""
-SAME_PATH = 0.5
-"""Nor are paths whose distance is more than this part of their own extent, as root mean squares."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +38,7 @@ class PathComparison:
 def compare_paths(simulated: Measurements, recorded: Measurements) -> PathComparison | str:
     """Compare the paths of a simulation and a recording of one manoeuvre.
 
-    The simulation's clock may have started up to `MOST_SHIFT_S` earlier or later.
+    The simulation's clock may have started up to `DATA.shift_s` earlier or later.
 
     Returns
     -------
@@ -53,23 +49,23 @@ def compare_paths(simulated: Measurements, recorded: Measurements) -> PathCompar
     if not all(np.isfinite(one.eta[one.usable, :2]).all() for one in scenes):
         return "a log has no positions"
     lengths = [float(one.t[one.usable][-1] - one.t[one.usable][0]) for one in scenes]
-    if abs(lengths[0] - lengths[1]) > SAME_LENGTH * max(lengths):
+    if abs(lengths[0] - lengths[1]) > DATA.length_difference * max(lengths):
         return f"the simulation lasts {lengths[0]:.0f} s, the recording {lengths[1]:.0f} s"
     step = 1.0 / RATE_HZ
     t = np.arange(recorded.t[0], recorded.t[-1], step)
     own, other = _sampled(recorded, t), None
     best, shift = np.inf, 0.0
-    for tried in np.arange(-MOST_SHIFT_S, MOST_SHIFT_S + step, step):
+    for tried in np.arange(-DATA.shift_s, DATA.shift_s + step, step):
         moved = _sampled(simulated, t - tried)
         away = np.hypot(*(own[:, :2] - moved[:, :2]).T)
-        if np.isfinite(away).mean() < 1.0 - 2.0 * SAME_LENGTH:
+        if np.isfinite(away).mean() < 1.0 - 2.0 * DATA.length_difference:
             continue
         distance = float(np.sqrt(np.nanmean(away**2)))
         if distance < best:
             best, shift, other = distance, float(tried), moved
     place = own[:, :2]
     extent = float(np.sqrt(np.nansum(np.nanvar(place, axis=0))))
-    if other is None or best > SAME_PATH * extent:
+    if other is None or best > DATA.path_distance * extent:
         return f"the paths are {best:.1f} m apart, on a manoeuvre with an extent of {extent:.1f} m"
     both = np.isfinite(own).all(axis=1) & np.isfinite(other).all(axis=1)
     own, other, t = own[both], other[both], t[both]

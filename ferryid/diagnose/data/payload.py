@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ferryid.diagnose.data.thresholds import DATA
 from ferryid.vessel.profile import Floats
-
-ABOARD = 0.5
-"""Share of the heaviest load measured from which on it counts as aboard."""
 
 
 def aboard(t: Floats, payload: Floats, rows: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], dict[str, float]]:
@@ -23,7 +21,7 @@ def aboard(t: Floats, payload: Floats, rows: NDArray[np.bool_]) -> tuple[NDArray
     rows
         Those in which it was measured, shape (n,).
     """
-    on = rows & (payload[:, 0] > ABOARD * np.max(payload[rows, 0], initial=0.0))
+    on = rows & (payload[:, 0] > DATA.payload_aboard * np.max(payload[rows, 0], initial=0.0))
     if not on.any():
         return rows, {}
     first, last = float(t[on][0]), float(t[on][-1])

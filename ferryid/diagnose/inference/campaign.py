@@ -10,19 +10,17 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose.data.measurements import dimensions
-from ferryid.diagnose.inference.autoregression import ORDER
 from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, Member, fit_campaign_hull, induced_spread
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Floats, Profile
 
-FEWEST_WINDOWS = 4 * ORDER
-"""Windows below which a log has no say."""
 OWN = "wind"
 """What every log has its own of, where it can be told: the commonest of what a hull would otherwise take upon itself."""
 
@@ -59,7 +57,7 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
     Parameters
     ----------
     logs
-        In the weak form; those with fewer than `FEWEST_WINDOWS` windows have no say.
+        In the weak form; those with fewer than `INFERENCE.campaign_windows` windows have no say.
     profile
         The vessel.
     progress
@@ -75,7 +73,7 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
     place: dict[str, int] = {}
     for log in logs:
         seen = log.windows
-        if len(seen.starts) < FEWEST_WINDOWS or log.path in place:
+        if len(seen.starts) < INFERENCE.campaign_windows or log.path in place:
             continue
         plain, spread = prior_force_model(seen.scene, profile)
         place[log.path] = len(members)

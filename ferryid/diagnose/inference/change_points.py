@@ -7,15 +7,10 @@ from math import sqrt
 
 import numpy as np
 
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.vessel.profile import Floats
 
-FEWEST = 4
-"""Windows between two changes."""
-BREAK = 2.3
-"""Kuiper's statistic of changes of the mean, as of which they are believed; three in a hundred series of noise have one."""
 MOST_BREAKS = 6
-ACTS = 0.25
-"""An interval acts whose mean excess is more than this part of the strongest one's."""
 
 
 def active_intervals(
@@ -49,7 +44,7 @@ def active_intervals(
         return ()
     found: list[tuple[float, float]] = []
     for (a, b), mean in zip(pairwise(edges), means, strict=True):
-        if mean - calm <= ACTS * (top - calm):
+        if mean - calm <= INFERENCE.active_share * (top - calm):
             continue
         start = whole[0] if a == 0 else float(0.5 * (times[a - 1] + times[a]))
         end = whole[1] if b == len(strength) else float(0.5 * (times[b - 1] + times[b]))
@@ -62,16 +57,16 @@ def active_intervals(
 
 def _breaks(values: Floats, first: int, end: int, most: int) -> list[int]:
     n = end - first
-    if n < 4 * FEWEST or most <= 0:
+    if n < 4 * INFERENCE.interval_windows or most <= 0:
         return []
     part = values[first:end]
     away = np.concatenate([[0.0], np.cumsum(part - part.mean())])
     # From its lowest to its highest point the sum gains most: one of the two ends of what differs, or both.
     cuts = sorted({int(np.argmin(away)), int(np.argmax(away))})
-    cuts = [k for k in cuts if FEWEST <= k <= n - FEWEST]
+    cuts = [k for k in cuts if INFERENCE.interval_windows <= k <= n - INFERENCE.interval_windows]
     pieces = np.split(part, cuts)
     deviation = _long_deviation(np.concatenate([piece - piece.mean() for piece in pieces]))
-    if not cuts or away.max() - away.min() <= BREAK * deviation * sqrt(n):
+    if not cuts or away.max() - away.min() <= INFERENCE.change_statistic * deviation * sqrt(n):
         return []
     ends = [first, *(first + k for k in cuts), end]
     further = [k for a, b in pairwise(ends) for k in _breaks(values, a, b, most // 2)]

@@ -17,17 +17,13 @@ from ferryid.diagnose.inference.noise_model import (
     fit_noise,
     make_whitening_filter,
 )
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import titled
 from ferryid.vessel.profile import Floats
 
-HULL_SPREAD = 0.12
-"""Standard deviation of what is believed of each of the hull's coefficients, as a share of it."""
-WIDER = 1.5
-"""Factor on standard deviations of the posterior, which takes the measured velocity and heading for true where they enter
-products. Chosen in view of simulated logs; `make proof` tells how often intervals hold in others."""
 STEPS = 24
 ANEW = 4
 """Steps after which the derivatives by the hull's coefficients are taken anew."""
@@ -121,7 +117,7 @@ class Fit:
         return np.sqrt(np.diag(self.spread)[first : first + len(self.values[index])])
 
     def reported_errors(self, index: int) -> Floats:
-        """Return the standard deviations that are told: `WIDER`, and with what no log tells of an effect's size.
+        """Return the standard deviations that are told: `INFERENCE.posterior_factor`, and what no log tells.
 
         That is its formula (``form``), and what hull or instruments may be off anyway (``idle``, about a 95 % interval). A
         place has no size.
@@ -130,7 +126,7 @@ class Fit:
         sized = np.array([one.unit == candidate.parameters[0].unit for one in candidate.parameters])
         away = values - np.array([one.neutral for one in candidate.parameters])
         beyond = np.where(sized, np.hypot(candidate.effect.form * away, 0.5 * candidate.effect.idle), 0.0)
-        return np.hypot(WIDER * self.errors(index), beyond)
+        return np.hypot(INFERENCE.posterior_factor * self.errors(index), beyond)
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
 
-FOLDS = 3
-BLOCK_WINDOWS = 5.0
-"""Length of a block in lengths of a window: 40 s for windows of 8 s, a manoeuvre or two."""
-FEWEST_BLOCKS = 2 * FOLDS
-GUARD = 0.25
-"""Purged between training and held-out windows, in lengths of a window, so that slow disturbances are not shared either."""
 DRAWS = 1000
 
 
@@ -43,13 +38,13 @@ class Folds:
 
 def block_s(windows: Windows) -> float:
     """Return how long a block is that is held out [s], in a log that is long enough."""
-    return BLOCK_WINDOWS * len(windows.weight) * windows.scene.step_s
+    return INFERENCE.block_windows * len(windows.weight) * windows.scene.step_s
 
 
 def folds_of(windows: Windows) -> Folds | None:
-    """Cut windows into blocks and deal them to folds; None where there are fewer than `FEWEST_BLOCKS`.
+    """Cut windows into blocks and deal them to folds; None where there are fewer than `INFERENCE.fewest_blocks`.
 
-    A block lasts `BLOCK_WINDOWS` windows' lengths, less in a short log, and is never shorter than two.
+    A block lasts `INFERENCE.block_windows` windows' lengths, less in a short log, and is never shorter than two.
     """
     if len(windows.starts) == 0:
         return None
@@ -57,16 +52,16 @@ def folds_of(windows: Windows) -> Folds | None:
     width_s = len(windows.weight) * scene.step_s
     stride_s = float(np.median(np.diff(windows.starts))) * scene.step_s if len(windows.starts) > 1 else width_s
     seconds = len(windows.starts) * stride_s
-    number = round(seconds / (BLOCK_WINDOWS * width_s))
-    if number < FEWEST_BLOCKS:
-        number = FEWEST_BLOCKS
+    number = round(seconds / (INFERENCE.block_windows * width_s))
+    if number < INFERENCE.fewest_blocks:
+        number = INFERENCE.fewest_blocks
     if seconds / number < 2.0 * width_s:
         return None
     block = np.arange(len(windows.starts)) * number // len(windows.starts)
-    fold = block % FOLDS
-    purge = round(GUARD * len(windows.weight)) + len(windows.weight)
+    fold = block % INFERENCE.folds
+    purge = round(INFERENCE.purge_windows * len(windows.weight)) + len(windows.weight)
     training = []
-    for k in range(FOLDS):
+    for k in range(INFERENCE.folds):
         held = np.sort(windows.starts[fold == k])
         place = np.searchsorted(held, windows.starts)
         after = np.abs(windows.starts - held[np.minimum(place, len(held) - 1)])

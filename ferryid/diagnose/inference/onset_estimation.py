@@ -23,19 +23,17 @@ from ferryid.diagnose.inference.estimation import (
 )
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.noise_model import stride_s
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel, as_measured
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
 
-PART_S, FEWEST_PARTS = 8.0, 24
-"""Length of the parts into which a log is cut [s], and how many there are at least: an effect begins and ends between two of
-them. In a calm log seconds matter: what acts too long or too short by them leaves a push that nothing explains."""
+FEWEST_PARTS = 24
+"""Parts of `INFERENCE.span_s` into which a log is cut at least: an effect begins and ends between two of them. In a calm log
+seconds matter: what acts too long or too short by them leaves a push that nothing explains."""
 MOST_NUMBERS = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
-LEAST_BLOCKS = 2.0
-"""Length of the shortest span that a name can be judged by, in blocks that are held out: a fit that is judged on one part of it
-must have seen another."""
 PROMISING = 3
 """Spans that are handed on to be fitted."""
 NEARBY_S, FINEST_S = 8.0, 0.2
@@ -111,7 +109,7 @@ def part_s(problem: EstimationProblem, candidate: Candidate) -> float:
 
 def brief(problem: EstimationProblem, candidate: Candidate) -> bool:
     """Tell whether a candidate acts for so short a time that it cannot be judged: it stands in for whatever came just then."""
-    return bool(candidate.times) and lasts_s(problem, candidate) < LEAST_BLOCKS * block_s(problem.windows)
+    return bool(candidate.times) and lasts_s(problem, candidate) < INFERENCE.span_blocks * block_s(problem.windows)
 
 
 def lasts_s(problem: EstimationProblem, candidate: Candidate) -> float:
@@ -126,7 +124,7 @@ def _edges(problem: EstimationProblem, candidate: Candidate) -> Floats:
     """Return where the log is cut [s], into parts of as many steps each: in a gap nothing begins or ends."""
     times = problem.steps.middle_s
     most = MOST_NUMBERS / (len(times) * problem.steps.channels.sum() * len(candidate.parameters))
-    parts = max(FEWEST_PARTS, int(min(len(times) * stride_s(problem.steps) / PART_S, most)))
+    parts = max(FEWEST_PARTS, int(min(len(times) * stride_s(problem.steps) / INFERENCE.span_s, most)))
     return np.interp(np.linspace(0.0, len(times) - 1.0, parts + 1), np.arange(len(times)), times)
 
 
@@ -180,7 +178,7 @@ def refine_span(
     made
         Fit of it.
     index
-        Of the candidate; its span stays as long as `PART_S` at least.
+        Of the candidate; its span stays as long as `INFERENCE.span_s` at least.
     begin
         Where each fit begins.
     step_s, finest_s
@@ -194,7 +192,7 @@ def refine_span(
             middle = getattr(best.candidates[index], end)
             for time in (middle - step, middle + step):
                 moved = best.candidates[index].moved(end, time)
-                if lasts_s(problem, moved) < PART_S or not times[0] < time < times[-1]:
+                if lasts_s(problem, moved) < INFERENCE.span_s or not times[0] < time < times[-1]:
                     continue
                 tried = fit(
                     problem, replace_candidate(best.candidates, index, moved), best.values, steps=GLANCE, begin=begin

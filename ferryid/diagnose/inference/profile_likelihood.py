@@ -13,13 +13,12 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.stats import norm
 
-from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fit, starting_point
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, starting_point
 from ferryid.diagnose.inference.onset_estimation import replace_candidate
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.effect import HELD
 from ferryid.vessel.profile import Floats
 
-DROP = 4.0
-"""Fall of the logarithm of the evidence, widened like all posteriors, as of which a value is out of the question."""
 FIRST, GROWTH = 0.5, 1.6
 """First step, in standard deviations at the top, and by how much each is longer than the one before."""
 STEEP, CLOSER = 3.0, 8
@@ -63,14 +62,19 @@ def intervals(problem: EstimationProblem, kept: Fit, index: int) -> dict[str, tu
         while (further := min(max(value + side * step, own.low), own.high)) != value:
             value = further
             found[value] = held(value, last)
-            if found[value][0] < max(evidence for evidence, _ in found.values()) - DROP * WIDER**2:
+            if (
+                found[value][0]
+                < max(evidence for evidence, _ in found.values())
+                - INFERENCE.profile_drop * INFERENCE.posterior_factor**2
+            ):
                 break
             step, last = GROWTH * step, found[value][1]
     for _ in range(CLOSER):
         steep = [
             (abs(found[a][0] - found[b][0]), a, b)
             for a, b in pairwise(sorted(found))
-            if max(found[a][0], found[b][0]) > max(evidence for evidence, _ in found.values()) - DROP * WIDER**2
+            if max(found[a][0], found[b][0])
+            > max(evidence for evidence, _ in found.values()) - INFERENCE.profile_drop * INFERENCE.posterior_factor**2
         ]
         fall, a, b = max(steep)
         if fall < STEEP:
@@ -78,7 +82,7 @@ def intervals(problem: EstimationProblem, kept: Fit, index: int) -> dict[str, tu
         higher = max(found[a], found[b], key=lambda one: one[0])[1]
         found[0.5 * (a + b)] = held(0.5 * (a + b), higher)
     values = np.array(sorted(found))
-    log_weights = np.array([found[value][0] for value in values.tolist()]) / WIDER**2
+    log_weights = np.array([found[value][0] for value in values.tolist()]) / INFERENCE.posterior_factor**2
     fine = np.linspace(values[0], values[-1], 50 * len(values))
     weights = np.exp(PchipInterpolator(values, log_weights)(fine) - log_weights.max())
     cut = norm.ppf((np.arange(PARTS) + 0.5) / PARTS)

@@ -30,25 +30,17 @@ from ferryid.diagnose.inference.onset_estimation import (
     refine_span,
     refit_spans,
 )
-from ferryid.diagnose.inference.stochastic_disturbance import WORTH, DisturbanceState, fit_disturbances
+from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, fit_disturbances
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
-ODDS = 8.0
-"""Logarithm of the evidence that an effect must show over none before it is as likely as none."""
 FAR = 8
 """Steps of a fit by which candidates are sorted from afar, `GLANCE` from nearby; the best are then fitted to the end."""
 REJUDGED = 5
 """Candidates whose evidence is weighed under the noise that each leaves itself."""
-MOST = 4
-"""Effects looked for at once."""
-CLEAR = 100.0
-"""Logarithm of the evidence as of which an effect is taken before gusts and waves are looked for: they look like nothing so
-clear."""
-VOID = 0.02
-"""An effect whose acceleration is less than this share of the measured one, by every channel's root mean square, is void."""
 
 
 @dataclass(frozen=True)
@@ -138,16 +130,16 @@ def search(
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
         found = _weighed(problem, chosen, left)
         rounds.append(_round(found))
-        good = [one for one in found if one.gain > ODDS and not is_negligible(problem, one.fit)]
-        best = good[0] if good and len(taken) < MOST else None
+        good = [one for one in found if one.gain > INFERENCE.prior_odds and not is_negligible(problem, one.fit)]
+        best = good[0] if good and len(taken) < INFERENCE.most_effects else None
         if best is None:
             chosen = prune(problem, chosen)
         beside, gain = _beside(problem, chosen, found, shaken)
-        clear = best is not None and best.gain > CLEAR
+        clear = best is not None and best.gain > INFERENCE.clear_gain
         if shaken and not states and not clear and beside.keys != calm_beside:
             progress("looking for gusts and waves")
             # What explains more is taken first.
-            least = max(WORTH, (0.0 if best is None else best.gain) - gain)
+            least = max(INFERENCE.disturbance_gain, (0.0 if best is None else best.gain) - gain)
             rough, found_states = fit_disturbances(problem, beside, shaken, calm, least)
             # What would stand in for them falls, and what they hid may show.
             kept = prune(rough, fit(rough, beside.candidates, beside.values)) if found_states else chosen
@@ -155,7 +147,7 @@ def search(
                 stood = beside.keys
                 problem, chosen, states = rough, kept, found_states
                 continue
-            calm_beside = beside.keys if least <= WORTH else calm_beside
+            calm_beside = beside.keys if least <= INFERENCE.disturbance_gain else calm_beside
         if best is None:
             break
         problem = problem.with_noise_of(best.fit)
@@ -242,14 +234,14 @@ def _best(
         return scored(refine_span(problem, kicked.fit, index, begin, min(step, NEARBY_S)))
 
     # Seconds matter: which of them is best shows when each has its own.
-    good = [one for one in spans if one.gain > max(whole.gain, 0.5 * ODDS)]
+    good = [one for one in spans if one.gain > max(whole.gain, 0.5 * INFERENCE.prior_odds)]
     return max([whole, *(refined(one) for one in good)], key=lambda one: one.gain)
 
 
 def _round(found: Sequence[ScoredCandidate]) -> Round:
-    top = max([ODDS, *(one.gain for one in found)])
+    top = max([INFERENCE.prior_odds, *(one.gain for one in found)])
     weights = [exp(one.gain - top) for one in found]
-    none = exp(ODDS - top)
+    none = exp(INFERENCE.prior_odds - top)
     total = sum(weights) + none
     return Round(tuple(found), tuple(weight / total for weight in weights), none / total)
 
@@ -272,7 +264,7 @@ def is_negligible(problem: EstimationProblem, made: Fit, index: int = -1) -> boo
     )
     moved = seen.gap(fitted_force_model(problem.plain, made)) - seen.gap(fitted_force_model(problem.plain, before))
     size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
-    return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
+    return bool((np.sqrt(np.mean(moved**2, axis=0)) < INFERENCE.void_share * size).all())
 
 
 def prune(problem: EstimationProblem, chosen: Fit) -> Fit:
@@ -280,7 +272,7 @@ def prune(problem: EstimationProblem, chosen: Fit) -> Fit:
     while chosen.candidates:
         fewer = over(partial(without, problem, chosen), range(len(chosen.candidates)))
         best = max(over(partial(refit_with_own_noise, problem), fewer), key=lambda one: one.evidence)
-        if max(chosen.evidence, refit_with_own_noise(problem, chosen).evidence) - best.evidence >= ODDS:
+        if max(chosen.evidence, refit_with_own_noise(problem, chosen).evidence) - best.evidence >= INFERENCE.prior_odds:
             break
         chosen = best
     return chosen

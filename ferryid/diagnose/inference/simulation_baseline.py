@@ -22,10 +22,10 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.data.path_comparison import PathComparison
 from ferryid.diagnose.data.payload import aboard
-from ferryid.diagnose.inference.estimation import HULL_SPREAD, Candidate, estimation_problem, fitted_force_model
+from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fitted_force_model
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import list_candidates, search
-from ferryid.diagnose.inference.stages import FEWEST_WINDOWS
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Values
@@ -33,10 +33,6 @@ from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Floats, Profile
 
-FREER = 2.5
-"""A simulator's hull may be this much further from the profile's than a vessel's."""
-FOREIGN = 0.35
-"""A log is of another vessel if this share of its mean square acceleration follows neither from hull, force nor any effect."""
 SHOWN_ROWS = 400
 
 
@@ -102,20 +98,20 @@ def learn_simulation(
     sensors, scene = examine(scene)
     name = survey.motion.log
     seen = windows(scene, *window_lengths(profile))
-    if len(seen.starts) < FEWEST_WINDOWS:
+    if len(seen.starts) < INFERENCE.fewest_windows:
         raise FerryIdError(
             f"{name}: --against needs a simulation long enough to learn its model from, found "
             f"{counted(len(seen.starts), 'stretch')} of "
-            f"{window_lengths(profile)[0]:.0f} s without a gap where {FEWEST_WINDOWS} are needed. "
+            f"{window_lengths(profile)[0]:.0f} s without a gap where {INFERENCE.fewest_windows} are needed. "
             "Fix: simulate and record the whole trial"
         )
     plain, spread = prior_force_model(seen.scene, profile)
-    wide = FREER * spread if profile.hull.has_model else spread
+    wide = INFERENCE.simulator_hull_factor * spread if profile.hull.has_model else spread
     progress(f"learning what {name} simulates")
     result = search(estimation_problem(seen, plain, wide), progress)
     made = result.fit
     left = float(np.mean((seen.gap(fitted_force_model(plain, made)) / _size(seen.measured[:, seen.channels])) ** 2))
-    if left > FOREIGN:
+    if left > INFERENCE.foreign_share:
         raise FerryIdError(
             f"{name}: --against needs a simulation of {profile.name}, found a motion of which its hull and the actuators' "
             f"force explain no more than {100.0 * max(0.0, 1.0 - left):.0f} %. Fix: give a simulation of this vessel that "
@@ -134,7 +130,7 @@ def learn_simulation(
         name,
         scene,
         hull,
-        np.hypot(HULL_SPREAD * hull, posterior * wide),
+        np.hypot(INFERENCE.hull_spread * hull, posterior * wide),
         (*_measured(scene), *conditions),
         sensors,
     )

@@ -11,6 +11,7 @@ from scipy.special import polygamma
 
 from ferryid.diagnose.inference.estimation import EstimationProblem
 from ferryid.diagnose.inference.force_errors import force_errors
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.vessel.profile import Floats
@@ -21,9 +22,6 @@ BURST_HZ = (0.03, 0.1, 0.2, 0.4, 0.8)
 """Bands that are searched for bursts."""
 BURST_S, BURST_PERIODS = 20.0, 1.2
 """Shortest block of a burst, and periods of a band's highest frequency that it holds at least."""
-FEWEST_BLOCKS = 6
-LOUD = 3.0
-"""A block is part of a burst whose power is so many times the median's."""
 BANDS_HZ = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 
 
@@ -121,7 +119,7 @@ def _uneven(short: Windows, errors: Floats, low_hz: float, high_hz: float, block
         for k in range(0, b - a - size + 1, size):
             detection_powers.append(np.mean(part[k : k + size] ** 2, axis=0))
             edges.append((float(short.middle_s[a + k]), float(short.middle_s[a + k + size - 1])))
-    if len(detection_powers) < FEWEST_BLOCKS:
+    if len(detection_powers) < INFERENCE.burst_blocks:
         return None
     level = np.log(np.maximum(detection_powers, 1e-12))
     held = max(1.0, 2.0 * (high_hz - low_hz) * block_s)
@@ -133,7 +131,7 @@ def _uneven(short: Windows, errors: Floats, low_hz: float, high_hz: float, block
     above = np.exp(level - np.median(level, axis=0))
     shares = np.maximum(chi - (len(detection_powers) - 1), 0.0)
     axes = shares / shares.sum() if shares.sum() > 0.0 else np.full(3, 1.0 / 3.0)
-    loud = above @ axes >= LOUD
+    loud = above @ axes >= INFERENCE.burst_level
     spans: list[tuple[float, float]] = []
     for (first, last), one in zip(edges, loud, strict=True):
         if one and spans and first - spans[-1][1] <= step_s * 1.5:

@@ -11,12 +11,10 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem
 from ferryid.diagnose.inference.search import Search, search
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
-
-FEWEST_WINDOWS = 60
-"""Windows below which nothing is tested."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class AveragedLog:
     @property
     def long_enough(self) -> bool:
         """True where there are windows enough to test anything."""
-        return len(self.windows.starts) >= FEWEST_WINDOWS
+        return len(self.windows.starts) >= INFERENCE.fewest_windows
 
 
 @dataclass(frozen=True)

@@ -12,21 +12,14 @@ from numpy.typing import NDArray
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.noise_model import NoiseModel, fit_noise, fit_noise_with, likelihood, stride_s
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
 
-WORTH = 12.0
-"""Logarithm of the evidence that a disturbance must show before its states are as likely as none."""
 STRENGTHS, BANDS = (0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
 """Where the search begins, as shares of the usual ones; from hardly anything nothing leads on."""
-FASTEST = 0.4
-"""Highest frequency that is believed, in steps of the filter; half of one is aliased."""
-WIDEST = 9.0
-"""Standard deviation of a logarithm beyond which nothing is known."""
-VAGUE = 0.5
-"""A disturbance whose parameters are known no better than within this factor (as a logarithm) was not seen."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +35,12 @@ class DisturbanceState:
     def known(self) -> frozenset[str]:
         """Names of the parameters that the log tells."""
         named = zip(self.candidate.parameters, self.widths.tolist(), strict=True)
-        return frozenset(one.name for one, width in named if width < VAGUE)
+        return frozenset(one.name for one, width in named if width < INFERENCE.vague_log)
 
     @property
     def estimates(self) -> dict[str, Estimate]:
         """Parameters with their 95 % intervals, which are even in the logarithm."""
-        away = np.exp(1.96 * np.minimum(np.hypot(self.widths, self.candidate.effect.form), WIDEST))
+        away = np.exp(1.96 * np.minimum(np.hypot(self.widths, self.candidate.effect.form), INFERENCE.widest_log))
         low, high = self.values / away, self.values * away
         return {
             one.name: Estimate(value, max(a, one.low), min(b, one.high), one.unit)
@@ -62,7 +55,7 @@ def fit_disturbances(
     made: Fit,
     candidates: Sequence[Candidate],
     calm: ForceModel,
-    least: float = WORTH,
+    least: float = INFERENCE.disturbance_gain,
     *,
     near: Sequence[DisturbanceState] = (),
 ) -> tuple[EstimationProblem, tuple[DisturbanceState, ...]]:
@@ -94,7 +87,7 @@ def fit_disturbances(
     states: list[DisturbanceState] = []
     left = list(candidates)
     while left:
-        worth = WORTH if states else least
+        worth = INFERENCE.disturbance_gain if states else least
         tried = []
         for candidate in left:
             assert candidate.effect.unsteady is not None
@@ -135,11 +128,13 @@ def _seen(candidate: Candidate, values: Floats, widths: Floats, step_s: float) -
     possible = all(
         one.low <= value <= one.high for one, value in zip(candidate.parameters, values.tolist(), strict=True)
     )
-    if not possible or (values[band] * step_s > FASTEST).any():
+    if not possible or (values[band] * step_s > INFERENCE.fastest_share).any():
         return False
     strength = _strengths(candidate)
     turning = np.array([parameter.unit == "N·m" for parameter in candidate.parameters])
-    return bool((widths[~strength | turning] < VAGUE).all() and (widths[strength] < VAGUE).any())
+    return bool(
+        (widths[~strength | turning] < INFERENCE.vague_log).all() and (widths[strength] < INFERENCE.vague_log).any()
+    )
 
 
 def _strengths(candidate: Candidate) -> NDArray[np.bool_]:

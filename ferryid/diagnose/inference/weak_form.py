@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.equations_of_motion import Places, to_ground
 from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes
 from ferryid.vessel.profile import Floats
@@ -91,8 +92,6 @@ class Windows:
 
 
 STEPS_A_WINDOW = 20
-FEWEST_STEPS = 10
-"""Steps below which a stretch tells nothing."""
 FORCES_HZ = 5.0
 """Rate at which forces are averaged over windows; they change slowly against it, and hypotheses cost a quarter."""
 
@@ -145,7 +144,7 @@ def steps_of(seen: Windows) -> Windows:
     runs: list[tuple[int, int]] = []
     for first, end in _stretches(covered):
         rows = range(first, end - span, m)
-        if len(rows) > FEWEST_STEPS:
+        if len(rows) > INFERENCE.fewest_steps:
             runs.append((len(starts), len(starts) + len(rows)))
             starts += rows
     at = np.array(starts, dtype=np.int64)

@@ -2,12 +2,12 @@
 
 from ferryid.diagnose.judging.confidence_rules import RULES, ConfidenceRule
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, to_json
-from ferryid.diagnose.judging.finding import HINT, NEAR, UNKNOWN, Finding
+from ferryid.diagnose.judging.finding import UNKNOWN, Finding
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import VERDICTS, Remainder, campaign_verdict, verdict_of
 
 __all__ = [
-    "HINT",
-    "NEAR",
+    "JUDGING",
     "RULES",
     "SCHEMA",
     "UNKNOWN",

@@ -10,16 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.sparse_regression import nuisance_columns
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.vessel.profile import Floats
-
-SHARE = 0.6
-"""Share of what an effect does on an axis that is not there, as of which it is not the effect."""
-SURE = 2.0
-"""Standard errors, as they are told, by which it has to be shown that some is missing."""
-ACTS = 0.1
-"""Share of an effect's whitened work as of which it acts on an axis."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +29,13 @@ class AxisConsistency:
     def inconsistent(self) -> bool:
         """Whether most of it is missing on an axis where it acts."""
         missing = -self.beyond
-        return bool(np.any((self.acts > ACTS) & (missing > SHARE) & (missing - SURE * self.errors > 0.0)))
+        return bool(
+            np.any(
+                (self.acts > JUDGING.acting_share)
+                & (missing > JUDGING.missing_share)
+                & (missing - JUDGING.missing_errors * self.errors > 0.0)
+            )
+        )
 
 
 def check_axis_consistency(problem: EstimationProblem, kept: Fit, index: int) -> AxisConsistency:
@@ -63,5 +64,5 @@ def check_axis_consistency(problem: EstimationProblem, kept: Fit, index: int) ->
     bend = A.T @ A + np.eye(A.shape[1])
     slope = A.T @ problem.noise.white(here, runs) + np.concatenate([centre, np.zeros(c)])
     covariance = np.linalg.inv(bend)
-    errors = WIDER * np.sqrt(np.diag(covariance))[-c:]
+    errors = INFERENCE.posterior_factor * np.sqrt(np.diag(covariance))[-c:]
     return AxisConsistency(-(covariance @ slope)[-c:], errors, work / max(float(work.sum()), 1e-12))

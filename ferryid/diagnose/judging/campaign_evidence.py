@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.campaign_hull import Member, fit_campaign_hull, residual_gaps
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.folds import DRAWS, FOLDS, folds_of, subset
+from ferryid.diagnose.inference.folds import DRAWS, folds_of, subset
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel
 from ferryid.errors import FerryIdError
 from ferryid.vessel.profile import Floats
@@ -72,7 +73,7 @@ def held_out_gains(
 
     def left(members: Sequence[Member]) -> list[Floats]:
         squares = [np.zeros(len(members[i].windows.starts)) for i in kept]
-        for k in range(FOLDS):
+        for k in range(INFERENCE.folds):
             training = [replace(members[i], windows=folds.training[k]) for i, folds in cut]
             made = fit_campaign_hull(training, spread, induced_size)
             for place, (i, folds) in enumerate(cut):

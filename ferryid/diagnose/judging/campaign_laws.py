@@ -15,17 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.candidate_terms import Term, terms_of
-from ferryid.diagnose.inference.estimation import WIDER, EstimationProblem, Fit, fit
+from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit
 from ferryid.diagnose.inference.folds import Folds
-from ferryid.diagnose.inference.search import VOID
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.held_out import compare_held_out, held_out
-from ferryid.diagnose.judging.sparse_regression import GAIN, MOST_TERMS, Law, law_candidate, linearise_terms
+from ferryid.diagnose.judging.sparse_regression import Law, law_candidate, linearise_terms
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
 from ferryid.vessel.profile import Floats
 
-CAN = 4.0
-"""Log-likelihood that a law gains on average in a log that can show it, if it is true. By chance such a log denies it in 8 % of
-cases, and the less often the more it can show."""
 REFITS = 2
 """Times that the logs are fitted anew beside a law: a hull that stood in for it has its masses wrong, and so the law's size."""
 
@@ -110,7 +108,7 @@ class VesselLaw:
     @property
     def able(self) -> NDArray[np.bool_]:
         """Which logs can show it, shape (logs,)."""
-        return self.expected >= CAN
+        return self.expected >= JUDGING.law_expected_gain
 
     @property
     def holds(self) -> bool:
@@ -118,7 +116,9 @@ class VesselLaw:
 
         What is wrong in the same way in all logs, such as the arithmetic, holds in all of them but moves it by next to nothing.
         """
-        return bool(self.able.sum() >= 2 and (self.gains[self.able] > 0.0).all() and (self.moves >= VOID).all())
+        return bool(
+            self.able.sum() >= 2 and (self.gains[self.able] > 0.0).all() and (self.moves >= INFERENCE.void_share).all()
+        )
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,11 @@ class CampaignLaws:
         others = [one for k, one in enumerate(self.said) if k != self.place]
         if self.law is not None:
             others = [one.beside(self.law.terms, self.law.values) for one in others]
-        gains = [gain for gain, expected in (one.gains(law.terms, law.values) for one in others) if expected >= CAN]
+        gains = [
+            gain
+            for gain, expected in (one.gains(law.terms, law.values) for one in others)
+            if expected >= JUDGING.law_expected_gain
+        ]
         return len(others), len(gains), sum(gain > 0.0 for gain in gains)
 
 
@@ -164,7 +168,7 @@ def find_campaign_laws(logs: Mapping[str, tuple[EstimationProblem, Fit]]) -> dic
     """
     best: VesselLaw | None = None
     said = tuple(log_information(problem, kept) for problem, kept in logs.values())
-    while best is None or len(best.terms) < MOST_TERMS:
+    while best is None or len(best.terms) < JUDGING.law_terms:
         law = select_campaign_law(said, best)
         if law is None:
             break
@@ -209,7 +213,7 @@ def select_campaign_law(said: Sequence[LogInformation], known: VesselLaw | None 
     taken = {term.key for term in chosen}
     tried = [_fitted(said, (*chosen, term)) for term in said[0].terms if term.of_vessel and term.key not in taken]
     best = max((one for one in tried if one.holds), key=lambda one: one.total, default=None)
-    least = GAIN + (_fitted(said, chosen).total if chosen else 0.0)
+    least = JUDGING.law_gain + (_fitted(said, chosen).total if chosen else 0.0)
     return best if best is not None and best.total >= least else None
 
 
@@ -235,6 +239,6 @@ def _fitted(said: Sequence[LogInformation], terms: tuple[Term, ...]) -> VesselLa
     # What each log would gain by coefficients of its own, over the common ones, is chi-squared if only noise parts them.
     own = np.array([0.5 * g @ np.linalg.pinv(N, hermitian=True) @ g for N, g in zip(normal, slope, strict=True)])
     apart = 2.0 * float(own.sum() - 0.5 * b @ values) / (len(terms) * (len(said) - 1))
-    errors = WIDER * np.sqrt(np.diag(inverse) * max(1.0, apart))
+    errors = INFERENCE.posterior_factor * np.sqrt(np.diag(inverse) * max(1.0, apart))
     most = np.array([max(one.move(term) for one in said) for term in terms])
     return VesselLaw(terms, values, errors, elsewhere, gains, expected, np.abs(values) * most)

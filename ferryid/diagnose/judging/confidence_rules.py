@@ -12,21 +12,15 @@ from dataclasses import dataclass, field, replace
 
 from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import AXES
-from ferryid.diagnose.inference.onset_estimation import LEAST_BLOCKS
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.claims import Claim, Figures, LogFigures
-from ferryid.diagnose.judging.finding import HINT, Finding
+from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
 
-STRONG = 40.0
-"""Gain in held-out log-likelihood that needs no axis on which an improvement is seen: what acts seldom, as a wake on another
-thruster, is lost in the means over a log."""
-FAST_HZ = 0.2
-"""Frequency above which no force of the library has most of its power: they change with motion, heading and thrust."""
 OUT_OF_STEP = ("time_delay", "thruster_lag")
 """Effects that a controller's answer to unmeasured, unsteady disturbances looks like."""
-FEWEST_LOGS = 3
-"""Logs of a campaign as of which one of them can be alone with a finding."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +73,7 @@ def lowered(finding: Finding, *unresolved: str, manoeuvre: str | None = None) ->
     """Return a finding as a hint, with what it cannot be told from, and what to record to tell."""
     return replace(
         finding,
-        probability=min(finding.probability, HINT),
+        probability=min(finding.probability, JUDGING.hint_probability),
         unresolved_with=tuple(dict.fromkeys((*finding.unresolved_with, *unresolved))),
         separating_manoeuvre=manoeuvre or finding.separating_manoeuvre,
     )
@@ -126,7 +120,7 @@ def law_of_one_log(finding: Finding, context: Context, _threshold: float) -> Out
     return lowered(replace(finding, says=f"{finding.says} {told}{shown}.")), ""
 
 
-@rule(0.3, "of the power")
+@rule(JUDGING.power_in_velocities, "of the power")
 def absent_in_velocities(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a disturbance of whose power the velocities show less: errors of positions look like a force, too."""
     if context.own.power_in_velocities >= threshold:
@@ -135,16 +129,16 @@ def absent_in_velocities(finding: Finding, context: Context, threshold: float) -
     return lowered(replace(finding, says=says)), ""
 
 
-@rule(1.0 / 3.0, "of a finding's improvement")
+@rule(JUDGING.claimed_share, "of a finding's improvement")
 def improves_no_claimed_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what improves neither force nor free run, by an interval that excludes zero, on an axis that it claims.
 
     It claims the axes on which this share of its improvement lies. The score adds up what every channel gains, in errors that
     the noise's autoregression weighs: a little on all of them makes a likelihood on none of which anything is seen to improve.
-    Only one above `STRONG` needs no more.
+    Only one above `JUDGING.strong_gain` needs no more.
     """
     own = context.own
-    if own.score is None or own.score > STRONG:
+    if own.score is None or own.score > JUDGING.strong_gain:
         return finding, ""
     claimed = [axis for axis, share in finding.axes.items() if share >= threshold or not any(finding.axes.values())]
     if any(own.force_low[axis] > 0.0 or own.free_run_low[axis] > 0.0 for axis in claimed):
@@ -156,7 +150,7 @@ def improves_no_claimed_axis(finding: Finding, context: Context, threshold: floa
     )
 
 
-@rule(LEAST_BLOCKS, "held-out blocks")
+@rule(INFERENCE.span_blocks, "held-out blocks")
 def too_brief(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what acts for less than this: a fit that is judged on one part of it must have seen another."""
     if not _brief(context.own, threshold):
@@ -181,15 +175,15 @@ def place_visited_once(finding: Finding, context: Context, _threshold: float) ->
     )
 
 
-@rule(1.0, "times what hull and formulas may be off by in a part of the manoeuvres")
+@rule(JUDGING.least_passing, "times what hull and formulas may be off by in a part of the manoeuvres")
 def passes_by_little(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what both begins and ends within the log and is smaller than this; what is too brief has its own rule."""
-    if context.own.passes >= threshold or _brief(context.own, LEAST_BLOCKS):
+    if context.own.passes >= threshold or _brief(context.own, INFERENCE.span_blocks):
         return finding, ""
     return _because(finding, "it comes and goes, by less than hull and formulas may be off in a part of the manoeuvres")
 
 
-@rule(0.2, "of the held-out squared force error")
+@rule(JUDGING.worsening, "of the held-out squared force error")
 def worse_on_an_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what makes an axis worse by more than this, over the log or while it acts; less may be chance."""
     change = {
@@ -205,7 +199,7 @@ def worse_on_an_axis(finding: Finding, context: Context, threshold: float) -> Ou
     )
 
 
-@rule(0.1, "of the held-out squared force error")
+@rule(JUDGING.least_removed, "of the held-out squared force error")
 def removes_little(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower what removes less than this on every axis while it acts: hull and formulas may be as much off."""
     removed = context.own.removed
@@ -234,14 +228,15 @@ def less_than_is_unexplained(finding: Finding, context: Context, _threshold: flo
 def unexplained_shares(context: Context) -> dict[str, float]:
     """Return the share of the squared error left that is a nameless force's, by axis; empty where there is none.
 
-    It counts as far as it is more than a hint and as slow as those of the library are: no bursts, and not above `FAST_HZ`.
+    It counts as far as it is more than a hint and as slow as those of the library are: no bursts, and not above
+    `JUDGING.slow_below_hz`.
     """
     slow = [
         one.finding
         for one in context.beside
         if one.figures.kind in ("law", "unsteady")
         and one.finding.sure
-        and (one.finding.law or one.finding.band_hz is None or one.finding.band_hz[0] < FAST_HZ)
+        and (one.finding.law or one.finding.band_hz is None or one.finding.band_hz[0] < JUDGING.slow_below_hz)
     ]
     # What no law describes may be all that is left; and of a law that all logs of a vessel have, there may be more.
     described = not context.log.joint and all(one.law for one in slow)
@@ -275,7 +270,7 @@ def about_nothing_sure(finding: Finding, context: Context, _threshold: float) ->
     return _because(finding, f"the {effects()[about].title.lower()} about which it comes and goes is no sure finding")
 
 
-@rule(0.15, "of what moves the vessel")
+@rule(JUDGING.drowned_share, "of what moves the vessel")
 def noise_drowns_an_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower all findings on forces where the velocity's noise, times damping, is more than this on some axis."""
     drowned = context.own.kind != "sensor" and drowned_axes(context.log, threshold)
@@ -290,7 +285,7 @@ def drowned_axes(log: LogFigures, threshold: float) -> dict[str, float]:
     return {axis: share for axis, share in log.velocity_noise.items() if share > threshold}
 
 
-@rule(0.5, "of the held-out squared force error")
+@rule(JUDGING.reaction_share, "of the held-out squared force error")
 def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a delay or lag beside unmeasured disturbances, unless it removes this much on an axis.
 
@@ -303,11 +298,11 @@ def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold
     return lowered(finding, "gusts", manoeuvre="the same manoeuvres in calm air"), ""
 
 
-@rule(0.5, "of the logs")
+@rule(JUDGING.campaign_share, "of the logs")
 def absent_in_other_logs(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a lasting property of the vessel that fewer of its logs show; a condition is a log's own, and a fault an event."""
     campaign = context.log.campaign
-    if len(campaign) < FEWEST_LOGS or not finding.sure or not lasting(finding):
+    if len(campaign) < JUDGING.campaign_logs or not finding.sure or not lasting(finding):
         return finding, ""
     if sum(finding.key in shown for shown in campaign) >= threshold * len(campaign):
         return finding, ""
@@ -371,7 +366,8 @@ def log_notes(log: LogFigures) -> list[str]:
     if not log.hull_known and not log.joint:
         notes.append(
             "The profile has no hull model: damping and added mass were fitted to this log beside the findings, which can "
-            f"stand in for what a hull model would explain. Take them as hints, of probability {HINT:g} at most."
+            "stand in for what a hull model would explain. Take them as hints, of probability "
+            f"{JUDGING.hint_probability:g} at most."
         )
     if drowned := drowned_axes(log, noise_drowns_an_axis.threshold or 0.0):
         shares = " and ".join(

@@ -20,17 +20,13 @@ from ferryid.diagnose.inference.estimation import (
     effect_slopes,
     fitted_force_model,
 )
-from ferryid.diagnose.inference.search import ODDS
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.experiment_design import OTHERWISE, SHOWS
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, titled
 from ferryid.vessel.profile import Floats
-
-SEEN = 0.5
-"""An effect of usual size that a log would show with less than this chance counts as one that it could not show."""
-LEARNT = 0.5
-"""An axis is excited if some combination of its coefficients is known to this share of what was known before the log."""
 
 AXES = {
     axis: tuple(k for k, name in enumerate(COEFFICIENTS) if name.startswith(begins))
@@ -59,8 +55,8 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
 
     With d the change of the whitened prediction errors that the effect makes at its usual size, less what hull and findings
     can imitate, and S the information on its parameters, the logarithm of the evidence is normal about ``½ d'd - ½ z'z - ½ log
-    det(1 + S)`` with a variance of ``d'd``; z are the parameters in their sizes. It has to exceed `ODDS`. Of effects that may
-    go either way the less visible one counts.
+    det(1 + S)`` with a variance of ``d'd``; z are the parameters in their sizes. It has to exceed
+    `INFERENCE.prior_odds`. Of effects that may go either way the less visible one counts.
 
     Parameters
     ----------
@@ -97,7 +93,7 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
             strength = float(change @ change)
             occam = float(np.linalg.slogdet(np.eye(len(size)) + information)[1])
             evidence = 0.5 * (strength - len(size) - occam)
-            chance = min(chance, 0.5 * (1.0 + erf((evidence - ODDS) / sqrt(2.0 * max(strength, 1.0)))))
+            chance = min(chance, 0.5 * (1.0 + erf((evidence - INFERENCE.prior_odds) / sqrt(2.0 * max(strength, 1.0)))))
         else:
             made.append(DetectionPower(candidate, chance))
     return tuple(made)
@@ -118,14 +114,14 @@ def unexcited_axes(problem: EstimationProblem) -> tuple[str, ...]:
     found = []
     for axis, places in AXES.items():
         most = float(np.linalg.eigvalsh(information[np.ix_(places, places)])[-1])
-        if 1.0 / sqrt(1.0 + max(most, 0.0)) > LEARNT:
+        if 1.0 / sqrt(1.0 + max(most, 0.0)) > JUDGING.excited_share:
             found.append(axis)
     return tuple(found)
 
 
 def is_testable(every: Sequence[DetectionPower], axes: Sequence[str]) -> bool:
     """Tell whether a log in which nothing was found can be said to match: more than half of the effects would have shown."""
-    return 2 * sum(one.chance >= SEEN for one in every) > len(every) and len(axes) < len(AXES)
+    return 2 * sum(one.chance >= JUDGING.detection_chance for one in every) > len(every) and len(axes) < len(AXES)
 
 
 def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> list[str]:
@@ -139,7 +135,7 @@ def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> li
         )
     by_manoeuvre: dict[str, dict[str, list[str]]] = {}
     for one in every:
-        if one.chance < SEEN:
+        if one.chance < JUDGING.detection_chance:
             known = by_manoeuvre.setdefault(SHOWS.get(one.candidate.effect.id, OTHERWISE), {})
             known.setdefault(one.candidate.effect.title.lower(), []).extend(filter(None, [one.candidate.instance]))
     if by_manoeuvre:

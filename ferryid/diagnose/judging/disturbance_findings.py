@@ -12,19 +12,15 @@ from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import fine_windows, spectrum_of
-from ferryid.diagnose.inference.stochastic_disturbance import WORTH, DisturbanceState
+from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
-
-ABOUT_PEAK = 0.1
-"""Share of its peak's power down to which a disturbance is compared with the velocities: a navigation that smooths them shifts
-a peak a little, and a narrow one then misses itself."""
-PASSED = 1e-2
-"""Share of the power that windows must let through for a frequency to be shown."""
 
 
 def disturbance_claims(
@@ -66,7 +62,7 @@ def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[
     turns = np.exp(-2j * np.pi * np.outer(frequency, step_s * np.arange(len(short.weight))))
     passed = np.abs(turns @ short.weight * step_s) ** 2
     # A mean is no part of what comes and goes, and what the windows stop tells nothing.
-    seen = (frequency > 0.0) & (passed > PASSED)
+    seen = (frequency > 0.0) & (passed > JUDGING.passed_power)
     pushed = sum(
         (np.mean(one.force[:, axis] ** 2) * density(one, frequency) for one in pushes), np.zeros_like(frequency)
     )
@@ -102,7 +98,7 @@ def _claim(
     finding = Finding(
         effect=candidate.effect.id,
         instance=None,
-        probability=1.0 / (1.0 + exp(min(WORTH - state.gain, 50.0))),
+        probability=1.0 / (1.0 + exp(min(INFERENCE.disturbance_gain - state.gain, 50.0))),
         parameters=parameters,
         axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
         intervals=((float(scene.t[0]), float(scene.t[-1])),),
@@ -125,5 +121,5 @@ def _power_in_velocities(evidence: Mapping[str, Floats]) -> float:
 
     It was found in positions, whose errors in a narrow band look like a force; a force moves velocities as well.
     """
-    strong = evidence["explained"] >= ABOUT_PEAK * evidence["explained"].max()
+    strong = evidence["explained"] >= JUDGING.peak_share * evidence["explained"].max()
     return float(evidence["before"][strong].sum() / max(evidence["explained"][strong].sum(), 1e-300))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import digamma, polygamma
 
 from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
@@ -17,11 +18,6 @@ Flags = NDArray[np.bool_]
 
 SECTORS = 12
 SPEEDS, PLACES, TIMES = 5, 3, 6
-FEWEST = 4
-"""Windows in a bin that are needed to judge it."""
-TELLS = 4.0
-"""Standard errors by which a profile must differ from an even one to name a regime."""
-HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,7 @@ class Profiled:
         Windows in each bin, shape (b,).
     excess, left
         Mean square over that of the noise, less 1, by axis, before and after, shape (b, 3); NaN in bins with fewer than
-        `FEWEST` windows.
+        `JUDGING.bin_windows` windows.
     error
         Its standard error if there were noise alone, shape (b,).
     mean
@@ -75,7 +71,7 @@ def profile_of(
     b = len(edges) - 1
     place = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, b - 1)
     count = np.bincount(place, minlength=b)
-    enough = count >= FEWEST
+    enough = count >= JUDGING.bin_windows
     safe = np.maximum(count, 1)
 
     def by_bin(values: Floats) -> Floats:
@@ -148,13 +144,13 @@ def profiles_of(windows_: Windows, kept: Ints, white: Floats, calm: Floats, erro
 
 def in_words(profiles: Sequence[Profiled], shares: Floats) -> str:
     """Return the bins of the most telling profile that hold at least half of its greatest excess."""
-    telling = [one for one in profiles if one.statistic >= TELLS]
+    telling = [one for one in profiles if one.statistic >= JUDGING.regime_errors]
     if not telling:
         return "all along"
     # When is said with the intervals: here time only stands for what nothing else tells.
     one = next((one for one in telling if one.name != "time"), telling[0])
     level = np.where(np.isfinite(one.excess).all(axis=1), np.nan_to_num(one.excess) @ shares, -np.inf)
-    strong = level >= HALF * level.max()
+    strong = level >= JUDGING.regime_level * level.max()
     pieces = [
         f"{_number(one.low[a])} to {_number(one.high[b - 1])}"
         for a, b in _stretches(strong, round_trip=one.unit == "deg" and len(one.low) == SECTORS)

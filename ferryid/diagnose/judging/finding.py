@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.vessel.profile import Floats
 
-HINT = 0.5
-"""Probability up to which a finding is a hint and names nothing: not more likely than not."""
 UNKNOWN = "unknown"
 """Effect id of what has no name."""
-NEAR = 3.0
-"""Rivals whose evidence is less than this behind are not told apart."""
 
 
 @dataclass(frozen=True)
@@ -120,4 +117,4 @@ class Finding:
     @property
     def sure(self) -> bool:
         """True where it is more than a hint."""
-        return self.probability > HINT
+        return self.probability > JUDGING.hint_probability

@@ -11,7 +11,6 @@ import numpy as np
 
 from ferryid.diagnose.data.estimate import AXES, Estimate
 from ferryid.diagnose.inference.estimation import (
-    WIDER,
     Candidate,
     EstimationProblem,
     Fit,
@@ -22,13 +21,15 @@ from ferryid.diagnose.inference.estimation import (
 from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.onset_estimation import lasts_s, replace_candidate
 from ferryid.diagnose.inference.profile_likelihood import intervals
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import Claim, Figures
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.figure_data import figure_columns, figure_regressor
-from ferryid.diagnose.judging.finding import NEAR, Finding, Rival
+from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
@@ -69,7 +70,9 @@ def _force_claim(
     rivals = tuple(
         Rival(one.candidate.effect.id, one.candidate.instance, one.gain) for one in standing.rivals[:SHOWN_RIVALS]
     )
-    unresolved = tuple(dict.fromkeys(one.candidate.effect.id for one in standing.rivals if one.gain > -NEAR))
+    unresolved = tuple(
+        dict.fromkeys(one.candidate.effect.id for one in standing.rivals if one.gain > -JUDGING.unresolved_evidence)
+    )
     # The hull stays as it is with the finding: refitted without, it would bend to it on axes where it does not act.
     bare = replace(
         kept,
@@ -219,7 +222,7 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
     # Each moment stands for the time about it; the posterior is as much wider as that of other parameters.
     edges = np.concatenate([moments[:1], 0.5 * (moments[1:] + moments[:-1]), moments[-1:]])
     edges[[0, -1]] += np.array([-0.5, 0.5]) * TIME_FINE_S
-    log_weights = np.array([tried[time] for time in moments.tolist()]) / WIDER**2
+    log_weights = np.array([tried[time] for time in moments.tolist()]) / INFERENCE.posterior_factor**2
     weights = np.exp(log_weights - log_weights.max()) * np.diff(edges)
     shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
     low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
-from ferryid.diagnose.inference.folds import FOLDS, Folds, by_block, draws
+from ferryid.diagnose.inference.folds import Folds, by_block, draws
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration
 from ferryid.vessel.profile import Floats
@@ -63,8 +64,8 @@ def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], a
     starts, last, block = _starts(windows, folds, stride * int(steps[0]))
     horizons = steps * stride * scene.step_s
     errors = np.full((2, len(starts), len(steps), 4), np.nan)
-    for k in range(FOLDS):
-        own = np.flatnonzero(block % FOLDS == k)
+    for k in range(INFERENCE.folds):
+        own = np.flatnonzero(block % INFERENCE.folds == k)
         if own.size == 0:
             continue
         for which, fits in enumerate((before, after)):

@@ -32,6 +32,7 @@ from ferryid.diagnose.inference.folds import Folds, by_block, draws, folds_of, s
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.free_runs import FreeRuns, free_runs
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, as_measured
@@ -39,16 +40,7 @@ from ferryid.vessel.profile import Floats
 
 Ints = NDArray[np.int64]
 
-SHIFTS = (0.29, 0.382, 0.5)
-"""Shares of the log that a placebo is late by. About a third, and none a multiple of another: a trial that repeats itself
-would make a single shift fit by accident."""
 HEADING = "heading mirrored"
-PLAIN = 8.0
-"""Logarithm of a likelihood ratio that needs no bootstrap to be believed."""
-MATCHED = 0.7
-"""Share of an improvement as of which a placebo is said to match it, whatever the interval of the difference."""
-SAME = 0.3
-"""A placebo whose force differs by less than this from its effect's, as a share of it in the root mean square, is none."""
 
 
 @dataclass(frozen=True)
@@ -115,9 +107,9 @@ class Proof:
         Lower end of the 95 % interval of how much better its score is than that of the placebos: the least of the mirrored
         heading's and the median of the shifted ones'. Infinite where there is no placebo.
     holds
-        True where it improves held-out data, and beyond its placebos, none of which comes to `MATCHED` of it; or, of what
-        the hull can imitate only by being off in all its coefficients together, where it improves them over the hull as it
-        is in the model.
+        True where it improves held-out data, and beyond its placebos, none of which comes to `JUDGING.placebo_share`
+        of it; or, of what the hull can imitate only by being off in all its coefficients together, where it improves them
+        over the hull as it is in the model.
     free_runs
         By adding it to the others.
     """
@@ -243,13 +235,13 @@ def placebos(problem: EstimationProblem, candidate: Candidate, values: Floats) -
     )
     candidate = replace(candidate, parameters=parameters)
     seconds = float(problem.windows.scene.t[-1] - problem.windows.scene.t[0])
-    made = {f"{share * seconds:.0f} s late": _shifted(candidate, share) for share in SHIFTS}
+    made = {f"{share * seconds:.0f} s late": _shifted(candidate, share) for share in JUDGING.placebo_shifts}
     mirrored = _mirrored(candidate)
     true = candidate.act(problem.plain, values)
     wrong = mirrored.act(problem.plain, values)
     size = np.linalg.norm(as_measured(true) - as_measured(problem.plain))
     # On a heading near north or south the mirrored force is the same: it would test nothing.
-    if np.linalg.norm(as_measured(true) - as_measured(wrong)) > SAME * size:
+    if np.linalg.norm(as_measured(true) - as_measured(wrong)) > JUDGING.placebo_difference * size:
         made[HEADING] = mirrored
     return made
 
@@ -276,7 +268,7 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
     scores = {name: float(one.sum()) for name, one in by_name.items()}
     holds = made.score_low > 0.0 and beaten > 0.0
     # What acts seldom shows in a block or two, which half of the draws leave out.
-    seldom = made.score > PLAIN and made.score > PLAIN + max(scores.values())
+    seldom = made.score > JUDGING.gain and made.score > JUDGING.gain + max(scores.values())
     holds = (holds or seldom) and not _matched(made.score, scores)
     if not holds and _hull_strains(problem, found, rest, start):
         rigid = replace(problem, hull_spread=np.zeros_like(problem.hull_spread))
@@ -293,7 +285,7 @@ def _proof(problem: EstimationProblem, folds: Folds, found: Fit, full: HeldOut, 
 
 def _matched(score: float, placebos: Mapping[str, float]) -> bool:
     late = sorted(value for name, value in placebos.items() if name != HEADING)
-    return max(late[len(late) // 2], placebos.get(HEADING, -np.inf)) > MATCHED * score
+    return max(late[len(late) // 2], placebos.get(HEADING, -np.inf)) > JUDGING.placebo_share * score
 
 
 def _beaten(picks: Floats, gains: Floats, by_name: Mapping[str, Floats]) -> float:
@@ -316,7 +308,7 @@ def _hull_strains(problem: EstimationProblem, found: Fit, rest: Sequence[Candida
         float(np.sum(((one.hull - problem.plain.hull)[free] / problem.hull_spread[free]) ** 2))
         for one in (without, found)
     ]
-    return without.evidence < found.evidence - PLAIN and strains[0] > strains[1] + 2.0 * PLAIN
+    return without.evidence < found.evidence - JUDGING.gain and strains[0] > strains[1] + 2.0 * JUDGING.gain
 
 
 def _part(problem: EstimationProblem, windows: Windows) -> EstimationProblem:

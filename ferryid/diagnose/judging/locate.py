@@ -18,7 +18,8 @@ from ferryid.diagnose.inference.change_points import active_intervals
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import Band, bands_of
-from ferryid.diagnose.judging.error_profiles import TELLS, Profiled, in_words, profiles_of
+from ferryid.diagnose.judging.error_profiles import Profiled, in_words, profiles_of
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import Measurements
 from ferryid.vessel.profile import Floats
 
@@ -83,7 +84,11 @@ def locate(problem: EstimationProblem, before: Fit, after: Fit, scene: Measureme
     excess = np.maximum(power_before / power_after - 1.0, 0.0)
     profiles = profiles_of(problem.windows, kept, white, calm, first)
     # Without a better hypothesis an axis stands out by how uneven its errors are.
-    uneven = profiles[0].by_axis if unexplained and profiles and profiles[0].statistic >= TELLS else np.zeros(3)
+    uneven = (
+        profiles[0].by_axis
+        if unexplained and profiles and profiles[0].statistic >= JUDGING.regime_errors
+        else np.zeros(3)
+    )
     shares = _shared(np.maximum(uneven, 0.0) if unexplained else excess)
     axes = shares if shares.any() else np.full(3, 1.0 / 3.0)
     strength = (white**2 if unexplained else white**2 - calm**2) @ axes

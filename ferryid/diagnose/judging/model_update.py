@@ -15,6 +15,7 @@ from ferryid import __version__
 from ferryid.counts import counted
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.posterior import Posterior
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.files import alone
@@ -24,9 +25,6 @@ from ferryid.models.forces import ModelForces
 from ferryid.models.store import check_name, save
 from ferryid.types import AXES
 from ferryid.vessel.profile import Floats, Profile
-
-APART = 0.25
-"""Logs contradict each other about a parameter where its intervals are apart, by more than this share of its usual size."""
 
 
 def store_updated_model(
@@ -161,7 +159,7 @@ def _contradictions(found: Sequence[StoredEffect], profile: Profile) -> list[str
         several = [stored.parameters[parameter.name] for stored in found]
         values = [each.value for each in several]
         gap = max(each.low for each in several) - min(each.high for each in several)
-        if gap > 0.0 and max(values) - min(values) > APART * parameter.size:
+        if gap > 0.0 and max(values) - min(values) > JUDGING.contradiction_share * parameter.size:
             told.append(f"{parameter.name} ({' against '.join(f'{value:.3g}' for value in values)} {parameter.unit})")
     return told
 

@@ -16,7 +16,8 @@ from ferryid.diagnose.inference.estimation import (
     without,
 )
 from ferryid.diagnose.inference.onset_estimation import brief
-from ferryid.diagnose.inference.search import FAR, ODDS
+from ferryid.diagnose.inference.search import FAR
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.parallel import over
 
 NEAREST = 4
@@ -65,7 +66,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     """
     candidate = kept.candidates[index]
     bare = without(problem, kept, index)
-    none = exp(min(bare.evidence - kept.evidence + ODDS, 50.0))
+    none = exp(min(bare.evidence - kept.evidence + INFERENCE.prior_odds, 50.0))
     if brief(problem, candidate):
         return RivalComparison((), 1.0 / (1.0 + none))
     begin = starting_point(problem, bare)

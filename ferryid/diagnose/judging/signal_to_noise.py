@@ -15,11 +15,9 @@ import numpy as np
 from ferryid.diagnose.data.complementary_filter import velocity_from_pose
 from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import EstimationProblem
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import acceleration
 from ferryid.signals.smooth import odd_rows, steady_mean
-
-MEAN_S = 2.0
-"""Time over which a slope of positions is about as noisy as the velocity in use."""
 
 
 def velocity_noise_shares(problem: EstimationProblem) -> dict[str, float]:
@@ -31,7 +29,7 @@ def velocity_noise_shares(problem: EstimationProblem) -> dict[str, float]:
     """
     seen, plain = problem.windows, problem.plain
     scene = seen.scene
-    rows = odd_rows(MEAN_S, 1.0 / scene.step_s)
+    rows = odd_rows(JUDGING.noise_mean_s, 1.0 / scene.step_s)
     if not seen.channels[0] or len(scene.t) < rows:
         return {}
     # Motion that is faster than the mean is left out of both.

@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise, fit_autoregression
 from ferryid.diagnose.inference.candidate_terms import Term, terms_of
-from ferryid.diagnose.inference.estimation import WIDER, Candidate, EstimationProblem, Fit, fit, fitted_force_model
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds
-from ferryid.diagnose.inference.search import VOID
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.held_out import Improvement, compare_held_out, held_out
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
@@ -31,21 +32,8 @@ from ferryid.vessel.profile import Floats
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
-MOST_TERMS = 3
-GAIN = 8.0
-"""Log-likelihood that a term must gain."""
 FLIPS, SHIFTS = 100, 31
 """Placebos of either kind."""
-BEATS = 0.99
-"""Share of the placebos with other signs that a term must beat; of the late ones it must beat half, as evidence does."""
-PLAIN = 80.0
-"""Log-likelihood that a term must gain where the noise is taken to be the least that any terms leave."""
-SURE = 3.0
-"""Standard errors by which a coefficient must differ from zero when the others are there."""
-ALIKE = 0.9
-"""Cosine between what an effect and what a term do to a log as of which they say the same."""
-WIDE = 30.0
-"""Limit of a coefficient, in usual ones."""
 
 
 @dataclass(frozen=True)
@@ -122,12 +110,12 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
     chosen: list[Term] = []
     made, seen = kept, problem
     gains: list[tuple[float, float]] = []
-    while len(chosen) < MOST_TERMS:
+    while len(chosen) < JUDGING.law_terms:
         lines = linearise_terms(seen, made, terms)
         best, real, chance = _best(seen, seen.noise, lines, folds)
-        if real < GAIN or real <= chance:
+        if real < JUDGING.law_gain or real <= chance:
             best, real, chance = _best(seen, _noise_of_the_rest(seen, lines), lines, folds, plain=True)
-            if real < PLAIN or real <= chance:
+            if real < JUDGING.unwhitened_law_gain or real <= chance:
                 break
         gains.append((real, chance))
         chosen.append(terms.pop(best))
@@ -137,7 +125,7 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
         return None
     made = _fitted(seen, kept, chosen)
     errors = made.errors(len(kept.candidates))
-    sure = [abs(value) > SURE * error for value, error in zip(made.values[-1], errors, strict=True)]
+    sure = [abs(value) > JUDGING.law_errors * error for value, error in zip(made.values[-1], errors, strict=True)]
     if not any(sure):
         return None
     if not all(sure):
@@ -150,14 +138,22 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
     better = compare_held_out(seen, folds, before, after)
     if better.score_low <= 0.0:
         return None
-    return Law(tuple(chosen), made, seen, better, *gains[0], made.values[-1], WIDER * made.errors(len(kept.candidates)))
+    return Law(
+        tuple(chosen),
+        made,
+        seen,
+        better,
+        *gains[0],
+        made.values[-1],
+        INFERENCE.posterior_factor * made.errors(len(kept.candidates)),
+    )
 
 
 def _unlike(problem: EstimationProblem, kept: Fit, terms: Sequence[Term], moved: Floats) -> list[Term]:
     pushes = linearise_terms(problem, kept, terms).terms
     size = np.sqrt(np.sum(moved**2) * np.sum(pushes**2, axis=(0, 1)))
     alike = np.abs(np.einsum("jc,jck->k", moved, pushes)) / np.maximum(size, 1e-12)
-    return [term for term, one in zip(terms, alike.tolist(), strict=True) if one < ALIKE]
+    return [term for term, one in zip(terms, alike.tolist(), strict=True) if one < JUDGING.law_likeness]
 
 
 def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) -> Candidate:
@@ -172,7 +168,9 @@ def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) 
         size = np.sqrt(np.mean(term.force(picture) ** 2, axis=0))
         axis = int(np.argmax(size / np.maximum(thrust, 1e-9)))
         usual = float(max(thrust[axis], 1e-9) / max(size[axis], 1e-9))
-        parameters.append(Parameter(term.name, term.coefficient_unit, usual, -WIDE * usual, WIDE * usual))
+        parameters.append(
+            Parameter(term.name, term.coefficient_unit, usual, -JUDGING.law_limit * usual, JUDGING.law_limit * usual)
+        )
     made = tuple(parameters)
 
     def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
@@ -203,7 +201,7 @@ def _void(problem: EstimationProblem, made: Fit) -> bool:
     without = replace(made, candidates=made.candidates[:-1], values=made.values[:-1])
     moved = seen.gap(fitted_force_model(problem.plain, made)) - seen.gap(fitted_force_model(problem.plain, without))
     size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
-    return bool((np.sqrt(np.mean(moved**2, axis=0)) < VOID * size).all())
+    return bool((np.sqrt(np.mean(moved**2, axis=0)) < INFERENCE.void_share * size).all())
 
 
 def _best(
@@ -229,7 +227,9 @@ def _best(
     best = int(np.argmax(gained[:, 0]))
     most = gained.max(axis=0)
     flipped, late = most[1 : 1 + FLIPS], most[1 + FLIPS :]
-    chance = float(np.median(flipped)) if plain else float(max(np.quantile(flipped, BEATS), np.median(late)))
+    chance = (
+        float(np.median(flipped)) if plain else float(max(np.quantile(flipped, JUDGING.law_beats), np.median(late)))
+    )
     return best, float(most[0]), chance
 
 

@@ -18,26 +18,20 @@ from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds, folds_of
 from ferryid.diagnose.inference.onset_estimation import brief
-from ferryid.diagnose.inference.search import ODDS
 from ferryid.diagnose.inference.spectra import BURST_HZ, Band, Burst, bursts_of
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_laws import CampaignLaws
 from ferryid.diagnose.judging.claims import Claim, Figures, OtherLogs
-from ferryid.diagnose.judging.error_profiles import TELLS
 from ferryid.diagnose.judging.figure_data import figure_columns
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
 from ferryid.diagnose.judging.locate import Location, locate
 from ferryid.diagnose.judging.sparse_regression import Law, select_law
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.vessel.profile import Floats
 
-USUAL = 0.9
-"""Quantile of a quantity's size at which its force is told."""
-BAND_SHARE = 0.5
-"""A band is told that holds this share of the power."""
 SPANS = 5
 """Intervals that are told."""
-BURSTS = 5.0
-"""Standard deviations from even as of which bursts are told."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +83,9 @@ def find_unexplained(
     left = locate(seen, after, after, scene)
     # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
     known = bool(problem.filter.processes)
-    uneven = bool(left.profiles) and left.profiles[0].statistic >= TELLS
+    uneven = bool(left.profiles) and left.profiles[0].statistic >= JUDGING.regime_errors
     burst = bursts_of(seen, fitted_force_model(seen.plain, after), scene)
-    if burst is not None and burst.deviations >= BURSTS:
+    if burst is not None and burst.deviations >= JUDGING.burst_deviations:
         uneven = True
         if not known:
             claims.append(Claim(_in_bursts(burst), Figures("bursts")))
@@ -132,8 +126,8 @@ def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) 
     with_law = fit(fair, [*rest, told], [*start, coefficients]).evidence
     with_effect = fit(fair, [*rest, candidate], [*start, values]).evidence
     with_both = fit(fair, [*rest, told, candidate], both.values).evidence
-    better = with_law - with_effect > max(ODDS, candidate.effect.form * (with_law - with_neither))
-    return better and with_both - with_law < ODDS
+    better = with_law - with_effect > max(INFERENCE.prior_odds, candidate.effect.form * (with_law - with_neither))
+    return better and with_both - with_law < INFERENCE.prior_odds
 
 
 def _lawful(law: Law, kept: Fit, scene: Measurements, whose: str) -> Finding:
@@ -175,7 +169,7 @@ def _lawful(law: Law, kept: Fit, scene: Measurements, whose: str) -> Finding:
 def _told(term: Term, picture: ForceModel, problem: EstimationProblem, value: float, error: float) -> LawTerm:
     """Return a term as people read it: its force where its quantity is as large as it usually gets."""
     quantity = term.value(picture)[problem.windows.scene.usable]
-    at = 1.0 if term.name == "1" else float(f"{np.quantile(np.abs(quantity), USUAL):.1g}")
+    at = 1.0 if term.name == "1" else float(f"{np.quantile(np.abs(quantity), JUDGING.usual_quantile):.1g}")
     low, high = value - 1.96 * error, value + 1.96 * error
     share = not term.force_unit
     scale, unit = (100.0 * at, "%") if share else (at, term.force_unit)
@@ -272,6 +266,6 @@ def _band(bands: Sequence[Band], shares: Floats, detection_powers: Sequence[Floa
     for count in range(1, len(bands) + 1):
         sums = [float(level[k : k + count].sum()) for k in range(len(bands) - count + 1)]
         best = int(np.argmax(sums))
-        if sums[best] >= BAND_SHARE * level.sum():
+        if sums[best] >= JUDGING.band_share * level.sum():
             return bands[best].low_hz, bands[best + count - 1].high_hz
     return None

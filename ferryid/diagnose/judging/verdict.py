@@ -8,14 +8,9 @@ from math import isfinite, nan
 
 from ferryid.diagnose.data.estimate import AXES, Estimate
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
+from ferryid.diagnose.judging.thresholds import JUDGING
 
 VERDICTS = ("matched", "explained", "partly_explained", "unexplained", "not_testable")
-CHANGED = 0.02
-"""Smallest change of the squared force error that is reported."""
-WORSE = 0.2
-"""Growth of an axis's squared force error beyond which it is worse with the findings, whatever its interval."""
-MUCH = 0.5
-"""Squared force error over the squared force that moves the vessel, from which more is left on an axis than is explained."""
 
 
 @dataclass(frozen=True)
@@ -47,16 +42,19 @@ class Remainder:
     @property
     def much(self) -> tuple[str, ...]:
         """Axes on which more is left than is explained."""
-        return tuple(axis for axis in AXES if self.left.get(axis, 0.0) >= MUCH)
+        return tuple(axis for axis in AXES if self.left.get(axis, 0.0) >= JUDGING.unexplained_share)
 
 
 def worse_axes(ratio: Mapping[str, Estimate]) -> tuple[str, ...]:
-    """Return the axes whose force error grows: by more than `WORSE`, or by an interval that excludes no change."""
+    """Return the axes whose force error grows: by more than `JUDGING.worsening`, or by an interval that excludes no change."""
     return tuple(
         axis
         for axis in AXES
         if axis in ratio
-        and (ratio[axis].value > 1.0 + WORSE or (ratio[axis].value > 1.0 + CHANGED and ratio[axis].low > 1.0))
+        and (
+            ratio[axis].value > 1.0 + JUDGING.worsening
+            or (ratio[axis].value > 1.0 + JUDGING.reported_change and ratio[axis].low > 1.0)
+        )
     )
 
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings
 from ferryid.identify.sweeps.settings_sweep import SCHEMA
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.regression.bases import Basis
 from ferryid.types import AXES, Flags, Floats, by_axis
-
-LEVEL = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +78,7 @@ class Structure:
     @property
     def kept(self) -> bool:
         """True where it cannot be told from the best."""
-        return self.p > 1.0 - LEVEL
+        return self.p > 1.0 - IDENTIFY.structure_level
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,18 +24,18 @@ from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings
 from ferryid.identify.split import correlation_time
 from ferryid.identify.sweeps.settings_sweep import BY, check_folds, log_json
 from ferryid.identify.sweeps.structure_comparison import (
-    LEVEL,
     Ratios,
     Structure,
     StructureComparison,
     StructureSweep,
     over_base,
 )
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models.forces import compute_residual
-from ferryid.regression import CrossProducts, fit_simpls, total
+from ferryid.regression import REGRESSION, CrossProducts, fit_simpls, total
 from ferryid.regression.bases import STRUCTURES, Basis, basis_names, with_hull_length
 from ferryid.regression.cross_validation import Curves, Folds, FoldSums, unpurged_parts
-from ferryid.regression.resampling import FEW_BLOCKS, block_seconds, model_confidence_set, percentiles, times_drawn
+from ferryid.regression.resampling import block_seconds, model_confidence_set, percentiles, times_drawn
 from ferryid.signals.smooth import Measured, smooth_measured
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, Ints, RunContext
@@ -147,9 +147,10 @@ def usable_bases(settings: FitSettings, profile: Profile) -> tuple[dict[str, str
 
 
 def block_length(logs: Sequence[_Log], bases: Sequence[Basis]) -> float:
-    """Return the least length of a block [s]: what residuals need to be independent, or as much of it as leaves `FEW_BLOCKS`.
+    """Return the least length of a block [s]: what residuals need to be independent, or what leaves enough blocks.
 
-    It is the longest over the bases, each fitted to all rows, and no less than the residual's correlation time.
+    Enough are `REGRESSION.few_blocks`. It is the longest over the bases, each fitted to all rows, and no less than the
+    residual's correlation time.
     """
     seconds = sum(np.count_nonzero(log.used) / log.test[0].rate_hz for log in logs)
     rates = [log.test[0].rate_hz for log in logs]
@@ -166,7 +167,7 @@ def block_length(logs: Sequence[_Log], bases: Sequence[Basis]) -> float:
             left = np.full_like(error, np.nan)
             left[log.used] = error[log.used] - functions.of(motion, log.used) @ theta - constant
             memory = max(memory, correlation_time(left, log.used, rate))
-    return max(min(longest, seconds / FEW_BLOCKS), memory)
+    return max(min(longest, seconds / REGRESSION.few_blocks), memory)
 
 
 def compare_structures(
@@ -258,7 +259,7 @@ def _rank(tried: Sequence[_StructureErrors], base: Floats, rows: Floats, folds: 
     def against(number: int, other: int) -> Ratios:
         with np.errstate(divide="ignore", invalid="ignore"):
             value, ratios = mse[number] / mse[other], drawn[number] / drawn[other]
-        low, high = percentiles(ratios.T, len(rows), LEVEL)
+        low, high = percentiles(ratios.T, len(rows), IDENTIFY.structure_level)
         return Ratios(value, low, high)
 
     structures = tuple(
@@ -329,7 +330,7 @@ def _notes(by: Mapping[str, StructureComparison], settings: FitSettings) -> list
         least = min(float(np.nanmean(over_base(structure, one))) for structure in one.structures)
         if least >= 1.0:
             notes.append(f"By {BY[key]} none predicts force better than the base model does without any.")
-    if blocks.blocks < FEW_BLOCKS:
+    if blocks.blocks < REGRESSION.few_blocks:
         notes.append(
             f"Only {counted(blocks.blocks, 'independent stretch')} to draw from: the intervals are probably too narrow."
         )

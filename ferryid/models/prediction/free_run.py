@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.counts import counted, verb
 from ferryid.models.forces.estimator import ForceLaw
+from ferryid.models.thresholds import MODELS
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, Ints
 
@@ -17,8 +18,6 @@ HORIZONS_S = (5.0, 10.0, 20.0, 30.0, 60.0)
 MAX_STARTS = 60
 STEP_S = 0.2
 NO_MASS = "the model's effective mass matrix is not positive definite: it cannot be run free"
-LEAP_MPS = 5.0
-"""Added to twice the greatest speed: a position that moves faster has jumped."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +196,7 @@ def _jumps(motion: Motion) -> Flags:
     step = np.hypot(*np.diff(motion.eta[:, :2], axis=0).T)
     fastest = np.nanmax(np.hypot(motion.raw_nu[:, 0], motion.raw_nu[:, 1]), initial=0.0)
     leaps = np.zeros(len(motion.t), dtype=bool)
-    leaps[1:] = step > (2.0 * fastest + LEAP_MPS) / motion.rate_hz
+    leaps[1:] = step > (2.0 * fastest + MODELS.leap_mps) / motion.rate_hz
     return leaps
 
 

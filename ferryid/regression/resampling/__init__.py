@@ -1,7 +1,6 @@
 """Resampling of blocks: intervals of coefficients, paired comparisons, and sets of models that cannot be told apart."""
 
 from ferryid.regression.resampling.bootstrap import (
-    FEW_BLOCKS,
     Blocks,
     block_seconds,
     bootstrap_coefficients,
@@ -19,7 +18,6 @@ from ferryid.regression.resampling.paired_bootstrap import (
 )
 
 __all__ = [
-    "FEW_BLOCKS",
     "Blocks",
     "PairedRatios",
     "block_seconds",

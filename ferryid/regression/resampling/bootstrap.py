@@ -14,13 +14,9 @@ from ferryid.regression.cross_products import CHUNK_ROWS, CrossProducts, Rows, g
 from ferryid.regression.qr import standard_deviations
 from ferryid.regression.recurrence import extract
 from ferryid.regression.simpls import group_outputs
+from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Flags, Floats, Ints
 
-FEWEST_BLOCKS = 10
-FEW_BLOCKS = 20
-"""Below this number of blocks the intervals are too narrow more often than they claim, and a note says so."""
-_MOST_BLOCKS = 500
-"""More blocks than this tell no more about the spread; longer ones are safer."""
 _BINS = 2000
 """Residuals are averaged to about this many bins before their autocorrelation is judged."""
 _BATCH = 250
@@ -175,7 +171,7 @@ def bootstrap_coefficients(
         raise FerryIdError(
             f"{where}: intervals by block bootstrap need two blocks or more, found {count}. Fix: use a longer log"
         )
-    if count < FEW_BLOCKS:
+    if count < REGRESSION.few_blocks:
         notes = (
             *notes,
             f"Only {counted(count, 'independent stretch')} to draw from: the intervals are probably too narrow.",
@@ -229,11 +225,11 @@ def block_seconds(
         chunks = (rows.chunk(low, low + CHUNK_ROWS) for low in range(0, len(rows.Y), CHUNK_ROWS))
         residual = np.concatenate([Y - X @ coefficients - intercepts for X, Y in chunks])
         seconds += len(residual) / rate
-        if len(residual) >= FEWEST_BLOCKS:
+        if len(residual) >= REGRESSION.fewest_blocks:
             lengths.append(correlated_rows(residual) / rate)
-    longest, allowed_s = max(lengths), seconds / FEWEST_BLOCKS
+    longest, allowed_s = max(lengths), seconds / REGRESSION.fewest_blocks
     if longest <= allowed_s:
-        return max(longest, seconds / _MOST_BLOCKS), ()
+        return max(longest, seconds / REGRESSION.most_blocks), ()
     note = (
         f"Residuals stay correlated over blocks of {longest:.3g} s; the rows allow {allowed_s:.3g} s only: "
         "the intervals are probably too narrow."

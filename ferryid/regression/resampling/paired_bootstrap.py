@@ -9,16 +9,10 @@ from itertools import combinations
 import numpy as np
 
 from ferryid.regression.resampling.bootstrap import correlated_rows
+from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Floats, Ints
 
-BLOCK_S = 30.0
-"""Shortest block [s]."""
-MEAN_S = 3.0
-FEWEST_BLOCKS = 8
-"""With fewer there is no interval."""
-MOST_BLOCKS = 500
 DRAWS = 9999
-LEVEL = 0.95
 NOTHING = 1e-7
 """A difference of ratios that is rounding."""
 
@@ -47,13 +41,18 @@ class PairedRatios:
 def paired_block_seconds(squares: Floats, rate_hz: float) -> tuple[float, bool]:
     """Return the length of a block [s] for squared errors, shape (n, c), and whether they stay correlated for longer.
 
-    It is what `correlated_rows` asks for, at least `BLOCK_S`, and no longer than leaves enough blocks.
-    Means over `MEAN_S` are what is asked about: shorter memory does not matter, and more samples would hide a longer one.
+    It is what `correlated_rows` asks for, at least `REGRESSION.paired_block_s`, and no longer than leaves enough blocks.
+    Means over `REGRESSION.paired_mean_s` are what is asked about: shorter memory does not matter, and more
+    samples would hide a longer one.
     """
-    seconds, width = len(squares) / rate_hz, max(1, round(MEAN_S * rate_hz))
+    seconds, width = len(squares) / rate_hz, max(1, round(REGRESSION.paired_mean_s * rate_hz))
     means = squares[: len(squares) // width * width].reshape(-1, width, squares.shape[1]).mean(axis=1)
-    wanted = max(BLOCK_S, seconds / MOST_BLOCKS, correlated_rows(means) * width / rate_hz if len(means) else 0.0)
-    length = max(BLOCK_S, min(wanted, seconds / FEWEST_BLOCKS))
+    wanted = max(
+        REGRESSION.paired_block_s,
+        seconds / REGRESSION.paired_most_blocks,
+        correlated_rows(means) * width / rate_hz if len(means) else 0.0,
+    )
+    length = max(REGRESSION.paired_block_s, min(wanted, seconds / REGRESSION.paired_fewest_blocks))
     return length, wanted > length
 
 
@@ -74,13 +73,16 @@ def sum_over_blocks(squares: Floats, at_s: Floats, block_s: float) -> Floats:
 
 def has_enough_blocks(logs: Sequence[Floats]) -> bool:
     """Tell whether the blocks of some logs, shape (blocks, ...) each, are enough for an interval."""
-    return any(len(sums) >= FEWEST_BLOCKS for sums in _strata(logs))
+    return any(len(sums) >= REGRESSION.paired_fewest_blocks for sums in _strata(logs))
 
 
 def _strata(logs: Sequence[Floats]) -> list[Floats]:
     """Return the blocks that are drawn from together: those of a log, and those of all logs that are too short alone."""
-    short = [sums for sums in logs if 0 < len(sums) < FEWEST_BLOCKS]
-    return [*(sums for sums in logs if len(sums) >= FEWEST_BLOCKS), *([np.concatenate(short)] if short else [])]
+    short = [sums for sums in logs if 0 < len(sums) < REGRESSION.paired_fewest_blocks]
+    return [
+        *(sums for sums in logs if len(sums) >= REGRESSION.paired_fewest_blocks),
+        *([np.concatenate(short)] if short else []),
+    ]
 
 
 def compare_pairs(logs: Sequence[Floats], draws: int = DRAWS, seed: int = 0) -> PairedRatios:
@@ -133,7 +135,7 @@ def compare_pairs(logs: Sequence[Floats], draws: int = DRAWS, seed: int = 0) -> 
             same = error[0] == 0.0
             away = np.where(same, np.where(np.abs(ratio[:, column] - 1.0) > NOTHING, np.inf, 0.0), away)
             strayed[:, same] = 0.0
-            reach = strayed[int(np.ceil(LEVEL * (draws + 1))) - 1] * error[0]
+            reach = strayed[int(np.ceil(REGRESSION.paired_level * (draws + 1))) - 1] * error[0]
             low[:, column], high[:, column] = ratio[:, column] * np.exp(-reach), ratio[:, column] * np.exp(reach)
             beyond = draws - np.array([np.searchsorted(strayed[:, k], away[k]) for k in range(len(pairs))])
             p[:, column] = (1.0 + beyond) / (draws + 1.0)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from ferryid.diagnose.inference.estimation import WIDER, Candidate, fit
+from ferryid.diagnose.inference.estimation import Candidate, fit
 from ferryid.diagnose.inference.profile_likelihood import intervals
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.vessel.profile import Floats
@@ -37,7 +38,7 @@ def test_the_ridge_of_a_product_has_the_intervals_of_its_posterior() -> None:
     a = np.linspace(1e-3, 12.0, 40_000)
     # With b integrated out; all posteriors are widened.
     log_posterior = norm.logpdf(a, 1.0, 1.0) + norm.logpdf(product, 0.0, np.hypot(error, 50.0 * a))
-    share = np.exp((log_posterior - log_posterior.max()) / WIDER**2)
+    share = np.exp((log_posterior - log_posterior.max()) / INFERENCE.posterior_factor**2)
     low, high = np.interp([0.025, 0.975], np.cumsum(share) / share.sum(), a)
     kept = fit(case, [FACTORS])
     found = intervals(case, kept, 0)
@@ -48,5 +49,5 @@ def test_the_ridge_of_a_product_has_the_intervals_of_its_posterior() -> None:
     rng = np.random.default_rng(0)
     drawn = rng.choice(a, 200_000, p=share / share.sum())
     weight = drawn**2 / error**2 + 1.0 / 50.0**2
-    b = drawn * product / error**2 / weight + WIDER * rng.normal(size=len(drawn)) / np.sqrt(weight)
+    b = drawn * product / error**2 / weight + INFERENCE.posterior_factor * rng.normal(size=len(drawn)) / np.sqrt(weight)
     assert found["b"] == pytest.approx(tuple(np.quantile(b, [0.025, 0.975])), rel=0.08)

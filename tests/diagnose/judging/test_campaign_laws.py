@@ -12,17 +12,10 @@ from ferryid.diagnose.inference.candidate_terms import Term, terms_of
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, estimation_problem, fit
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.campaign_laws import (
-    CAN,
-    CampaignLaws,
-    LogInformation,
-    find_campaign_laws,
-    select_campaign_law,
-)
+from ferryid.diagnose.judging.campaign_laws import CampaignLaws, LogInformation, find_campaign_laws, select_campaign_law
 from ferryid.diagnose.judging.claims import LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules
-from ferryid.diagnose.judging.finding import HINT
-from ferryid.diagnose.judging.sparse_regression import GAIN
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import find_unexplained
 from tests.diagnose.judging.test_unexplained import FERRY, nu, pushes, sailed, trial_with
 
@@ -72,7 +65,7 @@ def test_a_log_that_cannot_show_a_law_says_nothing_against_it() -> None:
     law = select_campaign_law([says(1.0, 0.1), says(1.0, 0.1), says(-1.0, 1.0)])
     assert law is not None
     assert law.able.tolist() == [True, True, False]
-    assert law.expected[2] < CAN
+    assert law.expected[2] < JUDGING.law_expected_gain
 
 
 def test_a_law_of_one_log_or_that_none_can_show_is_none() -> None:
@@ -113,7 +106,7 @@ def test_others_are_counted_by_what_they_can_show() -> None:
     assert told["0"].law is None
     (finding, *_), _ = apply_rules(find_unexplained(problem, kept, sailed(0), told["0"]).claims, LogFigures(joint=True))
     assert (finding.law[0].on, finding.law[0].quantity) == ("yaw", "uv")
-    assert finding.probability == HINT
+    assert finding.probability == JUDGING.hint_probability
     assert finding.says.endswith("Of 2 other logs 2 could show it at this size, and none does.")
     other = told["1"].said[1]
     deaf = replace(other, normal=1e-9 * other.normal, slope=1e-9 * other.slope)
@@ -130,7 +123,7 @@ def test_a_law_of_all_logs_is_told_in_each_of_them_and_fitted_to_the_others() ->
     assert [term.key for term in law.terms] == [("yaw", "uv")]
     assert law.values[0] == pytest.approx(SIZE, abs=3.0 * law.errors[0])
     assert law.errors[0] < 0.1 * SIZE
-    assert law.total > GAIN
+    assert law.total > JUDGING.law_gain
     for seed, (problem, kept) in enumerate(logs.values()):
         (claim,) = find_unexplained(problem, kept, sailed(seed), told[str(seed)]).claims
         finding = claim.finding

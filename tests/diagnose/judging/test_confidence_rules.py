@@ -11,7 +11,6 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.claims import Claim, Figures, Kind, LogFigures, OtherLogs
 from ferryid.diagnose.judging.confidence_rules import (
     RULES,
-    STRONG,
     ConfidenceRule,
     Context,
     about_nothing_sure,
@@ -34,7 +33,8 @@ from ferryid.diagnose.judging.confidence_rules import (
     unexplained_shares,
     worse_on_an_axis,
 )
-from ferryid.diagnose.judging.finding import HINT, UNKNOWN, Finding, LawTerm
+from ferryid.diagnose.judging.finding import UNKNOWN, Finding, LawTerm
+from ferryid.diagnose.judging.thresholds import JUDGING
 from tests.diagnose.judging.findings import found
 
 
@@ -45,7 +45,7 @@ def stands(rule: ConfidenceRule, finding: Finding, context: Context) -> bool:
     if judged.sure:
         assert (judged, note) == (finding, "")
     else:
-        assert judged.probability == HINT
+        assert judged.probability == JUDGING.hint_probability
     return judged.sure
 
 
@@ -88,7 +88,7 @@ def test_a_law_that_one_log_of_a_campaign_shows_is_a_hint() -> None:
     ):
         judged, note = law_of_one_log(law, on("law", other_logs=others))
         assert judged is not None
-        assert (judged.probability, judged.says, note) == (HINT, f"It is there. {told}", "")
+        assert (judged.probability, judged.says, note) == (JUDGING.hint_probability, f"It is there. {told}", "")
 
 
 def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
@@ -108,8 +108,8 @@ def test_a_disturbance_that_the_velocities_lack_is_a_hint() -> None:
         (0.4, 0.1, -0.1, 20.0, True),
         (0.5, -0.1, -inf, 20.0, False),
         (0.3, 0.1, 0.1, 20.0, False),
-        (0.3, 0.1, 0.1, STRONG, False),
-        (0.3, 0.1, 0.1, nextafter(STRONG, inf), True),
+        (0.3, 0.1, 0.1, JUDGING.strong_gain, False),
+        (0.3, 0.1, 0.1, nextafter(JUDGING.strong_gain, inf), True),
     ],
 )
 def test_only_an_axis_that_is_claimed_shows_an_improvement(
@@ -194,7 +194,7 @@ def test_bursts_hints_and_what_is_fast_stand_in_for_nothing() -> None:
     nameless = found(UNKNOWN)
     for kind, left in (
         ("bursts", nameless),
-        ("unsteady", replace(nameless, probability=HINT)),
+        ("unsteady", replace(nameless, probability=JUDGING.hint_probability)),
         ("unsteady", replace(nameless, band_hz=(0.2, 0.4))),
     ):
         assert unexplained_shares(beside(kind, left, {})) == {}  # type: ignore[arg-type]
@@ -288,11 +288,11 @@ def test_a_rule_sees_the_findings_as_those_before_it_left_them() -> None:
 
 
 def test_no_rule_raises_a_probability_and_dropped_findings_are_gone() -> None:
-    for probability in (0.0, 0.3, HINT, 0.7, 1.0):
+    for probability in (0.0, 0.3, JUDGING.hint_probability, 0.7, 1.0):
         claims = [
             Claim(found("wind", probability), Figures("force", once=True)),
             Claim(replace(found("hull_parameters", probability), parameters={}), Figures("force")),
         ]
         (only,), _ = apply_rules(claims, LogFigures(hull_known=False, velocity_noise={"yaw": 1.0}))
         assert only.effect == "wind"
-        assert only.probability == min(probability, HINT)
+        assert only.probability == min(probability, JUDGING.hint_probability)

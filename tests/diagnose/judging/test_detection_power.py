@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit
-from ferryid.diagnose.inference.search import ODDS
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.detection_power import (
     AXES,
     DetectionPower,
@@ -67,7 +67,7 @@ def test_the_chance_is_that_of_the_linear_case(strength: float) -> None:
     # Every row shifts by 10 strength at usual size: one regressor, with information 50 (10 strength)².
     information = ROWS * (10.0 * strength) ** 2
     expected = 0.5 * (information - 1.0 - np.log1p(information))
-    exact = 0.5 * (1.0 + erf((expected - ODDS) / sqrt(2.0 * max(information, 1.0))))
+    exact = 0.5 * (1.0 + erf((expected - INFERENCE.prior_odds) / sqrt(2.0 * max(information, 1.0))))
     assert chance(linear(strength)) == pytest.approx(exact, rel=1e-6)
 
 
@@ -77,7 +77,7 @@ def test_a_chance_is_how_often_the_evidence_is_enough() -> None:
     information = float(x @ x)
     y = x + random.standard_normal((20000, ROWS))
     evidence = 0.5 * (y @ x) ** 2 / (1.0 + information) - 0.5 * np.log1p(information)
-    assert chance(linear(strength)) == pytest.approx(float(np.mean(evidence > ODDS)), abs=0.03)
+    assert chance(linear(strength)) == pytest.approx(float(np.mean(evidence > INFERENCE.prior_odds)), abs=0.03)
 
 
 def test_what_the_hull_can_imitate_is_not_seen() -> None:

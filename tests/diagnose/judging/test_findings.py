@@ -13,10 +13,11 @@ from ferryid.diagnose.inference.estimation import EstimationProblem, fit
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import LogFigures
 from ferryid.diagnose.judging.confidence_rules import Context, apply_rules, improves_no_claimed_axis
-from ferryid.diagnose.judging.finding import HINT, Finding
+from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.held_out import held_out_evidence
 from ferryid.diagnose.judging.rivals import RivalComparison
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from tests.diagnose.judging.test_held_out import WIND, candidate, sailed, trial_on
 
@@ -56,7 +57,7 @@ def test_a_wind_that_blew_is_told_for_sure(windy: tuple[EstimationProblem, Elimi
 def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
     problem, stands = windy
     finding, (note,) = judged_by_rules(problem, with_lows(stands, [-0.1] * 3, [np.nan, -0.1, -0.1, -0.1]))
-    assert finding.probability == HINT
+    assert finding.probability == JUDGING.hint_probability
     assert note == (
         "Steady wind is a hint: on the axes that it claims, neither the held-out squared force error nor the free run "
         "improves by an interval that excludes zero."
@@ -68,7 +69,7 @@ def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[Esti
     (blown,) = stands.fit.candidates
     brief = replace(blown, effect=replace(blown.effect, once=lambda scene, p: True))
     finding, (note,) = judged_by_rules(problem, replace(stands, fit=replace(stands.fit, candidates=(brief,))))
-    assert finding.probability == HINT
+    assert finding.probability == JUDGING.hint_probability
     assert "the vessel was in that place once" in note
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ferryid.diagnose.inference.estimation import HULL_SPREAD, Candidate, EstimationProblem, estimation_problem, fit
-from ferryid.diagnose.inference.folds import FOLDS, folds_of, subset
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem, fit
+from ferryid.diagnose.inference.folds import folds_of, subset
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
-from ferryid.diagnose.inference.search import ODDS
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.free_runs import free_runs
 from ferryid.diagnose.judging.held_out import HEADING, held_out, held_out_evidence, placebos
@@ -65,7 +65,7 @@ def trial_on(scene: Measurements) -> EstimationProblem:
     seen = cut.scene
     still = wind_force(FERRY.wind, np.zeros((len(seen.t), 2)), seen.psi, seen.nu) if FERRY.wind else np.zeros(3)
     plain = ForceModel(seen, hull_of(FERRY), seen.parts, seen.angles, still)
-    return estimation_problem(cut, plain, HULL_SPREAD * np.abs(plain.hull))
+    return estimation_problem(cut, plain, INFERENCE.hull_spread * np.abs(plain.hull))
 
 
 def candidate(name: str, instance: str | None = None) -> Candidate:
@@ -100,14 +100,14 @@ def test_training_and_held_out_windows_share_no_row(windy: EstimationProblem) ->
     folds = folds_of(windy.windows)
     assert folds is not None
     width = len(windy.windows.weight)
-    for k in range(FOLDS):
+    for k in range(INFERENCE.folds):
         held = windy.windows.starts[folds.fold == k]
         learnt = folds.training[k].starts
         assert np.abs(held[:, None] - learnt[None]).min() >= 1.25 * width - 1
         # The purge takes no more than it must.
         assert len(learnt) > 0.4 * (len(windy.windows.starts) - len(held))
     assert np.all(np.diff(folds.block) >= 0)
-    assert set(folds.fold.tolist()) == set(range(FOLDS))
+    assert set(folds.fold.tolist()) == set(range(INFERENCE.folds))
 
 
 def test_no_series_of_training_windows_reaches_over_a_held_out_block(windy: EstimationProblem) -> None:
@@ -175,7 +175,7 @@ def test_what_did_not_happen_gains_less_than_its_prior_odds_or_does_not_hold(cal
     for name in ("wind", "current", "payload", "mooring"):
         told = held_out_evidence(calm, fit(calm, [candidate(name)]))
         assert told is not None
-        assert not told.proofs[0].holds or told.proofs[0].improvement.score < ODDS, name
+        assert not told.proofs[0].holds or told.proofs[0].improvement.score < INFERENCE.prior_odds, name
 
 
 def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: EstimationProblem) -> None:
@@ -219,7 +219,7 @@ def test_free_runs_of_the_true_picture_stay_with_the_vessel(windy: EstimationPro
     assert FERRY.wind is not None
     blown = wind_force(FERRY.wind, np.broadcast_to(WIND, (len(seen.t), 2)), seen.psi, seen.nu)
     true = replace(windy, plain=replace(windy.plain, external=blown))
-    knows = [replace(fit(true, ()), hull=true.plain.hull)] * FOLDS
+    knows = [replace(fit(true, ()), hull=true.plain.hull)] * INFERENCE.folds
     runs = free_runs(true, folds, knows, knows)
     # The path of scipy's integration at 1e-8, from a start that is off by the noise.
     np.testing.assert_array_less(runs.after[:, 0], 0.03)

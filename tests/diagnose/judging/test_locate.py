@@ -8,17 +8,12 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.change_points import MOST_BREAKS, _breaks, active_intervals
-from ferryid.diagnose.inference.estimation import (
-    HULL_SPREAD,
-    Candidate,
-    EstimationProblem,
-    Fit,
-    estimation_problem,
-    fit,
-)
+from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, estimation_problem, fit
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.error_profiles import FEWEST, in_words, profile_of
+from ferryid.diagnose.judging.error_profiles import in_words, profile_of
 from ferryid.diagnose.judging.locate import locate, whitened
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import Parameter, effects
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
 from ferryid.vessel import load_profile
@@ -53,7 +48,7 @@ def trial_on(push: Floats | None = None) -> EstimationProblem:
     scene = replace(seen, parts=parts)
     cut = windows(scene, 8.0, 2.0)
     plain = ForceModel(cut.scene, hull_of(FERRY), cut.scene.parts, cut.scene.angles, np.zeros((len(cut.scene.t), 3)))
-    return estimation_problem(cut, plain, HULL_SPREAD * np.abs(plain.hull))
+    return estimation_problem(cut, plain, INFERENCE.hull_spread * np.abs(plain.hull))
 
 
 def pushed(shape: Floats) -> Candidate:
@@ -181,7 +176,7 @@ def test_a_profile_of_noise_is_even_and_counts_every_window() -> None:
 
 
 def test_bins_with_too_few_windows_are_not_judged() -> None:
-    value = np.concatenate([np.full(50, 0.5), np.full(FEWEST - 1, 1.5), np.full(50, 2.5)])
+    value = np.concatenate([np.full(50, 0.5), np.full(JUDGING.bin_windows - 1, 1.5), np.full(50, 2.5)])
     white = np.random.default_rng(0).standard_normal((len(value), 3))
     one = profile_of("speed", "m/s", value, np.array([0.0, 1.0, 2.0, 3.0]), white, white, white)
     assert np.isnan(one.excess[1]).all()

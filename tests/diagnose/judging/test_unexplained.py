@@ -22,8 +22,9 @@ from ferryid.diagnose.inference.spectra import bursts_of
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.claims import Figures, LogFigures
 from ferryid.diagnose.judging.confidence_rules import Context, unexplained_shares
-from ferryid.diagnose.judging.sparse_regression import GAIN, select_law
-from ferryid.diagnose.judging.unexplained import BURSTS, find_displaced, find_unexplained
+from ferryid.diagnose.judging.sparse_regression import select_law
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.diagnose.judging.unexplained import find_displaced, find_unexplained
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
 from ferryid.vessel import load_profile
@@ -94,7 +95,7 @@ def test_a_law_comes_back(force: Floats, on: str, name: str, size: float) -> Non
     assert [(term.on, term.name) for term in law.terms] == [(on, name)]
     error = law.fit.errors(0)[0]
     assert law.fit.values[-1][0] == pytest.approx(size, abs=max(3.0 * error, 0.05 * abs(size)))
-    assert law.gain > max(GAIN, law.chance)
+    assert law.gain > max(JUDGING.law_gain, law.chance)
     assert law.held_out.score_low > 0.0
     made = find_unexplained(problem, fit(problem, ()), sailed(0))
     told = made.claims[0].finding
@@ -144,7 +145,7 @@ def test_even_noise_has_no_bursts() -> None:
         burst = bursts_of(problem, fitted_force_model(problem.plain, fit(problem, ())), sailed(seed))
         assert burst is not None
         strongest.append(burst.deviations)
-    assert max(strongest) < BURSTS
+    assert max(strongest) < JUDGING.burst_deviations
 
 
 def test_a_wind_is_told_right_whose_moment_the_profile_has_too_large() -> None:

@@ -13,16 +13,8 @@ from hypothesis import strategies as st
 from ferryid.diagnose.data.estimate import AXES, Estimate
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
-from ferryid.diagnose.judging.verdict import (
-    CHANGED,
-    MUCH,
-    VERDICTS,
-    WORSE,
-    Remainder,
-    campaign_verdict,
-    verdict_of,
-    worse_axes,
-)
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.diagnose.judging.verdict import VERDICTS, Remainder, campaign_verdict, verdict_of, worse_axes
 from ferryid.report.diagnosis_words import headline, summary, title
 from tests.diagnose.judging.findings import found
 
@@ -55,9 +47,9 @@ def ratio(value: float, low: float | None = None) -> Estimate:
         ((SURE,), Remainder(ratio={"surge": ratio(0.73), "sway": ratio(4.33)}), "partly_explained"),
         ((SURE,), Remainder(ratio={"surge": ratio(0.73), "sway": ratio(1.1)}), "explained"),
         ((SURE,), Remainder(ratio={"surge": ratio(0.73), "sway": ratio(1.1, 1.01)}), "partly_explained"),
-        ((SURE,), Remainder(left={"yaw": MUCH}), "partly_explained"),
-        ((SURE,), Remainder(left={"yaw": 0.9 * MUCH}), "explained"),
-        ((), Remainder(left={"yaw": MUCH}), "matched"),
+        ((SURE,), Remainder(left={"yaw": JUDGING.unexplained_share}), "partly_explained"),
+        ((SURE,), Remainder(left={"yaw": 0.9 * JUDGING.unexplained_share}), "explained"),
+        ((), Remainder(left={"yaw": JUDGING.unexplained_share}), "matched"),
     ],
 )
 def test_every_combination_has_its_word(findings: tuple[Finding, ...], remainder: Remainder, verdict: str) -> None:
@@ -65,7 +57,11 @@ def test_every_combination_has_its_word(findings: tuple[Finding, ...], remainder
 
 
 def test_an_axis_is_worse_by_much_or_beyond_doubt() -> None:
-    every = {"surge": ratio(1.0 + 1.01 * WORSE, 0.5), "sway": ratio(1.0 + 2.0 * CHANGED, 1.001), "yaw": ratio(1.1, 0.9)}
+    every = {
+        "surge": ratio(1.0 + 1.01 * JUDGING.worsening, 0.5),
+        "sway": ratio(1.0 + 2.0 * JUDGING.reported_change, 1.001),
+        "yaw": ratio(1.1, 0.9),
+    }
     assert worse_axes(every) == ("surge", "sway")
     assert worse_axes({"yaw": Estimate(1.1, float("nan"), float("nan"), "-")}) == ()
 
@@ -146,7 +142,7 @@ def test_no_sentence_contradicts_findings_and_figures(one: Diagnosis) -> None:
         assert len(named) == len(one.findings)
         assert one.remainder.testable
         assert not one.remainder.worse
-        assert max(one.remainder.left.values()) < MUCH
+        assert max(one.remainder.left.values()) < JUDGING.unexplained_share
     assert says.startswith(("Explained", "Partly explained")) == bool(named)
     for finding in one.findings:
         name = title(finding.effect)
@@ -217,6 +213,6 @@ def test_enumerated_figures_never_explain_what_they_leave() -> None:
         (0.0, 1.0),
     ):
         remainder = Remainder(testable, eliminated, {"sway": ratio(value)}, {"sway": left})
-        whole = testable and not eliminated and value < 1.2 and left < MUCH
+        whole = testable and not eliminated and value < 1.2 and left < JUDGING.unexplained_share
         expected = whole and findings in ((SURE,), (SENSOR,))
         assert (verdict_of(findings, remainder) == "explained") == expected

@@ -43,7 +43,8 @@ def oracle(scene: Measurements) -> SensorEstimate:
     """Return the step of the coarsest angle; the gain is that of its readings' being on a grid over being anywhere."""
     from math import log
 
-    from ferryid.diagnose.checks.azimuth_resolution import LEAST, corrected, error_of, estimate, off_grid, step_of
+    from ferryid.diagnose.checks.azimuth_resolution import corrected, error_of, estimate, off_grid, step_of
+    from ferryid.diagnose.checks.thresholds import CHECKS
     from ferryid.validation.oracle_sensors import SensorEstimate
 
     steps = [step_of(angle) for angle in scene.angles.T]
@@ -55,7 +56,7 @@ def oracle(scene: Measurements) -> SensorEstimate:
     count, near = len(readings), int(np.count_nonzero(off < 0.5 * CHANCE * step))
     share = min(max(near / count, CHANCE), 1.0 - LEAST_OFF)
     gain = near * log(share / CHANCE) + (count - near) * log((1.0 - share) / (1.0 - CHANCE))
-    idle = error_of(step) < LEAST
+    idle = error_of(step) < CHECKS.least_azimuth_error
     return SensorEstimate(gain, 1, {"step": estimate(step)}, lambda seen: corrected(seen, steps), idle)
 
 

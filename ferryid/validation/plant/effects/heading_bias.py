@@ -45,8 +45,8 @@ def oracle(scene: Measurements) -> SensorEstimate:
     from dataclasses import replace
     from math import degrees
 
-    from ferryid.diagnose.checks.heading_bias import LEAST_DEG
     from ferryid.diagnose.checks.kinematics import ANGLE, kinematics
+    from ferryid.diagnose.checks.thresholds import CHECKS
     from ferryid.validation.oracle_sensors import SensorEstimate, kinematic_gain
 
     found = kinematics(scene, (ANGLE,))
@@ -58,7 +58,7 @@ def oracle(scene: Measurements) -> SensorEstimate:
         1,
         {"angle": found.solution.estimate(ANGLE, "deg", degrees(1.0))},
         lambda seen: replace(seen, eta=seen.eta - bias),
-        abs(bias[2]) < radians(LEAST_DEG),
+        abs(bias[2]) < radians(CHECKS.least_angle_deg),
     )
 
 

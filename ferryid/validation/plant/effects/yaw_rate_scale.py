@@ -38,7 +38,8 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
 
 def oracle(scene: Measurements) -> SensorEstimate:
     """Return the estimate of the scale of the yaw rate from the reported heading."""
-    from ferryid.diagnose.checks.yaw_rate_scale import LEAST, compared, corrected
+    from ferryid.diagnose.checks.thresholds import CHECKS
+    from ferryid.diagnose.checks.yaw_rate_scale import compared, corrected
     from ferryid.validation.oracle_sensors import SensorEstimate, gain_of_score
 
     rates = compared(scene)
@@ -51,7 +52,7 @@ def oracle(scene: Measurements) -> SensorEstimate:
         1,
         {"factor": factor},
         lambda seen: corrected(seen, factor.value),
-        rates.off < LEAST,
+        rates.off < CHECKS.least_rate_scale,
     )
 
 

@@ -1,0 +1,155 @@
+"""Thresholds of what a log speaks for: priors, evidence, selection, and what is held out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ferryid.thresholds import threshold
+
+
+@dataclass(frozen=True)
+class InferenceThresholds:
+    """Diagnosis: inference."""
+
+    hull_spread: float = threshold(
+        0.12,
+        "of the coefficient",
+        "standard deviation of the prior of the hull's coefficients",
+        "convention: how well a hull model is known; profiles of simulated trials are off by as much",
+    )
+    posterior_factor: float = threshold(
+        1.5,
+        "-",
+        "factor on posterior standard deviations, as measured velocity and heading are taken as exact in products",
+        "tuned on simulated logs; `ferryid prove` measures the coverage on others",
+    )
+    simulator_hull_factor: float = threshold(
+        2.5,
+        "-",
+        "factor on the prior's standard deviation for the hull of a simulator",
+        "convention: a simulator may be further from the profile than a vessel",
+    )
+    prior_odds: float = threshold(
+        8.0,
+        "nat",
+        "log evidence that an effect must gain before it is as likely as none",
+        "tuned on simulated logs: lowered from 10 when whole diagnoses were first run; odds of 1 : 3000",
+    )
+    most_effects: int = threshold(
+        4, "effects", "most effects that are selected", "convention: more are rare in one log"
+    )
+    clear_gain: float = threshold(
+        100.0,
+        "nat",
+        "log evidence above which an effect is selected before gusts and waves are searched for",
+        "convention: gusts and waves look like nothing so clear",
+    )
+    void_share: float = threshold(
+        0.02,
+        "of the measured acceleration",
+        "acceleration by an effect, in the root mean square of every channel, below which it is not reported",
+        "convention: two per cent; discretisation shows in a clean log as an effect that hardly acts",
+    )
+    disturbance_gain: float = threshold(
+        12.0,
+        "nat",
+        "log evidence that a stochastic disturbance must gain",
+        "tuned on real recordings: raised from 8 after waves were named in a towing tank",
+    )
+    fastest_share: float = threshold(
+        0.4, "of the filter's rate", "highest frequency of a disturbance", "derived: half of the rate is aliased"
+    )
+    widest_log: float = threshold(
+        9.0,
+        "-",
+        "standard deviation of a parameter's logarithm that stands for nothing known",
+        "convention: four decades",
+    )
+    vague_log: float = threshold(
+        0.5,
+        "-",
+        "standard deviation of a parameter's logarithm above which a disturbance was not seen",
+        "convention: known within a factor of 2.7 at 95 %",
+    )
+    fewest_windows: int = threshold(
+        60,
+        "windows",
+        "shorter logs are not tested",
+        "convention: two and a half minutes for a vessel of 5 m, some manoeuvres",
+    )
+    campaign_windows: int = threshold(
+        16,
+        "windows",
+        "shorter logs do not count in a campaign's hull",
+        "derived: four times the order of the autoregression",
+    )
+    fewest_steps: int = threshold(
+        10, "steps", "shorter stretches are left out", "convention: half a window, from which no noise is estimated"
+    )
+    folds: int = threshold(
+        3,
+        "folds",
+        "of the blocks that are held out in turn",
+        "convention: two thirds of a log estimate, one third judges",
+    )
+    block_windows: float = threshold(
+        5.0, "windows' lengths", "length of a held-out block", "convention: 40 s for windows of 8 s, a manoeuvre or two"
+    )
+    fewest_blocks: int = threshold(
+        6, "blocks", "shorter logs have shorter blocks, or none is held out", "derived: two for each fold"
+    )
+    purge_windows: float = threshold(
+        0.25,
+        "windows' lengths",
+        "purged between training and held-out windows beside their overlap",
+        "convention: slow disturbances are not shared",
+    )
+    span_blocks: float = threshold(
+        2.0,
+        "held-out blocks",
+        "shortest span of an effect that begins and ends",
+        "derived: a fit that is judged on one block must have seen another",
+    )
+    span_s: float = threshold(
+        8.0,
+        "s",
+        "parts of a log between which an effect may begin or end, and the shortest span that is tried",
+        "convention: a window of a vessel of 5 m",
+    )
+    profile_drop: float = threshold(
+        4.0,
+        "nat",
+        "fall of the log evidence, times the posterior factor squared, beyond which a parameter's value is excluded",
+        "derived: exp(-4) of the top; a normal distribution has 0.5 % beyond",
+    )
+    interval_windows: int = threshold(
+        4, "windows", "least length between two change points", "convention: windows overlap over as many strides"
+    )
+    change_statistic: float = threshold(
+        2.3,
+        "-",
+        "Kuiper's statistic of changes of a mean above which there is one",
+        "tuned on simulated series of noise, of which three in a hundred have one; 1.95 before",
+    )
+    active_share: float = threshold(
+        0.25,
+        "of the largest excess",
+        "mean excess of an interval in which an effect acts",
+        "convention: a quarter",
+    )
+    foreign_share: float = threshold(
+        0.35,
+        "of the squared acceleration",
+        "left by hull, force and all effects, above which a simulation is of another vessel",
+        "convention: a third; 0.5 before",
+    )
+    burst_blocks: int = threshold(6, "blocks", "fewer are not searched for bursts", "convention: a median needs some")
+    burst_level: float = threshold(
+        3.0,
+        "median powers",
+        "power above which a block is part of a burst",
+        "convention: beyond the scatter of even noise",
+    )
+
+
+INFERENCE = InferenceThresholds()

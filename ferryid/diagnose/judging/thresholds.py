@@ -1,0 +1,228 @@
+"""Thresholds by which candidates become findings, hints or nothing, and a log gets its verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ferryid.thresholds import threshold
+
+
+@dataclass(frozen=True)
+class JudgingThresholds:
+    """Diagnosis: judging."""
+
+    hint_probability: float = threshold(
+        0.5, "-", "probability up to which a finding is a hint", "convention: not more likely than not"
+    )
+    unresolved_evidence: float = threshold(
+        3.0,
+        "nat",
+        "rivals whose log evidence is less than this behind are unresolved",
+        "convention: a Bayes factor of 20, strong evidence in the scale of Kass and Raftery (1995)",
+    )
+    missing_share: float = threshold(
+        0.6,
+        "-",
+        "share of an effect's force that is missing on an axis, above which the candidate is eliminated",
+        "tuned on cases of `ferryid prove`: a thruster in another place than in the profile was named a weak one",
+    )
+    missing_errors: float = threshold(
+        2.0, "standard errors", "by which a missing force must differ from zero", "convention: about 95 % confidence"
+    )
+    acting_share: float = threshold(
+        0.1, "-", "share of an effect's whitened force above which it acts on an axis", "convention: a tenth"
+    )
+    gain: float = threshold(
+        8.0,
+        "nat",
+        "log-likelihood ratio beyond which a held-out gain needs no bootstrap interval",
+        "convention: as much as the prior odds against an effect",
+    )
+    placebo_shifts: tuple[float, ...] = threshold(
+        (0.29, 0.382, 0.5),
+        "of the log",
+        "delays of the placebos of an effect",
+        "convention: about a third, none a multiple of another, so that a trial that repeats itself matches at most one",
+    )
+    placebo_share: float = threshold(
+        0.7,
+        "-",
+        "share of the held-out gain at which a placebo matches the effect",
+        "convention: a placebo that comes near is no less of an explanation; a bound beside the bootstrap interval",
+    )
+    placebo_difference: float = threshold(
+        0.3,
+        "-",
+        "least difference of a placebo's force from the effect's, as a share in the root mean square",
+        "tuned on simulated logs: a mirrored heading that gave nearly the same force was taken for a placebo",
+    )
+    law_gain: float = threshold(
+        8.0,
+        "nat",
+        "held-out log-likelihood that a term of an empirical law must gain",
+        "convention: as much as the prior odds against an effect",
+    )
+    unwhitened_law_gain: float = threshold(
+        80.0,
+        "nat",
+        "the same where the noise is taken to be the least that any terms leave",
+        "convention: ten times `law_gain`, as such a noise is too small",
+    )
+    law_beats: float = threshold(
+        0.99,
+        "-",
+        "share of the placebos with random signs that a term must beat",
+        "convention: 1 % false positives over the whole library of terms, as each placebo counts its best term",
+    )
+    law_errors: float = threshold(
+        3.0, "standard errors", "by which a law's coefficient must differ from zero", "convention: 99.7 % confidence"
+    )
+    law_terms: int = threshold(3, "terms", "most terms of a law", "convention: a law that can be read and checked")
+    law_limit: float = threshold(
+        30.0, "usual coefficients", "limit of a law's coefficient", "convention: beyond any force of a vessel"
+    )
+    law_likeness: float = threshold(
+        0.9,
+        "-",
+        "cosine between what an effect and a term do to a log above which they are the same explanation",
+        "tuned on cases of `ferryid prove`: a law on one thruster's force displaced that thruster's lower gain",
+    )
+    law_expected_gain: float = threshold(
+        4.0,
+        "nat",
+        "expected gain above which another log of a campaign can show a law",
+        "derived: a true law's gain is normal with variance twice its mean, so it is negative with probability 8 %",
+    )
+    strong_gain: float = threshold(
+        40.0,
+        "nat",
+        "held-out gain that needs no axis on which an improvement is significant",
+        "convention: five times `gain`; a force that acts seldom vanishes in means over a log",
+    )
+    power_in_velocities: float = threshold(
+        0.3,
+        "of the power",
+        "share of a disturbance's power that the velocities must show",
+        "convention: less than a half, as a navigation filter smooths; errors of positions are not in velocities",
+    )
+    peak_share: float = threshold(
+        0.1,
+        "of the peak's power",
+        "band about a disturbance's peak in which positions and velocities are compared",
+        "tuned on cases of `ferryid prove`: waves were hints, as the navigation shifts a narrow peak a little",
+    )
+    passed_power: float = threshold(
+        0.01,
+        "of the power",
+        "least transmission of the windows at a frequency that is shown",
+        "convention: one per cent",
+    )
+    claimed_share: float = threshold(
+        1.0 / 3.0,
+        "of the improvement",
+        "share on an axis above which a finding claims that axis",
+        "derived: the even share of three axes",
+    )
+    least_passing: float = threshold(
+        1.0,
+        "of the formula's uncertainty",
+        "least size of an effect that both begins and ends within a log",
+        "tuned on cases of `ferryid prove`: a thruster 5 % stronger for a minute was named; the uncertainty is each effect's",
+    )
+    worsening: float = threshold(
+        0.2,
+        "of the squared force error",
+        "growth of an axis's held-out error beyond which a finding is a hint and the fit is worse on that axis",
+        "tuned on cases of `ferryid prove`: the rule is from cases in which a finding made one axis far worse; 20 % "
+        "stands for more than chance",
+    )
+    least_removed: float = threshold(
+        0.1,
+        "of the squared force error",
+        "held-out error that a finding must remove on some axis while it acts",
+        "tuned on cases of `ferryid prove`: clean logs named small inflow losses and currents",
+    )
+    slow_below_hz: float = threshold(
+        0.2,
+        "Hz",
+        "unexplained disturbances above this frequency are not held in place of an effect",
+        "tuned on cases of `ferryid prove`: wakes that take time to form left fast errors; effects follow the motion",
+    )
+    drowned_share: float = threshold(
+        0.15,
+        "of what moves the vessel",
+        "velocity noise times damping, above which findings on forces are hints",
+        "convention: stands for errors in variables that are no longer small",
+    )
+    noise_mean_s: float = threshold(
+        2.0,
+        "s",
+        "time over which a slope of positions is about as noisy as the velocity in use",
+        "convention: twice the moving mean of the velocity in products",
+    )
+    reaction_share: float = threshold(
+        0.5,
+        "of the squared force error",
+        "error that a delay or lag must remove beside unmeasured disturbances, or is a hint",
+        "tuned on cases of `ferryid prove`: a gross lag and a late clock were hints; a controller's reaction explains little",
+    )
+    campaign_share: float = threshold(
+        0.5, "of the logs", "logs of a campaign that must show a property of the vessel", "convention: half of them"
+    )
+    campaign_logs: int = threshold(
+        3, "logs", "least size of a campaign in which one log can be the exception", "derived: a majority needs three"
+    )
+    contradiction_share: float = threshold(
+        0.25,
+        "of the usual size",
+        "gap between two logs' values of a parameter, beyond disjoint intervals, that is a contradiction",
+        "convention: a quarter; smaller gaps do not matter in a model",
+    )
+    detection_chance: float = threshold(
+        0.5,
+        "-",
+        "chance of finding an effect of usual size below which a log could not have shown it",
+        "convention: an even chance",
+    )
+    excited_share: float = threshold(
+        0.5,
+        "-",
+        "posterior over prior standard deviation of some combination of coefficients below which an axis is excited",
+        "convention: the log has three times the information of the prior",
+    )
+    bin_windows: int = threshold(
+        4, "windows", "least windows in a bin of an error profile", "convention: fewer have no scatter to judge by"
+    )
+    regime_errors: float = threshold(
+        4.0,
+        "standard errors",
+        "by which a profile must differ from an even one to name a regime",
+        "convention: a significance that several profiles of several bins do not reach by chance",
+    )
+    regime_level: float = threshold(
+        0.5, "of the largest bin", "level above which a bin belongs to the regime", "convention: half of the maximum"
+    )
+    usual_quantile: float = threshold(
+        0.9, "-", "quantile of a quantity at which a law's force is given", "convention: near the largest in the log"
+    )
+    band_share: float = threshold(
+        0.5, "of the power", "share that a frequency band must hold to be named", "convention: more than all others"
+    )
+    burst_deviations: float = threshold(
+        5.0,
+        "standard deviations",
+        "deviation from an even power above which bursts are reported",
+        "convention: rare by chance even over all bands and blocks that are searched",
+    )
+    reported_change: float = threshold(
+        0.02, "of the squared force error", "least change that is reported", "convention: too little to act on"
+    )
+    unexplained_share: float = threshold(
+        0.5,
+        "of the squared force",
+        "squared error left over the squared force that moves the vessel, above which an axis is mostly unexplained",
+        "derived: more is left than is explained",
+    )
+
+
+JUDGING = JudgingThresholds()

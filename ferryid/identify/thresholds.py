@@ -1,0 +1,101 @@
+"""Thresholds of a fit: split, accepted settings, inertia, acceptance and warnings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ferryid.thresholds import threshold
+
+
+@dataclass(frozen=True)
+class IdentifyThresholds:
+    """Identification."""
+
+    improvement: float = threshold(
+        0.05,
+        "of the base model's error",
+        "fall of the mean normalised squared error for which a model is accepted",
+        "convention: thesis 3.2.4",
+    )
+    worsening: float = threshold(
+        0.05,
+        "of the base model's error",
+        "growth of any one axis's squared error that is allowed",
+        "convention: as `improvement`",
+    )
+    least_inertia: float = threshold(
+        0.8,
+        "rigid-body inertia",
+        "lowest fitted inertia that is accepted",
+        "tuned on real recordings: added mass only adds; noise in the derivative takes some per cent",
+    )
+    most_inertia: float = threshold(
+        5.0,
+        "rigid-body inertia",
+        "highest fitted inertia that is accepted",
+        "tuned on real recordings: no hull has four times its own as added mass",
+    )
+    no_force: float = threshold(
+        1e-6,
+        "of the base model's force",
+        "standard deviation of the force below which an axis has no actuator",
+        "convention: rounding of logged actuator signals",
+    )
+    block_s: float = threshold(
+        40.0,
+        "s",
+        "usual block of the split into training and validation",
+        "tuned on real recordings: a manoeuvre or two, so that both see all kinds",
+    )
+    fewest_blocks: int = threshold(9, "blocks", "in a short log", "derived: three validation blocks")
+    most_blocks: int = threshold(
+        36, "blocks", "in a long log", "convention: slow vessels make long logs, and their manoeuvres last"
+    )
+    validates_every: int = threshold(3, "blocks", "of which one validates", "convention: a third of the rows")
+    guard_s: float = threshold(
+        2.0, "s", "purged beside one smoothing window", "convention: disturbances that outlast a window"
+    )
+    block_purges: float = threshold(
+        4.0, "purge gaps", "least length of a block", "convention: more rows are used than purged"
+    )
+    window_stretches: float = threshold(
+        10.0,
+        "windows",
+        "longest unbroken stretch of every log for which a smoothing window is tried",
+        "convention: a tenth of the stretch at most is lost at its ends",
+    )
+    shortest_window_s: float = threshold(
+        0.01, "s", "shortest smoothing window that is accepted, beside none", "derived: one sample at any usual rate"
+    )
+    least_factor: float = threshold(
+        1e-3, "-", "least factor on the base model that is accepted", "convention: less is the model's absence"
+    )
+    sector_share: float = threshold(
+        0.01, "of the rows", "rows in a heading sector for which it is covered", "convention: one per cent"
+    )
+    validation_s: float = threshold(60.0, "s", "shorter validation data give a warning", "convention: some manoeuvres")
+    moved_rows: int = threshold(
+        20,
+        "rows",
+        "repeated or out of order in a topic for which a warning is given",
+        "convention: more than single messages",
+    )
+    useless_rad: float = threshold(
+        0.5,
+        "rad",
+        "error of a free run's heading within `useless_s` that gives a warning",
+        "convention: 30°, another course",
+    )
+    useless_s: float = threshold(10.0, "s", "see `useless_rad`", "convention: the shortest manoeuvre")
+    free_run_worsening: float = threshold(
+        0.05,
+        "of the base model's error",
+        "growth of a free run's error that gives a warning",
+        "convention: as `worsening`",
+    )
+    structure_level: float = threshold(
+        0.95, "-", "confidence level of the set of structures that the data support", "convention: 95 %"
+    )
+
+
+IDENTIFY = IdentifyThresholds()

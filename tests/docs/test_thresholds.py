@@ -1,0 +1,207 @@
+"""Every threshold has a unit, a meaning and a basis, its page is up to date, and no decision rests on a number elsewhere."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, fields
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ferryid.thresholds import BASES
+from tests.docs.pages import ROOT
+from tests.docs.thresholds import PAGE, page, stages
+
+PACKAGES = ("signals", "regression", "models", "identify", "compare", "diagnose")
+"""Packages that decide by thresholds."""
+NO_DECISION = {
+    "constants of nature, of mathematics and of units": """
+        signals.sampling GRAVITY
+        signals.kalman WINDOW_PER_TIME
+        diagnose.data.measurements WATER_DENSITY BLOCK_COEFFICIENT
+        identify.adaptive.averaging NORMAL_95
+        identify.split _GOLDEN
+    """,
+    "indices, labels, exponents and neutral values": """
+        signals.smooth _AXIS_OF
+        diagnose.checks.kinematics SCALE ANGLE X Y LATE NORTH EAST NEUTRAL
+        diagnose.checks.yaw_rate_scale NEUTRAL SIZE
+        diagnose.inference.kalman OWN DIFFUSE
+        diagnose.inference.noise_model GROUPS
+        regression.bases.term SURGE SWAY YAW DIMENSIONS
+        regression.cross_validation.block_sums OUT
+    """,
+    "rounding, overflow and division by zero": """
+        signals.grid EXACT_S
+        identify.acceptance _ROUNDING _NOTHING
+        identify.adaptive.averaging _SUM
+        regression.bases.crossflow_integrals LEAST_SPEED_MPS
+        regression.cross_products LARGEST
+        regression.nipals TOLERANCE _EXHAUSTED
+        regression.recurrence EXHAUSTED
+        regression.resampling.confidence_set ALIKE
+        regression.resampling.paired_bootstrap NOTHING
+    """,
+    "rates, windows and orders of processing: how finely signals and forces are seen": """
+        signals.align RATE_LIMIT_HZ
+        signals.kalman _LONGEST_S
+        signals.smooth _POLYNOMIAL
+        diagnose.data.complementary_filter MEAN_S SLOW_S
+        diagnose.data.measurements WINDOW_S WINDOW_LENGTH_M STRIDES
+        diagnose.data.path_comparison RATE_HZ
+        diagnose.checks.spans LENGTH_S STRIDE_S RATE_HZ
+        diagnose.checks.kinematics DERIVATIVE_S
+        diagnose.inference.autoregression ORDER
+        diagnose.inference.weak_form STEPS_A_WINDOW FORCES_HZ
+        diagnose.inference.spectra FINE BURST_HZ BURST_S BURST_PERIODS BANDS_HZ
+        identify.settings TEST_WINDOW_S
+        models.forces.residual HORIZON_S
+        models.prediction.free_run HORIZONS_S STEP_S
+    """,
+    "steps, starts, grids and bounds of searches and iterations": """
+        signals.kalman _GRID
+        signals.poses _AHEAD
+        diagnose.checks.azimuth_resolution TURNS
+        diagnose.checks.contradiction SHIFTS_S MOST_ACTUATORS
+        diagnose.checks.kinematics SIZE TINY STEPS
+        diagnose.inference.campaign_hull ROUNDS STEPS TRUST TINY START
+        diagnose.inference.change_points MOST_BREAKS
+        diagnose.inference.estimation STEPS ANEW ENOUGH MOVED DAMPINGS NUDGE TRUST
+        diagnose.inference.kalman SETTLED
+        diagnose.inference.noise_model STARTS GLIMPSE SIGHT SMALL LONGEST
+        diagnose.inference.onset_estimation FEWEST_PARTS PROMISING NEARBY_S FINEST_S GLANCE
+        diagnose.inference.profile_likelihood FIRST GROWTH STEEP CLOSER PARTS
+        diagnose.inference.search FAR REJUDGED
+        diagnose.inference.stochastic_disturbance STRENGTHS BANDS
+        diagnose.judging.backward_elimination SWAPS
+        diagnose.judging.campaign_laws REFITS
+        diagnose.judging.findings TIME_DROP TIME_STEP TIME_FIT TIME_NEAR TIME_FINE_S
+        diagnose.judging.rivals NEAREST
+        identify.settings WINDOWS_S
+        models.forces.residual _PASSES
+        regression.nipals MOST_ITERATIONS
+    """,
+    "sizes: rows held at once, draws, folds, bins, and how much is shown": """
+        signals.kalman _LEAST_ROWS _FIT_ROWS
+        signals.poses _STEPS_SAID
+        signals.quality _MEDIAN_OF
+        signals.render _FIELDS_SHOWN
+        diagnose.inference.folds DRAWS
+        diagnose.inference.noise_model EXCERPT PIECES
+        diagnose.inference.onset_estimation MOST_NUMBERS
+        diagnose.inference.simulation_baseline SHOWN_ROWS
+        diagnose.judging.error_profiles SECTORS SPEEDS PLACES TIMES
+        diagnose.judging.findings SHOWN_RIVALS
+        diagnose.judging.sparse_regression FLIPS SHIFTS
+        diagnose.judging.unexplained SPANS
+        identify.archive MOST_DRAWN
+        identify.excitation SECTORS
+        identify.fit_warnings MOST_LOGS_SAID
+        identify.settings FOLDS
+        identify.split EVERY
+        identify.sweeps.structure_sweep DRAWS
+        models.forces.estimator CHUNK_ROWS
+        models.forces.residual _RUNS
+        models.prediction.free_run MAX_STARTS
+        compare.comparison_statements TOLD_QUANTITIES
+        regression.cross_products CHUNK_ROWS SEGMENT_ROWS _BLAS_ENTRIES
+        regression.cross_validation.folds MOST_GROUPS
+        regression.nipals _BLAS_ENTRIES
+        regression.qr _BLOCK_ROWS
+        regression.recurrence _MANY
+        regression.resampling.bootstrap _BINS _BATCH
+        regression.resampling.paired_bootstrap DRAWS
+    """,
+}
+"""Numbers that decide nothing of what is found, by reason: a module and its constants in each line."""
+
+EVERY = [pytest.param(name, one, id=f"{name}.{one.name}") for _, name, stage in stages() for one in fields(type(stage))]
+
+
+def test_the_page_is_that_of_the_dataclasses() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(), "Fix: python -m tests.docs.thresholds"
+
+
+@pytest.mark.parametrize(("name", "one"), EVERY)
+def test_a_threshold_has_unit_meaning_and_basis(name: str, one: Field[Any]) -> None:
+    assert set(one.metadata) == {"unit", "meaning", "basis"}
+    assert all(text.strip() for text in one.metadata.values())
+    basis = one.metadata["basis"]
+    begin = next((begin for begin in BASES if basis.startswith(begin)), None)
+    assert begin is not None, f"{name}.{one.name} is neither of {BASES}"
+    assert len(basis) > len(begin) + 2, f"{name}.{one.name} does not say from or for what"
+
+
+def test_every_threshold_is_used() -> None:
+    source = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "ferryid").rglob("*.py"))
+    assert [
+        f"{name}.{one.name}"
+        for _, name, stage in stages()
+        for one in fields(stage)
+        if f"{name}.{one.name}" not in source
+    ] == []
+
+
+def is_number(value: object) -> bool:
+    """Tell whether a value is a number, or holds nothing but numbers."""
+    if isinstance(value, Mapping):
+        return bool(value) and all(map(is_number, value.values()))
+    if isinstance(value, tuple | list):
+        return bool(value) and all(map(is_number, value))
+    return isinstance(value, int | float | np.ndarray) and not isinstance(value, bool)
+
+
+def constants(tree: ast.Module) -> Iterator[str]:
+    """Yield the names of constants of a module into which a number is written."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign):
+            targets: list[ast.expr] = node.targets
+        elif isinstance(node, ast.AnnAssign) and node.value is not None:
+            targets = [node.target]
+        else:
+            continue
+        assert node.value is not None
+        if any(isinstance(one, ast.Constant) and type(one.value) in (int, float) for one in ast.walk(node.value)):
+            names = [one.id for target in targets for one in ast.walk(target) if isinstance(one, ast.Name)]
+            yield from (name for name in names if name.isupper())
+
+
+def modules() -> list[Path]:
+    return sorted(path for package in PACKAGES for path in (ROOT / "ferryid" / package).rglob("*.py"))
+
+
+def written(path: Path) -> set[str]:
+    """Return module and name of each numeric constant of a file."""
+    name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    found = list(constants(ast.parse(path.read_text(encoding="utf-8"))))
+    module = import_module(name) if found else None
+    return {f"{name.removeprefix('ferryid.')} {one}" for one in found if is_number(getattr(module, one))}
+
+
+def test_no_other_number_decides() -> None:
+    listed = [line.split() for text in NO_DECISION.values() for line in text.strip().splitlines()]
+    allowed = [f"{module} {name}" for module, *names in listed for name in names]
+    there = set().union(*map(written, modules()))
+    assert len(allowed) == len(set(allowed))
+    assert there - set(allowed) == set(), "Fix: a field of the package's thresholds, or NO_DECISION with a reason"
+    assert set(allowed) - there == set(), "Fix: take them out of NO_DECISION"
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("LEAST = 0.5", ["LEAST"]),
+        ("_LEAST, MOST = -0.5, 10", ["_LEAST", "MOST"]),
+        ("LEAST: float = 2 * PERIOD", ["LEAST"]),
+        ("LEAST = JUDGING.least", []),
+        ("least = 0.5", []),
+        ("NAME = 'one'", []),
+        ("FLAG = True", []),
+    ],
+)
+def test_constants_are_found(text: str, names: list[str]) -> None:
+    assert list(constants(ast.parse(text))) == names
