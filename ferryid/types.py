@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
+Nanoseconds = NDArray[np.int64]
+"""Times since 1970 [ns]."""
 
 AXES = ("surge", "sway", "yaw")
 """The three degrees of freedom of motion in the horizontal plane, in the order of every array over axes."""

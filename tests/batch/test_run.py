@@ -284,6 +284,7 @@ if importlib.util.find_spec("ferryid.cli") is None:
     place = {str(cli)!r}
     spec = importlib.util.spec_from_file_location("ferryid.cli", place + "/__init__.py", submodule_search_locations=[place])
     sys.modules["ferryid.cli"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sys.modules["ferryid.cli"])
 from ferryid.cli.main import main
 main()
 """

@@ -90,6 +90,7 @@ import importlib.util, sys
 place = {cli!r}
 spec = importlib.util.spec_from_file_location("ferryid.cli", place + "/__init__.py", submodule_search_locations=[place])
 sys.modules["ferryid.cli"] = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(sys.modules["ferryid.cli"])
 from ferryid.validation import evaluators
 from tests.validation.stand_ins import PIPELINE
 evaluators.pipeline = lambda: PIPELINE

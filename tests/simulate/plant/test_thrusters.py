@@ -153,7 +153,8 @@ def test_a_thruster_in_the_wake_of_another_loses():
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.floats(-8, 12, allow_subnormal=False),
+    # No encoder tells a speed of less than this from zero, and the advance ratio at it overflows.
+    st.floats(-8, 12).filter(lambda n_rps: n_rps == 0.0 or abs(n_rps) > 1e-100),
     st.floats(-0.6, 0.6),
     st.floats(-0.5, 1.5),
     st.floats(-0.5, 0.5),
