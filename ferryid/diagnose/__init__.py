@@ -1,6 +1,6 @@
 """Diagnosis of missing physics: what a model left out of a recording, and what shows it."""
 
-from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import check_withheld
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, to_json
 from ferryid.diagnose.judging.error_profiles import Profiled
@@ -9,6 +9,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
+from ferryid.types import AXES
 
 __all__ = [
     "AXES",

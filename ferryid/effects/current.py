@@ -11,7 +11,8 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.wording import bearing
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:

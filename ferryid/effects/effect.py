@@ -9,7 +9,8 @@ from typing import Any
 
 from ferryid.effects.force_model import ForceModel, Measurements, between
 from ferryid.effects.simulated import Simulated
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 Values = Mapping[str, float]
 Residual = Callable[[ForceModel], Floats]

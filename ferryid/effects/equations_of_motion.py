@@ -7,12 +7,9 @@ got is an array without rows.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing, compiled
-from ferryid.vessel.profile import Floats
-
-Places = NDArray[np.int64]
+from ferryid.types import Floats, Ints
 
 MASSES = 5
 """Coefficients that are masses; those of damping follow."""
@@ -141,7 +138,7 @@ def required(
 
 @compiled
 def slopes(
-    places: Places,
+    places: Ints,
     moves: Floats,
     nu: Floats,
     hull: Floats,

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.counts import counted
-from ferryid.effects.equations_of_motion import Places, accelerations, from_antenna, required, slopes
+from ferryid.effects.equations_of_motion import accelerations, from_antenna, required, slopes
+from ferryid.types import Floats, Ints
 from ferryid.vessel.hull import payload_mass
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 from ferryid.vessel.wind import wind_force
 
 MASS = ("m11", "m22", "m23", "m32", "m33")
@@ -196,7 +197,7 @@ def acceleration(picture: ForceModel) -> Floats:
     return accelerations(np.ascontiguousarray(scene.nu), picture.hull, parts, *_forces(picture))
 
 
-def hull_changes(picture: ForceModel, places: Places, moves: Floats) -> Floats:
+def hull_changes(picture: ForceModel, places: Ints, moves: Floats) -> Floats:
     """Return by how much `as_measured` changes if coefficients of the hull move one by one, shape (n, 3, q).
 
     Parameters

@@ -9,7 +9,8 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
 from ferryid.effects.force_model import ForceModel, Measurements
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 from ferryid.vessel.wind import wind_force
 
 STEP = 0.1

@@ -13,7 +13,8 @@ import numpy as np
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, corrected
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:

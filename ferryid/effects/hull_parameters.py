@@ -21,7 +21,8 @@ import numpy as np
 from ferryid.effects.effect import HELD, Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import COEFFICIENTS, MASS, ForceModel, Measurements, hull_of
 from ferryid.effects.linear_evidence import HULL_STD, hull_jacobian
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 TELLING = 0.25
 """A coefficient that may be within this share of the model's is not worth a name."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from ferryid.effects.effect import Residual
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 HULL_STD = 0.12
 """Standard deviation of what is believed of a coefficient of the hull that nothing is wrong with, as a share of it."""

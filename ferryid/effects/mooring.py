@@ -11,8 +11,9 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.simulated import Simulated
+from ferryid.types import Floats
 from ferryid.vessel.frames import to_body
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:

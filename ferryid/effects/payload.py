@@ -13,7 +13,8 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements, aboard, added_mass
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 WATERPLANE = 0.85
 """Waterplane coefficient of a small workboat."""

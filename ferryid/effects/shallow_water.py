@@ -11,14 +11,12 @@ from math import log
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import ForceModel, Measurements, added_mass
 from ferryid.effects.linear_evidence import hull_jacobian, log_evidence_gains
-from ferryid.vessel.profile import Floats, Profile
-
-Places = NDArray[np.int64]
+from ferryid.types import Floats, Ints
+from ferryid.vessel.profile import Profile
 
 EDGE_M = 2.0
 """Width over which the factor comes in at a side, outside of it."""
@@ -97,7 +95,7 @@ def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
     south, west = np.repeat(a, len(a)), np.tile(a, len(a))
     north, east = np.repeat(b, len(b)), np.tile(b, len(b))
 
-    def covered(south: Places, north: Places, west: Places, east: Places) -> Floats:
+    def covered(south: Ints, north: Ints, west: Ints, east: Ints) -> Floats:
         return np.asarray(shares[north, east] - shares[south, east] - shares[north, west] + shares[south, west])
 
     lower, upper = (

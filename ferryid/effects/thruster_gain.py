@@ -7,8 +7,8 @@ from typing import Any
 
 from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel
-from ferryid.types import AXES
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import AXES, Floats
+from ferryid.vessel.profile import Profile
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:

@@ -10,8 +10,8 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
-from ferryid.types import AXES
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import AXES, Floats
+from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import thrust
 
 SHARPNESS = 16

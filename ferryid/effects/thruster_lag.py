@@ -12,8 +12,8 @@ from scipy.signal import lfilter
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
-from ferryid.types import AXES
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import AXES, Floats
+from ferryid.vessel.profile import Profile
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:

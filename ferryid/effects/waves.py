@@ -14,7 +14,8 @@ import numpy as np
 from ferryid.counts import plural
 from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 USUAL_HZ = 0.35
 """Usual frequency of the waves that a vessel of `USUAL_M` feels most; longer ones feel longer waves."""

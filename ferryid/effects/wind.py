@@ -17,7 +17,8 @@ from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.wording import bearing
-from ferryid.vessel.profile import Floats, Profile, WindAreas
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile, WindAreas
 from ferryid.vessel.wind import wind_force
 
 COEFFICIENTS = {"C_X": 0.1, "C_Y": 0.1, "C_N": 0.3}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ferryid.models.forces import Estimator
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 TOLERANCE = 1e-9
 """By how much a copy may be off, as a part of the largest value of the same kind."""

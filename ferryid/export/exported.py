@@ -14,7 +14,8 @@ from ferryid.export.cases import Case, cases, effective_mass, invertible
 from ferryid.export.names import identifier, legal
 from ferryid.models import RANGE_UNITS, Model, Quantity, StoredEffect
 from ferryid.models.forces import Estimator, acting_estimator, scale_hull
-from ferryid.vessel.profile import Floats, Hull
+from ferryid.types import Floats
+from ferryid.vessel.profile import Hull
 
 HULL, THRUSTERS, SENSORS = "hull", "thrusters", "sensors"
 

@@ -23,7 +23,8 @@ from ferryid.simulate.logs import CHUNK_BYTES
 from ferryid.simulate.output_paths import check_output
 from ferryid.simulate.recorders import write_mcap
 from ferryid.simulate.sensors import Stream
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 _FORCE = "/ferryid/force/"
 _END_BYTES = 1 << 20

@@ -16,8 +16,9 @@ from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.export.exported import Exported
 from ferryid.export.names import legal, number
 from ferryid.regression.bases import CROSSFLOW_FACTORS, LEAST_SPEED_MPS, Term
+from ferryid.types import Floats
 from ferryid.vessel.parse_hull import rigid_mass
-from ferryid.vessel.profile import Floats, Hull, WindAreas
+from ferryid.vessel.profile import Hull, WindAreas
 from ferryid.vessel.wind import AIR_DENSITY
 
 FUNCTIONS = ("abs", "atan2", "cos", "hypot", "sin")

@@ -26,7 +26,8 @@ from ferryid.ingest.layout import (
     targets,
     tree,
 )
-from ferryid.ingest.log import Column, Loss, Nanoseconds, Series
+from ferryid.ingest.log import Column, Loss, Series
+from ferryid.types import Nanoseconds
 
 __all__ = ["Decoder", "decoder_for", "leaf_fields"]
 

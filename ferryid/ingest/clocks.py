@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
-from ferryid.ingest.log import Nanoseconds, Series
+from ferryid.ingest.log import Series
 from ferryid.ingest.stray_times import stray_times
+from ferryid.types import Nanoseconds
 
 Rows = NDArray[np.int64]
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.definitions import DefinitionError, FieldList
-from ferryid.ingest.log import Loss, Nanoseconds, Series
+from ferryid.ingest.log import Loss, Series
 from ferryid.ingest.row_columns import INT64, NS_PER_S, RowColumns, Step, path_steps
+from ferryid.types import Nanoseconds
 
 STAMP_PATHS: tuple[tuple[str, ...], ...] = (("header", "stamp"), ("timestamp",), ("stamp",))
 _SECONDS = ("sec", "secs", "seconds")

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.errors import one_line
+from ferryid.types import Nanoseconds
 
-Nanoseconds = NDArray[np.int64]
 Column = NDArray[Any]
 
 

@@ -20,7 +20,8 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Schema, Statistics
 from numpy.typing import NDArray
 
-from ferryid.ingest.log import Loss, Nanoseconds
+from ferryid.ingest.log import Loss
+from ferryid.types import Nanoseconds
 
 MAGIC = b"\x89MCAP0\r\n"
 # Opcodes of the specification.

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.ingest.log import Nanoseconds
 from ferryid.ingest.mcap_index import Chunk, DamagedRecord, Index, index_entries
+from ferryid.types import Nanoseconds
 
 
 def spans(index: Index, file: memoryview, channels: Iterable[int]) -> dict[int, tuple[int, int]]:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.ingest.bulk import Decoder
-from ferryid.ingest.log import Loss, Nanoseconds, Series
+from ferryid.ingest.log import Loss, Series
 from ferryid.ingest.unpack import message_unpacker, unpacked_batches
+from ferryid.types import Nanoseconds
 
 # All messages of a topic together may unpack to this many times their size; constant pictures reach a thousand.
 MAX_RATIO = 4000

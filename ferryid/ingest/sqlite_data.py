@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ferryid.ingest.sqlite_database import FAULTS, Database
-from ferryid.ingest.sqlite_rows import CHUNK_ROWS, TABLE, Integers, Mask, Rows
+from ferryid.ingest.sqlite_rows import CHUNK_ROWS, TABLE, Rows
+from ferryid.types import Flags, Ints
 
 CHUNK_BYTES = 1 << 19
 # Topics that a statement names; of more, all rows are read.
@@ -22,9 +23,9 @@ class Piece:
     """Messages read together: `data` end to end, of the rows whose `kept` is true, and their sizes [bytes]."""
 
     rows: Rows
-    kept: Mask
+    kept: Flags
     data: bytes
-    size: Integers
+    size: Ints
 
 
 def read_data(database: Database, rows: Rows, topic_ids: Sequence[int]) -> Iterator[Piece]:
@@ -68,7 +69,7 @@ def read_data(database: Database, rows: Rows, topic_ids: Sequence[int]) -> Itera
         yield Piece(part, np.zeros(len(part), bool), b"", np.zeros(0, np.int64))
 
 
-def _edges(size: Integers) -> Iterator[tuple[int, int]]:
+def _edges(size: Ints) -> Iterator[tuple[int, int]]:
     """Cut rows into parts of limited number and size."""
     ends = np.cumsum(size)
     first = 0

@@ -13,13 +13,10 @@ from contextlib import closing
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.ingest.sqlite_database import FAULTS, Database
-
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from ferryid.types import Flags, Ints
 
 LAST_ROWID = 2**63 - 1
 CHUNK_ROWS = 4096
@@ -50,15 +47,15 @@ class Rows:
         Length of the data [bytes].
     """
 
-    rowid: Integers
-    topic_id: Integers
-    time_ns: Integers
-    size: Integers
+    rowid: Ints
+    topic_id: Ints
+    time_ns: Ints
+    size: Ints
 
     def __len__(self) -> int:
         return self.rowid.size
 
-    def take(self, which: Mask | Integers | slice) -> Rows:
+    def take(self, which: Flags | Ints | slice) -> Rows:
         """Return the rows chosen by a mask, indices or a slice."""
         return Rows(*(getattr(self, field.name)[which] for field in fields(self)))
 
@@ -231,10 +228,10 @@ def scan_rows(database: Database) -> Scan:
 def _compared(
     database: Database,
     rows: Rows,
-    invalid: Integers,
+    invalid: Ints,
     salvage: _Salvage,
     index: str,
-    listed: Integers | None,
+    listed: Ints | None,
 ) -> Scan:
     """Hold the rows against the rowids that the index lists, None where there is no readable index."""
     reason = salvage.reason
@@ -290,7 +287,7 @@ def _index_summary(database: Database, connection: sqlite3.Connection, index: st
     return int(found[0]), int(found[1] or 0)
 
 
-def _index_rowids(database: Database, connection: sqlite3.Connection, index: str) -> Integers | None:
+def _index_rowids(database: Database, connection: sqlite3.Connection, index: str) -> Ints | None:
     """Return the rowids that an index lists, ascending; None where it cannot be read to its end."""
     try:
         found = connection.execute(f'SELECT rowid FROM messages INDEXED BY "{index}"')
@@ -335,7 +332,7 @@ def _spans(low: int, high: int, capacity: int) -> Iterator[tuple[int, int]]:
             first = end + 1
 
 
-def _retry(salvage: _Salvage, rows: Rows, missing: Integers) -> None:
+def _retry(salvage: _Salvage, rows: Rows, missing: Ints) -> None:
     """Look once more for rows behind a damaged rowid, where a search may find what a walk did not."""
     for low, high in salvage.bad:
         missing = missing[(missing < low) | (missing > high)]
@@ -345,7 +342,7 @@ def _retry(salvage: _Salvage, rows: Rows, missing: Integers) -> None:
             salvage.read(int(run[0]), int(run[-1]))
 
 
-def _stretches(held: Integers, missing: Integers) -> tuple[Stretch, ...]:
+def _stretches(held: Ints, missing: Ints) -> tuple[Stretch, ...]:
     """Group missing rowids by the rows between which they are missing."""
     if not missing.size:
         return ()
@@ -355,7 +352,7 @@ def _stretches(held: Integers, missing: Integers) -> tuple[Stretch, ...]:
     return tuple(Stretch(*entry) for entry in zip(low, high, counts.tolist(), strict=True))
 
 
-def _gaps(held: Integers, capacity: int) -> tuple[Stretch, ...]:
+def _gaps(held: Ints, capacity: int) -> tuple[Stretch, ...]:
     """Return the gaps of a table without an index; one that is wider than the file is of unknown size."""
     if not held.size:
         return ()

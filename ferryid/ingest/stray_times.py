@@ -5,12 +5,8 @@ from __future__ import annotations
 from bisect import bisect_right
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ferryid.ingest.log import Nanoseconds
-
-Flags = NDArray[np.bool_]
-Places = NDArray[np.int64]
+from ferryid.types import Flags, Ints, Nanoseconds
 
 STEP_NS = 1_000_000_000
 _PERIODS = 10.0
@@ -107,7 +103,7 @@ def _mark(times: Nanoseconds, outlying: Flags, stray: Flags, late: Flags, usual:
     return first, last
 
 
-def _longest_chain(starts: Places, stops: Places, lowest: Places, highest: Places, usable: Flags) -> Places:
+def _longest_chain(starts: Ints, stops: Ints, lowest: Ints, highest: Ints, usable: Flags) -> Ints:
     """Return the pieces of the chain with the most rows: none begins over a second before the end of the one before.
 
     Between two pieces at most the share `_MOST` of all rows is passed over, so that the chain does not change from one

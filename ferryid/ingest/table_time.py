@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.ingest.log import Column, Nanoseconds
+from ferryid.ingest.log import Column
+from ferryid.types import Nanoseconds
 
 _READABLE = 0.75
 """Share of the cells that must be readable in a column that is guessed to be the time."""

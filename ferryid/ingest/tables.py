@@ -24,8 +24,8 @@ from ferryid.ingest.table_time import (
     stamps_to_ns,
     unit_doubt,
 )
+from ferryid.types import Flags
 
-Mask = NDArray[np.bool_]
 FARTHEST_NS = 1 << 62
 """Times further from 1970 (146 years) count as unreadable: the difference of two of them would not fit into 64 bits."""
 _WHOLE = re.compile(r"\s*([+-]?[0-9]{1,18}|[+-]?[0-8][0-9]{18})\s*$")
@@ -142,14 +142,14 @@ def _series(sheet: Sheet, fields: tuple[str, ...]) -> tuple[Series, list[Loss], 
     return Series(topic, time_ns, stamp_ns, columns, plan.column), losses, tuple(notes)
 
 
-def to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Mask, str]:
+def to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Flags, str]:
     """Convert a time column of numbers or of text to nanoseconds: times, readable mask, sentence on a repair."""
     times, good, note = _any_to_ns(values, unit)
     good &= np.abs(np.where(good, times, 0)) <= FARTHEST_NS
     return np.where(good, times, 0), good, note
 
 
-def _any_to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Mask, str]:
+def _any_to_ns(values: Column, unit: str) -> tuple[NDArray[np.int64], Flags, str]:
     if values.dtype.kind == "M":
         good = ~np.isnat(values)
         return values.astype("datetime64[ns]").astype(np.int64), good, ""
@@ -177,7 +177,7 @@ def number_doubt(values: Column, unit: str) -> str:
     return unit_doubt(numbers[np.isfinite(numbers) & (numbers != float(MISSING_TIME))], unit)
 
 
-def _untimed(sheet: Sheet, topic: str, time_ns: NDArray[np.int64], good: Mask) -> Loss:
+def _untimed(sheet: Sheet, topic: str, time_ns: NDArray[np.int64], good: Flags) -> Loss:
     """Rows without a readable time, with the readable times around them."""
     bad = np.flatnonzero(~good)
     before, after = np.flatnonzero(good[: bad[0]]), np.flatnonzero(good[bad[-1] :])

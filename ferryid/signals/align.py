@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
@@ -20,14 +19,13 @@ from ferryid.signals.sampling import check_advancing, single_rows
 from ferryid.signals.source import Held, Source
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import LeftOut, Track
+from ferryid.types import Flags, Floats
 from ferryid.vessel import actuator_columns, resolve, resolve_notes
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
     from ferryid.signals.stream import Recording
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 RATE_LIMIT_HZ = 20.0
 _VELOCITY = ("u", "vel_N", "x", "psi")

@@ -18,8 +18,7 @@ from ferryid.signals.mirror import mirrored
 from ferryid.signals.quality import IMPLAUSIBLE
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Doubt, Track
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 
 def cross_checks(track: Track) -> tuple[Doubt, ...]:

@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.ingest.log import Loss
@@ -15,8 +14,7 @@ from ferryid.signals.parquet import unit_of
 from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.track import LeftOut, Motion, Track
-
-Flags = NDArray[np.bool_]
+from ferryid.types import Flags
 
 
 def data_quality(recording: Recording, track: Track | Motion | None = None) -> dict[str, Any]:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.signals.quality import is_load, is_order
 from ferryid.signals.source import Source
 from ferryid.signals.thresholds import SIGNALS
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from ferryid.types import Flags, Floats
 
 EXACT_S = 1e-6
 

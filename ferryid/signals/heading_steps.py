@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ferryid.signals.pose_limits import Floats, Samples, integral
+from ferryid.signals.pose_limits import Samples, integral
 from ferryid.signals.thresholds import SIGNALS
+from ferryid.types import Floats
 
 
 def heading_steps(samples: Samples) -> tuple[tuple[int, int, float], ...]:

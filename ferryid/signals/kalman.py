@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from ferryid.types import Flags, Floats
 
 WINDOW_PER_TIME = 8.0 * np.sqrt(2.0) / 3.0
 """Length of the moving average with the same noise gain, over the smoother's time constant.

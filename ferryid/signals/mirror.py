@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.signals.thresholds import SIGNALS
+from ferryid.types import Floats
 
-Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.signals.thresholds import SIGNALS
+from ferryid.types import Floats, Nanoseconds
 from ferryid.vessel.frames import to_world, wrap
 
-Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Nanoseconds = NDArray[np.int64]
 Samples = Mapping[str, tuple[Nanoseconds, Floats]]
 """Canonical name to times [ns] and cleaned values, NaN where missing."""
 Path = Callable[[Floats], tuple[Complex, Floats]]

@@ -19,9 +19,7 @@ from ferryid.counts import counted
 from ferryid.signals.heading_steps import heading_steps
 from ferryid.signals.pose_limits import (
     Complex,
-    Floats,
     Limits,
-    Nanoseconds,
     Path,
     Samples,
     between,
@@ -32,6 +30,7 @@ from ferryid.signals.pose_limits import (
 )
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Doubt
+from ferryid.types import Floats, Nanoseconds
 from ferryid.vessel.frames import wrap
 
 USED = ("x", "y", "psi", "u", "v", "r", "vel_N", "vel_E")

@@ -13,10 +13,8 @@ from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Track
+from ferryid.types import Flags, Floats
 from ferryid.vessel.frames import wrap
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 NAVIGATION = ("x", "y", "psi", "phi", "theta", "u", "v", "r", "vel_N", "vel_E")
 POSE = ("x", "y", "psi")

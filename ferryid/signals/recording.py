@@ -13,10 +13,11 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest import log_suffixes, open_log
 from ferryid.ingest.clocks import ClockReport, Rows, repair_all
 from ferryid.ingest.hashing import content_hash
-from ferryid.ingest.log import Nanoseconds, Reader, Series, Topic
+from ferryid.ingest.log import Reader, Series, Topic
 from ferryid.signals import cache
 from ferryid.signals.data_quality import data_quality, grouped_notes, loss_sentence, main_loss
 from ferryid.signals.stream import Recording, Stream
+from ferryid.types import Nanoseconds
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.signal_map import Selection, convert, select
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
@@ -13,12 +12,10 @@ from ferryid.signals.kalman import fit_levels, smooth_runs
 from ferryid.signals.quality import REFERENCE, require_excited
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import LeftOut, Motion, Track, segments
+from ferryid.types import Flags, Floats
 from ferryid.vessel import applied_force, speed_doubts
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 SMOOTHERS = ("square", "savgol", "kalman")
 _POLYNOMIAL = 3

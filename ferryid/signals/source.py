@@ -6,17 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.signals.quality import VELOCITY, clean, is_actuator, is_load, is_order, stale, stuck
 from ferryid.signals.stream import Stream
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import segments
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Nanoseconds = NDArray[np.int64]
+from ferryid.types import Flags, Floats, Nanoseconds
 
 
 @dataclass(frozen=True)

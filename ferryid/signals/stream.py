@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ferryid.ingest.clocks import ClockReport
-from ferryid.ingest.log import Loss, Nanoseconds, Topic
+from ferryid.ingest.log import Loss, Topic
+from ferryid.types import Floats, Nanoseconds
 from ferryid.vessel.thrusters import ROLE_PREFIX
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.counts import counted
-from ferryid.signals.pose_limits import Floats, Nanoseconds, Samples, mean_interval
+from ferryid.signals.pose_limits import Samples, mean_interval
 from ferryid.signals.poses import PoseFault
 from ferryid.signals.thresholds import SIGNALS
+from ferryid.types import Floats, Nanoseconds
 from ferryid.vessel.frames import to_body
 
 _AXES = {

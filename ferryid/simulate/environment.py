@@ -6,12 +6,10 @@ from math import ceil
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.simulate.noise import generator, gusts, interpolated, sample_times
 from ferryid.simulate.scenario import Scenario, read_series
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 GUST_STEP_S = 0.02
 """Grid of the gusts [s], linear in between: their own, so that the rates of sensors do not change the weather."""

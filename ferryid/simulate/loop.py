@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ferryid.compiled import compiled
 from ferryid.simulate.control.allocation import Allocation, allocate
 from ferryid.simulate.control.feedforward import Feedforward
@@ -17,9 +14,7 @@ from ferryid.simulate.control.reference import Tuning, advance_reference, body_r
 from ferryid.simulate.noise import NavErrors, measure
 from ferryid.simulate.plant.hull import State
 from ferryid.simulate.plant.motion import Plant, advance
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from ferryid.types import Flags, Floats
 
 OBSERVED = 9
 ROW = 7 + OBSERVED

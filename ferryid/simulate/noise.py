@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from ferryid.compiled import compiled
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.sections import Noise
+from ferryid.types import Flags, Floats
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.uint64]
-Flags = NDArray[np.bool_]
 State = tuple[float, float, float, float, float, float]
 Vector = tuple[float, float, float]
 

@@ -14,10 +14,8 @@ from ferryid.simulate.environment import CURRENT, PAYLOAD, WIND, Link, current_s
 from ferryid.simulate.noise import gaps, generator, interpolated, sample_times
 from ferryid.simulate.scenario import Scenario
 from ferryid.simulate.states import Control, Truth
+from ferryid.types import Floats, Nanoseconds
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
-Nanoseconds = NDArray[np.int64]
 
 GRAVITY = 9.81
 

@@ -7,11 +7,9 @@ from math import isfinite
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 COLUMNS = (("time", "time_s", "t"), ("north", "north_mps"), ("east", "east_mps"))
 """The columns, by any of these names, in any order."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.simulate.check_scenario import line_in, vessel_of
@@ -24,12 +23,11 @@ from ferryid.simulate.scenario import Scenario, check_against
 from ferryid.simulate.sensors import Stream, sense
 from ferryid.simulate.size import check_size, steps_per_cycle
 from ferryid.simulate.states import Control, Truth
+from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
     from ferryid.models import Model
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

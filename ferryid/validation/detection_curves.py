@@ -31,10 +31,8 @@ from scipy.special import expit
 from scipy.stats import chi2, norm
 
 from ferryid.errors import FerryIdError
+from ferryid.types import Flags, Floats
 from ferryid.validation.json_record import Record
-from ferryid.vessel.profile import Floats
-
-Flags = NDArray[np.bool_]
 
 RELIABLE = 0.95
 """Share that is named reliably: 19 in 20."""

@@ -7,17 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.files import replacing
 from ferryid.simulate.recorders import write_mcap, write_ros1, write_ros2
 from ferryid.simulate.sensors import Stream
+from ferryid.types import Floats
 from ferryid.validation.plant.motion import BODY
 from ferryid.validation.plant.plant import wrapped
 from ferryid.validation.plant.thrusters import STATES
 from ferryid.validation.plant.trial import CONTROL_EVERY, Trial
 
-Floats = NDArray[np.float64]
 START_NS = 1_790_000_000_000_000_000
 CHUNK_BYTES = 768 * 1024
 LATENCY_S, JITTER_S = 0.004, 0.002

@@ -32,7 +32,7 @@ from ferryid.diagnose.inference import (
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD, Processes
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 ROUNDS = 2
 """Times that parameters are fitted under the noise that they leave themselves."""

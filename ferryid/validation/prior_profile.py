@@ -10,16 +10,15 @@ from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ferryid.types import Floats
 from ferryid.validation.plant.air import RHO_AIR, air_constants, air_load
 from ferryid.validation.plant.hull import added_mass, drag, hull_constants, inertia, rigid_mass
 from ferryid.validation.plant.vessels import Thruster, Vessel
 from ferryid.vessel.profile import WindAreas
 from ferryid.vessel.wind import wind_force
 
-Floats = NDArray[np.float64]
 TESTS = 4000
 """Velocities in the towing tank."""
 SURGE = ("X_u", "X_|u|u")

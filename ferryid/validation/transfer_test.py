@@ -16,12 +16,12 @@ from ferryid.models import Conditions, Model, StoredEffect, force_scores, usable
 from ferryid.models.prediction import FreeRun, Prediction, predict
 from ferryid.models.store import load_file
 from ferryid.signals.prepare import Prepared
-from ferryid.types import AXES
+from ferryid.types import AXES, Floats
 from ferryid.validation.records import DIAGNOSED, StoredEffectNote, TransferResult, TransferScore
 from ferryid.validation.rivals import RIVALS, Learner
 from ferryid.validation.rivals.base import base_of, prepared_log
 from ferryid.validation.rivals.learner import SMOOTHER, WINDOW_S
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 
 HORIZON_S = 60.0
 """Length of the free runs that are scored [s]."""

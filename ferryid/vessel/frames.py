@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 WGS84_A_M = 6378137.0
 WGS84_E2 = 6.69437999014e-3

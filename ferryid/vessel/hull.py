@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from ferryid.types import Floats
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.parse_hull import rigid_mass
-from ferryid.vessel.profile import Floats, Hull
+from ferryid.vessel.profile import Hull
 
 
 def coriolis(M: Floats, nu: Floats) -> Floats:

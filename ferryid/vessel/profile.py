@@ -5,12 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ferryid.ingest.log import TableLayout
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 
 @dataclass(frozen=True)

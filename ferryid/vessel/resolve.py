@@ -7,8 +7,9 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from ferryid.errors import FerryIdError
+from ferryid.types import Floats
 from ferryid.vessel.frames import derivative, to_body, to_world
-from ferryid.vessel.profile import Floats, Profile, Signal
+from ferryid.vessel.profile import Profile, Signal
 
 
 def resolve(profile: Profile, columns: Mapping[str, Floats], rate_hz: float | None = None) -> dict[str, Floats]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 
 def inflow_speed(u: Floats, wake_fraction: float) -> Floats:

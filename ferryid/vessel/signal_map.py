@@ -19,8 +19,9 @@ import numpy as np
 from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest.log import Loss, Series, Topic
+from ferryid.types import Floats
 from ferryid.vessel.frames import heading_from_enu, local_north_east, yaw_of_quaternion
-from ferryid.vessel.profile import Floats, Profile, Signal
+from ferryid.vessel.profile import Profile, Signal
 from ferryid.vessel.thrusters import ROLE_PREFIX, needed_roles, order_note
 from ferryid.vessel.units import factor
 

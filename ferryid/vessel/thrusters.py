@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.vessel.profile import Actuator, Floats, Profile, ThrustCurve
+from ferryid.types import Floats
+from ferryid.vessel.profile import Actuator, Profile, ThrustCurve
 from ferryid.vessel.rudder import inflow_speed, rudder_force
 
 FRESH_WATER = 1000.0

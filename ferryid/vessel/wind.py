@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from ferryid.types import Floats
 from ferryid.vessel.frames import to_body
-from ferryid.vessel.profile import Floats, WindAreas
+from ferryid.vessel.profile import WindAreas
 
 AIR_DENSITY = 1.225
 """Density of air [kg/m³]."""

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from ferryid import __version__
-from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.spectra import Band
 from ferryid.diagnose.judging.diagnosis import Diagnosis, Withheld
 from ferryid.diagnose.judging.diagnosis import HullChange as Moved
@@ -48,6 +48,7 @@ from ferryid.report.diagnosis_words import (
     where,
 )
 from ferryid.report.figures import STYLE, canvas
+from ferryid.types import AXES
 from ferryid.vessel import load_profile
 
 T = np.arange(0.0, 720.0, 2.0)

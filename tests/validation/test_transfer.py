@@ -18,13 +18,14 @@ from ferryid.models.model import Model, blank_model
 from ferryid.models.prediction.log_prediction import Prediction
 from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect
 from ferryid.signals.prepare import Prepared
+from ferryid.types import Floats
 from ferryid.validation.records import TransferResult
 from ferryid.validation.rivals import stepwise
 from ferryid.validation.rivals.base import base_of, prepared_log
 from ferryid.validation.rivals.learner import LearnedModel, Learner
 from ferryid.validation.transfer_test import transfer_test, transferred
 from ferryid.vessel import load_profile
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 from tests.validation.two_logs import EAST_MPS, NORTH_MPS, WIND, two_logs
 
 PROFILE = load_profile("milliampere")

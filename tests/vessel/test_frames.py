@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ferryid.types import Floats
 from ferryid.vessel.frames import (
     derivative,
     heading_from_enu,
@@ -18,7 +19,6 @@ from ferryid.vessel.frames import (
     wrap,
     yaw_of_quaternion,
 )
-from ferryid.vessel.profile import Floats
 
 
 def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> tuple[Floats, ...]:

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ferryid.types import Floats
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import coriolis, current_in_body, damping, forward, inverse_dynamics
-from ferryid.vessel.profile import Floats, Hull
+from ferryid.vessel.profile import Hull
 
 MILLIAMPERE = load_profile("milliampere").hull
 SPEEDS = st.tuples(*(st.floats(-3.0, 3.0) for _ in range(3))).map(np.array)

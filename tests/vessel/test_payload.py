@@ -8,9 +8,10 @@ from numpy.polynomial import Polynomial
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Series, Topic
+from ferryid.types import Floats
 from ferryid.vessel import check_profile, convert, describe, load_profile, parse_profile, resolve, resolve_notes, survey
 from ferryid.vessel.hull import coriolis, payload_force, payload_mass
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 
 BOAT = """schema = "ferryid.vessel/1"
 name = "boat"

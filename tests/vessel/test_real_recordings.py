@@ -14,9 +14,10 @@ import pytest
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Series
+from ferryid.types import Floats
 from ferryid.vessel import applied_force, convert, load_profile, resolve, select
 from ferryid.vessel.frames import to_body, wrap, yaw_of_quaternion
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 
 Locate = Callable[[str], Path]
 RATE_HZ = 10.0

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ferryid.types import Floats
 from ferryid.vessel import applied_force, load_profile
-from ferryid.vessel.profile import Floats
 from ferryid.vessel.rudder import rudder_force
 
 PROFILE = load_profile("kvlcc2-model")

@@ -10,8 +10,9 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Series, Topic
+from ferryid.types import Floats
 from ferryid.vessel import convert, parse_profile, resolve, resolve_notes, select, survey
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 
 HEAD = """schema = "ferryid.vessel/1"
 name = "boat"

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ferryid.errors import FerryIdError
+from ferryid.types import Floats
 from ferryid.vessel import applied_force, load_profile, speed_doubts
-from ferryid.vessel.profile import Floats, Profile, ThrustCurve
+from ferryid.vessel.profile import Profile, ThrustCurve
 from ferryid.vessel.thrusters import thrust
 
 Boat = Callable[..., Profile]

@@ -15,7 +15,7 @@ from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 TURNS = np.arange(-2, 3)
 """Whole turns after which an angle may have been rounded that is written within half a turn."""

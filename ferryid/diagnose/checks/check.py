@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.kinematics import LATE, kinematics
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
+from ferryid.types import Floats
 from ferryid.vessel.frames import to_body, to_world
-from ferryid.vessel.profile import Floats
 
 
 def find(scene: Measurements) -> SensorFinding | None:

@@ -13,8 +13,8 @@ from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
+from ferryid.types import Floats
 from ferryid.vessel.frames import wrap
-from ferryid.vessel.profile import Floats
 
 
 def find(scene: Measurements) -> SensorFinding | None:

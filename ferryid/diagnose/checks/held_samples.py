@@ -13,7 +13,7 @@ from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import interpolate_gaps
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 NAMES = ("north", "east", "heading", "surge", "sway", "yaw rate")
 

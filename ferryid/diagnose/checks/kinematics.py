@@ -25,8 +25,8 @@ from ferryid.diagnose.checks.regression import Solution, step
 from ferryid.diagnose.checks.spans import Spans, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
+from ferryid.types import Floats
 from ferryid.vessel.frames import to_body, to_world
-from ferryid.vessel.profile import Floats
 
 SCALE, ANGLE, X, Y, LATE, NORTH, EAST = range(7)
 """Places of k [-], b [rad], l [m], T [s] and the drift [m/s] among the parameters."""

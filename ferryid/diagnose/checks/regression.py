@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 LENGTH_S, STRIDE_S = 8.0, 2.0
 RATE_HZ = 5.0

@@ -16,7 +16,7 @@ from ferryid.diagnose.checks.regression import Solution, step
 from ferryid.diagnose.checks.spans import LENGTH_S, STRIDE_S, Spans, spans
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 OVERLAP = LENGTH_S / STRIDE_S
 """Windows that have one stretch of time in common: only every so many are independent."""

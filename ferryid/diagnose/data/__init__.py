@@ -1,6 +1,6 @@
 """What is measured from a log."""
 
-from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import (
     MeasuredLog,
     Survey,
@@ -9,6 +9,7 @@ from ferryid.diagnose.data.measurements import (
     read_measurements,
     window_lengths,
 )
+from ferryid.types import AXES
 
 __all__ = [
     "AXES",

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from ferryid.signals.smooth import odd_rows, steady_mean
+from ferryid.types import Floats
 from ferryid.vessel.frames import derivative, to_body
-from ferryid.vessel.profile import Floats
 
 MEAN_S = 1.0
 """Moving mean of the velocities [s]."""

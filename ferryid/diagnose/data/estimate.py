@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-AXES = ("surge", "sway", "yaw")
-
 
 @dataclass(frozen=True)
 class Estimate:

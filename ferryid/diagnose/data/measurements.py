@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
 from ferryid.diagnose.data.thresholds import DATA
@@ -23,10 +22,9 @@ from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
 from ferryid.signals.track import LeftOut, Motion, Track
+from ferryid.types import Flags, Floats
 from ferryid.vessel.hull import current_in_body
-from ferryid.vessel.profile import Floats, Profile
-
-Flags = NDArray[np.bool_]
+from ferryid.vessel.profile import Profile
 
 WITHHELD = {
     "wind": ("wind_N", "wind_E"),

@@ -8,8 +8,8 @@ import numpy as np
 
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
+from ferryid.types import Floats
 from ferryid.vessel.frames import wrap
-from ferryid.vessel.profile import Floats
 
 RATE_HZ = 2.0
 

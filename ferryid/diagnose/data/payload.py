@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.data.thresholds import DATA
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 
 def aboard(t: Floats, payload: Floats, rows: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], dict[str, float]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 ORDER = 4
 """Order of the autoregression; windows overlap over about as many strides."""

@@ -19,7 +19,8 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel
 from ferryid.errors import FerryIdError
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 OWN = "wind"
 """What every log has its own of, where it can be told: the commonest of what a hull would otherwise take upon itself."""

@@ -29,7 +29,7 @@ from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 INDUCED = ("X_vr", "X_vv")
 ROUNDS, STEPS = 3, 5

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ferryid.effects.force_model import ForceModel, Measurements, body_current
+from ferryid.types import AXES, Floats
 from ferryid.vessel.frames import to_body
-from ferryid.vessel.profile import Floats
 
 Quantity = Callable[[ForceModel], Floats]
-AXES = ("surge", "sway", "yaw")
 FORCE = ("N", "N", "N·m")
 
 

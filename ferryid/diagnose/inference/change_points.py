@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 MOST_BREAKS = 6
 

@@ -22,7 +22,7 @@ from ferryid.diagnose.inference.weak_form import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import titled
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 STEPS = 24
 ANEW = 4

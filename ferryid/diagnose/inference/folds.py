@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from ferryid.diagnose.inference.autoregression import ORDER
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.vessel.profile import Floats
-
-Ints = NDArray[np.int64]
+from ferryid.types import Floats, Ints
 
 DRAWS = 1000
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 
 def force_errors(windows: Windows, picture: ForceModel, plain: ForceModel) -> Floats:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ferryid.compiled import compiled
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 OWN = 5
 """States of a channel: position, velocity, measurement error, its rate, disturbance."""

@@ -21,7 +21,7 @@ from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 GROUPS = (0, 0, 1)
 """Channels that share a noise: north and east (or surge and sway), and the turn."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from math import inf, log
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.estimation import (
     NUDGE,
@@ -25,9 +24,7 @@ from ferryid.diagnose.inference.folds import block_s
 from ferryid.diagnose.inference.noise_model import stride_s
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel, as_measured
-from ferryid.vessel.profile import Floats
-
-Ints = NDArray[np.int64]
+from ferryid.types import Floats, Ints
 
 FEWEST_PARTS = 24
 """Parts of `INFERENCE.span_s` into which a log is cut at least: an effect begins and ends between two of them. In a calm log

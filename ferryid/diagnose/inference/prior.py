@@ -14,7 +14,8 @@ from ferryid.effects.measurements import hull_force_model
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
 from ferryid.models.forces import ModelForces
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 
 def prior_force_model(

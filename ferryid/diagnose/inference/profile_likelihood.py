@@ -17,7 +17,7 @@ from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, s
 from ferryid.diagnose.inference.onset_estimation import replace_candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.effect import HELD
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 FIRST, GROWTH = 0.5, 1.6
 """First step, in standard deviations at the top, and by how much each is longer than the one before."""

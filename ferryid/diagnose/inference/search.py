@@ -35,7 +35,7 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.parallel import over
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 FAR = 8
 """Steps of a fit by which candidates are sorted from afar, `GLANCE` from nearby; the best are then fitted to the end."""

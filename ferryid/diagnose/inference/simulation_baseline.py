@@ -31,7 +31,8 @@ from ferryid.effects import effects
 from ferryid.effects.effect import Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.errors import FerryIdError
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 SHOWN_ROWS = 400
 

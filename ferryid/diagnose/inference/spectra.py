@@ -14,7 +14,7 @@ from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.force_model import ForceModel, Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 FINE = 8
 """The spectrum's windows are this much shorter than those of the fit, as they must not hide what is fast."""

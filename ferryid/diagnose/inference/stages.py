@@ -14,7 +14,7 @@ from ferryid.diagnose.inference.search import Search, search
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.effects.equations_of_motion import Places, to_ground
+from ferryid.effects.equations_of_motion import to_ground
 from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats, Ints
 
 CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
 """Where the measured acceleration comes from: second derivative of the first three, first of the others."""
@@ -80,7 +80,7 @@ class Windows:
         to_ground(turned, *self.scene.pointing)
         return turned[:, :, 0]
 
-    def hull_changes(self, picture: ForceModel, places: Places, moves: Floats) -> Floats:
+    def hull_changes(self, picture: ForceModel, places: Ints, moves: Floats) -> Floats:
         """Return by how much `gap` changes if coefficients of the hull move one by one, shape (J, channels, q).
 
         `places` and `moves` as in `ferryid.effects.force_model.hull_changes`.
@@ -178,7 +178,7 @@ def _means(values: Floats, weight: Floats, starts: NDArray[np.int64], step_s: fl
 
 
 @compiled
-def weighed(values: Floats, weight: Floats, starts: Places) -> Floats:
+def weighed(values: Floats, weight: Floats, starts: Ints) -> Floats:
     """Return the sum of m rows times a weight, shape (m,), from every start on: shape (J, c), of values with c columns."""
     out = np.zeros((starts.shape[0], values.shape[1]))
     for j in range(starts.shape[0]):

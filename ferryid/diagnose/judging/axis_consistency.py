@@ -14,7 +14,7 @@ from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.sparse_regression import nuisance_columns
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from ferryid.diagnose.inference.folds import DRAWS, folds_of, subset
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel
 from ferryid.errors import FerryIdError
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 MIRRORED, EXCHANGED = "heading mirrored", "another log's heading"
 

@@ -22,7 +22,7 @@ from ferryid.diagnose.judging.held_out import compare_held_out, held_out
 from ferryid.diagnose.judging.sparse_regression import Law, law_candidate, linearise_terms
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 REFITS = 2
 """Times that the logs are fitted anew beside a law: a hull that stood in for it has its masses wrong, and so the law's size."""

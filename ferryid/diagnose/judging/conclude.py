@@ -10,7 +10,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.diagnose.checks.screening import ScreenedLog
-from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
@@ -32,7 +32,7 @@ from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
 from ferryid.effects.force_model import COEFFICIENTS, UNITS
-from ferryid.vessel.profile import Floats
+from ferryid.types import AXES, Floats
 
 
 def conclude(logs: Sequence[AveragedLog], judged: Sequence[JudgedLog], baseline: Baseline) -> tuple[Diagnosis, ...]:

@@ -12,7 +12,7 @@ from ferryid.diagnose.judging.locate import Location, plain_location
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.verdict import Remainder
 from ferryid.signals.track import LeftOut
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 SCHEMA = "ferryid.diagnosis/1"
 

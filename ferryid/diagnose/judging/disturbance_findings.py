@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors
 from ferryid.diagnose.inference.spectra import fine_windows, spectrum_of
@@ -20,7 +19,7 @@ from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Process
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import AXES, Floats
 
 
 def disturbance_claims(

@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import digamma, polygamma
 
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.vessel.profile import Floats
-
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from ferryid.types import Flags, Floats, Ints
 
 SECTORS = 12
 SPEEDS, PLACES, TIMES = 5, 3, 6

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem
 from ferryid.diagnose.judging.locate import Location
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats
+from ferryid.types import AXES, Floats
 
 
 def figure_columns(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.thresholds import JUDGING
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 UNKNOWN = "unknown"
 """Effect id of what has no name."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import (
     Candidate,
     EstimationProblem,
@@ -31,7 +31,7 @@ from ferryid.diagnose.judging.held_out import Proof
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import AXES, Floats
 
 TIME_DROP = 50.0
 """Fall of the logarithm of the evidence as of which no time farther away comes into question; smaller dips may lie between."""

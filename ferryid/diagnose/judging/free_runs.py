@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds, by_block, draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration
-from ferryid.vessel.profile import Floats
-
-Ints = NDArray[np.int64]
+from ferryid.types import Floats, Ints
 
 
 @dataclass(frozen=True)

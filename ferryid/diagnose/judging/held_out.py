@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER
 from ferryid.diagnose.inference.estimation import (
@@ -36,9 +35,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, as_measured
-from ferryid.vessel.profile import Floats
-
-Ints = NDArray[np.int64]
+from ferryid.types import Floats
 
 HEADING = "heading mirrored"
 

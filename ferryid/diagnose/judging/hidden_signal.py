@@ -12,7 +12,7 @@ from ferryid.diagnose.judging.diagnosis import Withheld
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 
 def compare_hidden_signals(

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ferryid.diagnose.checks import SensorFinding
-from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import Fit, fit
 from ferryid.diagnose.inference.stages import SelectedLog
 from ferryid.diagnose.judging.backward_elimination import Elimination, eliminate_backward
@@ -17,6 +16,7 @@ from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.findings import force_claims
 from ferryid.diagnose.judging.signal_to_noise import velocity_noise_shares
 from ferryid.diagnose.judging.unexplained import Unexplained, find_unexplained
+from ferryid.types import AXES
 
 
 @dataclass(frozen=True)

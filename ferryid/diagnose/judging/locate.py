@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER, fit_autoregression
 from ferryid.diagnose.inference.change_points import active_intervals
@@ -21,9 +20,7 @@ from ferryid.diagnose.inference.spectra import Band, bands_of
 from ferryid.diagnose.judging.error_profiles import Profiled, in_words, profiles_of
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import Measurements
-from ferryid.vessel.profile import Floats
-
-Ints = NDArray[np.int64]
+from ferryid.types import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ from ferryid.identify import Acceptance, accept
 from ferryid.models import Conditions, ForceScores, Model, ModelScores, Quantity, StoredEffect, blank_model
 from ferryid.models.forces import ModelForces
 from ferryid.models.store import check_name, save
-from ferryid.types import AXES
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.types import AXES, Floats
+from ferryid.vessel.profile import Profile
 
 
 def store_updated_model(

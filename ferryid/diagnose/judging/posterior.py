@@ -15,7 +15,7 @@ from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.models import Quantity, Source, StoredEffect, validity_ranges
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 IN_THE_HULL = "hull_parameters"
 """The effect that is nothing but other coefficients of the hull: it becomes these."""

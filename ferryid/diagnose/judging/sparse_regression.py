@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise, fit_autoregression
 from ferryid.diagnose.inference.candidate_terms import Term, terms_of
@@ -27,10 +26,7 @@ from ferryid.diagnose.judging.held_out import Improvement, compare_held_out, hel
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats
-
-Flags = NDArray[np.bool_]
-Ints = NDArray[np.int64]
+from ferryid.types import Flags, Floats, Ints
 
 FLIPS, SHIFTS = 100, 31
 """Placebos of either kind."""

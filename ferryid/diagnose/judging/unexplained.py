@@ -13,7 +13,7 @@ from math import exp
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds, folds_of
@@ -28,7 +28,7 @@ from ferryid.diagnose.judging.locate import Location, locate
 from ferryid.diagnose.judging.sparse_regression import Law, select_law
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import ForceModel, Measurements
-from ferryid.vessel.profile import Floats
+from ferryid.types import AXES, Floats
 
 SPANS = 5
 """Intervals that are told."""

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite, nan
 
-from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.types import AXES
 
 VERDICTS = ("matched", "explained", "partly_explained", "unexplained", "not_testable")
 

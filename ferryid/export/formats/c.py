@@ -10,7 +10,7 @@ from ferryid.export.format import Format
 from ferryid.export.names import number, plain
 from ferryid.export.physics import AXES, Physics, listed, physics, solved
 from ferryid.export.words import beside, effect_numbers, frames, heading, limits
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 _FUNCTIONS = {"abs": "fabs"}
 _STATE = "double psi, const double *wind, const double *current, const double *payload"

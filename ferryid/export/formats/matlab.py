@@ -10,7 +10,7 @@ from ferryid.export.format import Format
 from ferryid.export.names import number, plain
 from ferryid.export.physics import Physics, physics
 from ferryid.export.words import beside, commented, effect_numbers, frames, heading, limits
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 _CODE = """
 if nargin == 0

@@ -10,7 +10,7 @@ from ferryid.export.format import Format
 from ferryid.export.names import number, plain
 from ferryid.export.physics import Block, Physics, listed, physics, solved
 from ferryid.export.words import beside, commented, effect_numbers, frames, heading, limits
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 
 _FUNCTIONS = {name: f"math.{name}" for name in ("atan2", "cos", "hypot", "sin")}
 

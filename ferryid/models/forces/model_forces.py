@@ -15,8 +15,8 @@ from ferryid.models.forces.estimator import Estimator, ForceLaw, hull_coefficien
 from ferryid.models.forces.hull_terms import hull_contribution
 from ferryid.models.model import Model
 from ferryid.models.stored_effect import StoredEffect
+from ferryid.types import Floats
 from ferryid.vessel import parse_profile
-from ferryid.vessel.profile import Floats
 
 
 @dataclass(frozen=True)

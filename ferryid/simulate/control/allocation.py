@@ -12,12 +12,12 @@ from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
 from ferryid.simulate.control.angle import shorter_way
 from ferryid.simulate.plant.thrust import Curves, largest_force, speed_for
+from ferryid.types import Floats
 from ferryid.vessel.profile import Actuator, Profile
 
 if TYPE_CHECKING:
     from ferryid.simulate.scenario import Scenario
 
-Floats = NDArray[np.float64]
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]

@@ -7,7 +7,6 @@ from math import atan2, cos, isnan, sin, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
@@ -16,6 +15,7 @@ from ferryid.models.store import load_file
 from ferryid.regression.bases import DIMENSIONS, LEAST_SPEED_MPS
 from ferryid.simulate.plant.hull import Hydrodynamics, hydrodynamics, required_force
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
+from ferryid.types import Floats, Ints
 from ferryid.vessel.parse_hull import rigid_mass
 from ferryid.vessel.profile import Profile
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from ferryid.models import Model
     from ferryid.simulate.scenario import Scenario
 
-Floats = NDArray[np.float64]
-Wholes = NDArray[np.int64]
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
@@ -63,7 +61,7 @@ class Feedforward(NamedTuple):
     flow: bool
     load: bool
     zeta: float
-    factors: Wholes
+    factors: Ints
     theta: Floats
     intercept: Triple
     half: float

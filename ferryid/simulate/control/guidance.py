@@ -6,16 +6,15 @@ from math import atan2, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
 from ferryid.simulate.control.angle import shorter_way
+from ferryid.types import Floats
 
 if TYPE_CHECKING:
     from ferryid.simulate.scenario import Scenario
 
-Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 SET_POINTS, LOOK_AHEAD, ENCLOSURE, CARROT = 0, 1, 2, 3

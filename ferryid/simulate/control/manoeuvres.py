@@ -9,16 +9,15 @@ from math import pi, radians
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
+from ferryid.types import Floats
 from ferryid.vessel.profile import Actuator, Profile
 
 if TYPE_CHECKING:
     from ferryid.simulate.scenario import Scenario
 
-Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 NONE, ZIGZAG, TURNING_CIRCLE, ON_THE_SPOT, RPM_STEPS = 0, 1, 2, 3, 4

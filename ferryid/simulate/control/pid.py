@@ -6,18 +6,17 @@ from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.simulate.control.angle import shorter_way
 from ferryid.simulate.control.feedforward import Feedforward, ahead_of
 from ferryid.simulate.control.reference import body_reference
+from ferryid.types import Floats
 
 if TYPE_CHECKING:
     from ferryid.simulate.scenario import Scenario
     from ferryid.vessel.profile import Profile
 
-Floats = NDArray[np.float64]
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 

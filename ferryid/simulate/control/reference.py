@@ -6,14 +6,13 @@ from math import ceil, cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
+from ferryid.types import Floats
 
 if TYPE_CHECKING:
     from ferryid.simulate.scenario import Scenario
 
-Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 

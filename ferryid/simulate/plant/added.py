@@ -6,17 +6,14 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.effects import effects
 from ferryid.effects.simulated import address_of, call_load, call_thrust, load_address, thrust_address
 from ferryid.simulate.added_effects import AddedEffect
 from ferryid.simulate.plant.hull import Force
+from ferryid.types import Floats, Ints
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
-Wholes = NDArray[np.int64]
 
 EVERY = -1
 """In the place of a thruster: each of them."""
@@ -30,11 +27,11 @@ class Added(NamedTuple):
     those that act in the present step, and `force` (3,) at the address `force_at`, by every load.
     """
 
-    load: Wholes
-    thrust: Wholes
-    thruster: Wholes
+    load: Ints
+    thrust: Ints
+    thruster: Ints
     values: Floats
-    parameters: Wholes
+    parameters: Ints
     acts: Floats
     force: Floats
     force_at: int
@@ -61,7 +58,7 @@ def build_added(added: tuple[AddedEffect, ...], profile: Profile) -> Added:
     )
 
 
-def _addresses(given: Iterable[int]) -> Wholes:
+def _addresses(given: Iterable[int]) -> Ints:
     return np.array(list(given), dtype=np.int64)
 
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from math import cos, pi, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
 from ferryid.simulate.sections import Current
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 
 def turn_rate(current: Current) -> float:

@@ -6,7 +6,6 @@ from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
@@ -30,12 +29,11 @@ from ferryid.simulate.plant.shallow import Patch, damping_factor, patch_of
 from ferryid.simulate.plant.thrusters import Gear, gear_of, move, thrust_load
 from ferryid.simulate.plant.waves import Sea, sea_of, wave_load
 from ferryid.simulate.plant.wind import Areas, areas_of, wind_load
+from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
     from ferryid.simulate.scenario import Scenario
-
-Floats = NDArray[np.float64]
 
 
 class Plant(NamedTuple):

@@ -16,9 +16,8 @@ from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.simulate.plant.hull import Hydrodynamics
 from ferryid.simulate.plant.payload import boarding, inverse, loaded, together
 from ferryid.simulate.sections import Fault, Payload
+from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
-
-Floats = NDArray[np.float64]
 
 
 class Phases(NamedTuple):

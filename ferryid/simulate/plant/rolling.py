@@ -5,12 +5,10 @@ from __future__ import annotations
 from math import cos, exp, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.simulate.plant.waves import GRAVITY, Sea, slopes
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 ROLL_DAMPING, PITCH_DAMPING = 0.1, 0.3
 """Usual shares of the critical damping."""

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from math import atan2, cos, pi, sin, sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ferryid.compiled import borrowing
 from ferryid.simulate.plant.hull import Force
+from ferryid.types import Floats
 from ferryid.vessel.profile import Actuator
 from ferryid.vessel.thrusters import FRESH_WATER
-
-Floats = NDArray[np.float64]
 
 NAMES = (
     "area_m2",

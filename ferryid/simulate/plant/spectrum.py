@@ -5,11 +5,9 @@ from __future__ import annotations
 from math import exp, log, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing, compiled
-
-Floats = NDArray[np.float64]
+from ferryid.types import Floats
 
 LOWEST, HIGHEST = 0.4, 5.0
 """Frequencies that hold the energy, as multiples of the peak's: less than 1e-20 lies below, 0.2 % above."""

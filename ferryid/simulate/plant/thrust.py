@@ -6,15 +6,12 @@ from math import isfinite, nan
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.errors import FerryIdError
+from ferryid.types import Floats, Ints
 from ferryid.vessel.profile import Actuator, Profile, ThrustCurve
 from ferryid.vessel.thrusters import FRESH_WATER, thrust
-
-Floats = NDArray[np.float64]
-Wholes = NDArray[np.int64]
 
 NODES = 4001
 """Nodes from rest to either end of a curve's range; linear in between."""
@@ -28,7 +25,7 @@ class Curves(NamedTuple):
     `reach` the largest force up to each node (astern with its sign turned), which never falls: what `speed_for` searches.
     """
 
-    direct: Wholes
+    direct: Ints
     low: Floats
     high: Floats
     forces: Floats

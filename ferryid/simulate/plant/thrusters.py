@@ -10,7 +10,6 @@ from math import cos, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing
 from ferryid.simulate.plant.added import Added, added_thrust, build_added
@@ -19,11 +18,9 @@ from ferryid.simulate.plant.lags import Weights, decay_of, follow, lag_weights
 from ferryid.simulate.plant.rudder import COLUMNS, rudder_load, rudder_row
 from ferryid.simulate.plant.thrust import Curves, curves_of, force_at, largest_force
 from ferryid.simulate.sections import Thrusters
+from ferryid.types import Floats, Ints
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import FRESH_WATER
-
-Floats = NDArray[np.float64]
-Wholes = NDArray[np.int64]
 
 FIXED, AZIMUTH, RUDDER = 0, 1, 2
 """What an actuator's second order turns: nothing, itself, or its rudder."""
@@ -45,7 +42,7 @@ class Gear(NamedTuple):
     curves: Curves
     x: Floats
     y: Floats
-    steers: Wholes
+    steers: Ints
     angle: Floats
     speed_lag: Floats
     speed_rate: Floats
@@ -62,7 +59,7 @@ class Gear(NamedTuple):
     unit: Floats
     wake_fraction: Floats
     diameter: Floats
-    points: Wholes
+    points: Ints
     advance: Floats
     k_t: Floats
     open_water: Floats

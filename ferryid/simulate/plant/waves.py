@@ -19,7 +19,6 @@ from math import cos, exp, isnan, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import borrowing, compiled
 from ferryid.errors import FerryIdError
@@ -27,10 +26,9 @@ from ferryid.simulate.noise import generator
 from ferryid.simulate.plant.hull import Force
 from ferryid.simulate.plant.spectrum import components, deep_water
 from ferryid.simulate.sections import Wake, Waves
+from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import FRESH_WATER
-
-Floats = NDArray[np.float64]
 
 GRAVITY = 9.81
 """[m/s²]"""

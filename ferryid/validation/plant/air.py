@@ -6,12 +6,11 @@ from math import atan2, floor, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.vessels import Vessel
 
-Floats = NDArray[np.float64]
 RHO_AIR = 1.225
 COLUMNS = 36
 WINDWARD, LEEWARD = 0.75, 0.35

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.vessels import Vessel
 
-Floats = NDArray[np.float64]
 REST = 0.01
 """Share of its most thrust below which an azimuth stays where it points."""
 

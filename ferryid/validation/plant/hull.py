@@ -10,12 +10,11 @@ from math import log10
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.vessels import GRAVITY, RHO, Vessel
 
-Floats = NDArray[np.float64]
 STRIPS = 23
 VISCOSITY = 1.19e-6
 """Kinematic, of sea water at 15 degrees [m²/s]."""

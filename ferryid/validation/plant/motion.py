@@ -6,9 +6,9 @@ from math import cos, sin, tan
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.air import AirConstants, air_load
 from ferryid.validation.plant.effects.mooring import Mooring, mooring_load
 from ferryid.validation.plant.effects.payload import Payload, boarding_load, share_aboard
@@ -17,7 +17,6 @@ from ferryid.validation.plant.hull import HullConstants, coriolis, drag, restori
 from ferryid.validation.plant.thrusters import STATES, ThrusterConstants, thrust
 from ferryid.validation.plant.vessels import RHO
 
-Floats = NDArray[np.float64]
 BODY = 12
 """States of the body: north, east, down, roll, pitch, yaw, and the six velocities; the thrusters' follow."""
 

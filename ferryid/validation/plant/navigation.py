@@ -9,11 +9,10 @@ from math import cos, exp, pi, radians, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 
-Floats = NDArray[np.float64]
 RATE_HZ = 20.0
 FIX_EVERY = 4
 """Samples between GNSS fixes: 5 Hz."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from math import atan2, cos, pi, radians, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ferryid.types import Floats
 from ferryid.validation.plant.vessels import Vessel
 
-Floats = NDArray[np.float64]
 DWELL_S = 45.0
 PATHS = {"calibration": 16, "short": 7, "crossings": 16}
 """Names of paths, and how many set points each has."""

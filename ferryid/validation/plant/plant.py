@@ -9,8 +9,8 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ferryid.types import Floats
 from ferryid.validation.plant.air import air_constants
 from ferryid.validation.plant.effects import Conditions, plant_effects
 from ferryid.validation.plant.effects.mooring import NO_LINE
@@ -21,7 +21,6 @@ from ferryid.validation.plant.motion import World
 from ferryid.validation.plant.thrusters import thruster_constants
 from ferryid.validation.plant.vessels import Vessel
 
-Floats = NDArray[np.float64]
 Load = Callable[[float, Floats, Floats], None]
 """``load(t, y, out)`` writes a load [N, N·m], shape (6,), at a time [s] and the states of the body, shape (12 + 5 k,)."""
 Report = Callable[[Floats], None]

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.vessels import Vessel
 
-Floats = NDArray[np.float64]
 STATES = 5
 """Of a thruster: speed [rpm], angle [rad], race [rpm], and two of a force that is late [N]."""
 LAG_RATE = 2.0

@@ -8,9 +8,9 @@ from math import ceil, cos, radians, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.autopilot import Tuning, steer, tuning
 from ferryid.validation.plant.effects import Conditions, complete_conditions
 from ferryid.validation.plant.motion import BODY, World, step
@@ -20,7 +20,6 @@ from ferryid.validation.plant.plant import Plant, build_plant
 from ferryid.validation.plant.thrusters import LAG_RATE, STATES
 from ferryid.validation.plant.vessels import Vessel
 
-Floats = NDArray[np.float64]
 CONTROL_EVERY = 2
 """Samples of the navigation in a period of the autopilot: 10 Hz."""
 PATH_STREAM, NOISE_STREAM = 0, 3

@@ -16,8 +16,9 @@ from ferryid.models.forces import ModelForces, force_law
 from ferryid.models.prediction import Prediction, predict_with_effects
 from ferryid.signals.prepare import Prepared, prepare
 from ferryid.signals.smooth import odd_rows, steady_mean
+from ferryid.types import Floats
 from ferryid.validation.rivals.learner import SMOOTHER, WINDOW_S
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 
 Rows = NDArray[np.bool_]
 

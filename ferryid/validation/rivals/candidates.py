@@ -14,9 +14,9 @@ import numpy as np
 
 from ferryid.effects import Effect, effects
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, between
+from ferryid.types import Floats
 from ferryid.validation.rivals.base import Base
 from ferryid.vessel.frames import to_body
-from ferryid.vessel.profile import Floats
 
 ONSETS = 11
 """Times at which a term may set in, evenly over the log, besides its start."""

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.effects.force_model import ForceModel
+from ferryid.types import Floats, Ints
 from ferryid.validation.rivals.base import Base
-from ferryid.vessel.profile import Floats
-
-Places = NDArray[np.int64]
 
 ROUNDS = 5
 """Steps of Gauss's and Newton's method."""
@@ -50,7 +47,7 @@ def combined(base: Base, units: Sequence[ForceModel], coefficients: Floats) -> F
 
 
 def least_error(
-    base: Base, units: Sequence[ForceModel], several: Sequence[Floats], rows: Places, by_axis: Floats
+    base: Base, units: Sequence[ForceModel], several: Sequence[Floats], rows: Ints, by_axis: Floats
 ) -> Floats:
     """Return those of several coefficients whose force errs least in the log; other arguments as of `joint_coefficients`.
 
@@ -67,7 +64,7 @@ def least_error(
     return min(several, key=error)
 
 
-def joint_coefficients(base: Base, units: Sequence[ForceModel], start: Floats, rows: Places, by_axis: Floats) -> Floats:
+def joint_coefficients(base: Base, units: Sequence[ForceModel], start: Floats, rows: Ints, by_axis: Floats) -> Floats:
     """Return the coefficients with which the terms together leave least of the measured acceleration, shape (q,).
 
     Parameters

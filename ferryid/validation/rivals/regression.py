@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.errors import FerryIdError
 from ferryid.models.prediction import Prediction
 from ferryid.signals.prepare import Prepared
+from ferryid.types import Floats, Ints
 from ferryid.validation.records import RivalName
 from ferryid.validation.rivals.base import Base, base_of, prepared_log
 from ferryid.validation.rivals.candidates import CONSTANT, Candidate, candidates, distinct_columns
 from ferryid.validation.rivals.joint_fit import combined, joint_coefficients, least_error
 from ferryid.validation.rivals.learner import WINDOW_S, LearnedModel
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.vessel.profile import Profile
 
-Places = NDArray[np.int64]
-Choose = Callable[[Floats, Floats, Places], Floats]
+Choose = Callable[[Floats, Floats, Ints], Floats]
 """``choose(X (m, k), y (m,), block (m,)) -> coefficients (k,)``, zero where not chosen; columns and `y` have mean square 1.
 
 `block` numbers contiguous stretches of the log.
@@ -54,10 +53,10 @@ class Regression:
 
     X: Floats
     y: Floats
-    block: Places
+    block: Ints
     candidates: tuple[Candidate, ...]
     scale: Floats
-    rows: Places
+    rows: Ints
     by_axis: Floats
 
 

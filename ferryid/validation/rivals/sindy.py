@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ferryid.errors import FerryIdError
+from ferryid.types import Floats, Ints
 from ferryid.validation.rivals.learner import LearnedModel
-from ferryid.validation.rivals.regression import Places, learn_sparsely
-from ferryid.vessel.profile import Floats, Profile
+from ferryid.validation.rivals.regression import learn_sparsely
+from ferryid.vessel.profile import Profile
 
 THRESHOLDS = tuple(float(one) for one in np.geomspace(0.01, 1.0, 13))
 """Shares of the residual's root mean square below which a term is left out."""
@@ -48,7 +49,7 @@ def need() -> None:
         ) from error
 
 
-def choose(X: Floats, y: Floats, block: Places) -> Floats:
+def choose(X: Floats, y: Floats, block: Ints) -> Floats:
     """Return the coefficients of the fewest terms that cross-validation does not distinguish from the best.
 
     Each block is predicted from the others; of the thresholds and ridges whose mean error is within one standard error of the

@@ -7,15 +7,15 @@ from math import log
 
 import numpy as np
 
+from ferryid.types import Floats, Ints
 from ferryid.validation.rivals.learner import Learner
-from ferryid.validation.rivals.regression import Places, learn_sparsely, left_over
-from ferryid.vessel.profile import Floats
+from ferryid.validation.rivals.regression import learn_sparsely, left_over
 
 MOST_TERMS = 60
 """Terms at which adding ends."""
 
 
-def choose(X: Floats, y: Floats, block: Places) -> Floats:
+def choose(X: Floats, y: Floats, block: Ints) -> Floats:
     """Return the coefficients of a forward and then backward selection; Schwarz (1978), Efroymson (1960).
 
     Parameters

@@ -11,8 +11,8 @@ from ferryid.diagnose.checks.azimuth_resolution import find, restored, step_of
 from ferryid.effects.force_model import Measurements
 from ferryid.simulate import load_scenario
 from ferryid.simulate.trial import sail
+from ferryid.types import Floats
 from ferryid.vessel.load import load_profile
-from ferryid.vessel.profile import Floats
 
 PROFILE = load_profile("milliampere")
 

@@ -17,9 +17,9 @@ from ferryid.signals.mirror import mirrored
 from ferryid.simulate import load_scenario
 from ferryid.simulate.sections import Navigation, Wind
 from ferryid.simulate.trial import sail
+from ferryid.types import Floats
 from ferryid.vessel.frames import to_world, wrap
 from ferryid.vessel.load import load_profile
-from ferryid.vessel.profile import Floats
 
 PROFILE = load_profile("milliampere")
 TRIALS = range(1, 13)

@@ -10,8 +10,8 @@ import pytest
 from ferryid.diagnose.checks.held_samples import find as held
 from ferryid.diagnose.checks.unrecorded_force import find as unrecorded
 from ferryid.effects.force_model import Measurements
+from ferryid.types import Floats
 from ferryid.vessel import load_profile
-from ferryid.vessel.profile import Floats
 from tests.diagnose.checks.test_checks import sailed
 
 FERRY = load_profile("milliampere")

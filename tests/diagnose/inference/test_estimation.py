@@ -16,8 +16,8 @@ from ferryid.diagnose.inference.weak_form import steps_of, windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
+from ferryid.types import Floats
 from ferryid.vessel import load_profile
-from ferryid.vessel.profile import Floats
 
 FERRY = load_profile("milliampere")
 

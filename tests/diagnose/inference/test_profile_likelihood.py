@@ -13,7 +13,7 @@ from ferryid.diagnose.inference.profile_likelihood import intervals
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
-from ferryid.vessel.profile import Floats
+from ferryid.types import Floats
 from tests.diagnose.inference.test_estimation import PUSH, problem
 
 

@@ -19,8 +19,8 @@ from ferryid.diagnose.judging.disturbance_findings import _power_in_velocities, 
 from ferryid.effects import effects
 from ferryid.effects.effect import Process
 from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.types import Floats
 from ferryid.vessel import load_profile
-from ferryid.vessel.profile import Floats
 
 FERRY = load_profile("milliampere")
 BASE = """

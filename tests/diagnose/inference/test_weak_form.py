@@ -12,8 +12,8 @@ from ferryid.diagnose.data.complementary_filter import complementary_filter
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.simulate.plant.hull import hydrodynamics, required_force
+from ferryid.types import Floats
 from ferryid.vessel import load_profile
-from ferryid.vessel.profile import Floats
 
 FERRY = load_profile("milliampere")
 RATE_HZ = 20.0

@@ -24,8 +24,8 @@ from ferryid.diagnose.judging.detection_power import (
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
+from ferryid.types import Floats
 from ferryid.vessel import load_profile
-from ferryid.vessel.profile import Floats
 
 FERRY = load_profile("milliampere")
 ROWS = 50

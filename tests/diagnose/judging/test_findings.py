@@ -8,7 +8,6 @@ from math import inf
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.inference.estimation import EstimationProblem, fit
 from ferryid.diagnose.judging.backward_elimination import Elimination
 from ferryid.diagnose.judging.claims import LogFigures
@@ -19,6 +18,7 @@ from ferryid.diagnose.judging.held_out import held_out_evidence
 from ferryid.diagnose.judging.rivals import RivalComparison
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
+from ferryid.types import AXES
 from tests.diagnose.judging.test_held_out import WIND, candidate, sailed, trial_on
 
 

@@ -16,8 +16,8 @@ from ferryid.diagnose.judging.locate import locate, whitened
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import Parameter, effects
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
+from ferryid.types import Floats
 from ferryid.vessel import load_profile
-from ferryid.vessel.profile import Floats
 
 FERRY = load_profile("milliampere")
 SECONDS, STEP_S = 600.0, 0.2

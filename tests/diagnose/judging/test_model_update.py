@@ -13,7 +13,6 @@ import pytest
 from ferryid.compare.candidates import select_candidates
 from ferryid.compare.comparison import compare
 from ferryid.compare.evaluation import evaluate
-from ferryid.diagnose.data.estimate import AXES
 from ferryid.diagnose.data.measurements import Survey, read_measurements, window_lengths
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, estimation_problem, fit
 from ferryid.diagnose.inference.prior import prior_force_model
@@ -32,7 +31,7 @@ from ferryid.report.comparison_words import render_effects
 from ferryid.report.evaluation_text import render_evaluation
 from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.simulate.vessel_model import sailed_by
-from ferryid.types import RunContext
+from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 

@@ -27,8 +27,8 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import find_displaced, find_unexplained
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
+from ferryid.types import Floats
 from ferryid.vessel import load_profile
-from ferryid.vessel.profile import Floats
 
 FERRY = load_profile("milliampere")
 SECONDS, STEP_S = 720.0, 0.1

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ferryid.diagnose.data.estimate import AXES, Estimate
+from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import VERDICTS, Remainder, campaign_verdict, verdict_of, worse_axes
 from ferryid.report.diagnosis_words import headline, summary, title
+from ferryid.types import AXES
 from tests.diagnose.judging.findings import found
 
 SURE, HINT, NAMELESS, SENSOR = found("wind"), found("current", 0.5), found(UNKNOWN), found("clock_offset")

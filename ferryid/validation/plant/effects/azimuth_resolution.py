@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ferryid.types import Floats
 from ferryid.validation.plant.effects.effect import Conditions, Injection, PlantEffect, Span, injection
 from ferryid.validation.plant.plant import Plant, wrapped
 from ferryid.validation.plant.vessels import Vessel
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from ferryid.effects.force_model import Measurements
     from ferryid.validation.oracle_sensors import SensorEstimate
 
-Floats = NDArray[np.float64]
 CHANCE = 0.02
 """Share of the readings of an angle that is not rounded which are within a hundredth of a step off any grid."""
 LEAST_OFF = 1e-12

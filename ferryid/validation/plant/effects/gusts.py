@@ -5,14 +5,13 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ferryid.types import Floats
 from ferryid.validation.case import Truth
 from ferryid.validation.plant.effects.effect import Conditions, Injection, PlantEffect, Span, random_vector
 from ferryid.validation.plant.plant import Plant
 from ferryid.validation.plant.vessels import Vessel
 
-Floats = NDArray[np.float64]
 COMPONENTS = 72
 
 

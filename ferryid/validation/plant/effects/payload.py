@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.effects.effect import (
     ALWAYS,
     Conditions,
@@ -23,7 +23,6 @@ from ferryid.validation.plant.vessels import Vessel
 if TYPE_CHECKING:
     from ferryid.validation.plant.plant import Plant
 
-Floats = NDArray[np.float64]
 BOARDING_S = 6.0
 """Time in which a load comes aboard, piece by piece, or leaves."""
 

@@ -6,16 +6,15 @@ from math import cos
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.effects.effect import Conditions, Injection, PlantEffect, Span, injection
 from ferryid.validation.plant.vessels import Vessel
 
 if TYPE_CHECKING:
     from ferryid.validation.plant.plant import Plant
 
-Floats = NDArray[np.float64]
 SLOPE_M = 3.0
 """Over how many metres a bank rises."""
 ADDED_MASS_SHARE = 0.3

@@ -7,17 +7,16 @@ from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
 from ferryid.compiled import compiled
+from ferryid.types import Floats
 from ferryid.validation.plant.effects.effect import Conditions, Injection, PlantEffect, Span, injection
 from ferryid.validation.plant.navigation import RATE_HZ
 from ferryid.validation.plant.plant import Plant
 from ferryid.validation.plant.trial import Trial
 from ferryid.validation.plant.vessels import GRAVITY, RHO, Vessel
 
-Floats = NDArray[np.float64]
 COMPONENTS = 45
 DRIFT = 0.25
 """Mean force of waves over what a wall would feel that throws them all back."""

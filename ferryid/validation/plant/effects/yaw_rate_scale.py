@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ferryid.types import Floats
 from ferryid.validation.plant.effects.effect import Conditions, Injection, PlantEffect, Span, injection, random_sign
 from ferryid.validation.plant.plant import Plant
 from ferryid.validation.plant.vessels import Vessel
@@ -14,8 +14,6 @@ from ferryid.validation.plant.vessels import Vessel
 if TYPE_CHECKING:
     from ferryid.effects.force_model import Measurements
     from ferryid.validation.oracle_sensors import SensorEstimate
-
-Floats = NDArray[np.float64]
 
 
 def sample(size: float, vessel: Vessel, rng: np.random.Generator, span: Span) -> Injection:
