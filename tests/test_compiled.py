@@ -120,6 +120,7 @@ def _called(folder: Path, callee: str, caller: str = CALLER) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_what_is_called_from_another_file_counts_and_nothing_else(tmp_path: Path) -> None:
     assert _called(tmp_path, CALLEE) == ["8.0", "0"]
     assert _called(tmp_path, CALLEE) == ["8.0", "1"]
@@ -133,6 +134,7 @@ def test_what_is_called_from_another_file_counts_and_nothing_else(tmp_path: Path
     assert _called(tmp_path, CALLEE.replace("a: float\n    b: float", "b: float\n    a: float")) == ["12.0", "0"]
 
 
+@pytest.mark.slow
 def test_of_several_processes_one_compiles(tmp_path: Path) -> None:
     source = "import time\nfrom ferryid.compiled import compiled\n\n\n@compiled\ndef twice(x):\n    return 2.0 * x\n"
     (tmp_path / "both.py").write_text(source)

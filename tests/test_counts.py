@@ -71,6 +71,7 @@ def test_verbs_agree() -> None:
     assert plural(1.0, "sample") == "sample"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["ferryid", "cli"])
 def test_every_message_counts_with_the_helper(folder: str) -> None:
     modules = [path for path in sorted((ROOT / folder).rglob("*.py")) if path.name != "counts.py"]

@@ -26,6 +26,7 @@ def test_every_page_has_a_state_and_old_ones_are_told(record_property: Callable[
             record_property("notice", str(one))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", MAKERS)
 def test_makers_are_there_and_import_what_they_show(page: str) -> None:
     found = folders(page)

@@ -73,6 +73,7 @@ def _imports(path: Path) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.module or ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(ROOT)))
 def test_imports_point_one_way(path: Path) -> None:
     layer = _layer(path)
@@ -134,6 +135,7 @@ def test_the_border_of_a_package_is_small_and_all_there(path: Path) -> None:
     assert not set(names) & {file.stem for file in path.parent.iterdir()}
 
 
+@pytest.mark.slow
 def test_no_circle_of_imports() -> None:
     paths = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in _modules()}
     paths = {name.removesuffix(".__init__"): path for name, path in paths.items() if name.startswith("ferryid")}

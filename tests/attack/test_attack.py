@@ -26,6 +26,7 @@ SEED = int(os.environ.get("ATTACK_SEED", int(time.time())))
 SECONDS = float(os.environ.get("ATTACK_SECONDS", 30))
 
 
+@pytest.mark.slow
 def test_no_log_breaks_what_must_hold(record_property: Callable[[str, object], None]) -> None:
     record_property("repeat", f"ATTACK_SEED={SEED}")
     end = time.monotonic() + SECONDS
@@ -158,6 +159,7 @@ def test_a_case_is_the_same_for_the_same_seed_and_number() -> None:
         assert (first.kind, first.mutated) == (second.kind, second.mutated)
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_is_a_violation_and_the_run_goes_on() -> None:
     results = list(attack(1, iter((1, 2, 3)), workers=1, opener=lambda path: os._exit(3)))
     assert [result.number for result in results] == [1, 2, 3]
@@ -165,6 +167,7 @@ def test_a_worker_that_dies_is_a_violation_and_the_run_goes_on() -> None:
     assert "| **all** |  | 3 |" in table(results)
 
 
+@pytest.mark.slow
 def test_memory_beyond_the_limit_is_a_violation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tests.attack.check.BYTES", 100_000_000)
     outcome = _examined(_undamaged("text_table"), tmp_path, needs_memory)

@@ -26,6 +26,8 @@ from ferryid.files import unwritable
 from tests.batch.archive import archive, deadly, recipe, rows_of, run, same
 from tests.batch.work import children_of, default_interrupts, ended, environment
 
+pytestmark = pytest.mark.slow
+
 FIT = 'steps = ["fit"]\n[fit]\ndelta = 0.4\nsigma = 0.4\ndraws = 20\n'
 
 

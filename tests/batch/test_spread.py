@@ -26,6 +26,7 @@ def pids_in(folder: Path, number: int) -> list[int]:
     return [int(line) for line in (folder / str(number)).read_text().splitlines()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2])
 def test_everything_is_done_once(tmp_path: Path, processes: int) -> None:
     with spread(processes) as workers:
@@ -39,6 +40,7 @@ def test_everything_is_done_once(tmp_path: Path, processes: int) -> None:
     assert len(pids) <= processes, "processes are kept for the next stage"
 
 
+@pytest.mark.slow
 def test_results_come_as_they_are_ready(tmp_path: Path) -> None:
     with spread(2) as workers:
         for count, (number, _) in enumerate(workers.over(square, items(tmp_path, 6, at_0="sleeps")), 1):
@@ -58,6 +60,7 @@ def test_what_is_raised_ends_the_work(tmp_path: Path, processes: int) -> None:
     assert calls(tmp_path, 19) == 0
 
 
+@pytest.mark.slow
 def test_the_item_of_a_lost_process_is_done_again(tmp_path: Path) -> None:
     with spread(2) as workers:
         done = dict(workers.over(square, items(tmp_path, 8, at_2="dies once", at_5="dies once")))
@@ -72,12 +75,14 @@ def test_the_item_of_a_lost_process_is_done_again(tmp_path: Path) -> None:
         assert len(dict(workers.over(square, items(tmp_path, 3)))) == 3
 
 
+@pytest.mark.slow
 def test_an_item_that_kills_every_process_is_given_up(tmp_path: Path) -> None:
     with spread(2) as workers, pytest.raises(FerryIdError, match=r"item \d of 4 died 3 times\. Fix: "):
         list(workers.over(square, items(tmp_path, 4, at_1="dies")))
     assert calls(tmp_path, 1) <= 3
 
 
+@pytest.mark.slow
 def test_what_comes_of_an_item_that_kills_every_process_and_not_of_its_neighbour(tmp_path: Path) -> None:
     begun: list[int] = []
     fates = items(tmp_path, 5, at_0="lingers", at_1="dies")
@@ -91,6 +96,7 @@ def test_what_comes_of_an_item_that_kills_every_process_and_not_of_its_neighbour
     assert set(begun) == {0, 1, 2, 3, 4}
 
 
+@pytest.mark.slow
 def test_one_process_apart(tmp_path: Path) -> None:
     with spread(1, apart=True) as workers:
         done = dict(workers.over(square, items(tmp_path, 3, at_1="dies"), lost=lambda item: (0, 0)))
@@ -125,6 +131,7 @@ if __name__ == "__main__":
     assert ended([*pids_in(tmp_path, 0), *pids_in(tmp_path, 1)])
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker(tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]) -> None:
     address, (_, *workers) = cluster
     tally = tmp_path / "tally"
@@ -146,6 +153,7 @@ def test_a_cluster_that_loses_a_worker(tmp_path: Path, cluster: tuple[str, list[
             list(client.over(square, items(tally, 20, at_1="raises")))
 
 
+@pytest.mark.slow
 def test_a_cluster_whose_workers_an_item_kills(
     tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -162,6 +170,7 @@ def test_a_cluster_whose_workers_an_item_kills(
             list(client.over(square, items(tmp_path, 1)))
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_its_scheduler(
     tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -177,6 +186,7 @@ def test_a_cluster_that_loses_its_scheduler(
         work()
 
 
+@pytest.mark.slow
 def test_a_cluster_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr(spreading, "ANSWER_S", 1.0)

@@ -32,6 +32,7 @@ def test_a_step_and_its_chance() -> None:
     assert change["chance"] == pytest.approx(2 / comb(12, 5), abs=3 * (2 / comb(12, 5) / 4000) ** 0.5)
 
 
+@pytest.mark.slow
 def test_steady_values_seldom_look_like_a_trend() -> None:
     rng = np.random.default_rng(0)
     told = [trend(rng.standard_normal(n))[0] is not None for n in range(6, 30) for _ in range(40)]

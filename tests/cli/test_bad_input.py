@@ -83,6 +83,7 @@ def test_a_recording_and_its_copy_in_another_format_in_one_folder(
     refused(ferryid(command, tmp_path, *vessel), "short.mcap", "the same", "short.bag")
 
 
+@pytest.mark.slow
 def test_a_thruster_known_by_its_orders_alone_is_said_on_the_terminal(ferryid, fixtures: Path, tmp_path: Path) -> None:
     profile = profile_with(tmp_path, 'topic = "/thruster1/state"', 'topic = "/thruster1/stat"')
     run = ferryid("fit", fixtures / "short.mcap", "--vessel", profile, "--out", tmp_path / "out")
@@ -216,6 +217,7 @@ def test_a_full_disk(ferryid, fixtures: Path, tmp_path: Path) -> None:
     refused(run, "/dev/full")
 
 
+@pytest.mark.slow
 def test_an_interrupt_exits_with_130_and_leaves_nothing(
     ferryid, fixtures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -232,6 +234,7 @@ def test_an_interrupt_exits_with_130_and_leaves_nothing(
     assert [path.name for path in (tmp_path / "out" / "models").rglob("*")] == [".lock"]
 
 
+@pytest.mark.slow
 def test_a_terminated_command_cleans_up_and_exits_with_143(
     ferryid, fixtures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -252,6 +255,7 @@ def test_a_terminated_command_cleans_up_and_exits_with_143(
     assert not [path for path in (tmp_path / "out").rglob("*") if path.suffix in (".part", ".html")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
 def test_closed_output_is_no_bug(closed: str) -> None:
     run = "import sys; from ferryid.cli.main import main; sys.argv = ['ferryid', 'simulate', '--list']; main()"
@@ -292,6 +296,7 @@ def test_the_same_log_twice(ferryid, fixtures: Path, tmp_path: Path) -> None:
     refused(ferryid("fit", log, log, "--vessel", "milliampere", "--out", tmp_path, "--split", "logs"), "the same log")
 
 
+@pytest.mark.slow
 def test_a_model_of_another_vessel(ferryid, fixtures: Path, tmp_path: Path) -> None:
     run = ferryid("fit", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path)
     assert run.code == 0
@@ -327,6 +332,7 @@ def test_wrong_use_is_told_shortly(ferryid, arguments: tuple[str, ...]) -> None:
     assert "Traceback" not in run.err
 
 
+@pytest.mark.slow
 def test_comparisons_that_mean_nothing(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log, out = fixtures / "short.mcap", ("--out", tmp_path)
     for components in ("6", "9"):

@@ -5,7 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from tests.cli.test_every_command import conforms
+
+pytestmark = pytest.mark.slow
 
 BROKEN = """
 schema = "ferryid.scenario/1"

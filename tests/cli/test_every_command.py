@@ -15,6 +15,8 @@ import pytest
 import ferryid.cli
 from ferryid.regression.bases.forms import basis_names
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = sorted(
     module.name.removeprefix("cmd_")

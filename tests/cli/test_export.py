@@ -57,6 +57,7 @@ def test_a_module_runs_as_the_command_says(ferryid, out: Path) -> None:
     assert "every value as ferryid gives it" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_model_of_conditions_alone_is_its_hull_and_says_so(ferryid, out: Path) -> None:
     run = ferryid("export", "milliampere@3", "--to", "c", "--out", out, "--json", "-")
     assert run.code == 0
@@ -64,6 +65,7 @@ def test_a_model_of_conditions_alone_is_its_hull_and_says_so(ferryid, out: Path)
     assert "what is exported is the hull alone" in run.err
 
 
+@pytest.mark.slow
 def test_a_log_for_a_viewer(ferryid, fixtures: Path, out: Path, tmp_path: Path) -> None:
     log, diagnosis, mcap = fixtures / "short.mcap", tmp_path / "d.json", tmp_path / "v.mcap"
     assert ferryid("diagnose", log, "--vessel", "milliampere", "--out", tmp_path / "d", "--json", diagnosis).code == 0
@@ -104,6 +106,7 @@ def test_what_means_nothing(
     assert {path for path in tmp_path.rglob("*") if path.is_file() and path.name != ".lock"} == before
 
 
+@pytest.mark.slow
 def test_places_that_will_not_do(ferryid, out: Path, tmp_path: Path) -> None:
     thesis = tmp_path / "thesis.tex"
     thesis.write_text("of years", encoding="utf-8")

@@ -12,6 +12,8 @@ import pytest
 from tests.cli.conftest import Run
 from tests.damage import NAVIGATION, THRUSTER, silent, ten_minutes, without_heading, written
 
+pytestmark = pytest.mark.slow
+
 SECONDS = (0.3, 1.0, 5.0, 60.0)
 VESSEL = ("--vessel", "milliampere")
 LOST = 3 * 66

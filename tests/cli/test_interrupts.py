@@ -13,6 +13,8 @@ import pytest
 
 from tests.batch.work import children_of, default_interrupts, ended, environment
 
+pytestmark = pytest.mark.slow
+
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
 MESSAGE = "ferryid: interrupted, nothing half-written was left\n"
 BUSY = """

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 HOME = ROOT / "ferryid" / "diagnose"
 ORDER = ("parallel", "data", "checks", "inference", "judging", "pipeline")

@@ -80,6 +80,7 @@ def test_calls_within_stay_on_the_thread_that_they_are_made_on() -> None:
     assert len({row[0] for row in rows}) == CORES
 
 
+@pytest.mark.slow
 def test_one_of_several_processes_uses_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as started:
         started.setattr(parallel, "parent_process", object)

@@ -17,6 +17,8 @@ from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_camp
 from ferryid.simulate import Scenario, load_scenario, parse_scenario, scenarios, simulate, write_log
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.slow
+
 SHORT = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
 
 

@@ -19,6 +19,8 @@ from ferryid.effects import effects
 from ferryid.vessel import load_profile
 from tests.diagnose.trials import averaged
 
+pytestmark = pytest.mark.slow
+
 Locate = Callable[[str], Path]
 ENVIRONMENT = {"wind", "current", "gusts", "waves", "mooring", "shallow_water"}
 

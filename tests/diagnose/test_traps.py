@@ -52,6 +52,7 @@ def inflow(tmp_path_factory: pytest.TempPathFactory) -> EstimationProblem:
     )
 
 
+@pytest.mark.slow
 def test_trap_1_noise_in_the_acceleration_is_not_less_mass(clean: EstimationProblem, raw: Measurements) -> None:
     # The trap: force on the differentiated velocity by least squares.
     u_dot = np.gradient(raw.nu_raw[:, 0], raw.step_s)
@@ -77,6 +78,7 @@ def test_trap_2_a_controller_that_answers_noise_is_no_lag(clean: EstimationProbl
     assert abs(made.values[0][0]) < 0.05
 
 
+@pytest.mark.slow
 def test_trap_3_what_hides_in_a_product_is_found_and_sized(inflow: EstimationProblem) -> None:
     # Every effect among all the others: tests/effects/test_every_effect.py.
     made = fit(inflow, [candidate(inflow, "thrust_inflow_loss")])
@@ -109,6 +111,7 @@ def test_trap_5_a_hull_that_is_off_is_refitted_beside_every_candidate(inflow: Es
     assert fit(inflow, [one]).values[0][0] == pytest.approx(0.3, abs=0.05)
 
 
+@pytest.mark.slow
 def test_trap_6_what_is_certain_but_void_is_no_finding(
     clean: EstimationProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -123,6 +126,7 @@ def test_trap_6_what_is_certain_but_void_is_no_finding(
     assert [one.key for one in search(calm, lambda stage: None, known=[wind]).fit.candidates] == [wind.key]
 
 
+@pytest.mark.slow
 def test_trap_7_a_gain_that_a_reversed_heading_matches_names_nothing(clean: EstimationProblem) -> None:
     # Half a wind on the vessel as it turned, half one on a vessel that turned the other way: either explains as much.
     wind, plain = candidate(clean, "wind"), clean.plain

@@ -96,6 +96,7 @@ def called(call: Call, folder: Path) -> None:
     assert agrees(call.shown, run.stdout), f"{call.command} is shown with\n{call.shown}\nand printed\n{run.stdout}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("page", "run"), _cases())
 def test_blocks_of_a_page_run_in_order(
     page: Path, run: list[Block], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -26,6 +26,7 @@ def built(folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
 
 
+@pytest.mark.slow
 def test_it_builds_strictly_and_needs_no_network(tmp_path: Path) -> None:
     copytree(ROOT / "docs", tmp_path / "docs")
     run = built(tmp_path)
@@ -40,6 +41,7 @@ def test_it_builds_strictly_and_needs_no_network(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_broken_link_and_a_page_outside_the_contents_fail(tmp_path: Path) -> None:
     copytree(ROOT / "docs", tmp_path / "docs")
     page = tmp_path / "docs" / "guide.md"
@@ -61,6 +63,7 @@ def test_readme_is_one_page() -> None:
     assert len((ROOT / "README.md").read_bytes()) <= README_BYTES
 
 
+@pytest.mark.slow
 def test_drawing_is_that_of_the_imports() -> None:
     assert DRAWING.read_text(encoding="utf-8") == drawn(built_on()), "Fix: python -m tests.docs.drawing"
 

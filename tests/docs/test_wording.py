@@ -10,18 +10,21 @@ from tests.docs.pages import PAGES, ROOT
 from tests.docs.wording import WORDS, known, places, sentences
 
 
+@pytest.mark.slow
 def test_no_new_text_has_such_a_word() -> None:
     there = set(known())
     new = {f"{path.relative_to(ROOT)}: {place}" for place, path in places().items() if place not in there}
     assert new == set(), "Fix: say it in the words of the field (docs/nomenclature.md)"
 
 
+@pytest.mark.slow
 def test_places_that_are_gone_are_taken_out() -> None:
     left = places()
     assert [one for one in known() if one not in left] == [], "Fix: python -m tests.docs.wording --prune"
     assert known() == sorted(set(known()))
 
 
+@pytest.mark.slow
 def test_documents_have_none() -> None:
     assert [place for place, path in places().items() if path in PAGES] == []
 

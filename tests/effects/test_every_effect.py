@@ -20,6 +20,8 @@ from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 BASE = """
 schema = "ferryid.scenario/1"

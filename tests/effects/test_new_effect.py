@@ -139,6 +139,7 @@ def test_an_entry_that_makes_no_sense_is_told(entry: str, match: str) -> None:
         check_against(parse_scenario(f"{STEPS}[[effects]]\n{entry}\n", "t"), FERRY)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("library")
 def test_it_is_found_where_it_acts(tmp_path: Path) -> None:
     truth = {"north": 40.0, "east": -30.0, "moment": 30.0}
@@ -156,6 +157,7 @@ def test_without_its_file_there_is_no_such_effect() -> None:
         parse_scenario(f'{STEPS}[[effects]]\neffect = "push"\n', "t")
 
 
+@pytest.mark.slow
 def test_a_mooring_is_one_by_its_section_and_by_its_name() -> None:
     spring = "stiffness_north_Npm = 20\nstiffness_east_Npm = 30\nnorth_m = 5\neast_m = -5\nfrom_s = 10"
     named = 'effect = "mooring"\nstiffness_north = 20\nstiffness_east = 30\nnorth = 5\neast = -5\nfrom_s = 10'

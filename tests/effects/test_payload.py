@@ -20,6 +20,7 @@ def picture(draught_m: float) -> ForceModel:
     return ForceModel(scene, hull_of(profile), scene.parts, scene.angles, np.zeros((len(scene.t), 3)))
 
 
+@pytest.mark.slow
 def test_a_box_sinks_by_its_load_over_its_waterplane() -> None:
     """milliAmpère is 5 m by 2.8 m: 610 kg sink 0.85 of that area by 5 cm in water of 1025 kg/m³."""
     before = picture(0.25)

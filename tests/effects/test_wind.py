@@ -15,6 +15,8 @@ from ferryid.effects import effects
 from ferryid.effects.wind import SPEEDS_MPS
 from tests.diagnose.judging.test_unexplained import FERRY, pushes, trial_with
 
+pytestmark = pytest.mark.slow
+
 WIND = effects()["wind"]
 BREEZE = Suspect(WIND, None, WIND.parameters_of(FERRY))
 

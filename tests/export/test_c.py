@@ -67,6 +67,7 @@ def answers(program: Path, state: States) -> np.ndarray:
     return np.array([line.split() for line in run.stdout.splitlines()], dtype=float)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", COMPILERS)
 @pytest.mark.parametrize("name", MODELS)
 def test_it_gives_the_force_and_back_the_acceleration(name: str, language: str, tmp_path: Path) -> None:

@@ -71,6 +71,7 @@ def export(mcap: Path, log: Path | str = LOG, **options: Any) -> dict[str, Any]:
     return export_log(str(log), mcap, mcap.parent / "out", progress=lambda stage: None, **options)
 
 
+@pytest.mark.slow
 def test_forces_and_motion_are_those_of_the_log_at_its_times(tmp_path: Path) -> None:
     mcap = tmp_path / "view.mcap"
     result = export(mcap)
@@ -100,6 +101,7 @@ def test_forces_and_motion_are_those_of_the_log_at_its_times(tmp_path: Path) -> 
     assert {m.header.frame_id for _, m in found["/ferryid/pose"]} == {"map_ned"}
 
 
+@pytest.mark.slow
 def test_without_a_model_the_profile_s_hull_is_the_base(tmp_path: Path) -> None:
     mcap = tmp_path / "view.mcap"
     result = export(mcap, model=None, profile=FERRY)
@@ -112,6 +114,7 @@ def test_without_a_model_the_profile_s_hull_is_the_base(tmp_path: Path) -> None:
     np.testing.assert_array_equal(wrench(found["/ferryid/force/base"]), base[motion.valid])
 
 
+@pytest.mark.slow
 def test_findings_stand_at_their_times(tmp_path: Path) -> None:
     told = tmp_path / "diagnosis.json"
     findings = (
@@ -144,6 +147,7 @@ def test_findings_stand_at_their_times(tmp_path: Path) -> None:
     assert messages[0][1].status[0].hardware_id == "milliampere"
 
 
+@pytest.mark.slow
 def test_ferryid_reads_it(tmp_path: Path) -> None:
     mcap = tmp_path / "view.mcap"
     result = export(mcap)
@@ -156,6 +160,7 @@ def test_ferryid_reads_it(tmp_path: Path) -> None:
     assert again.read_bytes() == mcap.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_diagnosed_model_is_held_against_the_log(tmp_path: Path) -> None:
     mcap = tmp_path / "view.mcap"
     result = export(mcap, model=MODELS["conditions"])
@@ -200,6 +205,7 @@ def test_a_damaged_finding_is_told(tmp_path: Path) -> None:
     assert [one.time_s for one in told_by(path, read_diagnosis(path, "short"), 100.0)] == [0.0, 0.0]
 
 
+@pytest.mark.slow
 def test_places_that_will_not_do(tmp_path: Path) -> None:
     (tmp_path / "log.mcap").write_bytes(LOG.read_bytes())
     (tmp_path / "there.mcap").write_bytes(b"\x89MCAP0\r\n")

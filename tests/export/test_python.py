@@ -43,6 +43,7 @@ def loaded(model: Model) -> SimpleNamespace:
     return SimpleNamespace(**namespace)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_it_gives_the_force_and_back_the_acceleration(name: str, tmp_path: Path) -> None:
     model, module = MODELS[name], tmp_path / "vessel.py"

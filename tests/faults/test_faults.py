@@ -16,6 +16,7 @@ from tests.faults.system import Operation
 SAMPLE = 8
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="forks, and reads /proc")
 def test_after_any_fault_the_same_command_goes_on_to_the_same_result() -> None:
     seed = random.SystemRandom().randrange(10**6)

@@ -46,6 +46,7 @@ MODELS = (model(1), model(2, (1.0, 0.5, 1.25)), model(3, (0.8, 1.3, 0.9)))
 UNSEEN = with_flow(motion(7), 7)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3).filter(lambda weights: sum(weights) > 0.1))
 @settings(max_examples=15, deadline=None)
 def test_the_force_is_the_weighted_mean_of_the_forces(parts: list[float]) -> None:
@@ -115,6 +116,7 @@ def test_covariance_of_models_without_a_common_log_is_that_of_independent_ones()
         np.testing.assert_allclose(np.sqrt(np.diag(got[axis])), want, rtol=0.02, atol=1e-5)
 
 
+@pytest.mark.slow
 @given(st.floats(-1.0, 1.0), st.floats(0.05, 0.95))
 @settings(max_examples=20, deadline=None)
 def test_covariance_of_models_with_a_common_log_is_never_too_small(correlation: float, w: float) -> None:

@@ -55,6 +55,7 @@ def test_the_best_window_is_the_test_rows_own() -> None:
     assert auto.components < K
 
 
+@pytest.mark.slow
 def test_of_a_given_number_of_components_the_best_window_is_taken() -> None:
     log, windows_s = measured(1, noise=300.0), (0.5, 0.7, 0.9, 1.0, 1.5, 3.0)
     taken = {
@@ -164,6 +165,7 @@ def fitted(monkeypatch: pytest.MonkeyPatch, opened: Opened, log: Measured, windo
     return fit_logs(["short.mcap"], PROFILE, settings, RunContext(Path("nowhere")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("windows_s", [(), WINDOWS_S])
 @pytest.mark.parametrize(("seconds", "gaps"), [(130.0, 0), (240.0, 0), (240.0, 6), (600.0, 12)])
 def test_validation_rows_do_not_reach_the_choice(

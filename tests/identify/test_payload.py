@@ -29,6 +29,8 @@ from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Hull
 
+pytestmark = pytest.mark.slow
+
 Floats = NDArray[np.float64]
 
 PROFILE = load_profile("milliampere")

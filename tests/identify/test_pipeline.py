@@ -43,6 +43,7 @@ def test_a_factor_that_is_hardly_there_is_refused(factor: str, value: float) -> 
     assert FitSettings(sigma=0.0, delta=1e-3).scale == {"delta": 1e-3, "sigma": 0.0, "zeta": 1.0}
 
 
+@pytest.mark.slow
 def test_recovers_the_true_inertia_from_a_base_at_forty_percent(
     monkeypatch: pytest.MonkeyPatch, opened: Opened
 ) -> None:
@@ -53,6 +54,7 @@ def test_recovers_the_true_inertia_from_a_base_at_forty_percent(
     np.testing.assert_allclose(np.diag(mass) / np.diag(PROFILE.hull.M), 1.0, atol=0.25)
 
 
+@pytest.mark.slow
 def test_validation_rows_do_not_reach_the_coefficients(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
     honest = fitted(monkeypatch, opened)
     validation = honest.logs[0].validation
@@ -65,6 +67,7 @@ def test_validation_rows_do_not_reach_the_coefficients(monkeypatch: pytest.Monke
     assert not poisoned.acceptance.accepted or poisoned.acceptance.normalised_mse != honest.acceptance.normalised_mse
 
 
+@pytest.mark.slow
 def test_scores_are_those_of_the_stored_model(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
     result = fitted(monkeypatch, opened)
     log = result.logs[0]
@@ -76,6 +79,7 @@ def test_scores_are_those_of_the_stored_model(monkeypatch: pytest.MonkeyPatch, o
     np.testing.assert_allclose(curve, scores.mse_model / scores.mse_base, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_an_axis_without_force_keeps_its_inertia_and_says_so(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
     motion = opened.measured
     tau = motion.tau * np.array([1.0, 0.0, 1.0])
@@ -109,6 +113,7 @@ def test_held_axes_lose_their_acceleration_terms_only() -> None:
     assert mask.all()
 
 
+@pytest.mark.slow
 def test_several_logs_and_whole_logs_for_validation(tmp_path: Path) -> None:
     logs = [str(FIXTURES / "short.mcap"), str(FIXTURES / "short.bag")]
     result = fit_logs(logs, PROFILE, replace(SETTINGS, split="logs"), RunContext(tmp_path))
@@ -117,6 +122,7 @@ def test_several_logs_and_whole_logs_for_validation(tmp_path: Path) -> None:
     assert [log.motion.log for log in result.logs] == ["short (1)", "short (2)"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("residual", ["commanded", "parallel"])
 @pytest.mark.parametrize("smoother", ["savgol", "kalman"])
 def test_variants_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, residual: str, smoother: str) -> None:
@@ -130,6 +136,7 @@ def test_variants_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, residual:
     assert result.model.settings["residual"] == residual
 
 
+@pytest.mark.slow
 def test_wind_joins_the_basis_only_when_every_log_has_it(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> None:
     assert "wind" in fitted(monkeypatch, opened).model.settings["basis"]
     calm = replace(opened, measured=replace(opened.measured, wind=None))

@@ -34,6 +34,8 @@ from ferryid.types import RunContext
 from tests.identify.rounds import PROFILE, RATE_HZ
 from tests.identify.trials import measured
 
+pytestmark = pytest.mark.slow
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 

@@ -122,6 +122,7 @@ def assert_same(column: np.ndarray, expected: list[Any]) -> None:
         np.testing.assert_array_equal(column, np.array(plain, dtype=column.dtype))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 @given(definition=definitions(), seed=st.integers(0, 2**32 - 1), encoding=st.sampled_from(["ros1", "cdr"]))
 def test_bulk_equals_the_ordinary_decoder(definition: Any, seed: int, encoding: str) -> None:

@@ -382,6 +382,7 @@ def test_inputs_are_not_written_to() -> None:
 times_lists = st.lists(st.integers(-(10**12), 10**12), max_size=60)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.data(), times_lists)
 def test_any_times_give_rising_times_and_account_for_every_row(data: st.DataObject, values: list[int]) -> None:

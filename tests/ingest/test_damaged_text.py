@@ -128,6 +128,7 @@ def test_utf16_without_a_mark_is_read_where_the_profile_names_it(tmp_path: Path)
     assert len(series.receive_ns) == 10
 
 
+@pytest.mark.slow
 def test_a_header_longer_than_the_first_look(tmp_path: Path) -> None:
     names = ",".join(["time", *(f"a long name of column {n}" for n in range(6000))])
     rows = "\n".join(",".join([str(t), *["1"] * 6000]) for t in range(3))

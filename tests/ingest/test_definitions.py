@@ -143,6 +143,7 @@ def test_the_other_topics_of_a_log_are_read(encoding: str, text: str) -> None:
         assert note.startswith("cannot be decoded: the log's definition ")
 
 
+@pytest.mark.slow
 def test_a_definition_costs_no_more_than_its_text() -> None:
     long_texts = [
         ("ros2idl", idl(f"const long A = {'(' * 12}1{')' * 12};")),

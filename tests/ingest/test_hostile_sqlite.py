@@ -310,6 +310,7 @@ def circle(path: Path, table: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("table", ["messages", "timestamp_idx"])
 def test_pages_that_refer_to_each_other_in_circles_come_to_an_end(tmp_path: Path, table: str) -> None:
     path = circle(tmp_path / "log.db3", table)
@@ -319,6 +320,7 @@ def test_pages_that_refer_to_each_other_in_circles_come_to_an_end(tmp_path: Path
     assert time.monotonic() - begun < 15
 
 
+@pytest.mark.slow
 def test_many_topics_take_linear_time(tmp_path: Path) -> None:
     path = database(tmp_path / "log.db3", [])
     count = 20_000
@@ -389,6 +391,7 @@ HOSTILE: dict[str, Callable[[str], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_metadata_is_reported_and_the_recording_read(tmp_path: Path, name: str) -> None:
     folder = recording(tmp_path / "trial", count=50)

@@ -149,6 +149,7 @@ layouts = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None)
 @given(samples_strategy, layouts, st.sampled_from(["ros1", "cdr"]), st.booleans())
 def test_same_answer_as_the_mcap_package(
@@ -193,6 +194,7 @@ def test_same_answer_as_the_mcap_package(
             assert ours.stamp_ns.tolist() == times
 
 
+@pytest.mark.slow
 @settings(max_examples=120, deadline=None)
 @given(
     st.data(),
@@ -247,6 +249,7 @@ def record_bytes(sample: Sample, number: int) -> bytes:
     return builder.end()
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.data(), st.sampled_from(list(CompressionType)), st.sampled_from([400, 1500]), st.booleans())
 def test_a_flipped_byte_costs_at_most_its_chunk_and_is_told(
@@ -287,6 +290,7 @@ def test_a_message_turned_into_the_end_of_the_data_is_told() -> None:
     assert log.losses
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None)
 @given(st.data())
 def test_a_flipped_byte_outside_chunks_costs_one_message(data: st.DataObject) -> None:
@@ -669,6 +673,7 @@ def test_opening_by_content(tmp_path: Path) -> None:
     assert len(reader.read({"/number": ["data"]})["/number"].receive_ns) == len(expected(samples, "/number"))
 
 
+@pytest.mark.slow
 def test_conformance_files(shared_data: Any) -> None:
     """Every published MCAP file: the same messages as the mcap package gives, every checksum right."""
     files = sorted(shared_data("conformance").rglob("*.mcap"))

@@ -128,6 +128,7 @@ PATHS = ["name", "raw[1]", "position.x", "position.y", "track[1].x", "values[0]"
 PATHS += [f"a_{kind}" for kind in NUMERIC]
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.lists(states(), min_size=1, max_size=12))
 def test_protobuf_gives_what_google_gives(messages: list[Any]) -> None:
@@ -224,6 +225,7 @@ leaves = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.lists(leaves, max_size=12), st.booleans())
 def test_json_gives_what_python_gives(messages: list[dict[str, Any]], described: bool) -> None:

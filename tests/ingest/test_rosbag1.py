@@ -421,6 +421,7 @@ def test_what_is_no_bag_is_refused_in_one_line(tmp_path: Path, content: bytes, s
     assert "\n" not in message
 
 
+@pytest.mark.slow
 def test_any_cut_and_any_flipped_bytes_end_in_rows_or_one_line(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     path = write_bag(tmp_path / "a.bag", "lz4", count=60, chunk=1500)
@@ -449,6 +450,7 @@ REAL = ["ROS_example.bag", "tf_example.bag"]
 FIXTURES = ["example.bag", "example-bz2.bag", "example-lz4.bag", "example-unsorted-chunks.bag", "no-messages.bag"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [f"conformance/MichaelGrupp+evo/test/data/{name}" for name in REAL]

@@ -173,6 +173,7 @@ def test_parquet_of_several_row_groups_reads_only_the_wanted_column(tmp_path: Pa
     np.testing.assert_array_equal(series.receive_ns, np.arange(1000) * 5)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     rows=st.lists(
@@ -223,6 +224,7 @@ def test_datetimes_against_the_standard_library(text: str, expected: tuple[int, 
     assert (times.tolist(), good.tolist(), note) == ([seconds * 10**9 + expected[6]], [True], "")
 
 
+@pytest.mark.slow
 @given(st.lists(st.datetimes(min_value=datetime(1700, 1, 1), max_value=datetime(2200, 1, 1)), min_size=1, max_size=5))
 def test_datetimes_of_any_day_against_numpy(moments: list[datetime]) -> None:
     texts = [moment.isoformat(sep=" ", timespec="microseconds") for moment in moments]
@@ -418,6 +420,7 @@ def test_misspelt_column_gets_the_nearest_name(tmp_path: Path) -> None:
         reader.read({"/odom": ("x",)})
 
 
+@pytest.mark.slow
 def test_opening_and_reading_a_csv_does_not_import_pandas(tmp_path: Path) -> None:
     path = write(tmp_path, "log.csv", "time,u,mode\n0,1.5,a\n1,,b\n")
     code = (
@@ -442,6 +445,7 @@ def test_kvlcc2_text(shared_data: Callable[[str], Path]) -> None:
     assert reader.losses == ()
 
 
+@pytest.mark.slow
 def test_milliampere_2025_folder(shared_data: Callable[[str], Path]) -> None:
     reader = open_log(shared_data("milliampere1"))
     assert len(reader.topics) == 21

@@ -14,6 +14,8 @@ from ferryid.signals.track import Motion
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import coriolis, damping
 
+pytestmark = pytest.mark.slow
+
 RATE = 10.0
 
 

@@ -65,10 +65,12 @@ def pushed() -> Motion:
     return sail(lambda _, nu: np.array([-30.0, 20.0, 40.0]))
 
 
+@pytest.mark.slow
 def test_a_perfect_model_leaves_nothing(calm: Motion) -> None:
     np.testing.assert_allclose(compute_residual(PROFILE, calm, NOTHING), 0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_force_that_was_left_out_is_what_remains(pushed: Motion) -> None:
     # tau_mes + extra = F, so that tau_mes - F is the extra force with its sign turned.
     np.testing.assert_allclose(
@@ -138,6 +140,7 @@ def test_commanded_force_in_place_of_measured(pushed: Motion) -> None:
         compute_residual(PROFILE, pushed, NOTHING, "commanded")
 
 
+@pytest.mark.slow
 def test_the_parallel_simulation_of_a_perfect_model_stays_with_the_vessel(calm: Motion) -> None:
     error = compute_residual(PROFILE, calm, NOTHING, "parallel")
     inside = np.isfinite(error).all(axis=1)
@@ -146,6 +149,7 @@ def test_the_parallel_simulation_of_a_perfect_model_stays_with_the_vessel(calm: 
     assert np.abs(error[inside]).max() < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("horizon_s", [0.1, 0.5, 1.0])
 def test_the_parallel_simulation_finds_the_force_that_was_left_out(pushed: Motion, horizon_s: float) -> None:
     error = compute_residual(PROFILE, pushed, NOTHING, "parallel", horizon_s=horizon_s)

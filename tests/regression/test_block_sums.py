@@ -70,6 +70,7 @@ def test_one_block_has_no_near_rows() -> None:
     same(pieces.labelled(np.zeros(1, dtype=np.int64)), rows, np.ones(7, dtype=bool))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("n", "blocks", "purge"), [(60, 3, 0), (200, 7, 3), (3 * CHUNK_ROWS + 11, 5, 40), (400, 12, 9)]
 )

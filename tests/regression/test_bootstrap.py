@@ -112,6 +112,7 @@ def test_spread_of_independent_rows_is_that_of_least_squares() -> None:
     np.testing.assert_allclose((got.high - got.low)[:, 0], 2 * 1.96 * want, rtol=0.12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.9, 0.98])
 def test_intervals_hold_the_truth_as_often_as_they_say(memory: float) -> None:
     """95 % intervals of six coefficients and two intercepts over 40 trials with autocorrelated noise."""

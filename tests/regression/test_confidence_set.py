@@ -18,6 +18,7 @@ def judged(errors: Floats, draws: int = 400) -> Floats:
     return model_confidence_set(errors.mean(axis=0), times @ errors / len(errors), len(errors))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blocks", [20, 100])
 def test_of_equal_models_the_best_by_chance_drives_out_none_in_95_of_100(blocks: int) -> None:
     rng = np.random.default_rng(blocks)

@@ -42,6 +42,7 @@ def judged(rng: np.random.Generator, lengths_s: tuple[float, ...], ratio: float,
     return compare_pairs(logs, draws=DRAWS, seed=seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths_s", [(600.0,), (300.0,), (100.0, 150.0, 300.0)])
 @pytest.mark.parametrize("ratio", [1.0, 0.7])
 def test_intervals_cover_what_is_true_as_often_as_they_say(lengths_s: tuple[float, ...], ratio: float) -> None:

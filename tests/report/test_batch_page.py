@@ -117,6 +117,7 @@ def test_a_day_of_a_manifest_has_no_hour(given: str | None, told: str) -> None:
     assert Table(render(result(row("a.mcap", **more)))).rows[0]["cells"]["date"] == told
 
 
+@pytest.mark.slow
 def test_filters_offer_what_there_is() -> None:
     page = render(hostile())
     assert re.findall(r"<option>(\w+)</option>", page.partition('name="status"')[2].partition("</select>")[0]) == [
@@ -159,6 +160,7 @@ def test_what_was_evaluated_is_named(model: str) -> None:
     assert ("MSE of mine@2 over base" in page) == bool(model)
 
 
+@pytest.mark.slow
 def test_counts_memory_and_time() -> None:
     page = render(hostile())
     assert "4 logs, 2 done; 1 refused; 1 failed by a bug of ferryid" in page

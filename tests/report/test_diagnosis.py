@@ -208,6 +208,7 @@ class Structure(HTMLParser):
         assert self.open.pop() == tag
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_verdict_keeps_to_the_schema_and_leaves_a_whole_page(verdict: str, tmp_path: Path) -> None:
     outcome = report((diagnosis(verdict),), tmp_path)
@@ -228,6 +229,7 @@ def test_every_verdict_keeps_to_the_schema_and_leaves_a_whole_page(verdict: str,
     assert page.count("<svg") == {"not_testable": 0, "explained": 8, "partly_explained": 6}.get(verdict, 3)
 
 
+@pytest.mark.slow
 def test_the_letter_has_its_order() -> None:
     page = explained()[0]
     places = [
@@ -324,6 +326,7 @@ def nameless() -> Finding:
     )
 
 
+@pytest.mark.slow
 def test_what_has_no_name_is_no_fault_of_the_sensors() -> None:
     one = replace(diagnosis("partly_explained"), findings=(wind(), nameless()))
     assert headline(one).startswith("Partly explained: the model left out steady wind; with it,")
@@ -369,6 +372,7 @@ def test_tables_hold_roots_ratios_and_placebos() -> None:
     assert f"position after 20 s [m]</td>{of[0]}2</td>{of[1]}0.6</td>{of[2]}0.30 (0.25 to 0.37)" in page
 
 
+@pytest.mark.slow
 def test_tables_fold_where_a_page_is_narrow() -> None:
     """Every cell says by itself what it is of, as there is no heading above it on a telephone."""
     page = render((diagnosis("explained"), diagnosis("matched")), "trials")[0]
@@ -404,6 +408,7 @@ def test_free_run_is_told_at_the_longest_horizon_that_has_data() -> None:
     assert free_run_rows(replace(one, before={"mse": {}, "free_run": blind})) == []
 
 
+@pytest.mark.slow
 def test_the_table_says_what_its_errors_are_of_and_what_is_not_in_them() -> None:
     moved = Moved("Y_v", "kg/s", -200.0, -230.0, -1.25)
     gusts = replace(nameless(), effect="gusts")
@@ -434,12 +439,14 @@ def test_errors_that_no_finding_changes_are_told_once() -> None:
     assert headline(waves) == "Explained: the model left out waves."
 
 
+@pytest.mark.slow
 def test_the_sign_of_what_is_left_over_is_told_once_where_it_is_drawn() -> None:
     for verdict in ("explained", "matched"):
         assert unbroken(render((diagnosis(verdict),), "trial")[0]).count("model minus measured") == 1
     assert "model minus measured" not in render((diagnosis("not_testable"),), "trial")[0]
 
 
+@pytest.mark.slow
 def test_the_page_says_when_how_and_by_what_it_was_made(tmp_path: Path) -> None:
     one = replace(diagnosis("explained"), duration_s=719.6)
     outcome = report((one,), tmp_path, ("ferryid", "diagnose", "a log.csv"))
@@ -452,6 +459,7 @@ def test_the_page_says_when_how_and_by_what_it_was_made(tmp_path: Path) -> None:
     conforms(outcome.json)
 
 
+@pytest.mark.slow
 def test_a_note_is_told_once() -> None:
     twice = replace(diagnosis("explained"), notes=("The same.", "Another.", "The same."))
     for told in (render((twice,), "trial")[0], as_text((twice,))):
@@ -477,6 +485,7 @@ def test_no_parameter_is_told_by_a_name_that_is_no_word(name: str) -> None:
         assert parameter.name in COEFFICIENTS or "_" not in told
 
 
+@pytest.mark.slow
 def test_how_far_the_hull_went_is_in_the_json(tmp_path: Path) -> None:
     moved = Moved("Y_v", "kg/s", -200.0, -230.0, -1.25)
     outcome = report((replace(diagnosis("explained"), moved=moved),), tmp_path)
@@ -497,6 +506,7 @@ def gusts() -> Finding:
     )
 
 
+@pytest.mark.slow
 def test_what_comes_and_goes_is_shown_by_its_spectrum() -> None:
     one = replace(diagnosis("explained"), findings=(wind(), gusts()))
     page, drawings = render((one,), "trial")
@@ -518,6 +528,7 @@ def test_terminal_text_holds_the_same() -> None:
     assert max(len(line) for line in text.splitlines()) <= 110
 
 
+@pytest.mark.slow
 def test_names_and_sentences_are_escaped() -> None:
     evil = "<script>alert(1)</script>"
     one = replace(diagnosis("explained"), log=evil, notes=(evil,))
@@ -525,6 +536,7 @@ def test_names_and_sentences_are_escaped() -> None:
     assert evil not in render((one,), evil)[0]
 
 
+@pytest.mark.slow
 def test_figures_carry_units_and_only_what_there_is() -> None:
     drawings = explained()[1]
     assert "sway force left over [N]" in drawings["finding-1-evidence"]
@@ -538,6 +550,7 @@ def test_figures_carry_units_and_only_what_there_is() -> None:
     assert render((diagnosis("explained"),), "trial") == explained()
 
 
+@pytest.mark.slow
 def test_several_logs_are_one_object_and_one_page(tmp_path: Path) -> None:
     several = (diagnosis("matched", "a"), diagnosis("explained", "b"), diagnosis("not_testable", "c"))
     outcome = report(several, tmp_path)
@@ -629,6 +642,7 @@ def location() -> Location:
     )
 
 
+@pytest.mark.slow
 def test_where_the_whole_log_differs_is_drawn_and_in_the_json(tmp_path: Path) -> None:
     one = replace(diagnosis("explained"), located=location(), findings=(replace(wind(), band_hz=(0.1, 0.2)), gain()))
     outcome = report((one,), tmp_path)
@@ -673,6 +687,7 @@ def test_where_too_few_windows_tell_not_even_noise_is_shaded() -> None:
     assert {round(one) for one in turned} == {0, 30, 60, 90, 270, 300, 330, 360}
 
 
+@pytest.mark.slow
 def test_a_law_is_in_the_json(tmp_path: Path) -> None:
     term = LawTerm("sway", "r|r|", Estimate(-34.0, -38.0, -30.0, "N/(rad/s)²"), "in sway -34 N")
     one = replace(diagnosis("unexplained"), findings=(replace(nameless(), law=(term,)),))

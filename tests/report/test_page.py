@@ -17,6 +17,8 @@ from ferryid.report.page import headline, render
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.slow
+
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 
 

@@ -30,6 +30,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> StructureSweep:
     return sweep_structures(logs, PROFILE, settings, RunContext(tmp_path_factory.mktemp("out")))
 
 
+@pytest.mark.slow
 def test_a_forest_plot_for_each_way_of_cutting(found: StructureSweep) -> None:
     page, drawings = render(found)
     assert sorted(drawings) == ["basis-blocks", "basis-logs"]
@@ -43,6 +44,7 @@ def test_a_forest_plot_for_each_way_of_cutting(found: StructureSweep) -> None:
             assert f">{text}</text>" in html.unescape(drawing)
 
 
+@pytest.mark.slow
 def test_intervals_are_drawn_where_they_lie(found: StructureSweep) -> None:
     """Width of each drawn interval is in proportion to the logarithm of its ends, over all three panels."""
     one = found.by["blocks"]
@@ -61,6 +63,7 @@ def test_intervals_are_drawn_where_they_lie(found: StructureSweep) -> None:
     np.testing.assert_allclose(widths, scale * spans, atol=0.01)
 
 
+@pytest.mark.slow
 def test_every_number_is_on_it(found: StructureSweep) -> None:
     page = re.sub(r"<svg.*?</svg>", "", render(found)[0], flags=re.DOTALL)
     for one in found.by.values():
@@ -81,6 +84,7 @@ def test_every_number_is_on_it(found: StructureSweep) -> None:
     assert all(note in html.unescape(page) for note in found.notes)
 
 
+@pytest.mark.slow
 def test_what_comes_from_outside_is_escaped(found: StructureSweep) -> None:
     evil = "<script>alert(1)</script>"
     strange = replace(

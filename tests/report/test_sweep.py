@@ -17,6 +17,8 @@ from ferryid.report.sweep_text import headline
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.slow
+
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 WINDOWS_S = {"components": (), "window": (0.5, 1.0, 2.0), "both": (0.5, 1.0, 2.0)}
 

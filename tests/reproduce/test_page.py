@@ -88,6 +88,7 @@ def test_nothing_known_is_a_dash() -> None:
     assert spread([3.0], "m") == "3 m"
 
 
+@pytest.mark.slow
 def test_a_drawing_is_well_formed_and_the_same_every_time() -> None:
     drawing = Drawing(
         "two",

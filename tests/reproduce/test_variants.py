@@ -46,6 +46,7 @@ def test_sensors_without_noise_and_thrusters_without_lag() -> None:
     assert (thrusters.speed_lag_s, thrusters.azimuth_lag_s) == (0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_a_model_learnt_without_wind_areas_stores_none(flight: Flight) -> None:
     assert flight.profile.wind is not None
     bare = without_wind_areas(flight.profile)
@@ -65,6 +66,7 @@ def test_which_third_functions_of_the_wind_are_odd() -> None:
     assert (wrapped(gamma) - wrapped(-gamma)) / 2 == pytest.approx(np.pi * np.sin(gamma))
 
 
+@pytest.mark.slow
 def test_a_constant_force_leaves_the_scatter_and_the_shift_of_the_mean(flight: Flight) -> None:
     motion, master = flight.motion(THESIS.window_s), hull_alone(flight.profile, MASTER)
     left = (motion.tau - master.of(motion))[motion.valid]
@@ -72,6 +74,7 @@ def test_a_constant_force_leaves_the_scatter_and_the_shift_of_the_mean(flight: F
     assert rounds._with_constant((flight, flight, flight), flight.profile) == pytest.approx(np.var(left, axis=0))
 
 
+@pytest.mark.slow
 def test_true_signals_in_a_calm_log_make_the_true_hull(tmp_path: Path) -> None:
     flight = fly(tmp_path, "noisy", controlled(trial("calm"), BASE), 1)
     silent = fly(tmp_path, "silent", controlled(noiseless(trial("calm")), BASE), 1)

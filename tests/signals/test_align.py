@@ -59,6 +59,7 @@ def absolute(track: Track) -> Floats:
     return (track.t0_ns - START_NS) * 1e-9 + track.t
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
@@ -92,6 +93,7 @@ def test_samples_of_a_regular_stream_are_kept_bit_for_bit() -> None:
     np.testing.assert_allclose(track.columns["u"], u[first : first + track.t.size], rtol=0, atol=1e-7)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), gaps=st.lists(st.tuples(st.floats(2, 40), st.floats(0.1, 4)), max_size=3))
 @example(seed=0, gaps=[(10.0, 0.25), (20.0, 0.6), (30.0, 1.5)])
@@ -288,6 +290,7 @@ def test_segments_are_the_unbroken_stretches() -> None:
     assert segments(np.zeros(3, dtype=bool)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("log", "vessel", "rate_hz", "share", "said"),
     [

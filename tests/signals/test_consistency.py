@@ -110,6 +110,7 @@ def test_a_tenth_is_found_in_clean_signals(name: str, gain: float) -> None:
     assert not finding.certain
 
 
+@pytest.mark.slow
 def test_slow_noise_of_a_velocity_is_no_wrong_scale() -> None:
     """Errors of a navigation filter last for many seconds and attenuate the gain, by their size and by chance."""
     fired = 0
@@ -122,6 +123,7 @@ def test_slow_noise_of_a_velocity_is_no_wrong_scale() -> None:
     assert fired <= 2
 
 
+@pytest.mark.slow
 def test_the_undamaged_trial_raises_no_doubt_and_a_tenth_does(tmp_path: Path) -> None:
     ferry = load_profile("milliampere")
     assert open_track(str(written(ten_minutes(), tmp_path / "clean.mcap")), ferry, None).doubts == ()

@@ -34,6 +34,8 @@ from tests.damage import (
     zeros,
 )
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 START = 200.0
 FAULT = 75.0

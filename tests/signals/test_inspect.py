@@ -201,6 +201,7 @@ def test_names_are_cut_only_where_the_terminal_is_narrow() -> None:
         assert end in narrow
 
 
+@pytest.mark.slow
 def test_legend_explains_what_is_shown() -> None:
     log = FIXTURES / "short.bag"
     assert re.search(
@@ -209,6 +210,7 @@ def test_legend_explains_what_is_shown() -> None:
     assert re.search(r"^ppm: [^;]*$", render_inspect(inspect(log), 160), re.M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("relative", "profile"),
     [
@@ -227,6 +229,7 @@ def test_bundled_profile_of_a_real_recording_is_found(
     assert look(shared_data(relative), profile)[0]["vessel"]["usable"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("names", "said"), [((SURGE,), "u: the surge velocity stays at 0"), ((), "u: 99 of 12000 samples repeat")]
 )
@@ -246,12 +249,14 @@ def test_held_velocities_that_a_fit_leaves_out_are_said_with_counts(
     assert f"Lost: no message; a fit leaves out {left['rows']} rows for gaps and faults" in text
 
 
+@pytest.mark.slow
 def test_interpolated_velocities_are_said_with_counts(tmp_path: Path) -> None:
     edit = stuck((SURGE,), float("nan"))
     log = written(changed(ten_minutes(), [(100.0, 0.3)], edit), tmp_path / "short.mcap")
     assert "u: 5 of 12000 samples are missing (NaN); short ones are interpolated." in look(log, "milliampere")[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [3 * 86_400.0, 600.0])
 def test_a_pause_is_judged_by_inspect_as_by_a_fit_with_and_without_a_profile(tmp_path: Path, seconds: float) -> None:
     log, ferry = written(paused(ten_minutes(), 200.0, seconds), tmp_path / "pause.mcap"), load_profile("milliampere")
@@ -282,6 +287,7 @@ def test_a_fixture_is_judged_the_same_with_and_without_its_profile(name: str) ->
     assert (match["usable"], match["problem"]) == (with_profile["usable"], with_profile["problem"])
 
 
+@pytest.mark.slow
 def test_rows_left_out_for_their_times_stand_beside_what_is_lost(tmp_path: Path) -> None:
     made = ten_minutes()
     streams = []

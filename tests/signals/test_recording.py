@@ -252,6 +252,7 @@ def assert_rebuilt(again: Recording, first: Recording, fault: str) -> None:
     assert_same(replace(again, notes=again.notes[:-1]), first)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("touched", [False, True])
 def test_any_flipped_byte_of_a_cached_description_is_found(
     tmp_path: Path, log: Path, boat: Profile, touched: bool
@@ -344,6 +345,7 @@ def test_moved_log_is_read_again_under_its_new_path(tmp_path: Path, log: Path, b
     assert all(loss.file == str(moved) for loss in second.losses)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("profile", "relative", "start_s", "rows"),
     [

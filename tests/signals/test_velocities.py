@@ -120,6 +120,7 @@ def test_a_constant_is_not_held_and_a_wrong_pose_shows_nothing() -> None:
     assert held_velocities(samples(columns), (fault,)) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("log", "vessel"),
     [

@@ -13,6 +13,8 @@ from ferryid.simulate import list_scenarios, load_scenario, simulate, write_log
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.slow
+
 NAMES = tuple(list_scenarios())
 SUFFIXES = (".mcap", ".bag", "")
 

@@ -46,6 +46,7 @@ def messages(path):
             yield connection.topic, connection.msgtype, when, reader.deserialize(raw, connection.msgtype)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
 def test_every_format_holds_every_message(trial, tmp_path, name):
     write_log(trial, tmp_path / name, **LOGS[name])
@@ -116,6 +117,7 @@ def test_custom_definitions_travel_in_the_log(trial, tmp_path):
     assert "MSG: std_msgs/Header" in schemas["ferry_msgs/msg/ThrusterState"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
 def test_same_seed_same_bytes(trial, tmp_path, name):
     again = simulate(trial.scenario)
@@ -222,6 +224,7 @@ def test_run_scenario_says_what_it_wrote(tmp_path):
     assert "twelve-corner-wind" in {one["name"] for one in scenario_listing()["scenarios"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["short.mcap", "short.bag"])
 def test_fixtures_are_what_the_simulator_writes(name):
     simulation = simulate(load_scenario(FIXTURES / "short.toml"))

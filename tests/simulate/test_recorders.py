@@ -64,6 +64,7 @@ def contents(path):
     return raw
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
 def test_nothing_in_a_log_names_its_maker(logs, name):
     raw = contents(logs / name).lower()

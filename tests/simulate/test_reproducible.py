@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 SCENARIO = """
 schema = "ferryid.scenario/1"
 title = "Everything at once"

@@ -96,6 +96,7 @@ def test_bundled_scenarios_fit_their_vessels_and_can_be_fitted(name: str) -> Non
     assert 400.0 <= scenario.duration_s <= 1440.0
 
 
+@pytest.mark.slow
 def test_every_phenomenon_has_a_scenario() -> None:
     """No section of the file is without a bundled scenario that uses it."""
     used: set[str] = set()
@@ -279,6 +280,7 @@ def test_what_is_nested_too_deep(text: str) -> None:
         parse_profile(text, "mine.toml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["seed = " + "9" * 5000, "seed = " + "[" * 5000])
 def test_a_profile_that_breaks_the_reader(text: str) -> None:
     with pytest.raises(FerryIdError, match=r"^mine.toml:1: not valid TOML: "):
@@ -413,6 +415,7 @@ def test_every_section_that_is_left_out_has_its_defaults() -> None:
     }
 
 
+@pytest.mark.slow
 def test_listing_is_light() -> None:
     code = (
         "import sys, ferryid.simulate as s; s.list_scenarios(); print(*{'numba', 'scipy', 'pandas'} & set(sys.modules))"

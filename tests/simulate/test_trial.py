@@ -68,6 +68,7 @@ def test_the_full_model_follows_better_than_the_scaled_one(calm):
 CLOSED = [name for name in list_scenarios() if not load_scenario(name).manoeuvre.kind]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOSED)
 def test_bundled_scenarios_stay_on_their_path(name):
     scenario = load_scenario(name)
@@ -176,6 +177,7 @@ def test_imu_feels_gravity_and_the_turn(trial):
     assert turn.std() == pytest.approx(0.002, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_trial_tells_the_hull_from_the_scaled_base_model():
     """Ordinary least squares on the logged motion brings the force error far below the scaled model's, on other data."""
     scenario = replace(load_scenario("twelve-corner"), duration_s=720.0)

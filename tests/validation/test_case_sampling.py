@@ -86,6 +86,7 @@ def test_a_profile_is_what_a_tank_and_a_drawing_give(vessel, tmp_path) -> None:
     assert 0.5 < wind_areas(vessel).CD_t < 1.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("format", FORMATS)
 def test_a_case_is_written_the_same_each_time_and_its_transfer_log_is_another(format, tmp_path) -> None:
     from dataclasses import replace

@@ -19,6 +19,8 @@ from tests.cli.conftest import ferryid as ferryid_fixture
 from tests.cli.test_every_command import conforms
 from tests.validation.stand_ins import PIPELINE, TALLY
 
+pytestmark = pytest.mark.slow
+
 ferryid_run = ferryid_fixture
 
 

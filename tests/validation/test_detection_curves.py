@@ -57,6 +57,7 @@ def test_without_a_prior_it_is_logistic_regression() -> None:
     assert lost(made.high) == pytest.approx(1.9207, abs=0.02)
 
 
+@pytest.mark.slow
 def test_perfect_separation_has_an_answer_between_the_sizes() -> None:
     made = curve(*runs((0, 0, 6, 6, 6)))
     assert made.size is not None
@@ -82,6 +83,7 @@ def test_what_is_always_or_never_named_is_a_bound() -> None:
     assert rare.low > 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slope", [2.5, 5.0, 10.0])
 def test_intervals_hold_a_known_size_as_often_as_they_say(slope: float) -> None:
     rng = np.random.default_rng(2)
@@ -94,6 +96,7 @@ def test_intervals_hold_a_known_size_as_often_as_they_say(slope: float) -> None:
     assert held >= 0.9 * 80
 
 
+@pytest.mark.slow
 def test_the_ratio_of_two_known_sizes_is_held_as_often_as_it_says() -> None:
     rng = np.random.default_rng(3)
     held, values = 0, []
@@ -112,6 +115,7 @@ def test_the_ratio_of_two_known_sizes_is_held_as_often_as_it_says() -> None:
     assert float(np.median(values)) == pytest.approx(1.5, rel=0.15)
 
 
+@pytest.mark.slow
 def test_ratios_of_what_is_alike_and_of_bounds() -> None:
     sizes, half = runs((0, 0, 6, 6, 6))
     same = ratio(sizes, half, half)

@@ -19,6 +19,8 @@ from ferryid.validation.oracle_calibration import calibrated_thresholds, tail_qu
 from ferryid.validation.records import OracleEstimate, OracleResult
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 BASE = """
 schema = "ferryid.scenario/1"

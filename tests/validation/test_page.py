@@ -42,6 +42,7 @@ def test_a_target_is_reached_when_its_interval_says_so(
     assert share_target("so much", share, **limits).reached is reached
 
 
+@pytest.mark.slow
 def test_the_page_has_commitment_sizes_and_what_was_missed() -> None:
     absent = TransferScore(dict.fromkeys(("surge", "sway", "yaw")), why="pysindy is not installed")
     transfer = TransferResult(absent, {"sindy": absent})
@@ -91,6 +92,7 @@ def test_the_outcome_of_a_target_is_open_where_its_interval_allows_either(share:
     assert share_target("so much", share, at_most=0.01).outcome == outcome
 
 
+@pytest.mark.slow
 def test_the_figures_are_drawings_of_what_there_is() -> None:
     drawn = figures(score(curve_results()))
     assert set(drawn) == {"confusion.svg", "detection.svg", "errors.svg"}

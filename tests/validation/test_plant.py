@@ -130,6 +130,7 @@ def test_the_wind_pushes_as_on_real_ships() -> None:
         assert mirrored[[0, 1, 5]] == pytest.approx(slant[[0, 1, 5]] * [1.0, -1.0, -1.0])
 
 
+@pytest.mark.slow
 def test_gusts_have_their_size_and_memory() -> None:
     t = np.arange(0.0, 4000.0, 0.25)
     made = np.concatenate([gusts(np.random.default_rng(seed), t, 1.3, 8.0) for seed in range(6)], axis=1)
@@ -144,6 +145,7 @@ def test_gusts_have_their_size_and_memory() -> None:
     assert mean(0.1, 0.16) / mean(0.002, 0.006) == pytest.approx(7.2 ** (-5.0 / 3.0), rel=0.5)
 
 
+@pytest.mark.slow
 def test_long_waves_push_the_hull_as_the_water_it_displaces() -> None:
     """In waves much longer than the hull the force of the pressure is the displaced mass times the water's acceleration."""
     vessel = replace(FERRY, added=dict.fromkeys(FERRY.added, 0.0))
@@ -214,6 +216,7 @@ def test_a_late_force_comes_as_late_as_it_should() -> None:
     assert 0.005 * np.sum(1.0 - np.array(forces) / full) == pytest.approx(0.8, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag_s", [0.02, 0.0298, 0.05])
 def test_a_short_lag_is_no_trouble_to_the_integrator(lag_s: float) -> None:
     """Steps of 0.05 s diverge where the stages' rate is 2 / 0.0298 s; a force so little late changes hardly anything."""
@@ -221,6 +224,7 @@ def test_a_short_lag_is_no_trouble_to_the_integrator(lag_s: float) -> None:
     assert np.abs(late.states[:2000, :2] - none.states[:2000, :2]).max() < 0.3
 
 
+@pytest.mark.slow
 def test_steps_agree_with_a_library_integrator() -> None:
     world = world_of(FERRY, payload=(300.0, 1.0, 0.5), mooring=(20.0, 30.0, 4.0, -3.0))
     order = np.array([[700.0, 0.6], [500.0, -1.2]])
@@ -265,6 +269,7 @@ def test_what_comes_aboard_takes_its_momentum_from_the_vessel() -> None:
     assert kept[6] == pytest.approx(0.8, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vessel", VESSELS.values(), ids=list(VESSELS))
 def test_the_autopilot_reaches_its_set_points(vessel: Vessel) -> None:
     trial = simulate_trial(vessel, {}, "calibration", 5)
@@ -276,6 +281,7 @@ def test_the_autopilot_reaches_its_set_points(vessel: Vessel) -> None:
     assert np.median(np.degrees(turned)) < 6.0
 
 
+@pytest.mark.slow
 def test_navigation_errs_by_what_its_instruments_do() -> None:
     trial = simulate_trial(WORKBOAT, {"noise": 1.0}, "calibration", 6)
     true = trial.states[:, [0, 1, 5, 6, 7, 11]]
@@ -292,6 +298,7 @@ def test_navigation_errs_by_what_its_instruments_do() -> None:
     assert np.mean(v[20:] * v[:-20]) > 0.1 * np.mean(v * v)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_trial_and_another_another() -> None:
     conditions = {"wind": (2.0, 1.0), "gust_std": 0.5, "wave_height": 0.03}
     first, again = (simulate_trial(FERRY, conditions, "short", 7) for _ in range(2))
@@ -300,6 +307,7 @@ def test_the_same_seed_gives_the_same_trial_and_another_another() -> None:
     assert not np.allclose(first.reported, other.reported)
 
 
+@pytest.mark.slow
 def test_mistakes_of_the_navigation_are_those_asked_for() -> None:
     right = simulate_trial(FERRY, {}, "short", 9)
     errors = {"lever_m": (0.5, -0.3), "heading_bias_deg": 4.0, "yaw_rate_factor": 1.1}

@@ -86,6 +86,7 @@ def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     sys.modules.pop(f"{effects.__name__}.{NAME}", None)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("added")
 def test_an_effect_is_added_by_one_file(tmp_path: Path) -> None:
     assert list(plant_effects())[-1] == NAME

@@ -56,6 +56,7 @@ def _columns(rng: np.random.Generator, k: int = 30) -> Floats:
     return np.asarray(X / np.sqrt(np.mean(X**2, axis=0)))
 
 
+@pytest.mark.slow
 @CHOOSE
 def test_a_sparse_truth_is_found_term_by_term(choose: Choose) -> None:
     rng = np.random.default_rng(3)
@@ -66,6 +67,7 @@ def test_a_sparse_truth_is_found_term_by_term(choose: Choose) -> None:
     np.testing.assert_allclose(found, truth, atol=0.02)
 
 
+@pytest.mark.slow
 @CHOOSE
 def test_of_noise_next_to_nothing_is_chosen(choose: Choose) -> None:
     rng = np.random.default_rng(4)
@@ -87,6 +89,7 @@ def test_columns_that_are_one_are_kept_once() -> None:
     assert distinct_columns(np.column_stack([a, np.zeros(50), -2.0 * a, b, a + 1e-4 * b])) == [0, 3]
 
 
+@pytest.mark.slow
 def test_a_mass_aboard_leaves_the_force_that_moves_it(base: Base) -> None:
     """The column is what the load takes at the acceleration that vessel and load then have, by the hull module's formula."""
     term = _named(base, "mass aboard")
@@ -117,6 +120,7 @@ def test_a_term_with_an_onset_is_nothing_before_it(base: Base) -> None:
     np.testing.assert_allclose(column[t >= later.onset_s], first[t >= later.onset_s], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_measured_acceleration_is_in_no_column(base: Base) -> None:
     """Or thrust less mass times acceleration would add up to the residual, whatever the vessel does."""
     motion = base.prepared.motion
@@ -200,6 +204,7 @@ def test_a_start_without_mass_is_gone_only_so_far(base: Base) -> None:
     assert hull[0] + found[0] * load[0, 0] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rival", ["sindy", "stepwise"])
 def test_in_a_strong_wind_the_first_name_is_wind(
     windy: tuple[str, Path], profile: Profile, base: Base, rival: str
@@ -213,11 +218,13 @@ def test_in_a_strong_wind_the_first_name_is_wind(
     assert np.mean(after[base.rows, 1:] ** 2) < 0.2 * np.mean(base.residual[base.rows, 1:] ** 2)
 
 
+@pytest.mark.slow
 def test_of_a_weak_thruster_the_first_name_is_that_thruster(tmp_path: Path, profile: Profile) -> None:
     learnt = stepwise.learn(two_logs(tmp_path, WEAK)[0], profile, tmp_path)
     assert (learnt.names[0].effect, learnt.names[0].instance) == ("thruster_gain", "thruster1")
 
 
+@pytest.mark.slow
 def test_the_thesis_names_nothing_and_fits(windy: tuple[str, Path], profile: Profile, base: Base) -> None:
     learnt = RIVALS["thesis"](windy[0], profile, windy[1])
     assert learnt.names == ()

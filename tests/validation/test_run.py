@@ -29,6 +29,8 @@ from ferryid.validation.stages import LogJob, diagnose_case
 from tests.batch.work import children_of, ended, environment
 from tests.validation.stand_ins import PIPELINE, TALLY, OracleMade, chatty, counted
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def tally(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -275,6 +275,7 @@ def curve_results(idle: bool = False) -> list[CaseResult]:
     ]
 
 
+@pytest.mark.slow
 def test_detection_curves_of_a_diagnosis_and_of_its_oracle() -> None:
     lines = curve_results()
     scores = score(lines)
@@ -297,6 +298,7 @@ def test_detection_curves_of_a_diagnosis_and_of_its_oracle() -> None:
     assert (without.oracle, without.ratio) == (None, None)
 
 
+@pytest.mark.slow
 def test_what_became_of_what_the_oracle_alone_named() -> None:
     weak = result([WEAK], [finding("wind")], "thruster_gain")
     key = ("thruster_gain", "thruster1")
@@ -321,6 +323,7 @@ def test_the_size_of_a_cell_is_that_of_what_it_is_called_after() -> None:
     assert detections(lines, {})[0].blind.named == 0
 
 
+@pytest.mark.slow
 def test_scores_are_plain_data() -> None:
     scores = score(curve_results())
     plain = json.loads(json.dumps(scores.to_json(), allow_nan=False))
@@ -340,6 +343,7 @@ def test_scores_of_nothing_are_no_error() -> None:
     json.dumps(empty.to_json(), allow_nan=False)
 
 
+@pytest.mark.slow
 def test_scoring_draws_nothing() -> None:
     code = "import sys, ferryid.validation.oracle, ferryid.validation.scores; print('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

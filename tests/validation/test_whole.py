@@ -5,9 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 from ferryid.validation.commitment import verified_answers
 from ferryid.validation.evaluators import pipeline
 from ferryid.validation.run import run_validation
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_gross_wind_in_five_minutes(tmp_path: Path) -> None:

@@ -19,6 +19,8 @@ from ferryid.validation.worker_client import WorkerClient
 from ferryid.vessel import load_profile
 from tests.batch.work import ended, environment
 
+pytestmark = pytest.mark.slow
+
 STAND_IN = ("-m", "tests.validation.worker_stand_in")
 PROFILE = load_profile("milliampere").text
 

@@ -62,6 +62,7 @@ def test_force_is_the_sum_of_the_matrices(nu: Floats, nu_dot: Floats) -> None:
     )
 
 
+@pytest.mark.slow
 @given(SPEEDS, SPEEDS, SPEEDS)
 def test_forward_is_the_inverse(nu: Floats, nu_dot: Floats, current: Floats) -> None:
     nu_c = (current * [1.0, 1.0, 0.0])[None]
@@ -69,6 +70,7 @@ def test_forward_is_the_inverse(nu: Floats, nu_dot: Floats, current: Floats) -> 
     np.testing.assert_allclose(forward(MILLIAMPERE, nu[None], tau, nu_c)[0], nu_dot, atol=1e-9)
 
 
+@pytest.mark.slow
 @given(SPEEDS, SPEEDS, SPEEDS)
 def test_a_steady_current_is_a_moving_frame(nu: Floats, nu_dot: Floats, current: Floats) -> None:
     """Forces do not depend on the frame's steady speed (Galileo): they are those of still water at nu_r."""

@@ -64,6 +64,7 @@ def factor(expected: Floats, measured: Floats) -> float:
     return float(expected @ measured / (expected @ expected))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "log", "rows", "tolerance"),
     [
@@ -149,6 +150,7 @@ def test_a_bag_without_navigation_is_refused_in_one_line(shared_data: Locate) ->
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_milliampere_heading_is_clockwise_from_north_beside_an_enu_velocity(shared_data: Locate) -> None:
     """The receiver's quaternion against the ferry's own navigation, which says that it is NED."""
     profile = load_profile("milliampere-2025")

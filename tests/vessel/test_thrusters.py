@@ -115,6 +115,7 @@ def test_measured_kvlcc2_thrust_agrees_with_its_open_water_curve() -> None:
     assert value == pytest.approx([41.0], rel=0.1)
 
 
+@pytest.mark.slow
 @given(st.floats(-300, 300), st.floats(-300, 300), st.floats(-300, 300))
 def test_allocated_forces_sum_to_the_demand(boat: Boat, X_d: float, Y_d: float, N_d: float) -> None:
     """NSCA (Torben et al. 2019): the forces it allocates must sum to the demand through our geometry."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -70,6 +71,7 @@ KEYS = st.text(alphabet="abcxyz_|.=[]# ", min_size=1, max_size=6)
 VALUES = st.sampled_from(["1", '"a"', "[1, 2]", "[\n  1,\n  2,\n]", '"""\n[x]\ny = 1\n"""', "'#['", "{ a = 1 }"])
 
 
+@pytest.mark.slow
 @given(st.dictionaries(KEYS, st.dictionaries(KEYS, VALUES, max_size=4), max_size=4))
 def test_lines_of_written_tables(tables: dict[str, dict[str, str]]) -> None:
     text, expected = "", {}

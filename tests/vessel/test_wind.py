@@ -56,6 +56,7 @@ def test_drifting_with_the_wind_gives_no_load() -> None:
     np.testing.assert_allclose(load(3.0, 0.0, nu=[[3.0, 0.0, 0.0]]), 0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 @given(st.floats(-20, 20), st.floats(-20, 20), st.floats(-4, 4))
 def test_mirror_and_rotation(north: float, east: float, psi: float) -> None:
     mirrored = load(north, -east) * [1.0, -1.0, -1.0]

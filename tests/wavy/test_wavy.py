@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.wavy.wavy import AXES, lines, wavy
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_hull_learnt_in_waves_serves_in_calm_water(tmp_path: Path) -> None:

@@ -130,6 +130,7 @@ def test_a_gyro_of_the_wrong_sign() -> None:
     assert "sign" in finding.says
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "effect", "truth"),
     [
@@ -158,6 +159,7 @@ def test_an_error_is_found_alone_and_its_intervals_hold_the_truth(
     assert min(within.values()) >= 10, within
 
 
+@pytest.mark.slow
 def test_knots_for_metres_per_second_are_named() -> None:
     knots = 1.0 / 0.514444
     findings = [alone(scaled(sailed(seed), knots, knots, 1.0), "velocity_scale") for seed in TRIALS]
@@ -165,6 +167,7 @@ def test_knots_for_metres_per_second_are_named() -> None:
     assert sum(found.parameters["factor"].low <= knots <= found.parameters["factor"].high for found in findings) >= 10
 
 
+@pytest.mark.slow
 def test_several_errors_at_once_are_told_apart() -> None:
     scene = scaled(turned(armed(sailed(1, noise=QUIET), 1.5, 0.0), 8.0), 1.1, 1.1, 0.9)
     findings = {finding.effect: finding for finding in examine(scene)[0]}
@@ -174,6 +177,7 @@ def test_several_errors_at_once_are_told_apart() -> None:
     holds(findings["heading_bias"], angle=8.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "navigation",
     [Navigation(antenna_m=(1.2, -0.4)), Navigation(heading_bias_deg=4.0), Navigation(delay_s=0.4)],
@@ -183,6 +187,7 @@ def test_what_position_velocity_and_heading_share_is_left_to_forces(navigation: 
     assert examine(sailed(1, navigation=navigation, noise=QUIET))[0] == ()
 
 
+@pytest.mark.slow
 def test_a_heading_interpolated_through_the_wrap_is_repaired() -> None:
     clean = sailed(1, noise=QUIET)
     true = np.unwrap(wrap(clean.psi + 3.0))
@@ -194,6 +199,7 @@ def test_a_heading_interpolated_through_the_wrap_is_repaired() -> None:
     assert np.abs(repaired.psi - true).max() < 0.05
 
 
+@pytest.mark.slow
 def test_repeats_of_an_old_state_are_no_measurement() -> None:
     scene = sailed(1, navigation=Navigation(dropouts_per_min=1.0, dropout_s=1.0))
     finding = alone(scene, "held_samples")
@@ -227,6 +233,7 @@ def test_a_vessel_at_rest_and_a_short_log_tell_nothing() -> None:
     assert examine(replace(scene, eta=still, nu_raw=still, nu=still))[0] == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", ["heading", "hold"])
 def test_the_velocity_in_products_is_made_anew_of_what_was_corrected(error: str) -> None:
     right = quiet(2)
@@ -244,6 +251,7 @@ def test_the_velocity_in_products_is_made_anew_of_what_was_corrected(error: str)
     assert np.abs(corrected.nu - steady)[rows, :2].max() < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("along", "turning"), [(1.9438, 1.0), (1.0, 1.2)])
 def test_the_velocity_in_products_has_the_scale_that_was_found(along: float, turning: float) -> None:
     right = quiet(2)

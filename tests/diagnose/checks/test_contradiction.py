@@ -48,6 +48,7 @@ WRONG: dict[str, tuple[Callable[[Measurements], Measurements], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 def test_force_and_motion_that_contradict_each_other_are_refused(name: str) -> None:
     wrong, says = WRONG[name]

@@ -64,6 +64,7 @@ def fitted() -> CampaignHull:
     return fit_campaign_hull(members(), SPREAD, NONE_INDUCED)
 
 
+@pytest.mark.slow
 def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
     hull = fitted()
     for wind, values, errors in zip(WINDS, hull.values, hull.errors, strict=True):
@@ -71,6 +72,7 @@ def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
         assert (np.abs(values[0] - wind) < 5.0 * errors[0]).all()
 
 
+@pytest.mark.slow
 def test_the_common_hull_is_nearer_the_true_one_than_it_was_thought() -> None:
     mean, covariance = fitted().belief()
     known = np.sqrt(np.diag(covariance))[: len(SPREAD)] < 0.3 * SPREAD
@@ -80,6 +82,7 @@ def test_the_common_hull_is_nearer_the_true_one_than_it_was_thought() -> None:
     assert after[known].sum() < 0.35 * before[known].sum()
 
 
+@pytest.mark.slow
 def test_a_log_has_no_part_in_what_the_others_say() -> None:
     alone = fit_campaign_hull(members()[:2], SPREAD, NONE_INDUCED)
     mean, covariance = fitted().belief(without=2)
@@ -92,6 +95,7 @@ def test_a_log_has_no_part_in_what_the_others_say() -> None:
     assert np.linalg.norm(mean - fitted().belief()[0]) > np.linalg.norm(mean - expected)
 
 
+@pytest.mark.slow
 def test_logs_of_one_hull_agree_and_of_another_do_not() -> None:
     assert fitted().disagreement < 1.6
     assert fit_campaign_hull(members(1.4), SPREAD, NONE_INDUCED).disagreement > 2.0 * fitted().disagreement
@@ -117,6 +121,7 @@ def test_the_hull_as_a_suspect_has_the_same_mean_and_covariance() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
     hull = fitted()
     first = members()[0]
@@ -125,6 +130,7 @@ def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
     assert made.values[0] == pytest.approx(WINDS[0], abs=0.35)
 
 
+@pytest.mark.slow
 def test_winds_hold_on_held_out_stretches_and_placebos_do_not() -> None:
     bare = [replace(member, candidates=()) for member in members()]
     gains = held_out_gains({"found": members(), **placebos(members())}, bare, SPREAD, NONE_INDUCED)

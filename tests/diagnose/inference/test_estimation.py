@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
@@ -78,6 +79,7 @@ def problem(true_force: float, seed: int = 0) -> EstimationProblem:
     return EstimationProblem(moved, plain, white, np.full(len(plain.hull), 1e-9), NoiseModel(NOISE))
 
 
+@pytest.mark.slow
 def test_a_linear_hypothesis_has_the_mean_spread_and_evidence_of_the_formula() -> None:
     size, mass = 50.0, FERRY.hull.M[0, 0]
     case = problem(60.0)
@@ -99,6 +101,7 @@ def test_a_linear_hypothesis_has_the_mean_spread_and_evidence_of_the_formula() -
     np.testing.assert_allclose(found.evidence - nothing.evidence, known, rtol=1e-3, atol=1e-2)
 
 
+@pytest.mark.slow
 def test_evidence_weighs_filters_against_each_other() -> None:
     case = problem(0.0)
     y, h = case.steps.measured[DIFFUSE:, :3], stride_s(case.steps)

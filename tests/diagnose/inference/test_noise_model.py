@@ -208,6 +208,7 @@ def noisy() -> tuple[Windows, Floats]:
     return replace(steps, measured=np.tile(gaps, 2)), gaps
 
 
+@pytest.mark.slow
 def test_matching_noise_is_whitened(noisy: tuple[Windows, Floats]) -> None:
     steps, gaps = noisy
     white = make_whitening_filter(NoiseModel(TRUE), steps).white(gaps).reshape(gaps.shape)
@@ -222,6 +223,7 @@ def test_matching_noise_is_whitened(noisy: tuple[Windows, Floats]) -> None:
     np.testing.assert_allclose(columns, white.reshape(-1, 1) * [1.0, -2.0], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [None, 3.0, -3.0], ids=["no start", "start too large", "start too small"])
 def test_noise_is_learnt(noisy: tuple[Windows, Floats], wrong: float | None) -> None:
     steps, gaps = noisy
@@ -450,6 +452,7 @@ def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[EstimationProbl
     return made
 
 
+@pytest.mark.slow
 def test_a_closed_loop_does_not_bias_what_prediction_errors_estimate() -> None:
     # The controller answers as often as the filter looks: every 0.4 s, the steps of windows of 8 s.
     t, seen, force = looped(0.4)
@@ -472,6 +475,7 @@ def test_a_closed_loop_does_not_bias_what_prediction_errors_estimate() -> None:
     assert np.abs(wrong).max() > 10.0
 
 
+@pytest.mark.slow
 def test_a_fit_and_its_noise_learnt_in_turn_come_to_the_truth() -> None:
     t, seen, force = looped(0.4)
     for problem, plain in trials(seen, force, t)[:1]:
@@ -484,6 +488,7 @@ def test_a_fit_and_its_noise_learnt_in_turn_come_to_the_truth() -> None:
         assert (np.abs(made.values[0] - [1.0, 0.0]) < 5.0 * made.errors(0)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time_constant_s", [0.05, 0.5, 4.0])
 def test_the_thrusters_lag_is_that_of_its_equation(time_constant_s: float) -> None:
     t = np.arange(0.0, 20.0, STEP_S)

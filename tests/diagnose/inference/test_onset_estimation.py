@@ -38,6 +38,7 @@ def pushed(force: float, first_s: float, last_s: float) -> EstimationProblem:
     return replace(case, plain=replace(case.plain, external=away))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first_s", "last_s"), [(0.0, inf), (100.0, inf), (0.0, 180.0), (90.0, 170.0)])
 def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: float) -> None:
     case = pushed(240.0, first_s, last_s)
@@ -78,6 +79,7 @@ def test_where_nothing_pushes_no_span_is_promising() -> None:
     assert promising_spans(case, linearise(case, bare, starting_point(case, bare)), PUSH) == []
 
 
+@pytest.mark.slow
 def test_the_gain_of_a_span_is_that_of_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
@@ -121,6 +123,7 @@ def test_in_a_gap_nothing_begins_or_ends() -> None:
     assert not [end for end in ends if 101.0 < end < 199.0]
 
 
+@pytest.mark.slow
 def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None:
     load = "[[payload]]\nmass_kg = 300\nx_m = 0.6\nuntil_s = 400\n"
     case = trial_on(sailed(tmp_path, "leaves", TWELVE + load, 5))
@@ -133,6 +136,7 @@ def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None
     assert found.values[0] == pytest.approx([300.0, 0.6], rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_fault_that_passes_is_found_with_both_its_ends(tmp_path: Path) -> None:
     fault = '[[thrusters.faults]]\nthruster = "thruster2"\nfactor = 0.55\nfrom_s = 260\nuntil_s = 400\n'
     case = trial_on(sailed(tmp_path, "passes", TWELVE + fault, 6))

@@ -16,6 +16,8 @@ from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats
 from tests.diagnose.inference.test_estimation import PUSH, problem
 
+pytestmark = pytest.mark.slow
+
 
 def both(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """A constant force ahead, the product of two factors."""

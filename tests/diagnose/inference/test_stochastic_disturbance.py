@@ -71,6 +71,7 @@ def test_the_spectrum_of_a_disturbance_is_the_transform_of_its_covariance(freque
     np.testing.assert_allclose(density(process, at), expected, rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 6])
 def test_gusts_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     gusts = f"environment = {{ wind = {{ {WIND}, gust_std_mps = {TRUE_GUST}, gust_time_s = 8.0 }} }}\n"
@@ -84,6 +85,7 @@ def test_gusts_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     assert evidence["before"][slow].min() > 3.0 * np.median(evidence["before"][evidence["frequency"] > 0.5])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 6])
 def test_waves_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     waves = "waves = { significant_height_m = 0.12, peak_period_s = 2.4, direction_deg = 225.0 }"
@@ -97,6 +99,7 @@ def test_waves_are_a_state_and_no_delay(seed: int, tmp_path: Path) -> None:
     assert 0.2 < evidence["before"].max() / evidence["explained"].max() < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 6])
 @pytest.mark.parametrize("wind", ["", f"environment = {{ wind = {{ {WIND} }} }}\n"], ids=["calm", "steady wind"])
 def test_where_nothing_comes_and_goes_there_are_no_states(wind: str, seed: int, tmp_path: Path) -> None:

@@ -95,6 +95,7 @@ def test_windows_average_derivatives_of_polynomials_exactly() -> None:
     np.testing.assert_allclose(measured, np.broadcast_to([0.3, 0.0, 0.0, 0.1, 0.2, 0.0], measured.shape), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_no_window_reaches_over_unusable_rows() -> None:
     scene, _ = sailed()
     usable = np.ones(len(scene.t), dtype=bool)

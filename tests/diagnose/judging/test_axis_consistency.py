@@ -12,6 +12,8 @@ from ferryid.diagnose.judging.sparse_regression import select_law
 from ferryid.effects import effects
 from tests.diagnose.judging.test_unexplained import FERRY, sailed, trial_with
 
+pytestmark = pytest.mark.slow
+
 GAIN = effects()["thruster_gain"]
 
 

@@ -12,6 +12,8 @@ from ferryid.diagnose.inference.search import list_candidates, search
 from ferryid.diagnose.judging.backward_elimination import LAW, PLACEBO, _fallen, _told, eliminate_backward
 from tests.diagnose.trials import sailed, trial_on
 
+pytestmark = pytest.mark.slow
+
 TRIAL = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"

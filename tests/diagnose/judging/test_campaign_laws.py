@@ -96,6 +96,7 @@ def test_what_a_law_explains_is_not_said_twice() -> None:
     assert said.gains(terms(("north", "1")), np.array([1.0])) == (0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_others_are_counted_by_what_they_can_show() -> None:
     logs = with_force(1)
     problem, kept = logs["0"]
@@ -115,6 +116,7 @@ def test_others_are_counted_by_what_they_can_show() -> None:
     assert finding.says.endswith("Of 1 other log none could show it at this size.")
 
 
+@pytest.mark.slow
 def test_a_law_of_all_logs_is_told_in_each_of_them_and_fitted_to_the_others() -> None:
     logs = with_force(LOGS)
     told = find_campaign_laws(logs)
@@ -133,6 +135,7 @@ def test_a_law_of_all_logs_is_told_in_each_of_them_and_fitted_to_the_others() ->
         assert finding.law[0].coefficient.low < SIZE < finding.law[0].coefficient.high
 
 
+@pytest.mark.slow
 def test_noise_and_hulls_that_are_off_have_no_law_in_common() -> None:
     logs = {}
     for seed in range(LOGS):

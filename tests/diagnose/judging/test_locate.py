@@ -72,6 +72,7 @@ T = np.arange(0.0, SECONDS, STEP_S)
 PSI = 2.0 * np.pi / 100.0 * T
 
 
+@pytest.mark.slow
 def test_a_push_in_sway_shows_in_sway() -> None:
     shape = np.zeros((len(T), 3))
     shape[:, 1] = 60.0 * np.sin(T / 6.0)
@@ -84,6 +85,7 @@ def test_a_push_in_sway_shows_in_sway() -> None:
     assert where.offset_s is None
 
 
+@pytest.mark.slow
 def test_a_push_for_a_time_begins_and_ends() -> None:
     shape = np.zeros((len(T), 3))
     acts = (T >= 200.0) & (T < 420.0)
@@ -95,6 +97,7 @@ def test_a_push_for_a_time_begins_and_ends() -> None:
     assert where.offset_s == pytest.approx(420.0, abs=10.0)
 
 
+@pytest.mark.slow
 def test_a_push_at_some_headings_is_told_by_the_heading() -> None:
     heading = np.degrees(PSI) % 360.0
     shape = np.zeros((len(T), 3))
@@ -114,6 +117,7 @@ def test_a_push_at_some_headings_is_told_by_the_heading() -> None:
     assert abs(seen[9]) < 25.0
 
 
+@pytest.mark.slow
 def test_a_fast_push_lies_in_its_frequency_band() -> None:
     shape = np.zeros((len(T), 3))
     shape[:, 0] = 80.0 * np.sin(2.0 * np.pi * 0.15 * T)
@@ -125,6 +129,7 @@ def test_a_fast_push_lies_in_its_frequency_band() -> None:
     assert 0.7 * 3200.0 < gained[0.1, 0.2] < 3200.0
 
 
+@pytest.mark.slow
 def test_without_a_mismatch_nothing_stands_out() -> None:
     problem = trial_on()
     alone = fit(problem, ())
@@ -136,6 +141,7 @@ def test_without_a_mismatch_nothing_stands_out() -> None:
     assert all(np.array_equal(band.before, band.after) for band in where.bands)
 
 
+@pytest.mark.slow
 def test_errors_that_grow_are_found_without_any_explanation() -> None:
     shape = np.zeros((len(T), 3))
     late = T > 400.0

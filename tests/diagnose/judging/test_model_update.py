@@ -35,6 +35,8 @@ from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 FOULED = "[fouling]\nsurge = 1.8\nsway = 1.3\nyaw = 1.3\n"
 WINDY = "[environment.wind]\nnorth_mps = -3.0\neast_mps = 2.0\n"

@@ -30,6 +30,8 @@ from ferryid.effects.force_model import ForceModel, Measurements, acceleration, 
 from ferryid.types import Floats
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 SECONDS, STEP_S = 720.0, 0.1
 T = np.arange(0.0, SECONDS, STEP_S)

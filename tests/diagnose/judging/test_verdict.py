@@ -125,6 +125,7 @@ def diagnoses(draw: st.DrawFn) -> Diagnosis:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=500, deadline=None)
 @given(diagnoses())
 def test_no_sentence_contradicts_findings_and_figures(one: Diagnosis) -> None:
@@ -157,6 +158,7 @@ def test_no_sentence_contradicts_findings_and_figures(one: Diagnosis) -> None:
         assert re.search(rf"In [^.]*{axis}[^.]* more force is left", says)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.lists(diagnoses(), min_size=2, max_size=4))
 def test_no_sentence_on_several_logs_contradicts_them(logs: list[Diagnosis]) -> None:

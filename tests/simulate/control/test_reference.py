@@ -33,6 +33,7 @@ def test_step_response_is_the_critically_damped_third_order_one():
         advance_reference(FREE, ref, (15.0, 0.0, 0.0), 0.05)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(st.floats(-40, 40), st.floats(-40, 40), st.floats(-pi, pi))
 def test_it_keeps_its_limits_and_arrives_without_overshoot(x, y, psi):

@@ -87,6 +87,7 @@ def split_rates(eta, nu, tau, wind, current, *, turning=0.0, payload=(0.0, 0.0),
     return np.concatenate([R @ nu, np.linalg.solve(M_RB + M_A, right)])
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(states, forces, flows, streams, st.floats(-90, 90), st.floats(0, 900), st.floats(-2, 2))
 def test_rates_equal_the_split_into_rigid_body_and_added_mass(adrift, state, tau, wind, current, turning, mass, place):
@@ -145,6 +146,7 @@ WAVES = Waves(significant_height_m=0.2, peak_period_s=3.0, direction_deg=50.0, c
 sea_amplitude = 0.2 / 4.0 * np.sqrt(2.0 / 6.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("waves", "tolerance"), [(Waves(), 2e-6), (WAVES, 2e-5)])
 def test_integrator_against_a_tight_adaptive_one(make, waves, tolerance):
     """All of it at once; the table of wave force over heading is the only approximation."""

@@ -151,6 +151,7 @@ def test_a_thruster_in_the_wake_of_another_loses():
     assert half == pytest.approx((1.0 - 0.15) * F, rel=0.01)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     # No encoder tells a speed of less than this from zero, and the advance ratio at it overflows.

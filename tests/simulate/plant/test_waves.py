@@ -95,6 +95,7 @@ def pressure_force(frequency, amplitude, go, t, x, y, psi, phase):
     return X, -(W * sides).sum(), N - (W * along * sides).sum()
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     st.floats(0.8, 8.0),
@@ -171,6 +172,7 @@ def test_a_vessel_of_unknown_size_is_refused():
     assert len(sea_of(load_profile("vtec-usv"), Waves(), (), 1).frequency) == 0
 
 
+@pytest.mark.slow
 def test_oscillator_against_scipy():
     t = np.linspace(0.0, 12.0, 601)
     drive = 0.1 * np.sin(2.0 * t) + 0.05 * np.cos(7.0 * t)
@@ -184,6 +186,7 @@ def test_oscillator_against_scipy():
     np.testing.assert_allclose(values, exact, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_on_long_waves_the_hull_lies_flat_on_the_water():
     period = np.sqrt(2.0 * pi * 8000.0 / G)
     t = np.arange(1000.0, 1100.0, 0.05)
