@@ -15,7 +15,7 @@ class CompareThresholds:
         0.005,
         "of the mean square",
         "difference below which two models are alike, however certain",
-        "convention: half a per cent matters in no application",
+        "convention: half a per cent, too little to prefer one",
     )
     significance: float = threshold(
         0.05, "-", "probability by chance, corrected for all comparisons, below which one is better", "convention: 5 %"

@@ -26,9 +26,10 @@ ORDER = (
 HEAD = f"""# Thresholds
 
 Every number that decides what is found, left out, named, lowered to a hint or accepted, with its unit, its meaning and what it
-rests on: *{BASES[0]}* from something else, a *{BASES[1]}* that stands for something, or *{BASES[2]}* data. This page is made
-from the dataclasses in the `thresholds` modules (`python -m tests.docs.thresholds`), and a test fails when it no longer agrees
-with them. Sizes of buffers, bounds of iterations and grids of searches are not here.
+rests on: *{BASES[0]}* from something else, a *{BASES[1]}* that stands for something, or *{BASES[2]}* data that led to
+the rule or to its value. This page is made from the dataclasses in the `thresholds` modules
+(`python -m tests.docs.thresholds`), and a test fails when it no longer agrees with them. Sizes of buffers, bounds of iterations
+and grids of searches are not here.
 """
 
 

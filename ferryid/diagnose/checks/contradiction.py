@@ -111,8 +111,8 @@ def _left(scene: Measurements, push: NDArray[np.complexfloating[Any, Any]]) -> f
     if size <= CHECKS.no_push * float(np.linalg.norm(means[:, 0])) or spread == 0.0:
         return 1.0
     gain = complex(np.vdot(felt, rest)) / size**2
-    if not CHECKS.least_inertia < abs(gain) < CHECKS.most_inertia or abs(np.angle(gain)) > np.radians(
-        CHECKS.inertia_angle_deg
+    if not CHECKS.least_response < abs(gain) < CHECKS.most_response or abs(np.angle(gain)) > np.radians(
+        CHECKS.response_angle_deg
     ):
         return 1.0
     return float(np.linalg.norm(rest - gain * felt) / spread) ** 2

@@ -168,16 +168,19 @@ class CheckThresholds:
         "convention: above noise, below a manoeuvre",
     )
     opposed_windows: int = threshold(60, "windows", "fewer are not judged", "convention: four minutes of motion")
-    least_inertia: float = threshold(
-        0.2, "1/mass", "least coefficient of a force", "convention: added mass of four times the hull's"
+    least_response: float = threshold(
+        0.2,
+        "1/mass",
+        "least acceleration by a force, as a mass of five times the hull's gives",
+        "convention: added mass of four times the hull's",
     )
-    most_inertia: float = threshold(
-        5.0, "1/mass", "largest coefficient of a force", "convention: the reciprocal of the least"
+    most_response: float = threshold(
+        5.0, "1/mass", "largest acceleration by a force", "convention: the reciprocal of the least"
     )
-    inertia_angle_deg: float = threshold(
+    response_angle_deg: float = threshold(
         30.0,
         "deg",
-        "angle by which the coefficient differs from a real one at most",
+        "largest angle between force and acceleration",
         "convention: surge and sway masses differ",
     )
     opposed_left: float = threshold(

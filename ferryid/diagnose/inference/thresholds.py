@@ -15,7 +15,7 @@ class InferenceThresholds:
         0.12,
         "of the coefficient",
         "standard deviation of the prior of the hull's coefficients",
-        "convention: how well a hull model is known; profiles of simulated trials are off by as much",
+        "convention: how well a hull model is known",
     )
     posterior_factor: float = threshold(
         1.5,
