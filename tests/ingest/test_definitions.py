@@ -209,6 +209,8 @@ def test_names_that_are_not_of_ros_reach_no_generated_code(
     define("warm/msg/Up", RecordedText("ros2msg", "float64 x\n"), "", "")
     for store in Stores:
         get_typestore(store)
+    # The decoder of the log's other topic is generated once.
+    assert refusal(("x/msg/Y", "ros2msg", b"what is this"))
     ran: list[Any] = []
     monkeypatch.setattr(builtins, "exec", lambda *code: ran.append(code))
     for encoding in ("ros1msg", "ros2msg"):
