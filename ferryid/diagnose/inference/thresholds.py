@@ -129,7 +129,7 @@ class InferenceThresholds:
         2.3,
         "-",
         "Kuiper's statistic of changes of a mean above which there is one",
-        "tuned on simulated series of noise, of which three in a hundred have one; 1.95 before",
+        "derived: one change in a thousand by chance; of whole series of noise, three in a hundred have one",
     )
     active_share: float = threshold(
         0.25,
