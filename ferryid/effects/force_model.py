@@ -17,8 +17,8 @@ from ferryid.counts import counted
 from ferryid.effects.equations_of_motion import accelerations, from_antenna, required, slopes
 from ferryid.types import Floats, Ints
 from ferryid.vessel.hull import payload_mass
-from ferryid.vessel.profile import Profile
-from ferryid.vessel.wind import wind_force
+from ferryid.vessel.profile import Profile, WindAreas
+from ferryid.vessel.wind import relative_wind_force, wind_force
 
 MASS = ("m11", "m22", "m23", "m32", "m33")
 SURGE = ("X_u", "X_|u|u", "X_uuu")
@@ -96,6 +96,11 @@ class Measurements:
     def pointing(self) -> tuple[Floats, Floats]:
         """Cosine and sine of the heading, shape (n,) each."""
         return np.cos(self.psi), np.sin(self.psi)
+
+    @cached_property
+    def wind_loads(self) -> dict[tuple[float, ...], Floats]:
+        """Loads that were worked out already, by what tells them apart; see `ferryid.effects.wind.mean_load`."""
+        return {}
 
     @cached_property
     def turning(self) -> Floats:
@@ -275,6 +280,17 @@ def aboard(payload: Floats) -> Floats:
     return payload_mass(payload)[:, [0, 1, 1, 2, 2], [0, 1, 2, 1, 2]]
 
 
+def wind_load(scene: Measurements, areas: WindAreas, air: Floats) -> Floats:
+    """Return the load of a wind that is steady over ground [N, N, N·m], shape (n, 3).
+
+    `air` is where it goes to, north and east [m/s], shape (2,).
+    """
+    cos, sin = scene.pointing
+    north, east = air.tolist()
+    u_w, v_w = cos * north + sin * east, cos * east - sin * north
+    return relative_wind_force(areas, scene.nu[:, 0] - u_w, scene.nu[:, 1] - v_w)
+
+
 def between(
     before: ForceModel, after: ForceModel, onset_s: float, offset_s: float = inf, kick: Floats | None = None
 ) -> ForceModel:
@@ -289,7 +305,7 @@ def between(
         after = replace(after, external=external)
 
     def mixed(old: Floats, new: Floats) -> Floats:
-        return np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+        return new if old is new else np.where(rows.reshape(-1, *[1] * (old.ndim - 1)), new, old)
 
     def either(old: Floats | None, new: Floats | None, blank: float = 0.0) -> Floats | None:
         known = new if old is None else old

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, wind_load
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
-from ferryid.vessel.wind import wind_force
 
 STEP = 0.1
 """Change of the wind by which its load is differentiated [m/s]."""
@@ -34,12 +33,7 @@ def unsteady(picture: ForceModel) -> Processes:
         return lambda p: ()
     loads, factors = [], 1.0 if picture.air_factors is None else picture.air_factors
     for towards in np.eye(2):
-        ends = [
-            wind_force(
-                areas, np.broadcast_to(picture.air + side * STEP * towards, (len(scene.t), 2)), scene.psi, scene.nu
-            )
-            for side in (1.0, -1.0)
-        ]
+        ends = [wind_load(scene, areas, picture.air + side * STEP * towards) for side in (1.0, -1.0)]
         loads.append(factors * (ends[0] - ends[1]) / (2.0 * STEP))
     return lambda p: tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
 

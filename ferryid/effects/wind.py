@@ -14,18 +14,20 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
-from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.force_model import ForceModel, Measurements, wind_load
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.wording import bearing
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile, WindAreas
-from ferryid.vessel.wind import wind_force
 
 COEFFICIENTS = {"C_X": 0.1, "C_Y": 0.1, "C_N": 0.3}
 """Factors on the load along each axis, and how far off the profile's are believed to be."""
 SPEEDS_MPS, BEARINGS = (0.0, 1.5, 3.0, 6.0, 12.0), 12
 """Winds among which the likeliest is where a search begins: as a load goes with the square of the speed, and a controller leans
 against it, a wind from the other side may be likelier than none, and than all between."""
+
+KEPT = 8
+"""Loads of winds that are kept beside the measurements."""
 
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
@@ -58,12 +60,12 @@ def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
 
 def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the wind's load, less that of still air, which is there already."""
-    scene, areas = picture.scene, picture.scene.profile.wind
-    if areas is None:
+    scene = picture.scene
+    if scene.profile.wind is None:
         return picture
     air, factors = np.split(np.asarray(p, dtype=np.float64), [2])
     factors = factors if factors.size else np.ones(3)
-    more = factors * (mean_load(scene, areas, air, picture.gust_std) - scene.air_load)
+    more = factors * (mean_load(scene, air, picture.gust_std) - scene.air_load)
     return replace(picture, external=picture.external + more, air=air, air_factors=factors)
 
 
@@ -72,23 +74,33 @@ def untold(scene: Measurements, p: Floats) -> frozenset[str]:
     return frozenset(COEFFICIENTS)
 
 
-def mean_load(scene: Measurements, areas: WindAreas, air: Floats, gust_std: float) -> Floats:
+def mean_load(scene: Measurements, air: Floats, gust_std: float) -> Floats:
     """Return what a wind loads the vessel with on average [N, N, N·m], shape (n, 3).
 
     A load that goes with the square of the speed is larger in gusts: the mean over a normal distribution, by Gauss's and
-    Hermite's rule of three points along north and east each.
+    Hermite's rule of three points along north and east each. The last loads are kept: most steps of a fit move other effects.
     """
+    key = (*air.tolist(), gust_std)
+    known = scene.wind_loads.get(key)
+    if known is None:
+        known = _mean_load(scene, air, gust_std)
+        if len(scene.wind_loads) >= KEPT:
+            scene.wind_loads.clear()
+        scene.wind_loads[key] = known
+    return known
 
-    def load(towards: Floats) -> Floats:
-        return wind_force(areas, np.broadcast_to(towards, (len(scene.t), 2)), scene.psi, scene.nu)
 
-    steady = load(air)
+def _mean_load(scene: Measurements, air: Floats, gust_std: float) -> Floats:
+    areas = scene.profile.wind
+    if areas is None:
+        return np.zeros((len(scene.t), 3))
+    steady = wind_load(scene, areas, air)
     if gust_std == 0.0:
         return steady
-    reach = sqrt(3.0) * gust_std * np.eye(2)
-    return (
-        steady + sum((load(air + one) + load(air - one) - 2.0 * steady for one in reach), np.zeros_like(steady)) / 6.0
-    )
+    around = np.zeros_like(steady)
+    for one in sqrt(3.0) * gust_std * np.eye(2):
+        around += wind_load(scene, areas, air + one) + wind_load(scene, areas, air - one) - 2.0 * steady
+    return steady + around / 6.0
 
 
 def cannot(scene: Measurements) -> str:

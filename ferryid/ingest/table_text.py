@@ -182,12 +182,6 @@ def _split(line: str, separator: str) -> tuple[str, ...]:
         return tuple(line.split(separator))
 
 
-def _is_value(text: str, decimal: str) -> bool:
-    bare = text.strip()
-    # Most are numbers, and those are found fastest.
-    return _is_number(bare, decimal) or bare.lower() in _WORDS or looks_like_datetime(bare)
-
-
 def _is_number(text: str, decimal: str) -> bool:
     try:
         float(text.replace(",", ".") if decimal == "," and _COMMA_NUMBER.match(text) else text)
@@ -202,15 +196,19 @@ def _is_measured(text: str, decimal: str) -> bool:
     return bare not in ("", "1") and (_is_number(bare, decimal) or looks_like_datetime(bare))
 
 
-def _is_row(fields: Sequence[str], decimal: str) -> bool:
-    """At least half of the fields are values, and one is a number or a time."""
+def _values_in(fields: Sequence[str], decimal: str) -> int:
+    """Return how many fields are values; zero where this is no row: under half of them are, or none is a number or a time."""
     if len(fields) < 2:
-        return False
-    values = sum(_is_value(field, decimal) for field in fields)
-    filled = any(
-        field.strip() and (_is_number(field.strip(), decimal) or looks_like_datetime(field)) for field in fields
-    )
-    return filled and values * 2 >= len(fields)
+        return 0
+    values, measured = 0, False
+    for field in fields:
+        bare = field.strip()
+        # Most are numbers, and those are found fastest.
+        if _is_number(bare, decimal) or looks_like_datetime(bare):
+            values, measured = values + 1, True
+        elif bare.lower() in _WORDS:
+            values += 1
+    return values if measured and values * 2 >= len(fields) else 0
 
 
 def _decimal_of(rows: Sequence[Sequence[str]], separator: str) -> str:
@@ -230,13 +228,14 @@ def _guessed(path: Path, lines: Sequence[str]) -> _Shape:
     for separator in (",", ";", "\t", "whitespace"):
         split = [_split(line, separator) for line in sample]
         decimal = _decimal_of(split, separator)
-        rows = [place for place, fields in enumerate(split) if _is_row(fields, decimal)]
+        values = [_values_in(fields, decimal) for fields in split]
+        rows = [place for place, count in enumerate(values) if count]
         if not rows:
             continue
         width, count = Counter(len(split[place]) for place in rows).most_common(1)[0]
-        first = next(place for place in rows if len(split[place]) == width)
-        cells = [cell for place in rows if len(split[place]) == width for cell in split[place]]
-        share = sum(_is_value(cell, decimal) for cell in cells) / len(cells)
+        alike = [place for place in rows if len(split[place]) == width]
+        first = alike[0]
+        share = sum(values[place] for place in alike) / (count * width)
         rank = (count, share, width, separator, decimal, first)
         if best is None or rank[:3] > best[:3]:
             best = rank

@@ -32,28 +32,28 @@ def wind_force(
     air_density
         [kg/m³].
     """
-    wind_ne = np.asarray(wind_ne, dtype=np.float64)
     nu = np.asarray(nu, dtype=np.float64)
+    wind_ne = np.asarray(wind_ne, dtype=np.float64)
     u_w, v_w = to_body(wind_ne[..., 0], wind_ne[..., 1], np.asarray(psi, dtype=np.float64))
-    u_rw, v_rw = nu[..., 0] - u_w, nu[..., 1] - v_w
-    pressure = 0.5 * air_density * (u_rw**2 + v_rw**2)
-    c_x, c_y, c_n = wind_coefficients(areas, -np.arctan2(v_rw, u_rw))
-    return np.stack(
-        [
-            pressure * c_x * areas.frontal_m2,
-            pressure * c_y * areas.lateral_m2,
-            pressure * c_n * areas.lateral_m2 * areas.length_m,
-        ],
-        axis=-1,
-    )
+    return relative_wind_force(areas, nu[..., 0] - u_w, nu[..., 1] - v_w, air_density=air_density)
 
 
-def wind_coefficients(areas: WindAreas, gamma: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return ``C_X, C_Y, C_N`` of the angle of attack `gamma` [rad], 0 from ahead, negative from starboard."""
-    gamma = np.asarray(gamma, dtype=np.float64)
+def relative_wind_force(areas: WindAreas, u_rw: Floats, v_rw: Floats, *, air_density: float = AIR_DENSITY) -> Floats:
+    """Return the wind load, shape (n, 3) [N, N, N·m], at velocities relative to the air [m/s], shape (n,) each.
+
+    With the angle of attack ``γ = -atan2(v_rw, u_rw)`` and ``d = 1 - δ/2 (1 - CD_l/CD_t) sin²2γ`` the coefficients are
+    ``C_X = -CD_l,AF cos γ / d``, ``C_Y = CD_t sin γ / d`` and ``C_N = (S_L/L - 0.18 (|γ| - π/2)) C_Y``; sine and cosine are
+    ratios of the velocities.
+    """
+    square = u_rw * u_rw + v_rw * v_rw
+    speed = np.sqrt(square)
     cd_l = areas.CD_l_AF * areas.frontal_m2 / areas.lateral_m2
-    denominator = 1.0 - 0.5 * areas.delta * (1.0 - cd_l / areas.CD_t) * np.sin(2.0 * gamma) ** 2
-    c_x = -areas.CD_l_AF * np.cos(gamma) / denominator
-    c_y = areas.CD_t * np.sin(gamma) / denominator
-    c_n = (areas.S_L_m / areas.length_m - 0.18 * (np.abs(gamma) - 0.5 * math.pi)) * c_y
-    return c_x, c_y, c_n
+    sin_2gamma = 2.0 * u_rw * v_rw / np.maximum(square, np.finfo(np.float64).tiny)
+    denominator = 1.0 - 0.5 * areas.delta * (1.0 - cd_l / areas.CD_t) * (sin_2gamma * sin_2gamma)
+    pressure = -0.5 * air_density * speed / denominator
+    load = np.empty((*np.shape(square), 3))
+    load[..., 0] = areas.CD_l_AF * areas.frontal_m2 * pressure * u_rw
+    load[..., 1] = areas.CD_t * areas.lateral_m2 * pressure * v_rw
+    arm = areas.S_L_m + 0.18 * areas.length_m * (0.5 * math.pi - np.arctan2(np.abs(v_rw), u_rw))
+    load[..., 2] = arm * load[..., 1]
+    return load

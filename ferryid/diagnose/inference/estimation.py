@@ -10,6 +10,7 @@ from math import inf, isfinite, log
 import numpy as np
 
 from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
+from ferryid.diagnose.inference.newton_step import newton_step
 from ferryid.diagnose.inference.noise_model import (
     NoiseModel,
     WhiteningFilter,
@@ -265,29 +266,35 @@ def fit(
     w = white(z)
     cost = float(w @ w + z @ z)
     A = np.eye(h + q)
+    # What can move: coefficients of the hull, and parameters.
+    moving, free = np.flatnonzero(problem.hull_spread), np.flatnonzero(size > HELD)
+    both = np.concatenate([moving, h + free])
     # The hull's derivatives cost most: they are taken anew only now and then, and before the fit ends.
-    by_hull, fresh = (problem.by_hull if begin is None else begin.by_hull), False
+    by_hull, fresh = (problem.by_hull if begin is None else begin.by_hull)[:, moving], False
+    of_hull = by_hull.T @ by_hull
     for count in range(max(steps, 1)):
         if count > 0 and (bends or count % ANEW == 0):
-            by_hull, fresh = problem.hull_slopes(picture_of(z)), True
-        J = np.zeros((len(w), h + q))
-        J[:, :h] = by_hull
-        free = np.flatnonzero(size > HELD)
+            by_hull, fresh = problem.hull_slopes(picture_of(z))[:, moving], True
+            of_hull = by_hull.T @ by_hull
+        by_effects = np.empty((len(w), 0))
         if free.size:
             d = np.where(z[h + free] + NUDGE <= high[free], NUDGE, -NUDGE)
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
             gaps = np.stack([problem.steps.gap(picture_of(one)) for one in moved], axis=2)
-            J[:, h + free] = (problem.whitening_filter.white(gaps) - w[:, None]) / d
-        A = J.T @ J + np.eye(h + q)
+            by_effects = (problem.whitening_filter.white(gaps) - w[:, None]) / d
+        across = by_hull.T @ by_effects
+        A = np.eye(h + q)
+        A[np.ix_(both, both)] += np.block([[of_hull, across], [across.T, by_effects.T @ by_effects]])
         if count == steps:
             break
         least = np.concatenate([np.full(h, -np.inf), low - z[h:]])
         most = np.concatenate([np.full(h, np.inf), high - z[h:]])
-        slope, gained = J.T @ w + z, 0.0
+        slope, gained = z.copy(), 0.0
+        slope[both] += np.concatenate([by_hull.T @ w, by_effects.T @ w])
         for damping in DAMPINGS:
             # Levenberg's and Marquardt's way, where the whole step leads astray.
-            step = _step(A + damping * np.diag(np.diag(A)), slope, least, most)
+            step = newton_step(A + damping * np.diag(np.diag(A)), slope, least, most)
             step *= min(1.0, TRUST / max(float(np.abs(step).max()), 1e-12))
             new = z + step
             new[h:] = np.clip(new[h:], low, high)
@@ -300,7 +307,8 @@ def fit(
         if gained < ENOUGH:
             if fresh or steps <= ANEW:
                 break
-            by_hull, fresh = problem.hull_slopes(picture_of(z)), True
+            by_hull, fresh = problem.hull_slopes(picture_of(z))[:, moving], True
+            of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - problem.whitening_filter.log_scale
     evidence -= sum(
@@ -329,19 +337,6 @@ def without(problem: EstimationProblem, made: Fit, index: int) -> Fit:
     """Return the fit of a hypothesis that lacks one of its candidates."""
     rest = [k for k in range(len(made.candidates)) if k != index]
     return fit(problem, [made.candidates[k] for k in rest], [made.values[k] for k in rest])
-
-
-def _step(A: Floats, slope: Floats, low: Floats, high: Floats) -> Floats:
-    """Return the Gauss-Newton step; what would go beyond its limit goes there, and the others as well as they can then."""
-    step, free = np.zeros(len(slope)), np.ones(len(slope), dtype=np.bool_)
-    while free.any():
-        step[free] = -np.linalg.solve(A[np.ix_(free, free)], slope[free] + A[np.ix_(free, ~free)] @ step[~free])
-        beyond = free & ((step < low) | (step > high))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(step, low, high)[beyond]
-        free &= ~beyond
-    return step
 
 
 def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candidate) -> Candidate:

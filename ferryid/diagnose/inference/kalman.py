@@ -269,8 +269,10 @@ def errors_alone(K: Floats, spread: Floats, noise: Floats, integrals: int, step_
 
 
 @compiled
-def costs_alone(scale: Floats, noises: Floats, integrals: int, step_s: float, series: Floats) -> Floats:
-    """Return minus the logarithm of the likelihood of a channel's series under each of several noises, but for a constant.
+def predictions_alone(
+    scale: Floats, noises: Floats, integrals: int, step_s: float, series: Floats
+) -> tuple[Floats, Floats]:
+    """Return whitened prediction errors of a channel's series, and their scale, under each of several noises.
 
     Parameters
     ----------
@@ -284,17 +286,16 @@ def costs_alone(scale: Floats, noises: Floats, integrals: int, step_s: float, se
     Returns
     -------
     ndarray
-        Shape (p,).
+        Whitened errors, shape (p, n, q); those of the first steps, which only tell where a series starts, are zero.
+    ndarray
+        Logarithm of the standard deviation of every prediction, shape (p, n); zero for the first steps.
     """
     n, q = series.shape
-    out = np.zeros(len(noises))
+    whitened, log_scales = np.zeros((len(noises), n, q)), np.zeros((len(noises), n))
     blocks, drive, columns = np.empty((0, 0)), np.empty((2, 0, 0)), np.empty((n, 1, 0))
     for i in range(len(noises)):
         noise = noises[i : i + 1]
         K, spread = gains(scale, noise, integrals, blocks, drive, columns, step_s)
-        left = errors_alone(K, spread, noise, integrals, step_s, series)
-        for k in range(DIFFUSE, n):
-            out[i] += q * np.log(spread[k, 0])
-            for m in range(q):
-                out[i] += 0.5 * left[k, m] * left[k, m]
-    return out
+        whitened[i, DIFFUSE:] = errors_alone(K, spread, noise, integrals, step_s, series)[DIFFUSE:]
+        log_scales[i, DIFFUSE:] = np.log(spread[DIFFUSE:, 0])
+    return whitened, log_scales

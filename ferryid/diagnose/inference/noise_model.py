@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, replace
 from math import cos, exp, pi, sin
 
 import numpy as np
-from scipy.optimize import minimize
 
-from ferryid.diagnose.inference.kalman import DIFFUSE, costs_alone, errors, errors_alone, gains
+from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains, predictions_alone
+from ferryid.diagnose.inference.newton_step import newton_step
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import Process
@@ -36,6 +36,17 @@ EXCERPT, PIECES = 3600, 8
 """Steps from which noise is learnt, of longer logs from so many stretches: with more its sizes are hardly known better."""
 LONGEST = 500.0
 """Longest time constant, in steps."""
+FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-2, 1e-5, 1e5
+"""Damping of the steps of the search for the likeliest noise, as a share of the information."""
+LONGEST_STEP = 2.0
+"""Longest such step, in a parameter's logarithm."""
+SUFFICIENT_GAIN = 1e-3
+"""Gain in log-likelihood of a step that is worth another."""
+
+Predictions = tuple[Floats, Floats]
+"""Of each of p noises: whitened prediction errors, and the logarithms of their standard deviations, both of shape (p, N)."""
+Predicting = Callable[[Floats], Predictions]
+"""Returns the predictions of the noises that the logarithms of parameters, shape (p, k), stand for."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +111,15 @@ class WhiteningFilter:
         """Sum of the logarithms of the standard deviations of all predictions."""
         return sum(float(np.log(spread[DIFFUSE:]).sum()) for part in self.parts for _, spread in part.gains)
 
+    @property
+    def log_scales(self) -> Floats:
+        """Logarithms of the standard deviations of all predictions, shape (J, c); zero for those that are not judged."""
+        every = np.zeros((len(self.steps.starts), sum(len(part.channels) for part in self.parts)))
+        for part in self.parts:
+            for (first, end), (_, spread) in zip(self.steps.runs, part.gains, strict=True):
+                every[first + DIFFUSE : end, list(part.channels)] = np.log(spread[DIFFUSE:])
+        return every
+
 
 def make_whitening_filter(noise: NoiseModel, steps: Windows, pushes: Floats | None = None) -> WhiteningFilter:
     """Return a filter with its gains for some steps. Channels that share no disturbance are filtered by themselves.
@@ -157,9 +177,11 @@ def fit_noise(steps: Windows, gaps: Floats, near: NoiseModel | None = None) -> N
         series = [summed(gaps[a:b][:, own], steps) for a, b in steps.runs]
         size = scale[own].mean(keepdims=True)
 
-        def costs(z: Floats, series: list[Floats] = series, size: Floats = size) -> Floats:
-            every = [costs_alone(size, np.exp(z), integrals, h, part) for part in series]
-            return np.asarray(np.sum(every, axis=0))
+        def predictions(z: Floats, series: list[Floats] = series, size: Floats = size) -> Predictions:
+            every = [predictions_alone(size, np.exp(z), integrals, h, part) for part in series]
+            whitened, log_scales = (np.concatenate(part, axis=1) for part in zip(*every, strict=True))
+            scales = np.broadcast_to(log_scales[:, :, None], whitened.shape)
+            return whitened.reshape(len(z), -1), scales.reshape(len(z), -1)
 
         rough = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
         # The second difference of a position has six times the variance of its errors, the first of a velocity's twice.
@@ -171,11 +193,11 @@ def fit_noise(steps: Windows, gaps: Floats, near: NoiseModel | None = None) -> N
         ]
         begin += [np.log(near.channels[own[0]])] if near else []
 
-        def searched(start: Floats, h: float = h, costs: Callable[[Floats], Floats] = costs) -> Floats:
-            return _least(costs, start, _bounds(start, h))
+        def searched(start: Floats, predictions: Predicting = predictions) -> tuple[float, Floats]:
+            return _most_likely(predictions, start, _bounds(start, h))
 
-        ends = np.array(over(searched, begin))
-        channels[own] = np.exp(ends[np.argmin(costs(ends))])
+        _, best = min(over(searched, begin), key=lambda end: end[0])
+        channels[own] = np.exp(best)
     return NoiseModel(channels)
 
 
@@ -229,8 +251,13 @@ def fit_noise_with(
     def cost(z: Floats) -> float:
         return -likelihood(noise(z), steps, gaps, pushes)
 
-    def costs(every: Floats) -> Floats:
-        return np.array(over(cost, every))
+    def predicted(z: Floats) -> Predictions:
+        ready = make_whitening_filter(noise(z), steps, pushes)
+        return ready.white(gaps), ready.log_scales.reshape(-1)
+
+    def predictions(every: Floats) -> Predictions:
+        whitened, log_scales = zip(*over(predicted, every), strict=True)
+        return np.array(whitened), np.array(log_scales)
 
     channels = np.log(alone.channels[first])
     begin = np.concatenate([channels.ravel(), np.log(start)])
@@ -240,16 +267,15 @@ def fit_noise_with(
     some = [5 * group + size for group in range(len(first)) for size in (1, 3)]
     some += range(len(begin) - len(start), len(begin))
 
-    def costs_of_some(every: Floats) -> Floats:
+    def predictions_of_some(every: Floats) -> Predictions:
         full = np.repeat(begin[None], len(every), axis=0)
         full[:, some] = every
-        return costs(full)
+        return predictions(full)
 
     z = begin.copy()
-    z[some] = _least(costs_of_some, begin[some], [bounds[k] for k in some], most=GLIMPSE)
-    if -cost(z) > worth - SIGHT:
-        z = _least(costs, z, bounds)
-    best = cost(z)
+    best, z[some] = _most_likely(predictions_of_some, begin[some], [bounds[k] for k in some], most=GLIMPSE)
+    if -best > worth - SIGHT:
+        best, z = _most_likely(predictions, z, bounds)
     # What is not worth it need not be known.
     width = _widths(cost, z, len(start), best) if -best > worth else np.full(len(start), np.inf)
     return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
@@ -315,19 +341,53 @@ def summed(gaps: Floats, steps: Windows) -> Floats:
     return np.ascontiguousarray(np.cumsum(total, axis=0) * h if integrals_of(steps) == 2 else total)
 
 
-def _least(
-    costs: Callable[[Floats], Floats], start: Floats, bounds: list[tuple[float, float]], most: int = 60
-) -> Floats:
-    """Return the parameters, shape (k,), of least cost nearby; `costs` are those of several at once, of shape (p, k)."""
+def _most_likely(
+    predictions: Predicting, start: Floats, bounds: list[tuple[float, float]], most: int = 60
+) -> tuple[float, Floats]:
+    """Return the least cost nearby, minus the logarithm of the likelihood, and its parameters, shape (k,), by Fisher's scoring.
 
-    def with_slope(z: Floats) -> tuple[float, Floats]:
-        here, *moved = costs(z + SMALL * np.eye(len(z) + 1, len(z), -1)).tolist()
-        return here, (np.array(moved) - here) / SMALL
+    What the likelihood's second derivatives are on average follows from first ones of the predictions, which are found by
+    differences (Harvey 1989, section 3.4.5); steps are damped as by Levenberg and Marquardt.
 
-    best = minimize(
-        with_slope, start, method="L-BFGS-B", jac=True, bounds=bounds, options={"maxiter": most, "ftol": 1e-8}
-    )
-    return np.asarray(best.x, dtype=np.float64)
+    Parameters
+    ----------
+    predictions
+        Of the parameters, several at once.
+    start, bounds
+        Where the search begins, shape (k,), and the limits of each parameter.
+    most
+        Steps at most.
+    """
+    low, high = np.array(bounds).T
+    z, damping = np.clip(start, low, high), FIRST_DAMPING
+    (whitened,), (log_scales,) = predictions(z[None])
+    cost = 0.5 * float(whitened @ whitened) + float(log_scales.sum())
+    for _ in range(most):
+        moves = np.where(z + SMALL <= high, SMALL, -SMALL)
+        near_whitened, near_scales = predictions(z + np.diag(moves))
+        by_whitened = (near_whitened - whitened) / moves[:, None]
+        by_scale = (near_scales - log_scales) / moves[:, None]
+        slope = by_whitened @ whitened + by_scale.sum(axis=1)
+        # A prediction moves by its whitened error's move and by what its scale's move hides of that.
+        moved = by_whitened + by_scale * whitened
+        information = moved @ moved.T + 2.0 * by_scale @ by_scale.T
+        # What nothing shows stays where it is.
+        scale = np.maximum(np.diag(information), 1e-9 * max(float(np.diag(information).max()), 1e-12))
+        gained = 0.0
+        while damping < LARGEST_DAMPING:
+            reach_low, reach_high = np.maximum(low - z, -LONGEST_STEP), np.minimum(high - z, LONGEST_STEP)
+            new = z + newton_step(information + damping * np.diag(scale), slope, reach_low, reach_high)
+            (new_whitened,), (new_scales,) = predictions(new[None])
+            new_cost = 0.5 * float(new_whitened @ new_whitened) + float(new_scales.sum())
+            if new_cost < cost:
+                gained = cost - new_cost
+                z, whitened, log_scales, cost = new, new_whitened, new_scales, new_cost
+                damping = max(damping / 10.0, LEAST_DAMPING)
+                break
+            damping *= 10.0
+        if gained < SUFFICIENT_GAIN:
+            break
+    return cost, z
 
 
 def _bounds(start: Floats, h: float) -> list[tuple[float, float]]:

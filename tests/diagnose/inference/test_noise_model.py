@@ -12,7 +12,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit
-from ferryid.diagnose.inference.kalman import DIFFUSE, costs_alone, errors, errors_alone, gains
+from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains, predictions_alone
 from ferryid.diagnose.inference.noise_model import (
     EXCERPT,
     PIECES,
@@ -127,18 +127,20 @@ def test_one_channel_alone_has_the_innovations_of_its_dense_covariance(row: Floa
 
 
 @pytest.mark.parametrize("integrals", [2, 1], ids=["positions", "velocities"])
-def test_the_cost_of_a_noise_is_that_of_its_gains_and_errors(integrals: int) -> None:
+def test_predictions_under_several_noises_are_those_of_each_alone(integrals: int) -> None:
     n, h, scale = 80, 0.4, np.array([0.7])
     series = 0.02 * np.cumsum(np.random.default_rng(6).standard_normal((n, 2)), axis=0)
     noises = np.stack([TRUE[0], TRUE[2], OTHER[1]])
-    known = []
-    for row in noises[:, None]:
+    whitened, log_scales = predictions_alone(scale, noises, integrals, h, series)
+    for k, row in enumerate(noises[:, None]):
         none, nothing = np.empty((0, 0)), np.empty((n, 1, 0))
         K, spread = gains(scale, row, integrals, none, np.empty((2, 0, 0)), nothing, h)
-        left = errors_alone(K, spread, row, integrals, h, series)[DIFFUSE:]
-        known.append(0.5 * np.sum(left**2) + 2.0 * np.sum(np.log(spread[DIFFUSE:])))
-    assert np.ptp(known) > 10.0
-    np.testing.assert_allclose(costs_alone(scale, noises, integrals, h, series), known, rtol=1e-12)
+        left = errors_alone(K, spread, row, integrals, h, series)
+        assert np.ptp(left) > 1.0
+        np.testing.assert_allclose(whitened[k, DIFFUSE:], left[DIFFUSE:], rtol=1e-12)
+        np.testing.assert_allclose(log_scales[k, DIFFUSE:], np.log(spread[DIFFUSE:, 0]), rtol=1e-12)
+        assert not whitened[k, :DIFFUSE].any()
+        assert not log_scales[k, :DIFFUSE].any()
 
 
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
