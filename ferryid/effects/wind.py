@@ -18,7 +18,7 @@ from ferryid.effects.force_model import ForceModel, Measurements, wind_load
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.wording import bearing
 from ferryid.types import Floats
-from ferryid.vessel.profile import Profile, WindAreas
+from ferryid.vessel.profile import Profile
 
 COEFFICIENTS = {"C_X": 0.1, "C_Y": 0.1, "C_N": 0.3}
 """Factors on the load along each axis, and how far off the profile's are believed to be."""
