@@ -19,6 +19,7 @@ ORDER = (
     "files",
     "interrupts",
     "compiled",
+    "recursive_filter",
     "lazy",
     "types",
     "thresholds",

@@ -8,10 +8,10 @@ from math import exp
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.recursive_filter import recursive_filter
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -46,8 +46,7 @@ def _late(values: Floats, time_constant_s: float, step_s: float) -> Floats:
     x = step_s / time_constant_s
     keep = exp(-x)
     new, old = 1.0 - (1.0 - keep) / x, (1.0 - keep) / x - keep
-    late, _ = lfilter([new, old], [1.0, -keep], values, axis=0, zi=(1.0 - new) * values[:1])
-    return np.asarray(late)
+    return recursive_filter(np.array([new, old]), np.array([1.0, -keep]), values, values[0])
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -42,14 +42,15 @@ def _stretch(log: LogFit, name: str, j: int) -> Floats:
 
 def spectrum(log: LogFit, name: str, j: int) -> tuple[Floats, Floats]:
     """Return frequency [Hz] and Welch's one-sided power spectral density of a residual."""
-    from scipy.signal import welch
+    from matplotlib.mlab import psd  # scipy.signal takes a second to import
 
     values = _stretch(log, name, j)
     if values.size < 16:
         return np.empty(0), np.empty(0)
     rows = min(values.size, max(16, int(51.2 * log.motion.rate_hz)))
-    frequency, density = welch(values, fs=log.motion.rate_hz, nperseg=rows)
-    return frequency, density
+    hann = np.hanning(rows + 1)[:-1]
+    density, frequency = psd(values, NFFT=rows, Fs=log.motion.rate_hz, window=hann, noverlap=rows // 2, detrend="mean")
+    return np.asarray(frequency, dtype=np.float64), np.asarray(density, dtype=np.float64)
 
 
 def autocorrelation(log: LogFit, name: str, j: int, longest_s: float = 30.0) -> tuple[Floats, Floats, int]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ferryid.recursive_filter import recursive_filter
 from ferryid.types import Flags, Floats
 
 WINDOW_PER_TIME = 8.0 * np.sqrt(2.0) / 3.0
@@ -161,13 +162,11 @@ def smooth_run(values: Floats, time_rows: float) -> Floats:
 
 def _prediction_variance(columns: Sequence[Floats], time_rows: float) -> float:
     """Return the mean square of the steady-state filter's one-step prediction errors."""
-    from scipy.signal import lfilter
-
     polynomial, _ = steady_state(time_rows)
     total, count = 0.0, 0
     for column in columns:
         # Starting at zero is wrong by the first value only, and soon forgotten.
-        error = lfilter([1.0, -2.0, 1.0], polynomial, column - column[0])
+        error = recursive_filter(np.array([1.0, -2.0, 1.0]), polynomial, column - column[0])
         settled = error[min(column.size // 2, int(5 * time_rows) + 2) :]
         total += float(settled @ settled)
         count += settled.size

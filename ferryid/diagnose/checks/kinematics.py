@@ -19,7 +19,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from ferryid.diagnose.checks.regression import Solution, step
 from ferryid.diagnose.checks.spans import Spans, spans
@@ -157,7 +156,7 @@ def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
     if np.sqrt(2.0 * np.mean(problem.rate(eta[:, :2]) ** 2)) < CHECKS.slow_mps:
         return None
     m = 2 * max(2, round(0.5 * DERIVATIVE_S / problem.step_s)) + 1
-    pulled = np.asarray(savgol_filter(eta[:, :2], m, 2, deriv=1, delta=problem.step_s, axis=0))
+    pulled = _slope(eta[:, :2], m) / problem.step_s
     data = _Data(problem, eta, velocity, pulled)
     p, active = _start(data)
     active[list(told)] = True
@@ -174,6 +173,23 @@ def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
     if rival is None:
         return None
     return Kinematics(active, solution, rival[0], data.problem.middle_s, data.derivatives(p), data.residual(p))
+
+
+def _slope(values: Floats, rows: int) -> Floats:
+    """Return the slope per row of a quadratic through every `rows` rows, an odd number, shape (n, 2): Savitzky and Golay 1964.
+
+    At the ends it is that of the outermost quadratic. It is what `scipy.signal.savgol_filter` returns, which takes a second to
+    import.
+    """
+    half = rows // 2
+    offsets = np.arange(-half, half + 1)
+    inner = np.stack([values[k : len(values) - 2 * half + k] for k in range(rows)])
+    slope = np.empty_like(values)
+    slope[half : len(values) - half] = np.tensordot(offsets / np.sum(offsets**2), inner, axes=1)
+    quadratic = np.linalg.pinv(np.vander(offsets, 3, increasing=True))
+    slope[:half] = (quadratic[1] + 2.0 * offsets[:half, None] * quadratic[2]) @ values[:rows]
+    slope[len(values) - half :] = (quadratic[1] + 2.0 * offsets[half + 1 :, None] * quadratic[2]) @ values[-rows:]
+    return slope
 
 
 def _start(data: _Data) -> tuple[Floats, NDArray[np.bool_]]:

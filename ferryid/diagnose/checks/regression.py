@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
@@ -34,7 +34,7 @@ class Solution:
 
     def estimate(self, index: int, unit: str, scale: float = 1.0) -> Estimate:
         """Return a parameter with its 95 % interval, multiplied by `scale`."""
-        value, reach = float(self.values[index]), float(student.ppf(0.975, self.freedom) * self.errors[index])
+        value, reach = float(self.values[index]), float(stdtrit(self.freedom, 0.975) * self.errors[index])
         low, high = sorted((scale * (value - reach), scale * (value + reach)))
         return Estimate(scale * value, low, high, unit)
 
@@ -44,7 +44,7 @@ class Solution:
 
     def certain(self, index: int, neutral: float = 0.0) -> bool:
         """Return whether a parameter is not neutral, beyond reasonable doubt."""
-        return self.score(index, neutral) > float(student.ppf(1.0 - 0.5 * CHECKS.false_alarm, self.freedom))
+        return self.score(index, neutral) > float(stdtrit(self.freedom, 1.0 - 0.5 * CHECKS.false_alarm))
 
 
 def step(Z: Floats, J: Floats, e: Floats, place: NDArray[np.int64], size: Floats, away: Floats) -> Solution | None:

@@ -10,8 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, starting_point
 from ferryid.diagnose.inference.onset_estimation import replace_candidate
@@ -81,11 +80,13 @@ def intervals(problem: EstimationProblem, kept: Fit, index: int) -> dict[str, tu
             break
         higher = max(found[a], found[b], key=lambda one: one[0])[1]
         found[0.5 * (a + b)] = held(0.5 * (a + b), higher)
+    from scipy.interpolate import PchipInterpolator  # takes half a second to import: only where it is needed
+
     values = np.array(sorted(found))
     log_weights = np.array([found[value][0] for value in values.tolist()]) / INFERENCE.posterior_factor**2
     fine = np.linspace(values[0], values[-1], 50 * len(values))
     weights = np.exp(PchipInterpolator(values, log_weights)(fine) - log_weights.max())
-    cut = norm.ppf((np.arange(PARTS) + 0.5) / PARTS)
+    cut = ndtri((np.arange(PARTS) + 0.5) / PARTS)
     ends = {}
     for k, name in enumerate(names):
         if k == place:
