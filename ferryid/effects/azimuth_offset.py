@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -67,5 +68,5 @@ EFFECT = Effect(
     instances=instances,
     vessel=True,
     regressor=regressor,
-    form=DEFINITION,
+    form=EFFECTS.definition_error,
 )

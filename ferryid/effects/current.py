@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -58,5 +59,5 @@ EFFECT = Effect(
     cannot=cannot,
     regressor=regressor,
     bends_hull=True,
-    idle=0.01,
+    idle=EFFECTS.least_current,
 )

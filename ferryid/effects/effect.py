@@ -9,6 +9,7 @@ from typing import Any
 
 from ferryid.effects.force_model import ForceModel, Measurements, between
 from ferryid.effects.simulated import Simulated
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -16,10 +17,6 @@ Values = Mapping[str, float]
 Residual = Callable[[ForceModel], Floats]
 """What a picture leaves of a log, whitened: so that its square is twice what the logarithm of the likelihood loses."""
 
-FORMULA, DEFINITION = 0.1, 0.02
-"""How far off an effect's formula is believed to be, as a share of what it changes: a standard deviation. What its parameter
-defines, as a share of a thruster's force or an angle, hardly is; of the rest some ten per cent are usual. Chosen in view of
-trials of a plant with other formulas; `make proof` tells how often intervals hold."""
 HELD = 1e-6
 """Size of a parameter that is not to move: one of several alternatives that was not chosen."""
 
@@ -169,7 +166,7 @@ class Effect:
     once: Callable[[Measurements, Floats], bool] = lambda scene, p: False
     in_part: bool = False
     idle: float = 0.0
-    form: float = FORMULA
+    form: float = EFFECTS.formula_error
     passing: float = 0.0
     bends_hull: bool = False
     ridge: str = ""

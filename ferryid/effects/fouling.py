@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -66,6 +67,7 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     regressor=regressor,
-    idle=0.12,
+    # Within the prior of the hull it is the hull's own.
+    idle=EFFECTS.hull_spread,
     bends_hull=True,
 )

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, corrected
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -61,8 +62,7 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     of_sensor=True,
-    # Compasses are no better.
-    idle=0.5,
+    idle=EFFECTS.least_heading,
     regressor=regressor,
-    form=DEFINITION,
+    form=EFFECTS.definition_error,
 )

@@ -20,14 +20,11 @@ import numpy as np
 
 from ferryid.effects.effect import HELD, Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import COEFFICIENTS, MASS, ForceModel, Measurements, hull_of
-from ferryid.effects.linear_evidence import HULL_STD, hull_jacobian
+from ferryid.effects.linear_evidence import hull_jacobian
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
-TELLING = 0.25
-"""A coefficient that may be within this share of the model's is not worth a name."""
-OFF = 1.0
-"""Standard deviation of what is believed of the factor of a coefficient that is chosen."""
 ARMS = ("m23", "m32")
 """How far ahead the mass lies; that a few hundred kilograms lie elsewhere is a payload's to say."""
 SURGE_ALONE = frozenset({"X_|u|u"})
@@ -36,7 +33,7 @@ SURGE_ALONE = frozenset({"X_|u|u"})
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return a factor for each coefficient that the profile's hull has."""
-    return tuple(_factor(name, OFF) for name in _named(profile))
+    return tuple(_factor(name, EFFECTS.selected_spread) for name in _named(profile))
 
 
 def _named(profile: Profile) -> list[str]:
@@ -57,7 +54,7 @@ def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
     if 2 * len(chosen) > len(able):
         # A model that is wrong all over is wrong there, too.
         chosen |= frozenset(ARMS)
-    return Choice(tuple(_factor(name, OFF if name in chosen else HELD) for name in names), doubt)
+    return Choice(tuple(_factor(name, EFFECTS.selected_spread if name in chosen else HELD) for name in names), doubt)
 
 
 def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str], float]:
@@ -71,7 +68,7 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
     def score(chosen: frozenset[str]) -> float:
         if not chosen or chosen == SURGE_ALONE:
             return -np.inf
-        spread = np.array([OFF if name in chosen else HULL_STD for name in names])
+        spread = np.array([EFFECTS.selected_spread if name in chosen else EFFECTS.hull_spread for name in names])
         A = np.eye(n) + G * np.outer(spread, spread)
         c = spread * b
         return 0.5 * float(c @ np.linalg.solve(A, c)) - 0.5 * float(np.linalg.slogdet(A)[1]) - doubt(chosen)
@@ -102,7 +99,7 @@ def cannot(scene: Measurements) -> str:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence; the values are those of the coefficients that are certainly off."""
-    off = {name: value for name, value in values.items() if abs(value - 1.0) > TELLING}
+    off = {name: value for name, value in values.items() if abs(value - 1.0) > EFFECTS.coefficient_change}
     masses = [name for name in off if name in MASS]
     what = " and ".join(
         word for word, some in (("masses", masses), ("damping", [name for name in off if name not in MASS])) if some
@@ -128,6 +125,6 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     choose=choose,
-    least=TELLING,
+    least=EFFECTS.coefficient_change,
     bends_hull=True,
 )

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, corrected
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.frames import to_world
 from ferryid.vessel.profile import Profile
@@ -66,5 +67,5 @@ EFFECT = Effect(
     of_sensor=True,
     regressor=regressor,
     bends_hull=True,
-    form=DEFINITION,
+    form=EFFECTS.definition_error,
 )

@@ -11,6 +11,7 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.simulated import Simulated
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Profile
@@ -89,6 +90,6 @@ EFFECT = Effect(
     cannot=cannot,
     onset=True,
     regressor=regressor,
-    form=0.05,
+    form=EFFECTS.load_error,
     simulated=Simulated(load),
 )

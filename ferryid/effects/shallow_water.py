@@ -15,6 +15,7 @@ import numpy as np
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import ForceModel, Measurements, added_mass
 from ferryid.effects.linear_evidence import hull_jacobian, log_evidence_gains
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats, Ints
 from ferryid.vessel.profile import Profile
 
@@ -22,11 +23,6 @@ EDGE_M = 2.0
 """Width over which the factor comes in at a side, outside of it."""
 CELLS = 8
 """Cells of the grid along north and east each."""
-LEAST, MOST = 0.05, 0.8
-"""Shares of the log that lie in a place, the latter with all its sides as far out as they may be fitted to: one cell. What
-is nearly everywhere is the hull's own damping, or its fouling."""
-BEYOND = 0.02
-"""Share of the log that must lie beyond a side for the log to tell where it is."""
 FACTOR = Parameter("factor", "-", 0.4, 1.0, 6.0, neutral=1.0)
 SIDES = ("south", "north", "west", "east")
 HEAVIER = Parameter("added_mass", "-", 0.3, 0.0, 2.0, start=0.2)
@@ -103,7 +99,7 @@ def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
         (np.minimum(one + 1, CELLS) for one in (north, east)),
     )
     widest = [corner for pair in zip(lower, upper, strict=True) for corner in pair]
-    fits = (covered(south, north, west, east) >= LEAST) & (covered(*widest) <= MOST)
+    fits = (covered(south, north, west, east) >= EFFECTS.least_place) & (covered(*widest) <= EFFECTS.most_place)
     if not fits.any():
         return Choice(parameters_of(scene.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
@@ -129,7 +125,7 @@ def untold(scene: Measurements, p: Floats) -> frozenset[str]:
     x, y = scene.eta[scene.usable, 0], scene.eta[scene.usable, 1]
     south, north, west, east = p[1:5].tolist()
     outside = (x < south, x > north, y < west, y > east)
-    far = (name for name, rows in zip(SIDES, outside, strict=True) if float(np.mean(rows)) < BEYOND)
+    far = (name for name, rows in zip(SIDES, outside, strict=True) if float(np.mean(rows)) < EFFECTS.beyond_side)
     return frozenset({HEAVIER.name, *far})
 
 
@@ -137,7 +133,7 @@ def once(scene: Measurements, p: Floats) -> bool:
     """Tell whether the vessel was in the place a single time, or hardly: then it is a time as well as a place."""
     there = inside(scene, p[1:5])[scene.usable] > 0.5
     entered = int(there[0]) + int(np.count_nonzero(there[1:] & ~there[:-1]))
-    return entered < 2 or float(np.mean(there)) < LEAST
+    return entered < 2 or float(np.mean(there)) < EFFECTS.least_place
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -177,6 +173,6 @@ EFFECT = Effect(
     untold=untold,
     once=once,
     in_part=True,
-    idle=0.1,
+    idle=EFFECTS.least_shallow,
     bends_hull=True,
 )

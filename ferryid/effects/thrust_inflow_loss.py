@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, body_current
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -63,5 +64,5 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     regressor=regressor,
-    idle=0.03,
+    idle=EFFECTS.least_inflow,
 )

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values, span
+from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -58,6 +59,6 @@ EFFECT = Effect(
     onset=True,
     vessel=True,
     regressor=regressor,
-    form=DEFINITION,
-    passing=0.1,
+    form=EFFECTS.definition_error,
+    passing=EFFECTS.passing_gain,
 )

@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import thrust
@@ -88,5 +89,5 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     regressor=regressor,
-    idle=0.05,
+    idle=EFFECTS.least_wake,
 )

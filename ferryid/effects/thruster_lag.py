@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -68,5 +69,13 @@ def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -
 
 
 EFFECT = Effect(
-    "thruster_lag", "Thruster lag", parameters_of, apply, says, scenario, vessel=True, idle=0.03, regressor=regressor
+    "thruster_lag",
+    "Thruster lag",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    vessel=True,
+    idle=EFFECTS.least_lag,
+    regressor=regressor,
 )

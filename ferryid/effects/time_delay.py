@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -53,5 +54,13 @@ def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -
 
 
 EFFECT = Effect(
-    "time_delay", "Time delay", parameters_of, apply, says, scenario, idle=0.03, form=DEFINITION, regressor=regressor
+    "time_delay",
+    "Time delay",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    idle=EFFECTS.least_delay,
+    form=EFFECTS.definition_error,
+    regressor=regressor,
 )

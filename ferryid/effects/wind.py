@@ -16,6 +16,7 @@ import numpy as np
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile, WindAreas
@@ -126,5 +127,5 @@ EFFECT = Effect(
     choose=choose,
     untold=untold,
     regressor=regressor,
-    form=0.05,
+    form=EFFECTS.load_error,
 )

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ferryid.diagnose.inference.kalman import DIFFUSE, costs_alone, errors, errors_alone, gains
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import Process
@@ -28,14 +29,8 @@ GROUPS = (0, 0, 1)
 STARTS = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5))
 """Where the search for a channel's noise begins: white error, as a share of all; time constant of the coloured, in steps; and
 disturbance, as a share of the acceleration left over."""
-GLIMPSE, SIGHT = 12, 12.0
-"""Steps of the search for a disturbance after which it is given up if the likelihood is farther than this from being enough."""
 SMALL = 1e-4
 """Move of a parameter's logarithm by which a slope is found."""
-EXCERPT, PIECES = 3600, 8
-"""Steps from which noise is learnt, of longer logs from so many stretches: with more its sizes are hardly known better."""
-LONGEST = 500.0
-"""Longest time constant, in steps."""
 
 
 @dataclass(frozen=True)
@@ -246,8 +241,8 @@ def fit_noise_with(
         return costs(full)
 
     z = begin.copy()
-    z[some] = _least(costs_of_some, begin[some], [bounds[k] for k in some], most=GLIMPSE)
-    if -cost(z) > worth - SIGHT:
+    z[some] = _least(costs_of_some, begin[some], [bounds[k] for k in some], most=INFERENCE.screening_iterations)
+    if -cost(z) > worth - INFERENCE.screening_gain:
         z = _least(costs, z, bounds)
     best = cost(z)
     # What is not worth it need not be known.
@@ -258,12 +253,12 @@ def fit_noise_with(
 def excerpt(steps: Windows) -> Windows:
     """Return the steps from which noise is learnt: all of a short log, evenly spread stretches of a long one."""
     n = len(steps.starts)
-    if n <= EXCERPT:
+    if n <= INFERENCE.noise_steps:
         return steps
-    length = EXCERPT // PIECES
+    length = INFERENCE.noise_steps // INFERENCE.noise_stretches
     runs: list[tuple[int, int]] = []
     rows: list[int] = []
-    for middle in np.linspace(0.0, n, 2 * PIECES + 1)[1::2]:
+    for middle in np.linspace(0.0, n, 2 * INFERENCE.noise_stretches + 1)[1::2]:
         first, end = int(middle) - length // 2, int(middle) + length // 2
         for a, b in steps.runs:
             own = range(max(a, first), min(b, end))
@@ -331,7 +326,7 @@ def _least(
 
 
 def _bounds(start: Floats, h: float) -> list[tuple[float, float]]:
-    times = (float(np.log(0.5 * h)), float(np.log(LONGEST * h)))
+    times = (float(np.log(0.5 * h)), float(np.log(INFERENCE.longest_memory * h)))
     return [(one - 12.0, one + 6.0) if k not in (2, 4) else times for k, one in enumerate(start.tolist())]
 
 

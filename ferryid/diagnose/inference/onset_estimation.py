@@ -26,13 +26,8 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel, as_measured
 from ferryid.types import Floats, Ints
 
-FEWEST_PARTS = 24
-"""Parts of `INFERENCE.span_s` into which a log is cut at least: an effect begins and ends between two of them. In a calm log
-seconds matter: what acts too long or too short by them leaves a push that nothing explains."""
 MOST_NUMBERS = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
-PROMISING = 3
-"""Spans that are handed on to be fitted."""
 NEARBY_S, FINEST_S = 8.0, 0.2
 """Steps [s] with which a time is searched for nearby, from the first down to the last."""
 GLANCE = 3
@@ -88,7 +83,7 @@ def promising_spans(problem: EstimationProblem, ground: Linearisation, candidate
     gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(problem.windows.starts))
     found: list[tuple[int, int]] = []
     for k in np.argsort(-gain).tolist():
-        if gain[k] <= 0.0 or len(found) == PROMISING:
+        if gain[k] <= 0.0 or len(found) == INFERENCE.fitted_spans:
             break
         # A neighbour tells nothing new.
         if all(max(abs(int(a[k]) - i), abs(int(b[k]) - j)) > 1 for i, j in found):
@@ -121,7 +116,7 @@ def _edges(problem: EstimationProblem, candidate: Candidate) -> Floats:
     """Return where the log is cut [s], into parts of as many steps each: in a gap nothing begins or ends."""
     times = problem.steps.middle_s
     most = MOST_NUMBERS / (len(times) * problem.steps.channels.sum() * len(candidate.parameters))
-    parts = max(FEWEST_PARTS, int(min(len(times) * stride_s(problem.steps) / INFERENCE.span_s, most)))
+    parts = max(INFERENCE.span_parts, int(min(len(times) * stride_s(problem.steps) / INFERENCE.span_s, most)))
     return np.interp(np.linspace(0.0, len(times) - 1.0, parts + 1), np.arange(len(times)), times)
 
 

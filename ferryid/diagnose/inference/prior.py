@@ -8,9 +8,9 @@ from math import sqrt
 import numpy as np
 
 from ferryid.diagnose.data.measurements import BLOCK_COEFFICIENT, WATER_DENSITY, WINDOW_LENGTH_M, dimensions
-from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.effects.measurements import hull_force_model
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
 from ferryid.models.forces import ModelForces
@@ -42,7 +42,7 @@ def prior_force_model(
     ForceModel
         Without candidates.
     ndarray
-        Standard deviations, shape (26,), in the units of the coefficients: `INFERENCE.hull_spread` of each where a hull model
+        Standard deviations, shape (26,), in the units of the coefficients: `EFFECTS.hull_spread` of each where a hull model
         is known (with the model's own intervals added), and what a vessel of this size may have at most where it is not.
 
     Raises
@@ -53,9 +53,7 @@ def prior_force_model(
     if model is not None:
         return _modelled(scene, profile, model, sha256)
     bare = hull_force_model(scene, hull_of(profile))
-    spread = (
-        INFERENCE.hull_spread * np.abs(bare.hull) if profile.hull.has_model else default_hull_spread(scene, profile)
-    )
+    spread = EFFECTS.hull_spread * np.abs(bare.hull) if profile.hull.has_model else default_hull_spread(scene, profile)
     return replace(bare, external=scene.air_load, ambient=lambda now: now.air_load), spread
 
 
@@ -123,7 +121,7 @@ def _modelled(scene: Measurements, profile: Profile, model: Model, sha256: str) 
         )
     plain = replace(known.plain(scene), ambient=lambda now: known.plain(now).external)
     picture = known.altered(plain, sha256).picture
-    spread = np.sqrt((INFERENCE.hull_spread * picture.hull) ** 2 + known.variance)
+    spread = np.sqrt((EFFECTS.hull_spread * picture.hull) ** 2 + known.variance)
     if not known.force.profile.hull.has_model:
         # What the base does not know, the fit had to learn; terms that it left out may be anything.
         spread = np.where(picture.hull == 0.0, default_hull_spread(scene, profile), spread)

@@ -39,8 +39,6 @@ from ferryid.types import Floats
 
 FAR = 8
 """Steps of a fit by which candidates are sorted from afar, `GLANCE` from nearby; the best are then fitted to the end."""
-REJUDGED = 5
-"""Candidates whose evidence is weighed under the noise that each leaves itself."""
 
 
 @dataclass(frozen=True)
@@ -192,8 +190,8 @@ def _weighed(problem: EstimationProblem, chosen: Fit, candidates: Sequence[Candi
     ground = linearise(problem, current, begin)
     found = over(partial(_best, problem, current, begin, ground), candidates)
     found.sort(key=lambda one: -one.gain)
-    fair = over(partial(_fairly, problem), found[:REJUDGED])
-    return sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
+    fair = over(partial(_fairly, problem), found[: INFERENCE.compared_candidates])
+    return sorted([*fair, *found[INFERENCE.compared_candidates :]], key=lambda one: -one.gain)
 
 
 def _fairly(problem: EstimationProblem, one: ScoredCandidate) -> ScoredCandidate:

@@ -30,6 +30,7 @@ from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Values
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -131,7 +132,7 @@ def learn_simulation(
         name,
         scene,
         hull,
-        np.hypot(INFERENCE.hull_spread * hull, posterior * wide),
+        np.hypot(EFFECTS.hull_spread * hull, posterior * wide),
         (*_measured(scene), *conditions),
         sensors,
     )

@@ -24,9 +24,6 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
 from ferryid.types import Floats
 
-REFITS = 2
-"""Times that the logs are fitted anew beside a law: a hull that stood in for it has its masses wrong, and so the law's size."""
-
 
 @dataclass(frozen=True)
 class LogInformation:
@@ -172,7 +169,7 @@ def find_campaign_laws(logs: Mapping[str, tuple[EstimationProblem, Fit]]) -> dic
         law = select_campaign_law(said, best)
         if law is None:
             break
-        for _ in range(REFITS):
+        for _ in range(JUDGING.law_refits):
             again = tuple(log_information(problem, kept, law) for problem, kept in logs.values())
             law = _fitted(again, law.terms)
         if not law.holds:

@@ -33,12 +33,10 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import Measurements
 from ferryid.types import AXES, Floats
 
-TIME_DROP = 50.0
-"""Fall of the logarithm of the evidence as of which no time farther away comes into question; smaller dips may lie between."""
 TIME_STEP, TIME_FIT = 0.125, 3
 """Step between times that are weighed, in lengths of a window, and steps of the fit for each."""
-TIME_NEAR, TIME_FINE_S = 10.0, 0.2
-"""Fall of the logarithm of the evidence up to which times are weighed in fine steps, and these [s]: the forces' own."""
+TIME_FINE_S = 0.2
+"""Fine step between times that are compared [s]: that of the forces."""
 SHOWN_RIVALS = 3
 
 
@@ -207,12 +205,12 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
         time = here + side * step
         while first < time < last:
             tried[time] = evidence_at(time)
-            if tried[time] < max(tried.values()) - TIME_DROP:
+            if tried[time] < max(tried.values()) - JUDGING.time_drop:
                 break
             time += side * step
     # About the likeliest it changes within a step.
     top = max(tried.values())
-    for time in [time for time, evidence in tried.items() if evidence > top - TIME_NEAR]:
+    for time in [time for time, evidence in tried.items() if evidence > top - JUDGING.fine_time_drop]:
         for near_by in (
             time + TIME_FINE_S * np.arange(-round(step / TIME_FINE_S), round(step / TIME_FINE_S) + 1)
         ).tolist():

@@ -28,9 +28,6 @@ from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Flags, Floats, Ints
 
-FLIPS, SHIFTS = 100, 31
-"""Placebos of either kind."""
-
 
 @dataclass(frozen=True)
 class Law:
@@ -222,7 +219,7 @@ def _best(
     gained = _gains(tried, known, lines.centre, columns, parts)
     best = int(np.argmax(gained[:, 0]))
     most = gained.max(axis=0)
-    flipped, late = most[1 : 1 + FLIPS], most[1 + FLIPS :]
+    flipped, late = np.split(most[1:], [JUDGING.law_sign_placebos])
     chance = (
         float(np.median(flipped)) if plain else float(max(np.quantile(flipped, JUDGING.law_beats), np.median(late)))
     )
@@ -283,14 +280,16 @@ def _noise_of_the_rest(problem: EstimationProblem, lines: LinearTerms) -> Autore
 
 
 def _placebos(left: Floats, block: Ints, rng: np.random.Generator) -> Floats:
-    """Return what is left; with signs drawn anew for every block; and late by parts of the log: shape (w, 1 + FLIPS + SHIFTS).
+    """Return what is left; with signs drawn anew for every block; and late by parts of the log: shape (w, 1 + placebos).
 
     Shifts cannot tell what is the same at all times or comes round again; signs can.
     """
     made = [left]
-    for _ in range(FLIPS):
+    for _ in range(JUDGING.law_sign_placebos):
         made.append(left * rng.choice([-1.0, 1.0], int(block.max()) + 1)[block][:, None])
-    made += [np.roll(left, round(share * len(left)), axis=0) for share in np.linspace(0.1, 0.9, SHIFTS)]
+    made += [
+        np.roll(left, round(share * len(left)), axis=0) for share in np.linspace(0.1, 0.9, JUDGING.law_shift_placebos)
+    ]
     return np.stack([one.reshape(-1) for one in made], axis=-1)
 
 

@@ -14,8 +14,6 @@ from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit
 from ferryid.diagnose.inference.kalman import DIFFUSE, costs_alone, errors, errors_alone, gains
 from ferryid.diagnose.inference.noise_model import (
-    EXCERPT,
-    PIECES,
     NoiseModel,
     _widths,
     excerpt,
@@ -24,6 +22,7 @@ from ferryid.diagnose.inference.noise_model import (
     make_whitening_filter,
     stride_s,
 )
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, steps_of, windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter, Process
@@ -274,7 +273,7 @@ def marked(seconds: float, *breaks: float) -> Windows:
 
 def test_a_short_log_is_its_own_excerpt() -> None:
     steps = marked(1430.0, 200.0)
-    assert EXCERPT - 100 < len(steps.starts) <= EXCERPT
+    assert INFERENCE.noise_steps - 100 < len(steps.starts) <= INFERENCE.noise_steps
     assert excerpt(steps) is steps
 
 
@@ -292,10 +291,10 @@ def test_an_excerpt_of_a_long_log_is_spread_evenly_and_crosses_no_break(
 ) -> None:
     steps = marked(seconds, *breaks)
     n, stride = len(steps.starts), int(steps.starts[1] - steps.starts[0])
-    assert n > EXCERPT
+    assert n > INFERENCE.noise_steps
     assert len(steps.runs) == len(breaks) + 1
     part = excerpt(steps)
-    assert len(part.starts) == EXCERPT
+    assert len(part.starts) == INFERENCE.noise_steps
     np.testing.assert_array_equal(part.measured[:, 0], part.middle_s)
     assert set(part.starts.tolist()) <= set(steps.starts.tolist())
     assert (np.diff(part.starts) > 0).all()
@@ -309,21 +308,21 @@ def test_an_excerpt_of_a_long_log_is_spread_evenly_and_crosses_no_break(
         assert part.scene.usable[part.starts[first] : part.starts[end - 1] + len(part.weight)].all()
     # An equal part of the excerpt in the middle of each part of the log, by count.
     where = np.searchsorted(steps.starts, part.starts)
-    for k, one in enumerate(np.array_split(where, PIECES)):
-        assert np.mean(one) == pytest.approx((k + 0.5) * n / PIECES, abs=0.01 * n)
+    for k, one in enumerate(np.array_split(where, INFERENCE.noise_stretches)):
+        assert np.mean(one) == pytest.approx((k + 0.5) * n / INFERENCE.noise_stretches, abs=0.01 * n)
 
 
 @pytest.mark.parametrize("sliver", range(5))
 def test_what_only_starts_a_filter_is_left_out_of_an_excerpt(sliver: int) -> None:
     longer = marked(3002.0)
     n = len(longer.starts) - 5
-    first = int(n / (2 * PIECES)) - EXCERPT // PIECES // 2
+    first = int(n / (2 * INFERENCE.noise_stretches)) - INFERENCE.noise_steps // INFERENCE.noise_stretches // 2
     # The first piece begins so many steps before a break.
     kept = np.delete(np.arange(n + 5), np.arange(first + sliver, first + sliver + 5))
     runs = ((0, first + sliver), (first + sliver, n))
     part = excerpt(replace(longer, starts=longer.starts[kept], measured=longer.measured[kept], runs=runs))
-    assert len(part.starts) == EXCERPT - (sliver if sliver <= DIFFUSE else 0)
-    assert len(part.runs) == PIECES + (sliver > DIFFUSE)
+    assert len(part.starts) == INFERENCE.noise_steps - (sliver if sliver <= DIFFUSE else 0)
+    assert len(part.runs) == INFERENCE.noise_stretches + (sliver > DIFFUSE)
     np.testing.assert_array_equal(part.measured[:, 0], part.middle_s)
 
 

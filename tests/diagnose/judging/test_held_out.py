@@ -18,6 +18,7 @@ from ferryid.diagnose.judging.held_out import HEADING, held_out, held_out_eviden
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.vessel import load_profile
 from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
@@ -65,7 +66,7 @@ def trial_on(scene: Measurements) -> EstimationProblem:
     seen = cut.scene
     still = wind_force(FERRY.wind, np.zeros((len(seen.t), 2)), seen.psi, seen.nu) if FERRY.wind else np.zeros(3)
     plain = ForceModel(seen, hull_of(FERRY), seen.parts, seen.angles, still)
-    return estimation_problem(cut, plain, INFERENCE.hull_spread * np.abs(plain.hull))
+    return estimation_problem(cut, plain, EFFECTS.hull_spread * np.abs(plain.hull))
 
 
 def candidate(name: str, instance: str | None = None) -> Candidate:

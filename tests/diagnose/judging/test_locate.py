@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.change_points import MOST_BREAKS, _breaks, active_intervals
+from ferryid.diagnose.inference.change_points import LEVELS, _breaks, active_intervals
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, estimation_problem, fit
-from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.error_profiles import in_words, profile_of
 from ferryid.diagnose.judging.locate import locate, whitened
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import Parameter, effects
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel import load_profile
 
@@ -48,7 +48,7 @@ def trial_on(push: Floats | None = None) -> EstimationProblem:
     scene = replace(seen, parts=parts)
     cut = windows(scene, 8.0, 2.0)
     plain = ForceModel(cut.scene, hull_of(FERRY), cut.scene.parts, cut.scene.angles, np.zeros((len(cut.scene.t), 3)))
-    return estimation_problem(cut, plain, INFERENCE.hull_spread * np.abs(plain.hull))
+    return estimation_problem(cut, plain, EFFECTS.hull_spread * np.abs(plain.hull))
 
 
 def pushed(shape: Floats) -> Candidate:
@@ -157,7 +157,7 @@ def test_white_noise_has_no_change_and_a_step_has_one() -> None:
     false = 0
     for seed in range(200):
         noise = np.random.default_rng(seed).standard_normal(300)
-        false += len(_breaks(np.abs(noise), 0, 300, MOST_BREAKS)) > 0
+        false += len(_breaks(np.abs(noise), 0, 300, LEVELS)) > 0
         false += active_intervals(times, noise**2, 4.0, (0.0, 300.0), steady=True) != ((0.0, 300.0),)
     assert false <= 8
     step = np.random.default_rng(1).standard_normal(300) ** 2 * np.where(times < 120.0, 0.05, 4.0)
