@@ -5,7 +5,7 @@ An effect takes a force model and returns another, in which its own physics acts
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, inf, sin
@@ -168,11 +168,6 @@ def hull_of(profile: Profile) -> Floats:
     M, D = profile.hull.M, profile.hull.D
     mass = (M[0, 0], M[1, 1], M[1, 2], M[2, 1], M[2, 2])
     return np.array([*mass, *(D.get(name, 0.0) for name in COEFFICIENTS[5:])], dtype=np.float64)
-
-
-def named(hull: Floats) -> Mapping[str, float]:
-    """Return coefficients by name."""
-    return dict(zip(COEFFICIENTS, hull.tolist(), strict=True))
 
 
 def body_current(picture: ForceModel) -> tuple[Floats, Floats]:

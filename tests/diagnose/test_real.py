@@ -13,11 +13,11 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.data.measurements import read_measurements
 from ferryid.diagnose.inference.campaign import fit_campaign
 from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, fit_campaign_hull
-from ferryid.diagnose.judging.campaign_evidence import MIRRORED, placebos
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.vessel import load_profile
 from tests.diagnose.trials import averaged
+from tests.real.campaign_evidence import MIRRORED, placebos
 
 pytestmark = pytest.mark.slow
 

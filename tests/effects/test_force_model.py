@@ -25,8 +25,9 @@ from ferryid.effects.force_model import (
 )
 from ferryid.effects.wind import mean_load
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import damping, inverse_dynamics
+from ferryid.vessel.hull import inverse_dynamics
 from ferryid.vessel.wind import wind_force
+from tests.vessel.hull_matrices import damping
 
 FERRY = load_profile("milliampere")
 RNG = np.random.default_rng(4)

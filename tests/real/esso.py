@@ -16,13 +16,13 @@ from ferryid.diagnose.inference.campaign_hull import CampaignHull, Member, fit_c
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.campaign_evidence import Gains, held_out_gains, placebos, turn_heading
 from ferryid.effects.effect import Parameter
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.signals.smooth import moving_mean
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.trials import averaged
+from tests.real.campaign_evidence import Gains, held_out_gains, placebos, turn_heading
 from tests.real.places import DATA
 
 Floats = NDArray[np.float64]

@@ -198,22 +198,6 @@ def fit_campaign_hull(members: Sequence[Member], spread: Floats, induced_size: F
     return joint.result(z, own, noise)
 
 
-def residual_gaps(member: Member, hull: CampaignHull, place: int) -> Floats:
-    """Return the gaps that are left in some windows of a log, shape (J, c), with its hull and effects fitted elsewhere.
-
-    Parameters
-    ----------
-    member
-        With the windows to judge.
-    hull, place
-        The fit, and the log's place in it.
-    """
-    h = len(COEFFICIENTS)
-    mean = hull.before + hull.spread * hull.step
-    picture = induced(replace(member.plain, hull=mean[:h]), mean[h:])
-    return member.windows.gap(apply_candidates(picture, member.candidates, hull.values[place]))
-
-
 @dataclass(frozen=True)
 class _Joint:
     """All logs with the belief about their hull; z is the hull in spreads, own[i] the effects of log i in sizes."""

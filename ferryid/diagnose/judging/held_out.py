@@ -71,7 +71,7 @@ class Improvement:
         Mean squares by axis, shape (3,) [N², N², N²m²].
     removed, low, high
         Fraction of the mean square that was removed, with its 95 % block-bootstrap interval, shape (3,).
-    score, score_low, score_high
+    score, score_low
         Gain in log-likelihood of all channels under the noise of the better fit, with the same interval; positive where the
         second hypothesis predicts better.
     """
@@ -85,7 +85,6 @@ class Improvement:
     high: Floats
     score: float
     score_low: float
-    score_high: float
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,7 @@ def compare_held_out(problem: EstimationProblem, folds: Folds, before: HeldOut, 
     drawn = 1.0 - (picks @ sums[1]) / (picks @ sums[0])
     low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
     gains = _gains(problem, folds, before.gaps, after.gaps)
-    score_low, score_high = np.quantile(picks @ gains, [0.025, 0.975])
+    score_low = np.quantile(picks @ gains, 0.025)
     return Improvement(
         before.errors,
         after.errors,
@@ -214,7 +213,6 @@ def compare_held_out(problem: EstimationProblem, folds: Folds, before: HeldOut, 
         high,
         float(gains.sum()),
         float(score_low),
-        float(score_high),
     )
 
 

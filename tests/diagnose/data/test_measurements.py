@@ -17,8 +17,8 @@ from ferryid.models.forces.estimator import model_estimator
 from ferryid.models.model import Model
 from ferryid.regression.bases.basis import make_basis
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
+from tests.vessel.hull_matrices import forward
 
 SHORT = str(Path(__file__).resolve().parents[3] / "fixtures" / "short.mcap")
 FERRY = load_profile("milliampere")

@@ -15,7 +15,6 @@ from ferryid.diagnose.inference.campaign import Campaign, fit_campaign
 from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, Member, fit_campaign_hull
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
@@ -23,6 +22,7 @@ from ferryid.errors import FerryIdError
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.judging.test_held_out import sailed
+from tests.real.campaign_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 
 FERRY = load_profile("milliampere")
 WIND = effects()["wind"]

@@ -20,8 +20,8 @@ from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
+from tests.vessel.hull_matrices import forward
 
 FERRY = load_profile("milliampere")
 WIND = np.array([-2.0, 1.5])

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
-from ferryid.diagnose.inference.campaign_hull import Member, fit_campaign_hull, residual_gaps
-from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.campaign_hull import CampaignHull, Member, fit_campaign_hull, induced
+from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.folds import DRAWS, folds_of, subset
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.errors import FerryIdError
 from ferryid.types import Floats
 
@@ -95,6 +95,22 @@ def held_out_gains(
             blocks.append(sums)
         gains[name] = Gains(np.concatenate(blocks), log)
     return gains
+
+
+def residual_gaps(member: Member, hull: CampaignHull, place: int) -> Floats:
+    """Return the gaps that are left in some windows of a log, shape (J, c), with its hull and effects fitted elsewhere.
+
+    Parameters
+    ----------
+    member
+        With the windows to judge.
+    hull, place
+        The fit, and the log's place in it.
+    """
+    h = len(COEFFICIENTS)
+    mean = hull.before + hull.spread * hull.step
+    picture = induced(replace(member.plain, hull=mean[:h]), mean[h:])
+    return member.windows.gap(apply_candidates(picture, member.candidates, hull.values[place]))
 
 
 def _white_squares(gaps: Floats, noise: AutoregressiveNoise, block: NDArray[np.int64]) -> Floats:
