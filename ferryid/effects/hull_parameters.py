@@ -44,12 +44,12 @@ def _factor(name: str, size: float) -> Parameter:
     return Parameter(name, "-", size, 0.05, 10.0, neutral=1.0)
 
 
-def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
+def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Choice:
     """Return factors of which only those of the coefficients that are worth it can move."""
-    names = _named(picture.scene.profile)
+    names = _named(force_model.measurements.profile)
     able = [name for name in names if name not in ARMS]
     places = [COEFFICIENTS.index(name) for name in able]
-    J, e = hull_jacobian(picture, believed, residual, places)
+    J, e = hull_jacobian(force_model, believed, residual, places)
     chosen, doubt = _best_subset(J.T @ J, -J.T @ e, able)
     if 2 * len(chosen) > len(able):
         # A model that is wrong all over is wrong there, too.
@@ -85,16 +85,16 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
     return best, doubt(best)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the coefficients."""
     factor = np.ones(len(COEFFICIENTS))
-    factor[hull_of(picture.scene.profile) != 0.0] = p
-    return replace(picture, hull=picture.hull * factor)
+    factor[hull_of(force_model.measurements.profile) != 0.0] = p
+    return replace(force_model, hull=force_model.hull * factor)
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show a wrong hull model."""
-    return "" if scene.profile.hull.has_model else "the profile has no hull model"
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show a wrong hull model."""
+    return "" if measurements.profile.hull.has_model else "the profile has no hull model"
 
 
 def says(values: Values, instance: str | None) -> str:

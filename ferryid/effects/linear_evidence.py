@@ -15,19 +15,19 @@ TINY = 0.01
 
 
 def hull_jacobian(
-    picture: ForceModel, believed: Floats, residual: Residual, places: list[int]
+    force_model: ForceModel, believed: Floats, residual: Residual, places: list[int]
 ) -> tuple[Floats, Floats]:
     """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
 
-    The line is drawn at the picture's hull, which is the fitted one, as acceleration is far from linear in mass.
+    The line is drawn at the force model's hull, which is the fitted one, as acceleration is far from linear in mass.
     """
-    e = residual(picture)
+    e = residual(force_model)
     columns, away = [], []
     for k in places:
-        hull = picture.hull.copy()
+        hull = force_model.hull.copy()
         hull[k] += TINY * believed[k]
-        columns.append((residual(replace(picture, hull=hull)) - e) / TINY)
-        away.append(picture.hull[k] / believed[k] - 1.0 if believed[k] != 0.0 else 0.0)
+        columns.append((residual(replace(force_model, hull=hull)) - e) / TINY)
+        away.append(force_model.hull[k] / believed[k] - 1.0 if believed[k] != 0.0 else 0.0)
     J = np.column_stack(columns)
     return J, e - J @ np.array(away)
 

@@ -41,14 +41,14 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Change nothing: what waves push on average is not theirs alone."""
-    return picture
+    return force_model
 
 
-def unsteady(picture: ForceModel) -> Processes:
+def unsteady(force_model: ForceModel) -> Processes:
     """Return a process on each axis."""
-    loads = [np.tile(axis, (len(picture.scene.t), 1)) for axis in np.eye(3)]
+    loads = [np.tile(axis, (len(force_model.measurements.t), 1)) for axis in np.eye(3)]
 
     def processes(p: Floats) -> tuple[Process, ...]:
         frequency, force, moment, memory = (float(value) for value in p)

@@ -38,18 +38,18 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
-def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
+def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Choice:
     """Return the parameters with the wind to begin with."""
-    parameters = parameters_of(picture.scene.profile)
+    parameters = parameters_of(force_model.measurements.profile)
     angles = np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS
     winds = [
         np.array([speed * np.cos(angle), speed * np.sin(angle)])
         for speed in SPEEDS_MPS
         for angle in (angles if speed > 0.0 else angles[:1])
     ]
-    J, e = hull_jacobian(picture, believed, residual, np.flatnonzero(believed).tolist())
-    calm = residual(picture)
-    left = np.column_stack([e + residual(apply(picture, wind, None)) - calm for wind in winds])
+    J, e = hull_jacobian(force_model, believed, residual, np.flatnonzero(believed).tolist())
+    calm = residual(force_model)
+    left = np.column_stack([e + residual(apply(force_model, wind, None)) - calm for wind in winds])
     sizes = np.array([one.size for one in parameters[:2]])
     away = np.array([float(np.sum((wind / sizes) ** 2)) for wind in winds])
     best = winds[int(np.argmin(profiled_loss(J, left) + 0.5 * away))]
@@ -57,23 +57,23 @@ def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
     return Choice((*begun, *parameters[2:]), 0.0)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the wind's load, less that of still air, which is there already."""
-    scene, areas = picture.scene, picture.scene.profile.wind
+    measurements, areas = force_model.measurements, force_model.measurements.profile.wind
     if areas is None:
-        return picture
+        return force_model
     air, factors = np.split(np.asarray(p, dtype=np.float64), [2])
     factors = factors if factors.size else np.ones(3)
-    more = factors * (mean_load(scene, areas, air, picture.gust_std) - scene.air_load)
-    return replace(picture, external=picture.external + more, air=air, air_factors=factors)
+    more = factors * (mean_load(measurements, areas, air, force_model.gust_std) - measurements.air_load)
+    return replace(force_model, external=force_model.external + more, air=air, air_factors=factors)
 
 
-def untold(scene: Measurements, p: Floats) -> frozenset[str]:
+def untold(measurements: Measurements, p: Floats) -> frozenset[str]:
     """Return what is fitted so that the rest comes out right, and is of no interest itself."""
     return frozenset(COEFFICIENTS)
 
 
-def mean_load(scene: Measurements, areas: WindAreas, air: Floats, gust_std: float) -> Floats:
+def mean_load(measurements: Measurements, areas: WindAreas, air: Floats, gust_std: float) -> Floats:
     """Return what a wind loads the vessel with on average [N, N, N·m], shape (n, 3).
 
     A load that goes with the square of the speed is larger in gusts: the mean over a normal distribution, by Gauss's and
@@ -81,7 +81,7 @@ def mean_load(scene: Measurements, areas: WindAreas, air: Floats, gust_std: floa
     """
 
     def load(towards: Floats) -> Floats:
-        return wind_force(areas, np.broadcast_to(towards, (len(scene.t), 2)), scene.psi, scene.nu)
+        return wind_force(areas, np.broadcast_to(towards, (len(measurements.t), 2)), measurements.psi, measurements.nu)
 
     steady = load(air)
     if gust_std == 0.0:
@@ -92,11 +92,11 @@ def mean_load(scene: Measurements, areas: WindAreas, air: Floats, gust_std: floa
     )
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show a wind."""
-    if scene.wind is not None:
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show a wind."""
+    if measurements.wind is not None:
         return "the wind was measured and is part of the model"
-    return "the profile has no wind areas" if scene.profile.wind is None else ""
+    return "the profile has no wind areas" if measurements.profile.wind is None else ""
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -111,9 +111,9 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"wind": {"north_mps": values["north"], "east_mps": values["east"]}}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the heading: what is constant over ground turns with it."""
-    return "heading [deg]", np.asarray(np.degrees(picture.scene.psi) % 360.0)
+    return "heading [deg]", np.asarray(np.degrees(force_model.measurements.psi) % 360.0)
 
 
 EFFECT = Effect(

@@ -43,13 +43,13 @@ class NoiseModel:
         As `ferryid.diagnose.inference.kalman.gains` takes it, shape (c, 5).
     processes
         Shared disturbances.
-    picture
+    force_model
         In which these push.
     """
 
     channels: Floats
     processes: tuple[Process, ...] = ()
-    picture: ForceModel | None = None
+    force_model: ForceModel | None = None
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def make_whitening_filter(noise: NoiseModel, steps: Windows, pushes: Floats | No
     """
     h, integrals = stride_s(steps), integrals_of(steps)
     scale = _scales(steps)
-    if noise.processes and noise.picture is not None:
+    if noise.processes and noise.force_model is not None:
         columns = disturbance_columns(noise, steps) if pushes is None else pushes
         blocks, drive = _blocks(noise.processes, h)
         by_run = tuple(
@@ -123,11 +123,11 @@ def make_whitening_filter(noise: NoiseModel, steps: Windows, pushes: Floats | No
 
 def disturbance_columns(noise: NoiseModel, steps: Windows) -> Floats:
     """Return the acceleration of every channel by a unit of every state of the shared disturbances, shape (J, c, states)."""
-    assert noise.picture is not None
+    assert noise.force_model is not None
     columns = []
     for process in noise.processes:
-        pushed = replace(noise.picture, external=noise.picture.external + process.force)
-        column = (steps.gap(pushed) - steps.gap(noise.picture))[:, :, None]
+        pushed = replace(noise.force_model, external=noise.force_model.external + process.force)
+        column = (steps.gap(pushed) - steps.gap(noise.force_model))[:, :, None]
         columns.append(column)
         if process.frequency_hz > 0.0:
             columns.append(np.zeros_like(column))
@@ -180,7 +180,7 @@ def fit_noise_with(
     alone: NoiseModel,
     made: Callable[[Floats], tuple[Process, ...]],
     start: Floats,
-    picture: ForceModel,
+    force_model: ForceModel,
     worth: float = -np.inf,
 ) -> tuple[NoiseModel, Floats, Floats, float]:
     """Return the noise that gaps have if disturbances push beside each channel's own noise.
@@ -195,7 +195,7 @@ def fit_noise_with(
         The further processes, from positive parameters.
     start
         These to begin with, shape (k,).
-    picture
+    force_model
         In which all push.
     worth
         Logarithm of the likelihood that has to come into sight before the search goes on to its end.
@@ -216,10 +216,10 @@ def fit_noise_with(
 
     def noise(z: Floats) -> NoiseModel:
         own, rest = np.exp(z[: 5 * len(first)].reshape(-1, 5)), np.exp(z[5 * len(first) :])
-        return NoiseModel(own[list(GROUPS)], (*alone.processes, *made(rest)), picture)
+        return NoiseModel(own[list(GROUPS)], (*alone.processes, *made(rest)), force_model)
 
     # How a disturbance pushes does not depend on its parameters.
-    pushes = disturbance_columns(NoiseModel(alone.channels, (*alone.processes, *made(start)), picture), steps)
+    pushes = disturbance_columns(NoiseModel(alone.channels, (*alone.processes, *made(start)), force_model), steps)
 
     def cost(z: Floats) -> float:
         return -likelihood(noise(z), steps, gaps, pushes)
@@ -300,7 +300,7 @@ def integrals_of(steps: Windows) -> int:
 
 def stride_s(steps: Windows) -> float:
     """Return the time between two steps [s]; a position's weight is two of them long, a velocity's one."""
-    return (len(steps.weight) - 1) // integrals_of(steps) * steps.scene.step_s
+    return (len(steps.weight) - 1) // integrals_of(steps) * steps.measurements.step_s
 
 
 def summed(gaps: Floats, steps: Windows) -> Floats:

@@ -40,7 +40,7 @@ class Linearisation:
 
     Attributes
     ----------
-    picture
+    force_model
         That the fit has of the log.
     left
         What it leaves, whitened, shape (w,).
@@ -50,7 +50,7 @@ class Linearisation:
         Of their cross-products and the prior, shape (k, k).
     """
 
-    picture: ForceModel
+    force_model: ForceModel
     left: Floats
     slopes: Floats
     inverse: Floats
@@ -58,10 +58,10 @@ class Linearisation:
 
 def linearise(problem: EstimationProblem, made: Fit, begin: StartingPoint) -> Linearisation:
     """Return a fit linearised; `begin` is `ferryid.diagnose.inference.estimation.starting_point` of it."""
-    picture = fitted_force_model(problem.plain, made)
+    force_model = fitted_force_model(problem.plain, made)
     slopes = np.column_stack([begin.by_hull, effect_slopes(problem, made)])
     inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
-    return Linearisation(picture, problem.white(picture), slopes, np.asarray(inverse, dtype=np.float64))
+    return Linearisation(force_model, problem.white(force_model), slopes, np.asarray(inverse, dtype=np.float64))
 
 
 def promising_spans(problem: EstimationProblem, ground: Linearisation, candidate: Candidate) -> list[Candidate]:
@@ -127,12 +127,12 @@ def _cross_products(
     steps, start = problem.steps, candidate.start
     part = np.clip(np.searchsorted(edges, steps.middle_s, side="right") - 1, 0, len(edges) - 2)
     own = part[:, None, None] == np.arange(len(edges) - 1)
-    there = as_measured(candidate.effect.apply(ground.picture, start, candidate.instance))
+    there = as_measured(candidate.effect.apply(ground.force_model, start, candidate.instance))
     columns = []
     for k, one in enumerate(candidate.parameters):
         moved = start.copy()
         moved[k] += NUDGE * one.size
-        change = as_measured(candidate.effect.apply(ground.picture, moved, candidate.instance)) - there
+        change = as_measured(candidate.effect.apply(ground.force_model, moved, candidate.instance)) - there
         columns.append(steps.mean(steps.along(change))[:, :, None] / NUDGE * own)
     p = len(columns)
     C = problem.whitening_filter.white(np.stack(columns, axis=3).reshape(len(steps.starts), -1, (len(edges) - 1) * p))

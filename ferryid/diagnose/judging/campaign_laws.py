@@ -32,7 +32,7 @@ class LogInformation:
     Attributes
     ----------
     terms
-        Those that its scene offers, k in all.
+        Those that its measurements offer, k in all.
     normal, slope
         Second derivatives of the negative log-likelihood by the coefficients, shape (k, k), and first ones of the
         log-likelihood where there is no law, shape (k,).
@@ -179,7 +179,7 @@ def find_campaign_laws(logs: Mapping[str, tuple[EstimationProblem, Fit]]) -> dic
 
 
 def log_information(problem: EstimationProblem, kept: Fit, law: VesselLaw | None = None) -> LogInformation:
-    """Return what a log says of all terms that its scene offers, beside a fit.
+    """Return what a log says of all terms that its measurements offer, beside a fit.
 
     The slopes are those where there is no law. If one is known, all derivatives are taken where it acts, and the hull does not
     have to stand in for it.
@@ -187,7 +187,7 @@ def log_information(problem: EstimationProblem, kept: Fit, law: VesselLaw | None
     if law is not None:
         kept = _with(problem, kept, law.terms, law.values)
         problem = problem.with_noise_of(kept)
-    terms = terms_of(problem.plain.scene)
+    terms = terms_of(problem.plain.measurements)
     lines = linearise_terms(problem, kept, terms)
     pushes, seen = lines.terms * lines.sizes, problem.windows
     left, known, columns = (problem.noise.white(one, seen.runs) for one in (lines.gaps, lines.known, pushes))

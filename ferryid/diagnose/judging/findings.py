@@ -40,7 +40,7 @@ TIME_FINE_S = 0.2
 SHOWN_RIVALS = 3
 
 
-def force_claims(problem: EstimationProblem, stands: Elimination, scene: Measurements) -> list[Claim]:
+def force_claims(problem: EstimationProblem, stands: Elimination, measurements: Measurements) -> list[Claim]:
     """Return the findings of forces with their figures, that which removes most of the error first.
 
     Parameters
@@ -49,18 +49,19 @@ def force_claims(problem: EstimationProblem, stands: Elimination, scene: Measure
         With the noise that the selection leaves.
     stands
         What is left of the selection.
-    scene
-        The log's scene at its full rate.
+    measurements
+        The log's measurements at its full rate.
     """
     removed = removed_shares(problem, stands)
     claims = [
-        _force_claim(problem, stands, scene, i, removed.get(one.key, {})) for i, one in enumerate(stands.fit.candidates)
+        _force_claim(problem, stands, measurements, i, removed.get(one.key, {}))
+        for i, one in enumerate(stands.fit.candidates)
     ]
     return sorted(claims, key=lambda one: -sum(one.finding.improvement.values()))
 
 
 def _force_claim(
-    problem: EstimationProblem, stands: Elimination, scene: Measurements, i: int, removed: Mapping[str, float]
+    problem: EstimationProblem, stands: Elimination, measurements: Measurements, i: int, removed: Mapping[str, float]
 ) -> Claim:
     kept, standing = stands.fit, stands.standings[i]
     candidate, values = kept.candidates[i], kept.values[i]
@@ -77,7 +78,7 @@ def _force_claim(
         candidates=tuple(kept.candidates[j] for j in others),
         values=tuple(kept.values[j] for j in others),
     )
-    place = locate(problem, bare, kept, scene)
+    place = locate(problem, bare, kept, measurements)
     estimates = _estimates(problem, candidate, kept, i)
     by_name = dict(zip((p.name for p in candidate.parameters), values.tolist(), strict=True))
     told = {name: value for name, value in by_name.items() if name in estimates}
@@ -123,7 +124,7 @@ def _figures(
         removed=removed,
         lasts_s=lasts_s(problem, candidate) if candidate.times else inf,
         block_s=block_s(problem.windows),
-        once=candidate.effect.once(problem.plain.scene, values),
+        once=candidate.effect.once(problem.plain.measurements, values),
         passes=passes,
         **shown,
     )
@@ -153,7 +154,7 @@ def removed_shares(problem: EstimationProblem, stands: Elimination) -> dict[tupl
 def _estimates(problem: EstimationProblem, candidate: Candidate, kept: Fit, index: int) -> dict[str, Estimate]:
     error = kept.reported_errors(index)
     estimates = {}
-    untold = candidate.effect.untold(problem.plain.scene, kept.values[index])
+    untold = candidate.effect.untold(problem.plain.measurements, kept.values[index])
     followed = intervals(problem, kept, index) if candidate.effect.ridge and not candidate.times else {}
     for parameter, value, spread in zip(candidate.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
         low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
@@ -188,7 +189,7 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
     """
     candidate = kept.candidates[index]
     times = problem.windows.middle_s
-    step = TIME_STEP * len(problem.windows.weight) * problem.windows.scene.step_s
+    step = TIME_STEP * len(problem.windows.weight) * problem.windows.measurements.step_s
 
     begin = starting_point(problem, kept)
 
@@ -225,11 +226,11 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
     shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
     low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
     # Forces have a value a row: within one, nothing is known of when they change.
-    row_s = problem.windows.scene.step_s
+    row_s = problem.windows.measurements.step_s
     return Estimate(middle, max(low - row_s, 0.0), high + row_s, "s")
 
 
 def _intervals(problem: EstimationProblem, estimates: Mapping[str, Estimate]) -> tuple[tuple[float, float], ...]:
-    t = problem.windows.scene.t
+    t = problem.windows.measurements.t
     begun, ended = _value(estimates, "onset"), _value(estimates, "offset")
     return ((max(begun or 0.0, float(t[0])), float(t[-1]) if ended is None else min(ended, float(t[-1]))),)

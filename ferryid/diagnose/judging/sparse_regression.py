@@ -97,7 +97,7 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
         What an effect moves the gaps by, shape (J, c): no term that says the same, as a share of a thruster's force says what a
         weak thruster does. Any will do where None.
     """
-    terms = list(terms_of(problem.plain.scene))
+    terms = list(terms_of(problem.plain.measurements))
     if unlike is not None:
         terms = _unlike(problem, kept, terms, unlike)
     chosen: list[Term] = []
@@ -154,11 +154,11 @@ def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) 
 
     A coefficient's usual size gives a force as large as the thrusters' is in the root mean square, on the axis of the term.
     """
-    picture = fitted_force_model(problem.plain, kept)
-    thrust = np.sqrt(np.mean(picture.parts.sum(axis=1) ** 2, axis=0))
+    force_model = fitted_force_model(problem.plain, kept)
+    thrust = np.sqrt(np.mean(force_model.parts.sum(axis=1) ** 2, axis=0))
     parameters = []
     for term in terms:
-        size = np.sqrt(np.mean(term.force(picture) ** 2, axis=0))
+        size = np.sqrt(np.mean(term.force(force_model) ** 2, axis=0))
         axis = int(np.argmax(size / np.maximum(thrust, 1e-9)))
         usual = float(max(thrust[axis], 1e-9) / max(size[axis], 1e-9))
         parameters.append(
@@ -166,11 +166,11 @@ def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) 
         )
     made = tuple(parameters)
 
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        external = picture.external.copy()
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        external = force_model.external.copy()
         for coefficient, term in zip(p.tolist(), terms, strict=True):
-            external += coefficient * term.force(picture)
-        return replace(picture, external=external)
+            external += coefficient * term.force(force_model)
+        return replace(force_model, external=external)
 
     effect = Effect(
         "unknown",
@@ -229,11 +229,15 @@ def _best(
 def linearise_terms(problem: EstimationProblem, made: Fit, terms: Sequence[Term]) -> LinearTerms:
     """Return a fit's gaps and what they change by with hull, effects and the coefficients of terms."""
     seen = problem.windows
-    picture = fitted_force_model(problem.plain, made)
-    base = seen.gap(picture)
+    force_model = fitted_force_model(problem.plain, made)
+    base = seen.gap(force_model)
     known, centre = nuisance_columns(problem, made)
     pushes = np.stack(
-        [seen.gap(replace(picture, external=picture.external + term.force(picture))) - base for term in terms], axis=-1
+        [
+            seen.gap(replace(force_model, external=force_model.external + term.force(force_model))) - base
+            for term in terms
+        ],
+        axis=-1,
     )
     sizes = np.maximum(np.sqrt(np.mean(pushes**2, axis=(0, 1))), 1e-12)
     return LinearTerms(base, known, centre, pushes / sizes, sizes)

@@ -41,21 +41,27 @@ def trial_on(push: Floats | None = None) -> EstimationProblem:
     )
     bare = ForceModel(seen, hull_of(FERRY), seen.parts, seen.angles, np.zeros((len(t), 3)))
     accelerated = np.column_stack([np.cos(t / 23.0) / 23.0, 0.7 / 53.0 * np.cos(t / 53.0), np.zeros_like(t)])
-    # Inverse dynamics with the picture's own equations: its force is what is left of the motion it gives without any.
+    # Inverse dynamics with the force model's own equations: its force is what is left of the motion it gives without any.
     needed = (accelerated - acceleration(bare)) @ FERRY.hull.M.T
     gone = np.zeros((len(t), 3)) if push is None else push
     parts = np.stack([needed - gone, np.zeros_like(needed)], axis=1)
-    scene = replace(seen, parts=parts)
-    cut = windows(scene, 8.0, 2.0)
-    plain = ForceModel(cut.scene, hull_of(FERRY), cut.scene.parts, cut.scene.angles, np.zeros((len(cut.scene.t), 3)))
+    measurements = replace(seen, parts=parts)
+    cut = windows(measurements, 8.0, 2.0)
+    plain = ForceModel(
+        cut.measurements,
+        hull_of(FERRY),
+        cut.measurements.parts,
+        cut.measurements.angles,
+        np.zeros((len(cut.measurements.t), 3)),
+    )
     return estimation_problem(cut, plain, EFFECTS.hull_spread * np.abs(plain.hull))
 
 
 def pushed(shape: Floats) -> Candidate:
     """An effect that is any push: `shape` times its only parameter."""
 
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        return replace(picture, external=picture.external + p[0] * shape)
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        return replace(force_model, external=force_model.external + p[0] * shape)
 
     effect = replace(effects()["wind"], id="push", apply=apply)
     return Candidate(effect, None, (Parameter("size", "", 1.0, -10.0, 10.0),))
