@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -24,17 +25,17 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
     return tuple(actuator.name for actuator in profile.actuators if actuator.kind == "azimuth")
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Turn the force of the thruster."""
-    k = picture.scene.names.index(str(instance))
-    x, y = picture.scene.profile.actuators[k].position_m
+    k = force_model.measurements.names.index(str(instance))
+    x, y = force_model.measurements.profile.actuators[k].position_m
     c, s = np.cos(radians(p[0])), np.sin(radians(p[0]))
-    parts, angles = picture.parts.copy(), picture.angles.copy()
-    X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
+    parts, angles = force_model.parts.copy(), force_model.angles.copy()
+    X, Y = force_model.parts[:, k, 0], force_model.parts[:, k, 1]
     parts[:, k, 0], parts[:, k, 1] = c * X - s * Y, s * X + c * Y
     parts[:, k, 2] = x * parts[:, k, 1] - y * parts[:, k, 0]
     angles[:, k] += radians(p[0])
-    return replace(picture, parts=parts, angles=angles)
+    return replace(force_model, parts=parts, angles=angles)
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -48,11 +49,11 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"faults": [{"thruster": instance, "offset_deg": values["angle"]}]}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the thruster's own force turned by a right angle."""
-    k = picture.scene.names.index(str(instance))
-    x, y = picture.scene.profile.actuators[k].position_m
-    X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
+    k = force_model.measurements.names.index(str(instance))
+    x, y = force_model.measurements.profile.actuators[k].position_m
+    X, Y = force_model.parts[:, k, 0], force_model.parts[:, k, 1]
     turned = {"surge": -Y, "sway": X, "yaw": x * X + y * Y}[axis]
     return f"{instance}'s force turned by 90° {'[N·m]' if axis == 'yaw' else '[N]'}", turned
 
@@ -67,5 +68,5 @@ EFFECT = Effect(
     instances=instances,
     vessel=True,
     regressor=regressor,
-    form=DEFINITION,
+    form=EFFECTS.definition_error,
 )

@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -20,15 +21,15 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("north", "m/s", 0.2, -3.0, 3.0), Parameter("east", "m/s", 0.2, -3.0, 3.0))
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let the water move."""
-    flow = np.broadcast_to(p, (len(picture.scene.t), 2))
-    return replace(picture, flow=flow if picture.flow is None else picture.flow + flow)
+    flow = np.broadcast_to(p, (len(force_model.measurements.t), 2))
+    return replace(force_model, flow=flow if force_model.flow is None else force_model.flow + flow)
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show a current."""
-    return "the current was measured and is part of the model" if scene.current is not None else ""
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show a current."""
+    return "the current was measured and is part of the model" if measurements.current is not None else ""
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -43,9 +44,9 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"current": {"north_mps": values["north"], "east_mps": values["east"]}}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the heading: what is constant over ground turns with it."""
-    return "heading [deg]", np.asarray(np.degrees(picture.scene.psi) % 360.0)
+    return "heading [deg]", np.asarray(np.degrees(force_model.measurements.psi) % 360.0)
 
 
 EFFECT = Effect(
@@ -58,5 +59,5 @@ EFFECT = Effect(
     cannot=cannot,
     regressor=regressor,
     bends_hull=True,
-    idle=0.01,
+    idle=EFFECTS.least_current,
 )

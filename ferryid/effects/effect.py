@@ -1,4 +1,4 @@
-"""What an effect is: parameters, how it changes the picture of the forces, and how a simulated trial shows it."""
+"""What an effect is: parameters, how it changes the force model, and how a simulated trial shows it."""
 
 from __future__ import annotations
 
@@ -9,17 +9,14 @@ from typing import Any
 
 from ferryid.effects.force_model import ForceModel, Measurements, between
 from ferryid.effects.simulated import Simulated
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
 Values = Mapping[str, float]
 Residual = Callable[[ForceModel], Floats]
-"""What a picture leaves of a log, whitened: so that its square is twice what the logarithm of the likelihood loses."""
+"""Whitened residual of a force model: half its square is minus the logarithm of the likelihood, but for a constant."""
 
-FORMULA, DEFINITION = 0.1, 0.02
-"""How far off an effect's formula is believed to be, as a share of what it changes: a standard deviation. What its parameter
-defines, as a share of a thruster's force or an angle, hardly is; of the rest some ten per cent are usual. Chosen in view of
-trials of a plant with other formulas; `make proof` tells how often intervals hold."""
 HELD = 1e-6
 """Size of a parameter that is not to move: one of several alternatives that was not chosen."""
 
@@ -95,20 +92,20 @@ class Effect:
     parameters_of
         Parameters for a vessel.
     apply
-        ``apply(picture, p, instance)`` returns the picture with the effect in it; `p` has one value per parameter.
+        ``apply(force_model, p, instance)`` returns the force model with the effect in it; `p` has one value per parameter.
     instances
         The thrusters that it can be an effect of; ``(None,)`` where it is one of the whole vessel.
     cannot
-        Why the scene cannot show it, as a sentence; empty where it can.
+        Why the measurements cannot show it, as a sentence; empty where it can.
     onset
         True where it may begin or end during the log.
     kick
-        ``kick(picture, p)`` returns the momentum that an effect gives the vessel if it begins in a row [N·s, N·s, N·m·s], shape
-        (n, 3). What ends leaves the vessel as fast as it is.
+        ``kick(force_model, p)`` returns the momentum that an effect gives the vessel if it begins in a row [N·s, N·s, N·m·s],
+        shape (n, 3). What ends leaves the vessel as fast as it is.
     says
         One sentence on a finding, from its values by name and its instance.
     once
-        ``once(scene, p)`` is True where it acted for so short a time that whatever came just then would look the same.
+        ``once(measurements, p)`` is True where it acted for so short a time that whatever came just then would look the same.
     in_part
         True where that sentence can be said of some of the values alone, those that a log tells.
     scenario
@@ -119,13 +116,13 @@ class Effect:
     vessel
         True for a property of hull or actuators, which carries over to other logs; False for a condition of one log.
     choose
-        ``choose(picture, believed, residual)`` returns the parameters for a log whose forces are otherwise as in the picture,
-        where there are alternatives to choose from (places, coefficients): a quick scan, in place of ``parameters_of``. The
-        picture's hull is the fitted one, `believed` its coefficients as believed before the log, shape (26,).
+        ``choose(force_model, believed, residual)`` returns the parameters for a log whose forces are otherwise those of the
+        force model, where there are alternatives to choose from (places, coefficients): a quick scan, in place of
+        ``parameters_of``. The force model's hull is the fitted one, `believed` the prior's coefficients, shape (26,).
     least
         How far the interval of a parameter has to stay from its neutral value for the parameter to be worth a report.
     untold
-        ``untold(scene, p)`` returns the names of parameters about which a log tells nothing, wherever they are fitted to be.
+        ``untold(measurements, p)`` returns the names of parameters that a log does not determine, whatever their values.
     idle
         An effect whose parameters are all nearer to neutral than this is void: hull or instruments may be as much off anyway.
         Those count that have the unit of the first; a place has no size.
@@ -143,13 +140,13 @@ class Effect:
     of_sensor
         True where it corrects what was measured: such effects act first, as the others act on what is true.
     unsteady
-        ``unsteady(picture)(p)`` returns what comes and goes by chance, from positive parameters; none where the picture has
-        nothing for it to act on. Such an effect changes no picture: it is a state of the filter.
+        ``unsteady(force_model)(p)`` returns stochastic disturbances from positive parameters; none where the force model has
+        nothing for them to act on. Such an effect changes no force model: it is a state of the filter.
     about
         Id of the effect about which an unsteady one comes and goes, and beside which it is looked for.
     regressor
-        ``regressor(picture, p, instance, axis)`` returns label with unit and values, shape (n,), of the quantity on which the
-        force that is left over on that axis gives the effect away: the figure that would convince a sceptic.
+        ``regressor(force_model, p, instance, axis)`` returns label with unit and values, shape (n,), of the quantity against
+        which the residual force of that axis is drawn to show the effect.
     """
 
     id: str
@@ -159,17 +156,17 @@ class Effect:
     says: Callable[[Values, str | None], str]
     scenario: Callable[[Values, str | None], dict[str, Any]]
     instances: Callable[[Profile], tuple[str | None, ...]] = lambda profile: (None,)
-    cannot: Callable[[Measurements], str] = lambda scene: ""
+    cannot: Callable[[Measurements], str] = lambda measurements: ""
     onset: bool = False
     kick: Callable[[ForceModel, Floats], Floats] | None = None
     vessel: bool = False
     choose: Callable[[ForceModel, Floats, Residual], Choice] | None = None
     least: float = 0.0
-    untold: Callable[[Measurements, Floats], frozenset[str]] = lambda scene, p: frozenset()
-    once: Callable[[Measurements, Floats], bool] = lambda scene, p: False
+    untold: Callable[[Measurements, Floats], frozenset[str]] = lambda measurements, p: frozenset()
+    once: Callable[[Measurements, Floats], bool] = lambda measurements, p: False
     in_part: bool = False
     idle: float = 0.0
-    form: float = FORMULA
+    form: float = EFFECTS.formula_error
     passing: float = 0.0
     bends_hull: bool = False
     ridge: str = ""
@@ -185,11 +182,11 @@ class Effect:
         return 0 if self.of_sensor else 1 if self.unsteady is not None else 2
 
     def act(
-        self, picture: ForceModel, p: Floats, instance: str | None, onset_s: float = 0.0, offset_s: float = inf
+        self, force_model: ForceModel, p: Floats, instance: str | None, onset_s: float = 0.0, offset_s: float = inf
     ) -> ForceModel:
-        """Return the picture with the effect in it from an onset until an offset [s]; as they stand here, all along."""
-        after = self.apply(picture, p, instance)
+        """Return the force model with the effect in it from an onset until an offset [s]; as they stand here, all along."""
+        after = self.apply(force_model, p, instance)
         if onset_s <= 0.0 and not isfinite(offset_s):
             return after
-        kick = None if self.kick is None or onset_s <= 0.0 else self.kick(picture, p)
-        return between(picture, after, onset_s, offset_s, kick)
+        kick = None if self.kick is None or onset_s <= 0.0 else self.kick(force_model, p)
+        return between(force_model, after, onset_s, offset_s, kick)

@@ -1,4 +1,4 @@
-"""The equations of motion in every row of a picture, compiled: one pass instead of some hundred over short-lived arrays.
+"""The equations of motion in every row of a force model, compiled: one pass instead of some hundred over short-lived arrays.
 
 The coefficients of the hull are in the order of `ferryid.effects.force_model.COEFFICIENTS`; what a force model has not
 got is an array without rows.
@@ -97,7 +97,7 @@ def accelerations(
     hull
         Shape (26,).
     parts, external, load, factor
-        As `parts`, `external`, `load` and `damping_factor` of a picture.
+        As `parts`, `external`, `load` and `damping_factor` of a force model.
     flow
         Velocity of the water along the vessel's axes, shape (n, 2).
     """

@@ -5,7 +5,7 @@ An effect takes a force model and returns another, in which its own physics acts
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, inf, sin
@@ -123,12 +123,12 @@ class ForceModel:
 
     Attributes
     ----------
-    scene
+    measurements
         What was measured.
     hull
         Coefficients in the order of `COEFFICIENTS`, shape (26,).
     parts, angles
-        As in the scene, with what the effects make of them.
+        As in the measurements, with what the effects make of them.
     external
         All other forces on the hull [N, N, N·m], shape (n, 3).
     flow
@@ -145,14 +145,14 @@ class ForceModel:
     gust_std
         Standard deviation of gusts about that flow, of north and east each [m/s].
     ambient
-        Those of the external forces that follow from what was measured: ``ambient(scene)``, shape (n, 3); None where none do.
+        Those of the external forces that follow from what was measured: ``ambient(measurements)``, shape (n, 3), or None.
     turned
         Angle from the axes that the navigation measures along to the vessel's, counterclockwise [rad].
     antenna
         What the navigation measures the motion of, ahead and to starboard of the body origin [m].
     """
 
-    scene: Measurements
+    measurements: Measurements
     hull: Floats
     parts: Floats
     angles: Floats
@@ -175,133 +175,130 @@ def hull_of(profile: Profile) -> Floats:
     return np.array([*mass, *(D.get(name, 0.0) for name in COEFFICIENTS[5:])], dtype=np.float64)
 
 
-def named(hull: Floats) -> Mapping[str, float]:
-    """Return coefficients by name."""
-    return dict(zip(COEFFICIENTS, hull.tolist(), strict=True))
-
-
-def body_current(picture: ForceModel) -> tuple[Floats, Floats]:
+def body_current(force_model: ForceModel) -> tuple[Floats, Floats]:
     """Return the water's velocity over ground along the vessel's x and y axes [m/s], shape (n,) each."""
-    flow, scene = picture.flow, picture.scene
+    flow, measurements = force_model.flow, force_model.measurements
     if flow is None:
-        still = np.zeros(len(scene.t))
+        still = np.zeros(len(measurements.t))
         return still, still
-    cosine, sine = scene.pointing
+    cosine, sine = measurements.pointing
     north, east = flow.T
     return cosine * north + sine * east, cosine * east - sine * north
 
 
-def acceleration(picture: ForceModel) -> Floats:
-    """Return the acceleration over ground that a picture gives at the measured velocities, shape (n, 3).
+def acceleration(force_model: ForceModel) -> Floats:
+    """Return the acceleration over ground that a force model gives at the measured velocities, shape (n, 3).
 
     ``M nu_dot = tau + external - C(nu_r) nu_r - D(nu_r) nu_r``, with ``[r v_c, -r u_c, 0]`` added for the water that the body
     frame turns through; Fossen (2021), section 10.3.
     """
-    scene = picture.scene
-    parts = np.ascontiguousarray(picture.parts)
-    return accelerations(np.ascontiguousarray(scene.nu), picture.hull, parts, *_forces(picture))
+    measurements = force_model.measurements
+    parts = np.ascontiguousarray(force_model.parts)
+    return accelerations(np.ascontiguousarray(measurements.nu), force_model.hull, parts, *_forces(force_model))
 
 
-def hull_changes(picture: ForceModel, places: Ints, moves: Floats) -> Floats:
+def hull_changes(force_model: ForceModel, places: Ints, moves: Floats) -> Floats:
     """Return by how much `as_measured` changes if coefficients of the hull move one by one, shape (n, 3, q).
 
     Parameters
     ----------
-    picture
+    force_model
         n rows.
     places, moves
         Which of `COEFFICIENTS` move, and by how much, shape (q,) each.
     """
-    parts = np.ascontiguousarray(picture.parts)
-    changes = slopes(places, moves, np.ascontiguousarray(picture.scene.nu), picture.hull, parts, *_forces(picture))
-    return _from_antenna(picture, changes)
+    parts = np.ascontiguousarray(force_model.parts)
+    changes = slopes(
+        places, moves, np.ascontiguousarray(force_model.measurements.nu), force_model.hull, parts, *_forces(force_model)
+    )
+    return _from_antenna(force_model, changes)
 
 
-def corrected(picture: ForceModel, scene: Measurements) -> ForceModel:
-    """Return the picture of a scene whose measurements were corrected, with the ambient forces at what it then shows."""
-    if picture.ambient is None:
-        return replace(picture, scene=scene)
-    more = picture.ambient(scene) - picture.ambient(picture.scene)
-    return replace(picture, scene=scene, external=picture.external + more)
+def corrected(force_model: ForceModel, measurements: Measurements) -> ForceModel:
+    """Return the force model with corrected measurements, and with the ambient forces that follow from these."""
+    if force_model.ambient is None:
+        return replace(force_model, measurements=measurements)
+    more = force_model.ambient(measurements) - force_model.ambient(force_model.measurements)
+    return replace(force_model, measurements=measurements, external=force_model.external + more)
 
 
-def as_measured(picture: ForceModel) -> Floats:
+def as_measured(force_model: ForceModel) -> Floats:
     """Return `acceleration` as the navigation would measure it: that of its antenna, along its own axes, shape (n, 3)."""
-    rates = acceleration(picture)
-    return _from_antenna(picture, rates[:, :, None])[:, :, 0]
+    rates = acceleration(force_model)
+    return _from_antenna(force_model, rates[:, :, None])[:, :, 0]
 
 
-def _from_antenna(picture: ForceModel, rates: Floats) -> Floats:
+def _from_antenna(force_model: ForceModel, rates: Floats) -> Floats:
     """Turn accelerations, shape (n, 3, q), into those that the navigation measures, in place."""
-    if picture.antenna != (0.0, 0.0) or picture.turned != 0.0:
-        from_antenna(rates, *picture.antenna, cos(picture.turned), sin(picture.turned))
+    if force_model.antenna != (0.0, 0.0) or force_model.turned != 0.0:
+        from_antenna(rates, *force_model.antenna, cos(force_model.turned), sin(force_model.turned))
     return rates
 
 
-def required_force(picture: ForceModel, nu_dot: Floats) -> Floats:
+def required_force(force_model: ForceModel, nu_dot: Floats) -> Floats:
     """Return the force that the actuators need for an acceleration over ground [N, N, N·m], shape (n, 3).
 
     The inverse of `acceleration`: what `parts` add up to plays no part.
 
     Parameters
     ----------
-    picture
+    force_model
         Hull, water, load and all other forces.
     nu_dot
         Shape (n, 3) [m/s², m/s², rad/s²].
     """
-    nu = np.ascontiguousarray(picture.scene.nu)
-    return required(np.ascontiguousarray(nu_dot), nu, picture.hull, *_forces(picture))
+    nu = np.ascontiguousarray(force_model.measurements.nu)
+    return required(np.ascontiguousarray(nu_dot), nu, force_model.hull, *_forces(force_model))
 
 
-def _forces(picture: ForceModel) -> tuple[Floats, Floats, Floats, Floats]:
+def _forces(force_model: ForceModel) -> tuple[Floats, Floats, Floats, Floats]:
     """Return external forces, flow along the vessel's axes, load, and factor on damping, for the equations of motion."""
-    n = len(picture.scene.t)
-    flow = _NO_FLOW if picture.flow is None else np.column_stack(body_current(picture))
-    load = _NO_LOAD if picture.load is None else picture.load
-    factor = _NO_FACTOR if picture.damping_factor is None else picture.damping_factor
+    n = len(force_model.measurements.t)
+    flow = _NO_FLOW if force_model.flow is None else np.column_stack(body_current(force_model))
+    load = _NO_LOAD if force_model.load is None else force_model.load
+    factor = _NO_FACTOR if force_model.damping_factor is None else force_model.damping_factor
     # Compiled code does not look where an array ends.
-    lengths = {len(one) for one in (picture.external, flow, load, factor) if len(one)}
-    if lengths - {n} or picture.scene.nu.shape != (n, 3) or picture.parts.shape[::2] != (n, 3):
-        raise ValueError(f"a picture of {counted(n, 'row')} has parts of other lengths: {sorted(lengths)}")
-    external, flow, load, factor = map(np.ascontiguousarray, (picture.external, flow, load, factor))
+    lengths = {len(one) for one in (force_model.external, flow, load, factor) if len(one)}
+    if lengths - {n} or force_model.measurements.nu.shape != (n, 3) or force_model.parts.shape[::2] != (n, 3):
+        raise ValueError(f"a force model of {counted(n, 'row')} has parts of other lengths: {sorted(lengths)}")
+    external, flow, load, factor = map(np.ascontiguousarray, (force_model.external, flow, load, factor))
     return external, flow, load, factor
 
 
-def added_mass(picture: ForceModel) -> Floats:
-    """Return the part of a picture's mass matrix that is not the rigid body's, as a load, shape (5,)."""
-    hull = picture.scene.profile.hull
+def added_mass(force_model: ForceModel) -> Floats:
+    """Return the part of a force model's mass matrix that is not the rigid body's, as a load, shape (5,)."""
+    hull = force_model.measurements.profile.hull
     moment = hull.mass_kg * hull.x_g_m
-    return np.asarray(picture.hull[:5] - [hull.mass_kg, hull.mass_kg, moment, moment, hull.inertia_z])
+    return np.asarray(force_model.hull[:5] - [hull.mass_kg, hull.mass_kg, moment, moment, hull.inertia_z])
 
 
 def aboard(payload: Floats) -> Floats:
-    """Return what masses and their places, as of `payload_mass`, shape (n, 2), are as the load of a picture, shape (n, 5)."""
+    """Return the load of a force model, shape (n, 5), by masses and their places as of `payload_mass`, shape (n, 2)."""
     return payload_mass(payload)[:, [0, 1, 1, 2, 2], [0, 1, 2, 1, 2]]
 
 
-def wind_load(scene: Measurements, areas: WindAreas, air: Floats) -> Floats:
+def wind_load(measurements: Measurements, areas: WindAreas, air: Floats) -> Floats:
     """Return the load of a wind that is steady over ground [N, N, N·m], shape (n, 3).
 
     `air` is where it goes to, north and east [m/s], shape (2,).
     """
-    cos, sin = scene.pointing
+    cos, sin = measurements.pointing
     north, east = air.tolist()
     u_w, v_w = cos * north + sin * east, cos * east - sin * north
-    return relative_wind_force(areas, scene.nu[:, 0] - u_w, scene.nu[:, 1] - v_w)
+    return relative_wind_force(areas, measurements.nu[:, 0] - u_w, measurements.nu[:, 1] - v_w)
 
 
 def between(
     before: ForceModel, after: ForceModel, onset_s: float, offset_s: float = inf, kick: Floats | None = None
 ) -> ForceModel:
-    """Return the second picture from an onset until an offset [s], else the first; hull and scene are the second's.
+    """Return the second force model from an onset until an offset [s], else the first, with the second's hull.
 
     `kick` is a momentum by row, as of `ferryid.effects.effect.Effect`; that of the first row of the onset acts there.
     """
-    rows = (before.scene.t >= onset_s) & (before.scene.t < offset_s)
+    rows = (before.measurements.t >= onset_s) & (before.measurements.t < offset_s)
     if kick is not None and rows.any() and not rows[0]:
         external, first = after.external.copy(), int(np.argmax(rows))
-        external[first] += kick[first] / before.scene.step_s
+        external[first] += kick[first] / before.measurements.step_s
         after = replace(after, external=external)
 
     def mixed(old: Floats, new: Floats) -> Floats:

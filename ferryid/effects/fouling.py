@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -24,18 +25,18 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return tuple(Parameter(axis, "-", 1.0, 0.3, 6.0, neutral=1.0) for axis in AXES)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the coefficients."""
-    hull = picture.hull.copy()
+    hull = force_model.hull.copy()
     for names, factor in zip(SECOND_ORDER, p.tolist(), strict=True):
         for name in names:
             hull[COEFFICIENTS.index(name)] *= factor
-    return replace(picture, hull=hull)
+    return replace(force_model, hull=hull)
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show fouling."""
-    return "" if scene.profile.hull.has_model else "the profile has no hull model"
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show fouling."""
+    return "" if measurements.profile.hull.has_model else "the profile has no hull model"
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -49,10 +50,10 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"fouling": {axis: values[axis] for axis in AXES}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the squared speed along the axis, with its sign."""
     k = AXES.index(axis)
-    speed = picture.scene.nu[:, k]
+    speed = force_model.measurements.nu[:, k]
     return f"{axis} speed squared, signed [{'rad²/s²' if axis == 'yaw' else 'm²/s²'}]", np.abs(speed) * speed
 
 
@@ -66,6 +67,7 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     regressor=regressor,
-    idle=0.12,
+    # Within the prior of the hull it is the hull's own.
+    idle=EFFECTS.hull_spread,
     bends_hull=True,
 )

@@ -21,28 +21,28 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("std", "m/s", 1.0, 0.0, 15.0), Parameter("time_constant", "s", 8.0, 0.1, 300.0))
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let a wind be gusty, which raises its mean load."""
-    return replace(picture, gust_std=float(p[0]))
+    return replace(force_model, gust_std=float(p[0]))
 
 
-def unsteady(picture: ForceModel) -> Processes:
+def unsteady(force_model: ForceModel) -> Processes:
     """Return the load of a gust to the north and to the east; none in still air, whose load is of second order."""
-    scene, areas = picture.scene, picture.scene.profile.wind
-    if areas is None or picture.air is None:
+    measurements, areas = force_model.measurements, force_model.measurements.profile.wind
+    if areas is None or force_model.air is None:
         return lambda p: ()
-    loads, factors = [], 1.0 if picture.air_factors is None else picture.air_factors
+    loads, factors = [], 1.0 if force_model.air_factors is None else force_model.air_factors
     for towards in np.eye(2):
-        ends = [wind_load(scene, areas, picture.air + side * STEP * towards) for side in (1.0, -1.0)]
+        ends = [wind_load(measurements, areas, force_model.air + side * STEP * towards) for side in (1.0, -1.0)]
         loads.append(factors * (ends[0] - ends[1]) / (2.0 * STEP))
     return lambda p: tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show gusts."""
-    if scene.wind is not None:
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show gusts."""
+    if measurements.wind is not None:
         return "the wind was measured, gusts included"
-    return "the profile has no wind areas" if scene.profile.wind is None else ""
+    return "the profile has no wind areas" if measurements.profile.wind is None else ""
 
 
 def says(values: Values, instance: str | None) -> str:

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, corrected
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -22,17 +23,17 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("angle", "deg", 4.0, -90.0, 90.0),)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Turn heading and velocity to the true axes, for all that depends on them; what is compared stays along those measured."""
     b = radians(float(p[0]))
     if b == 0.0:
-        return picture
-    scene = picture.scene
+        return force_model
+    measurements = force_model.measurements
     c, s = cos(b), sin(b)
-    u, v, r = scene.nu.T
+    u, v, r = measurements.nu.T
     nu = np.column_stack([c * u - s * v, s * u + c * v, r])
-    eta = scene.eta - np.array([0.0, 0.0, b])
-    return replace(corrected(picture, replace(scene, eta=eta, nu=nu)), turned=picture.turned + b)
+    eta = measurements.eta - np.array([0.0, 0.0, b])
+    return replace(corrected(force_model, replace(measurements, eta=eta, nu=nu)), turned=force_model.turned + b)
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -46,10 +47,10 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"heading_bias_deg": values["angle"]}}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the thrust along the other axis, some of which seems to act along this one."""
     j, other = (1, "sway") if axis == "surge" else (0, "surge")
-    return f"thrusters' {other} force [N]", picture.parts[:, :, j].sum(axis=1)
+    return f"thrusters' {other} force [N]", force_model.parts[:, :, j].sum(axis=1)
 
 
 EFFECT = Effect(
@@ -61,8 +62,7 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     of_sensor=True,
-    # Compasses are no better.
-    idle=0.5,
+    idle=EFFECTS.least_heading,
     regressor=regressor,
-    form=DEFINITION,
+    form=EFFECTS.definition_error,
 )

@@ -20,14 +20,11 @@ import numpy as np
 
 from ferryid.effects.effect import HELD, Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import COEFFICIENTS, MASS, ForceModel, Measurements, hull_of
-from ferryid.effects.linear_evidence import HULL_STD, hull_jacobian
+from ferryid.effects.linear_evidence import hull_jacobian
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
-TELLING = 0.25
-"""A coefficient that may be within this share of the model's is not worth a name."""
-OFF = 1.0
-"""Standard deviation of what is believed of the factor of a coefficient that is chosen."""
 ARMS = ("m23", "m32")
 """How far ahead the mass lies; that a few hundred kilograms lie elsewhere is a payload's to say."""
 SURGE_ALONE = frozenset({"X_|u|u"})
@@ -36,7 +33,7 @@ SURGE_ALONE = frozenset({"X_|u|u"})
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return a factor for each coefficient that the profile's hull has."""
-    return tuple(_factor(name, OFF) for name in _named(profile))
+    return tuple(_factor(name, EFFECTS.selected_spread) for name in _named(profile))
 
 
 def _named(profile: Profile) -> list[str]:
@@ -47,17 +44,17 @@ def _factor(name: str, size: float) -> Parameter:
     return Parameter(name, "-", size, 0.05, 10.0, neutral=1.0)
 
 
-def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
+def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Choice:
     """Return factors of which only those of the coefficients that are worth it can move."""
-    names = _named(picture.scene.profile)
+    names = _named(force_model.measurements.profile)
     able = [name for name in names if name not in ARMS]
     places = [COEFFICIENTS.index(name) for name in able]
-    J, e = hull_jacobian(picture, believed, residual, places)
+    J, e = hull_jacobian(force_model, believed, residual, places)
     chosen, doubt = _best_subset(J.T @ J, -J.T @ e, able)
     if 2 * len(chosen) > len(able):
         # A model that is wrong all over is wrong there, too.
         chosen |= frozenset(ARMS)
-    return Choice(tuple(_factor(name, OFF if name in chosen else HELD) for name in names), doubt)
+    return Choice(tuple(_factor(name, EFFECTS.selected_spread if name in chosen else HELD) for name in names), doubt)
 
 
 def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str], float]:
@@ -71,7 +68,7 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
     def score(chosen: frozenset[str]) -> float:
         if not chosen or chosen == SURGE_ALONE:
             return -np.inf
-        spread = np.array([OFF if name in chosen else HULL_STD for name in names])
+        spread = np.array([EFFECTS.selected_spread if name in chosen else EFFECTS.hull_spread for name in names])
         A = np.eye(n) + G * np.outer(spread, spread)
         c = spread * b
         return 0.5 * float(c @ np.linalg.solve(A, c)) - 0.5 * float(np.linalg.slogdet(A)[1]) - doubt(chosen)
@@ -88,21 +85,21 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
     return best, doubt(best)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the coefficients."""
     factor = np.ones(len(COEFFICIENTS))
-    factor[hull_of(picture.scene.profile) != 0.0] = p
-    return replace(picture, hull=picture.hull * factor)
+    factor[hull_of(force_model.measurements.profile) != 0.0] = p
+    return replace(force_model, hull=force_model.hull * factor)
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show a wrong hull model."""
-    return "" if scene.profile.hull.has_model else "the profile has no hull model"
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show a wrong hull model."""
+    return "" if measurements.profile.hull.has_model else "the profile has no hull model"
 
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence; the values are those of the coefficients that are certainly off."""
-    off = {name: value for name, value in values.items() if abs(value - 1.0) > TELLING}
+    off = {name: value for name, value in values.items() if abs(value - 1.0) > EFFECTS.coefficient_change}
     masses = [name for name in off if name in MASS]
     what = " and ".join(
         word for word, some in (("masses", masses), ("damping", [name for name in off if name not in MASS])) if some
@@ -128,6 +125,6 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     choose=choose,
-    least=TELLING,
+    least=EFFECTS.coefficient_change,
     bends_hull=True,
 )

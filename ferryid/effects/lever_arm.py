@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, corrected
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.frames import to_world
 from ferryid.vessel.profile import Profile
@@ -24,18 +25,18 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return tuple(Parameter(axis, "m", 0.4 * half, -2.0 * half, 2.0 * half) for axis in ("x", "y"))
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Move position and velocity to the body origin, for all that depends on them; what is compared stays the antenna's."""
     x, y = float(p[0]), float(p[1])
     if x == 0.0 and y == 0.0:
-        return picture
-    scene = picture.scene
-    r = scene.nu[:, 2]
-    nu = scene.nu + np.column_stack([r * y, -r * x, np.zeros_like(r)])
-    arm = to_world(np.full_like(r, x), np.full_like(r, y), scene.psi)
-    eta = scene.eta - np.column_stack([*arm, np.zeros_like(r)])
-    antenna = (picture.antenna[0] + x, picture.antenna[1] + y)
-    return replace(corrected(picture, replace(scene, eta=eta, nu=nu)), antenna=antenna)
+        return force_model
+    measurements = force_model.measurements
+    r = measurements.nu[:, 2]
+    nu = measurements.nu + np.column_stack([r * y, -r * x, np.zeros_like(r)])
+    arm = to_world(np.full_like(r, x), np.full_like(r, y), measurements.psi)
+    eta = measurements.eta - np.column_stack([*arm, np.zeros_like(r)])
+    antenna = (force_model.antenna[0] + x, force_model.antenna[1] + y)
+    return replace(corrected(force_model, replace(measurements, eta=eta, nu=nu)), antenna=antenna)
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -50,9 +51,9 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"antenna_m": [values["x"], values["y"]]}}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the yaw rate, with which the antenna swings."""
-    return "yaw rate [deg/s]", np.degrees(picture.scene.nu[:, 2])
+    return "yaw rate [deg/s]", np.degrees(force_model.measurements.nu[:, 2])
 
 
 EFFECT = Effect(
@@ -66,5 +67,5 @@ EFFECT = Effect(
     of_sensor=True,
     regressor=regressor,
     bends_hull=True,
-    form=DEFINITION,
+    form=EFFECTS.definition_error,
 )

@@ -8,27 +8,26 @@ import numpy as np
 
 from ferryid.effects.effect import Residual
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 
-HULL_STD = 0.12
-"""Standard deviation of what is believed of a coefficient of the hull that nothing is wrong with, as a share of it."""
 TINY = 0.01
 
 
 def hull_jacobian(
-    picture: ForceModel, believed: Floats, residual: Residual, places: list[int]
+    force_model: ForceModel, believed: Floats, residual: Residual, places: list[int]
 ) -> tuple[Floats, Floats]:
     """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
 
-    The line is drawn at the picture's hull, which is the fitted one, as acceleration is far from linear in mass.
+    The line is drawn at the force model's hull, which is the fitted one, as acceleration is far from linear in mass.
     """
-    e = residual(picture)
+    e = residual(force_model)
     columns, away = [], []
     for k in places:
-        hull = picture.hull.copy()
+        hull = force_model.hull.copy()
         hull[k] += TINY * believed[k]
-        columns.append((residual(replace(picture, hull=hull)) - e) / TINY)
-        away.append(picture.hull[k] / believed[k] - 1.0 if believed[k] != 0.0 else 0.0)
+        columns.append((residual(replace(force_model, hull=hull)) - e) / TINY)
+        away.append(force_model.hull[k] / believed[k] - 1.0 if believed[k] != 0.0 else 0.0)
     J = np.column_stack(columns)
     return J, e - J @ np.array(away)
 
@@ -43,7 +42,7 @@ def profiled_loss(J: Floats, residuals: Floats) -> Floats:
     residuals
         With the hull as believed, shape (w, q).
     """
-    H = HULL_STD * J
+    H = EFFECTS.hull_spread * J
     product = H.T @ residuals
     share = np.einsum("pq,pq->q", product, np.linalg.solve(H.T @ H + np.eye(H.shape[1]), product))
     return np.asarray(0.5 * (np.einsum("wq,wq->q", residuals, residuals) - share))
@@ -61,7 +60,7 @@ def log_evidence_gains(J: Floats, e: Floats, columns: Floats, size: float) -> Fl
     size
         Standard deviation of what is believed of that parameter.
     """
-    H, every = HULL_STD * J, np.column_stack([e, columns])
+    H, every = EFFECTS.hull_spread * J, np.column_stack([e, columns])
     free = every - H @ np.linalg.solve(H.T @ H + np.eye(H.shape[1]), H.T @ every)
     power = np.einsum("wq,wq->q", columns, free[:, 1:])
     product = columns.T @ free[:, 0]

@@ -1,4 +1,4 @@
-"""Scenes from logs: forces of the actuators, and signals bridged where nothing was measured."""
+"""Measurements from logs: forces of the actuators, and signals bridged where nothing was measured."""
 
 from __future__ import annotations
 
@@ -15,10 +15,18 @@ from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
 
 
-def hull_force_model(scene: Measurements, hull: Floats) -> ForceModel:
-    """Return the picture of a hull in a scene, in the water and with the payload that were measured, and no air."""
-    load = None if scene.payload is None else aboard(scene.payload)
-    return ForceModel(scene, hull, scene.parts, scene.angles, np.zeros((len(scene.t), 3)), scene.current, load)
+def hull_force_model(measurements: Measurements, hull: Floats) -> ForceModel:
+    """Return the force model of a hull in measurements, in the water and with the payload that were measured, and no air."""
+    load = None if measurements.payload is None else aboard(measurements.payload)
+    return ForceModel(
+        measurements,
+        hull,
+        measurements.parts,
+        measurements.angles,
+        np.zeros((len(measurements.t), 3)),
+        measurements.current,
+        load,
+    )
 
 
 def actuator_forces(
@@ -70,7 +78,7 @@ def interpolate_gaps(values: Floats, usable: Flags, *, held: bool = False) -> Fl
 
 
 def measurements_of_motion(track: Track, motion: Motion, profile: Profile) -> Measurements:
-    """Return a smoothed log as a scene, bridged where nothing was measured."""
+    """Return a smoothed log as measurements, bridged where nothing was measured."""
     rows = motion.valid
     over_ground = motion.raw_nu
     through_water = (
@@ -92,10 +100,10 @@ def measurements_of_motion(track: Track, motion: Motion, profile: Profile) -> Me
     )
 
 
-def payload_and_damping(picture: ForceModel) -> Floats | None:
+def payload_and_damping(force_model: ForceModel) -> Floats | None:
     """Return load and factor on the damping on every row, shape (n, 6), where there is either."""
-    if picture.load is None and picture.damping_factor is None:
+    if force_model.load is None and force_model.damping_factor is None:
         return None
-    n = len(picture.scene.t)
-    load = np.zeros((n, 5)) if picture.load is None else picture.load
-    return np.column_stack([load, np.ones(n) if picture.damping_factor is None else picture.damping_factor])
+    n = len(force_model.measurements.t)
+    load = np.zeros((n, 5)) if force_model.load is None else force_model.load
+    return np.column_stack([load, np.ones(n) if force_model.damping_factor is None else force_model.damping_factor])

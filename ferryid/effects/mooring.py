@@ -11,6 +11,7 @@ import numpy as np
 from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.simulated import Simulated
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.frames import to_body
 from ferryid.vessel.profile import Profile
@@ -28,11 +29,11 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the spring's pull on the body origin."""
-    scene = picture.scene
-    X, Y = to_body(-p[0] * (scene.eta[:, 0] - p[2]), -p[1] * (scene.eta[:, 1] - p[3]), scene.psi)
-    return replace(picture, external=picture.external + np.column_stack([X, Y, np.zeros_like(X)]))
+    measurements = force_model.measurements
+    X, Y = to_body(-p[0] * (measurements.eta[:, 0] - p[2]), -p[1] * (measurements.eta[:, 1] - p[3]), measurements.psi)
+    return replace(force_model, external=force_model.external + np.column_stack([X, Y, np.zeros_like(X)]))
 
 
 def load(
@@ -44,9 +45,9 @@ def load(
     return c * north + s * east, c * east - s * north, 0.0
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show a mooring."""
-    return "" if np.isfinite(scene.eta[scene.usable, :2]).all() else "the log has no position"
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show a mooring."""
+    return "" if np.isfinite(measurements.eta[measurements.usable, :2]).all() else "the log has no position"
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -70,9 +71,9 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"mooring": spring}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return how far the vessel is from the point, along the axis."""
-    eta = picture.scene.eta
+    eta = force_model.measurements.eta
     ahead, aside = to_body(eta[:, 0] - p[2], eta[:, 1] - p[3], eta[:, 2])
     if axis == "sway":
         return "place from the mooring, to starboard [m]", aside
@@ -89,6 +90,6 @@ EFFECT = Effect(
     cannot=cannot,
     onset=True,
     regressor=regressor,
-    form=0.05,
+    form=EFFECTS.load_error,
     simulated=Simulated(load),
 )

@@ -42,32 +42,34 @@ def _by_mass(profile: Profile) -> float:
     return 1.0 / (WATER * WATERPLANE * hull.length_m * hull.beam_m * hull.draught_m)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Put the mass aboard."""
-    n = len(picture.scene.t)
-    load, damping = aboard(np.tile(p[:2], (n, 1))), picture.damping_factor
+    n = len(force_model.measurements.t)
+    load, damping = aboard(np.tile(p[:2], (n, 1))), force_model.damping_factor
     if len(p) > 2:
-        more = float(p[2] * p[0]) * _by_mass(picture.scene.profile)
-        load = load + more * added_mass(picture)
+        more = float(p[2] * p[0]) * _by_mass(force_model.measurements.profile)
+        load = load + more * added_mass(force_model)
         damping = np.full(n, 1.0 + more) if damping is None else damping * (1.0 + more)
-    return replace(picture, load=load if picture.load is None else picture.load + load, damping_factor=damping)
+    return replace(
+        force_model, load=load if force_model.load is None else force_model.load + load, damping_factor=damping
+    )
 
 
-def untold(scene: Measurements, p: Floats) -> frozenset[str]:
+def untold(measurements: Measurements, p: Floats) -> frozenset[str]:
     """Return what is fitted so that the rest comes out right, and is of no interest itself."""
     return frozenset({DEEPER})
 
 
-def kick(picture: ForceModel, p: Floats) -> Floats:
+def kick(force_model: ForceModel, p: Floats) -> Floats:
     """Return the momentum that a load takes which lay still over ground before it came aboard, shape (n, 3)."""
     m, x = float(p[0]), float(p[1])
-    u, v, r = picture.scene.nu.T
+    u, v, r = force_model.measurements.nu.T
     return -m * np.column_stack([u, v + x * r, x * (v + x * r)])
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show a payload."""
-    return "the payload was measured and is part of the model" if scene.payload is not None else ""
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show a payload."""
+    return "the payload was measured and is part of the model" if measurements.payload is not None else ""
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -82,11 +84,11 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"payload": [{"mass_kg": values["mass"], "x_m": values["x"], **span(values)}]}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the acceleration along the axis, that of turning included."""
-    scene = picture.scene
-    u, v, r = scene.nu.T
-    u_dot, v_dot, r_dot = np.gradient(scene.nu, scene.step_s, axis=0).T
+    measurements = force_model.measurements
+    u, v, r = measurements.nu.T
+    u_dot, v_dot, r_dot = np.gradient(measurements.nu, measurements.step_s, axis=0).T
     values = {"surge": u_dot - v * r, "sway": v_dot + u * r, "yaw": r_dot}[axis]
     return f"{axis} acceleration [{'rad/s²' if axis == 'yaw' else 'm/s²'}]", values
 

@@ -15,6 +15,7 @@ import numpy as np
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import ForceModel, Measurements, added_mass
 from ferryid.effects.linear_evidence import hull_jacobian, log_evidence_gains
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats, Ints
 from ferryid.vessel.profile import Profile
 
@@ -22,11 +23,6 @@ EDGE_M = 2.0
 """Width over which the factor comes in at a side, outside of it."""
 CELLS = 8
 """Cells of the grid along north and east each."""
-LEAST, MOST = 0.05, 0.8
-"""Shares of the log that lie in a place, the latter with all its sides as far out as they may be fitted to: one cell. What
-is nearly everywhere is the hull's own damping, or its fouling."""
-BEYOND = 0.02
-"""Share of the log that must lie beyond a side for the log to tell where it is."""
 FACTOR = Parameter("factor", "-", 0.4, 1.0, 6.0, neutral=1.0)
 SIDES = ("south", "north", "west", "east")
 HEAVIER = Parameter("added_mass", "-", 0.3, 0.0, 2.0, start=0.2)
@@ -52,40 +48,42 @@ def _share(outside: Floats) -> Floats:
     return np.asarray(s * s * (3.0 - 2.0 * s))
 
 
-def inside(scene: Measurements, sides: Floats) -> Floats:
+def inside(measurements: Measurements, sides: Floats) -> Floats:
     """Return how much of the factor acts in every row, 0 to 1, shape (n,)."""
-    x, y = scene.eta[:, 0], scene.eta[:, 1]
+    x, y = measurements.eta[:, 0], measurements.eta[:, 1]
     south, north, west, east = sides.tolist()
     return _share(south - x) * _share(x - north) * _share(west - y) * _share(y - east)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the damping in the place, and let the added mass grow."""
-    growth = (float(p[0]) - 1.0) * inside(picture.scene, p[1:5])
-    load = float(p[5]) * growth[:, None] * added_mass(picture)
-    return replace(_damped(picture, 1.0 + growth), load=load if picture.load is None else picture.load + load)
+    growth = (float(p[0]) - 1.0) * inside(force_model.measurements, p[1:5])
+    load = float(p[5]) * growth[:, None] * added_mass(force_model)
+    return replace(
+        _damped(force_model, 1.0 + growth), load=load if force_model.load is None else force_model.load + load
+    )
 
 
-def _damped(picture: ForceModel, factor: Floats) -> ForceModel:
-    before = picture.damping_factor
-    return replace(picture, damping_factor=factor if before is None else before * factor)
+def _damped(force_model: ForceModel, factor: Floats) -> ForceModel:
+    before = force_model.damping_factor
+    return replace(force_model, damping_factor=factor if before is None else before * factor)
 
 
-def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
+def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Choice:
     """Return the place whose damping explains most of what is left, with its neighbours on the grid as the usual error."""
-    scene = picture.scene
-    place = scene.eta[:, :2]
-    low, high = place[scene.usable].min(axis=0), place[scene.usable].max(axis=0)
+    measurements = force_model.measurements
+    place = measurements.eta[:, :2]
+    low, high = place[measurements.usable].min(axis=0), place[measurements.usable].max(axis=0)
     lines = np.linspace(low, high, CELLS + 1)
     cell = np.clip(((place - low) / np.maximum(high - low, 1e-9) * CELLS).astype(np.int64), 0, CELLS - 1)
-    e = residual(picture)
+    e = residual(force_model)
     by_cell, share = np.zeros((CELLS, CELLS, len(e))), np.zeros((CELLS, CELLS))
     for i in range(CELLS):
         for j in range(CELLS):
             rows = (cell[:, 0] == i) & (cell[:, 1] == j)
-            share[i, j] = float(np.mean(rows[scene.usable]))
+            share[i, j] = float(np.mean(rows[measurements.usable]))
             if share[i, j] > 0.0:
-                by_cell[i, j] = (residual(_damped(picture, 1.0 + 0.5 * rows)) - e) / 0.5
+                by_cell[i, j] = (residual(_damped(force_model, 1.0 + 0.5 * rows)) - e) / 0.5
     # Columns of rectangles are sums of those of their cells, here as differences of sums from the corner.
     sums = np.zeros((CELLS + 1, CELLS + 1, len(e)))
     sums[1:, 1:] = by_cell.cumsum(axis=0).cumsum(axis=1)
@@ -103,12 +101,12 @@ def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
         (np.minimum(one + 1, CELLS) for one in (north, east)),
     )
     widest = [corner for pair in zip(lower, upper, strict=True) for corner in pair]
-    fits = (covered(south, north, west, east) >= LEAST) & (covered(*widest) <= MOST)
+    fits = (covered(south, north, west, east) >= EFFECTS.least_place) & (covered(*widest) <= EFFECTS.most_place)
     if not fits.any():
-        return Choice(parameters_of(scene.profile), 0.0)
+        return Choice(parameters_of(measurements.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
     columns = (sums[north, east] - sums[south, east] - sums[north, west] + sums[south, west]).T
-    J, linear = hull_jacobian(picture, believed, residual, np.flatnonzero(believed).tolist())
+    J, linear = hull_jacobian(force_model, believed, residual, np.flatnonzero(believed).tolist())
     gains = log_evidence_gains(J, linear, columns, FACTOR.size)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
@@ -117,27 +115,27 @@ def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
     return Choice((FACTOR, *parameters, HEAVIER), log(len(gains)))
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show shallow water."""
-    if not scene.profile.hull.has_model:
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show shallow water."""
+    if not measurements.profile.hull.has_model:
         return "the profile has no hull model"
-    return "" if np.isfinite(scene.eta[scene.usable, :2]).all() else "the log has no position"
+    return "" if np.isfinite(measurements.eta[measurements.usable, :2]).all() else "the log has no position"
 
 
-def untold(scene: Measurements, p: Floats) -> frozenset[str]:
+def untold(measurements: Measurements, p: Floats) -> frozenset[str]:
     """Return the sides beyond which the vessel hardly went, as the place may reach any farther there, and the added mass."""
-    x, y = scene.eta[scene.usable, 0], scene.eta[scene.usable, 1]
+    x, y = measurements.eta[measurements.usable, 0], measurements.eta[measurements.usable, 1]
     south, north, west, east = p[1:5].tolist()
     outside = (x < south, x > north, y < west, y > east)
-    far = (name for name, rows in zip(SIDES, outside, strict=True) if float(np.mean(rows)) < BEYOND)
+    far = (name for name, rows in zip(SIDES, outside, strict=True) if float(np.mean(rows)) < EFFECTS.beyond_side)
     return frozenset({HEAVIER.name, *far})
 
 
-def once(scene: Measurements, p: Floats) -> bool:
+def once(measurements: Measurements, p: Floats) -> bool:
     """Tell whether the vessel was in the place a single time, or hardly: then it is a time as well as a place."""
-    there = inside(scene, p[1:5])[scene.usable] > 0.5
+    there = inside(measurements, p[1:5])[measurements.usable] > 0.5
     entered = int(there[0]) + int(np.count_nonzero(there[1:] & ~there[:-1]))
-    return entered < 2 or float(np.mean(there)) < LEAST
+    return entered < 2 or float(np.mean(there)) < EFFECTS.least_place
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -177,6 +175,6 @@ EFFECT = Effect(
     untold=untold,
     once=once,
     in_part=True,
-    idle=0.1,
+    idle=EFFECTS.least_shallow,
     bends_hull=True,
 )

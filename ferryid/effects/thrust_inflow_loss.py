@@ -9,6 +9,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, body_current
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -18,19 +19,19 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("per_mps", "s/m", 0.2, -0.2, 2.0),)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take ``k V_a`` off each force, V_a the velocity of the thruster through the water along its own push."""
-    scene = picture.scene
-    u_c, v_c = body_current(picture)
-    u, v, r = scene.nu.T
-    parts = picture.parts.copy()
-    for k, actuator in enumerate(scene.profile.actuators):
+    measurements = force_model.measurements
+    u_c, v_c = body_current(force_model)
+    u, v, r = measurements.nu.T
+    parts = force_model.parts.copy()
+    for k, actuator in enumerate(measurements.profile.actuators):
         x, y = actuator.position_m
-        X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
+        X, Y = force_model.parts[:, k, 0], force_model.parts[:, k, 1]
         size = np.hypot(X, Y)
         along = (X * (u - u_c - r * y) + Y * (v - v_c + r * x)) / np.where(size > 0.0, size, 1.0)
         parts[:, k] *= (1.0 - np.clip(p[0] * along, -1.0, 1.0))[:, None]
-    return replace(picture, parts=parts)
+    return replace(force_model, parts=parts)
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -43,11 +44,11 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"inflow_loss_per_mps": values["per_mps"]}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return force times inflow, of all thrusters together."""
     j = AXES.index(axis)
     # A hundredth of the loss, so that nothing is clipped.
-    lost = picture.parts.sum(axis=1) - apply(picture, np.array([0.01]), instance).parts.sum(axis=1)
+    lost = force_model.parts.sum(axis=1) - apply(force_model, np.array([0.01]), instance).parts.sum(axis=1)
     unit = "N·m·m/s" if axis == "yaw" else "N·m/s"
     return f"inflow speed times {axis} {'moment' if axis == 'yaw' else 'force'} of the thrusters [{unit}]", lost[
         :, j
@@ -63,5 +64,5 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     regressor=regressor,
-    idle=0.03,
+    idle=EFFECTS.least_inflow,
 )

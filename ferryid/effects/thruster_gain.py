@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values, span
+from ferryid.effects.effect import Effect, Parameter, Values, span
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -21,12 +22,12 @@ def instances(profile: Profile) -> tuple[str | None, ...]:
     return tuple(actuator.name for actuator in profile.actuators)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the force of the thruster."""
-    k = picture.scene.names.index(str(instance))
-    parts = picture.parts.copy()
+    k = force_model.measurements.names.index(str(instance))
+    parts = force_model.parts.copy()
     parts[:, k] *= p[0]
-    return replace(picture, parts=parts)
+    return replace(force_model, parts=parts)
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -40,11 +41,11 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"faults": [fault]}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the thruster's own force."""
-    k = picture.scene.names.index(str(instance))
+    k = force_model.measurements.names.index(str(instance))
     j = AXES.index(axis)
-    return f"{instance}'s own {axis} {'moment [N·m]' if axis == 'yaw' else 'force [N]'}", picture.parts[:, k, j]
+    return f"{instance}'s own {axis} {'moment [N·m]' if axis == 'yaw' else 'force [N]'}", force_model.parts[:, k, j]
 
 
 EFFECT = Effect(
@@ -58,6 +59,6 @@ EFFECT = Effect(
     onset=True,
     vessel=True,
     regressor=regressor,
-    form=DEFINITION,
-    passing=0.1,
+    form=EFFECTS.definition_error,
+    passing=EFFECTS.passing_gain,
 )

@@ -10,6 +10,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.thrusters import thrust
@@ -23,41 +24,41 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("fraction", "-", 0.2, 0.0, 1.0),)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Take the loss off, which grows with the root of the force behind the wake as a jet's speed does."""
-    actuators = picture.scene.profile.actuators
-    parts = picture.parts.copy()
-    size = np.hypot(picture.parts[:, :, 0], picture.parts[:, :, 1])
+    actuators = force_model.measurements.profile.actuators
+    parts = force_model.parts.copy()
+    size = np.hypot(force_model.parts[:, :, 0], force_model.parts[:, :, 1])
     for i, hit in enumerate(actuators):
         for j, source in enumerate(actuators):
             dx, dy = hit.position_m[0] - source.position_m[0], hit.position_m[1] - source.position_m[1]
             apart = hypot(dx, dy)
             if i == j or apart == 0.0:
                 continue
-            push = picture.parts[:, j]
+            push = force_model.parts[:, j]
             towards = -(push[:, 0] * dx + push[:, 1] * dy) / (np.maximum(size[:, j], 1e-9) * apart)
-            share = np.minimum(size[:, j] / _full(picture, j, size[:, j]), 1.0)
+            share = np.minimum(size[:, j] / _full(force_model, j, size[:, j]), 1.0)
             loss = np.maximum(towards, 0.0) ** SHARPNESS * np.sqrt(share)
             parts[:, i] *= (1.0 - p[0] * loss)[:, None]
-    return replace(picture, parts=parts)
+    return replace(force_model, parts=parts)
 
 
-def _full(picture: ForceModel, j: int, size: Floats) -> Floats:
+def _full(force_model: ForceModel, j: int, size: Floats) -> Floats:
     """Return the most that a thruster can push, ahead or astern as it does [N], shape (n,); the log's most without a curve."""
-    actuator = picture.scene.profile.actuators[j]
+    actuator = force_model.measurements.profile.actuators[j]
     most = np.full(len(size), max(float(size.max()), 1e-9))
     if actuator.thrust is None or actuator.thrust.kind == "open_water":
         return most
-    angle = picture.angles[:, j] if actuator.kind == "azimuth" else np.full(len(size), actuator.angle_rad)
-    along = picture.parts[:, j, 0] * np.cos(angle) + picture.parts[:, j, 1] * np.sin(angle)
+    angle = force_model.angles[:, j] if actuator.kind == "azimuth" else np.full(len(size), actuator.angle_rad)
+    along = force_model.parts[:, j, 0] * np.cos(angle) + force_model.parts[:, j, 1] * np.sin(angle)
     factor = 60.0 if actuator.thrust.input_unit == "rps" else 1.0
     astern, ahead = thrust(actuator.thrust, factor * np.array(actuator.thrust.valid))[0] * actuator.count
     return np.asarray(np.maximum(np.abs(np.where(along < 0.0, astern, ahead)), 1e-9))
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show it."""
-    return "" if len(scene.names) > 1 else "there is one actuator only"
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show it."""
+    return "" if len(measurements.names) > 1 else "there is one actuator only"
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -70,10 +71,10 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"interaction_fraction": values["fraction"]}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the force of a thruster by how much of a full wake it lies in: the angle alone leaves its direction open."""
     j = AXES.index(axis)
-    lost = picture.parts.sum(axis=1) - apply(picture, np.array([1.0]), instance).parts.sum(axis=1)
+    lost = force_model.parts.sum(axis=1) - apply(force_model, np.array([1.0]), instance).parts.sum(axis=1)
     what, unit = ("moment", "N·m") if axis == "yaw" else ("force", "N")
     return f"{axis} {what} of the thruster in the wake [{unit}]", lost[:, j]
 
@@ -88,5 +89,5 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     regressor=regressor,
-    idle=0.05,
+    idle=EFFECTS.least_wake,
 )

@@ -11,6 +11,7 @@ import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.recursive_filter import recursive_filter
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -21,24 +22,24 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("time_constant", "s", 0.5, 0.0, 10.0),)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Let the strength of each thruster lag; its direction is as measured."""
     if p[0] < 1e-3:
-        return picture
-    late = partial(_late, time_constant_s=float(p[0]), step_s=picture.scene.step_s)
-    parts = picture.parts.copy()
+        return force_model
+    late = partial(_late, time_constant_s=float(p[0]), step_s=force_model.measurements.step_s)
+    parts = force_model.parts.copy()
     for k in range(parts.shape[1]):
-        angle = picture.angles[:, k]
+        angle = force_model.angles[:, k]
         if np.isfinite(angle).all():
             c, s = np.cos(angle), np.sin(angle)
             along = parts[:, k, 0] * c + parts[:, k, 1] * s
             felt = late(along)
-            x, y = picture.scene.profile.actuators[k].position_m
+            x, y = force_model.measurements.profile.actuators[k].position_m
             parts[:, k, 0], parts[:, k, 1] = felt * c, felt * s
             parts[:, k, 2] = x * parts[:, k, 1] - y * parts[:, k, 0]
         else:
             parts[:, k] = late(parts[:, k])
-    return replace(picture, parts=parts)
+    return replace(force_model, parts=parts)
 
 
 def _late(values: Floats, time_constant_s: float, step_s: float) -> Floats:
@@ -59,13 +60,21 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"thrusters": {"force_lag_s": values["time_constant"]}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return how fast the thrust changes."""
     j = AXES.index(axis)
-    rate = np.gradient(picture.parts[:, :, j].sum(axis=1), picture.scene.step_s)
+    rate = np.gradient(force_model.parts[:, :, j].sum(axis=1), force_model.measurements.step_s)
     return f"change of the thrusters' {axis} {'moment [N·m/s]' if axis == 'yaw' else 'force [N/s]'}", rate
 
 
 EFFECT = Effect(
-    "thruster_lag", "Thruster lag", parameters_of, apply, says, scenario, vessel=True, idle=0.03, regressor=regressor
+    "thruster_lag",
+    "Thruster lag",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    vessel=True,
+    idle=EFFECTS.least_lag,
+    regressor=regressor,
 )

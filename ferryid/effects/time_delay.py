@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import DEFINITION, Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
 
@@ -18,16 +19,16 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     return (Parameter("seconds", "s", 0.3, -3.0, 3.0),)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Look the actuators' forces up at the time that the motion was measured at."""
     if p[0] == 0.0:
-        return picture
-    t = picture.scene.t
-    shape = picture.parts.shape
-    flat = picture.parts.reshape(len(t), -1)
+        return force_model
+    t = force_model.measurements.t
+    shape = force_model.parts.shape
+    flat = force_model.parts.reshape(len(t), -1)
     when = t - p[0]
     parts = np.column_stack([np.interp(when, t, column) for column in flat.T]).reshape(shape)
-    return replace(picture, parts=parts)
+    return replace(force_model, parts=parts)
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -45,13 +46,21 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"sensors": {"navigation": {"delay_s": values["seconds"]}}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return how fast the thrust changes."""
     j = AXES.index(axis)
-    rate = np.gradient(picture.parts[:, :, j].sum(axis=1), picture.scene.step_s)
+    rate = np.gradient(force_model.parts[:, :, j].sum(axis=1), force_model.measurements.step_s)
     return f"change of the thrusters' {axis} {'moment [N·m/s]' if axis == 'yaw' else 'force [N/s]'}", rate
 
 
 EFFECT = Effect(
-    "time_delay", "Time delay", parameters_of, apply, says, scenario, idle=0.03, form=DEFINITION, regressor=regressor
+    "time_delay",
+    "Time delay",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    idle=EFFECTS.least_delay,
+    form=EFFECTS.definition_error,
+    regressor=regressor,
 )

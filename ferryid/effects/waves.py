@@ -14,14 +14,13 @@ import numpy as np
 from ferryid.counts import plural
 from ferryid.effects.effect import Effect, Parameter, Process, Processes, Values
 from ferryid.effects.force_model import ForceModel
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
 USUAL_HZ = 0.35
 """Usual frequency of the waves that a vessel of `USUAL_M` feels most; longer ones feel longer waves."""
 USUAL_M = 5.0
-SLOWEST = 0.25
-"""Slowest waves, as a share of that frequency: they are sixteen times as long, and what is slower is no sea."""
 
 
 def _length(profile: Profile) -> float:
@@ -35,21 +34,21 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     frequency = USUAL_HZ * sqrt(USUAL_M / length)
     force = 0.03 * profile.hull.mass_kg
     return (
-        Parameter("peak_frequency", "Hz", frequency, SLOWEST * frequency, 3.0),
+        Parameter("peak_frequency", "Hz", frequency, EFFECTS.slowest_waves * frequency, 3.0),
         Parameter("force_std", "N", force, 0.0, 100.0 * force),
         Parameter("moment_std", "N·m", 0.2 * force * length, 0.0, 20.0 * force * length),
         Parameter("time_constant", "s", 2.0 / frequency, 0.1, 300.0),
     )
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Change nothing: what waves push on average is not theirs alone."""
-    return picture
+    return force_model
 
 
-def unsteady(picture: ForceModel) -> Processes:
+def unsteady(force_model: ForceModel) -> Processes:
     """Return a process on each axis."""
-    loads = [np.tile(axis, (len(picture.scene.t), 1)) for axis in np.eye(3)]
+    loads = [np.tile(axis, (len(force_model.measurements.t), 1)) for axis in np.eye(3)]
 
     def processes(p: Floats) -> tuple[Process, ...]:
         frequency, force, moment, memory = (float(value) for value in p)

@@ -16,6 +16,7 @@ import numpy as np
 from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
 from ferryid.effects.force_model import ForceModel, Measurements, wind_load
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -39,18 +40,18 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
-def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
+def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Choice:
     """Return the parameters with the wind to begin with."""
-    parameters = parameters_of(picture.scene.profile)
+    parameters = parameters_of(force_model.measurements.profile)
     angles = np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS
     winds = [
         np.array([speed * np.cos(angle), speed * np.sin(angle)])
         for speed in SPEEDS_MPS
         for angle in (angles if speed > 0.0 else angles[:1])
     ]
-    J, e = hull_jacobian(picture, believed, residual, np.flatnonzero(believed).tolist())
-    calm = residual(picture)
-    left = np.column_stack([e + residual(apply(picture, wind, None)) - calm for wind in winds])
+    J, e = hull_jacobian(force_model, believed, residual, np.flatnonzero(believed).tolist())
+    calm = residual(force_model)
+    left = np.column_stack([e + residual(apply(force_model, wind, None)) - calm for wind in winds])
     sizes = np.array([one.size for one in parameters[:2]])
     away = np.array([float(np.sum((wind / sizes) ** 2)) for wind in winds])
     best = winds[int(np.argmin(profiled_loss(J, left) + 0.5 * away))]
@@ -58,56 +59,56 @@ def choose(picture: ForceModel, believed: Floats, residual: Residual) -> Choice:
     return Choice((*begun, *parameters[2:]), 0.0)
 
 
-def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Add the wind's load, less that of still air, which is there already."""
-    scene = picture.scene
-    if scene.profile.wind is None:
-        return picture
+    measurements = force_model.measurements
+    if measurements.profile.wind is None:
+        return force_model
     air, factors = np.split(np.asarray(p, dtype=np.float64), [2])
     factors = factors if factors.size else np.ones(3)
-    more = factors * (mean_load(scene, air, picture.gust_std) - scene.air_load)
-    return replace(picture, external=picture.external + more, air=air, air_factors=factors)
+    more = factors * (mean_load(measurements, air, force_model.gust_std) - measurements.air_load)
+    return replace(force_model, external=force_model.external + more, air=air, air_factors=factors)
 
 
-def untold(scene: Measurements, p: Floats) -> frozenset[str]:
+def untold(measurements: Measurements, p: Floats) -> frozenset[str]:
     """Return what is fitted so that the rest comes out right, and is of no interest itself."""
     return frozenset(COEFFICIENTS)
 
 
-def mean_load(scene: Measurements, air: Floats, gust_std: float) -> Floats:
+def mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Floats:
     """Return what a wind loads the vessel with on average [N, N, N·m], shape (n, 3).
 
     A load that goes with the square of the speed is larger in gusts: the mean over a normal distribution, by Gauss's and
     Hermite's rule of three points along north and east each. The last loads are kept: most steps of a fit move other effects.
     """
     key = (*air.tolist(), gust_std)
-    known = scene.wind_loads.get(key)
+    known = measurements.wind_loads.get(key)
     if known is None:
-        known = _mean_load(scene, air, gust_std)
-        if len(scene.wind_loads) >= KEPT:
-            scene.wind_loads.clear()
-        scene.wind_loads[key] = known
+        known = _mean_load(measurements, air, gust_std)
+        if len(measurements.wind_loads) >= KEPT:
+            measurements.wind_loads.clear()
+        measurements.wind_loads[key] = known
     return known
 
 
-def _mean_load(scene: Measurements, air: Floats, gust_std: float) -> Floats:
-    areas = scene.profile.wind
+def _mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Floats:
+    areas = measurements.profile.wind
     if areas is None:
-        return np.zeros((len(scene.t), 3))
-    steady = wind_load(scene, areas, air)
+        return np.zeros((len(measurements.t), 3))
+    steady = wind_load(measurements, areas, air)
     if gust_std == 0.0:
         return steady
     around = np.zeros_like(steady)
     for one in sqrt(3.0) * gust_std * np.eye(2):
-        around += wind_load(scene, areas, air + one) + wind_load(scene, areas, air - one) - 2.0 * steady
+        around += wind_load(measurements, areas, air + one) + wind_load(measurements, areas, air - one) - 2.0 * steady
     return steady + around / 6.0
 
 
-def cannot(scene: Measurements) -> str:
-    """Say why the scene cannot show a wind."""
-    if scene.wind is not None:
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show a wind."""
+    if measurements.wind is not None:
         return "the wind was measured and is part of the model"
-    return "the profile has no wind areas" if scene.profile.wind is None else ""
+    return "the profile has no wind areas" if measurements.profile.wind is None else ""
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -122,9 +123,9 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"wind": {"north_mps": values["north"], "east_mps": values["east"]}}}
 
 
-def regressor(picture: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
+def regressor(force_model: ForceModel, p: Floats, instance: str | None, axis: str) -> tuple[str, Floats]:
     """Return the heading: what is constant over ground turns with it."""
-    return "heading [deg]", np.asarray(np.degrees(picture.scene.psi) % 360.0)
+    return "heading [deg]", np.asarray(np.degrees(force_model.measurements.psi) % 360.0)
 
 
 EFFECT = Effect(
@@ -138,5 +139,5 @@ EFFECT = Effect(
     choose=choose,
     untold=untold,
     regressor=regressor,
-    form=0.05,
+    form=EFFECTS.load_error,
 )

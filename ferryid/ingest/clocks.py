@@ -114,30 +114,17 @@ class ClockReport:
         return ClockReport(**values)
 
 
-def repair(receive_ns: Nanoseconds, stamp_ns: Nanoseconds | None) -> tuple[Nanoseconds, Rows, ClockReport]:
-    """Choose the clock of one topic and put its rows in order on the recorder's time base.
-
-    Parameters
-    ----------
-    receive_ns
-        Receive time of every row [ns], shape (n,), in the file's order.
-    stamp_ns
-        Sender's stamp [ns], shape (n,), or None for a type without a header.
-
-    Returns
-    -------
-    tuple
-        Strictly rising times [ns], shape (m,); the indices of the rows kept, in that order, shape (m,); the report.
-    """
-    time_ns, rows, report = _one_topic(receive_ns, stamp_ns)
-    return _shifted(time_ns, rows, report, _base_shift(report.offset_s))
-
-
 def repair_all(series: Mapping[str, Series]) -> dict[str, tuple[Nanoseconds, Rows, ClockReport]]:
     """Repair all topics of one log such that stamps of one sender stay as far apart as they were.
 
     Topics whose clock offsets lie within a second of one another come from one sender's clock: all are shifted by the
-    smallest of their offsets, which holds the least latency. Otherwise as `repair`, per topic.
+    smallest of their offsets, which holds the least latency. Otherwise each topic is brought to the recorder's time base by
+    its own offset.
+
+    Returns
+    -------
+    dict
+        By topic: strictly rising times [ns], shape (m,); the indices of the rows kept, in that order, shape (m,); the report.
     """
     found = {topic: _one_topic(one.receive_ns, one.stamp_ns, one.time_column) for topic, one in series.items()}
     stamped = sorted(

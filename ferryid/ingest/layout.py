@@ -30,7 +30,6 @@ PRIMITIVES: Mapping[str, str] = {
     "float64": "<f8",
 }
 SIZES: Mapping[str, int] = {name: int(np.dtype(code).itemsize) for name, code in PRIMITIVES.items()}
-STAMP_TYPE = "builtin_interfaces/msg/Time"
 HEADER_TYPE = "std_msgs/msg/Header"
 # rosbags gives an empty message this member; ROS2 serialises it as one byte, ROS1 as nothing.
 EMPTY_MEMBER = "structure_needs_at_least_one_member"

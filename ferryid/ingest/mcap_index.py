@@ -60,7 +60,6 @@ FEW = 64
 
 record_header: Callable[..., tuple[int, int]] = struct.Struct("<BQ").unpack_from
 _chunk_fields: Callable[..., tuple[int, int, int, int]] = struct.Struct("<QQQI").unpack_from
-_chunk_index_fields: Callable[..., tuple[int, int, int, int, int]] = struct.Struct("<QQQQI").unpack_from
 _index_fields: Callable[..., tuple[int, int, int, int]] = struct.Struct("<BQHI").unpack_from
 Bytes = NDArray[np.uint8]
 Definition = TypeVar("Definition")

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects import Effect, effects
-from ferryid.effects.force_model import COEFFICIENTS, LIFT, UNITS
-from ferryid.effects.force_model import ForceModel as Picture
+from ferryid.effects.force_model import COEFFICIENTS, LIFT, UNITS, ForceModel
 from ferryid.effects.wording import timed
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.vessel.profile import Profile
@@ -85,11 +84,11 @@ class StoredEffect:
         ends = [one.offset_s for one in self.sources if one.sha256 == sha256 and one.offset_s is not None]
         return ends[0] if ends else math.inf
 
-    def act(self, picture: Picture, sha256: str) -> Picture:
-        """Return the picture of a log with the effect in it."""
+    def act(self, force_model: ForceModel, sha256: str) -> ForceModel:
+        """Return the force model of a log with the effect in it."""
         p = np.array(list(self.values.values()))
         span = self.onset_in(sha256), self.offset_in(sha256)
-        return effects()[self.effect].act(picture, p, self.instance, *span)
+        return effects()[self.effect].act(force_model, p, self.instance, *span)
 
     def says(self, sha256: str = "") -> str:
         """Return the effect as a sentence, without parameters of which no log told anything; of one log, with its times."""

@@ -50,19 +50,6 @@ class CrossProducts:
     products: Floats
 
     @classmethod
-    def from_rows(
-        cls, X: Floats, Y: Floats, mask: Flags | None = None, *, names: Sequence[str] = (), where: str = "fit"
-    ) -> CrossProducts:
-        """Cross-products of the rows of `X` (n, K) and `Y` (n, m) where `mask` (n,) is true.
-
-        Raises
-        ------
-        FerryIdError
-            When a value is not finite; the message names the column.
-        """
-        return cls.of(Rows.of(X, Y, mask, where), names=names, where=where)
-
-    @classmethod
     def of(cls, *parts: Rows, names: Sequence[str] = (), where: str = "fit") -> CrossProducts:
         """Cross-products of the rows of one or several logs.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ferryid.counts import counted
 from ferryid.regression.cross_products import CHUNK_ROWS, LARGEST, CrossProducts, Rows, not_finite
 from ferryid.regression.thresholds import REGRESSION
-from ferryid.types import Flags, Floats
+from ferryid.types import Floats
 
 _BLOCK_ROWS = 256
 """Rows factorised at once: they stay in the innermost caches, 2.5 times as fast as 1024 and more."""
@@ -39,19 +39,6 @@ class QrFactor:
     m: int
     shift: Floats
     triangle: Floats
-
-    @classmethod
-    def from_rows(
-        cls, X: Floats, Y: Floats, mask: Flags | None = None, *, names: Sequence[str] = (), where: str = "fit"
-    ) -> QrFactor:
-        """Factorise the rows of `X` (n, K) and `Y` (n, m) where `mask` (n,) is true, 8192 rows at a time.
-
-        Raises
-        ------
-        FerryIdError
-            When a value is not finite; the message names the column.
-        """
-        return cls.of(Rows.of(X, Y, mask, where), names=names, where=where)
 
     @classmethod
     def of(cls, *parts: Rows, names: Sequence[str] = (), where: str = "fit") -> QrFactor:

@@ -81,12 +81,6 @@ class Simpls:
         """Return scores T (n, A) of the rows of `X` (n, K); orthonormal over the rows fitted."""
         return np.asarray((X - self.mean_x) / self.scale_x @ self.weights[group])
 
-    def variances(self, group: int = 0) -> tuple[Floats, Floats]:
-        """Return ``diag(P'P)/(n-1)`` and ``diag(Q'Q)/(n-1)``, shape (A,) each; Appendix A, lines 25-26."""
-        degrees = max(self.n - 1, 1)
-        P, Q = self.loadings[group], self.y_loadings[group]
-        return np.sum(P**2, axis=0) / degrees, np.sum(Q**2, axis=0) / degrees
-
     def vip(self, components: int) -> Floats:
         """Variable importance in projection with the first `components`, shape (K,); the squares' mean is one.
 

@@ -44,41 +44,6 @@ class Measured:
     left_out: tuple[LeftOut, ...] = ()
 
 
-def smooth(track: Track, profile: Profile, window_s: float, smoother: str = "square") -> Motion:
-    """Smooth one log and differentiate its velocities.
-
-    Position, velocity, applied and commanded force, wind and current all pass through the same zero-phase filter, so
-    that force and motion stay comparable; the force is formed before, from unsmoothed actuator signals. A payload is not
-    smoothed: it steps when somebody boards.
-
-    Parameters
-    ----------
-    track
-        Aligned signals.
-    profile
-        Turns actuator signals into forces.
-    window_s
-        Window [s]; 0 leaves the signals as they are.
-    smoother
-        ``"square"``: centred moving average over an odd number of rows, then the central difference, thesis (4.8).
-        ``"savgol"``: local cubic over the window (at least 5 rows), and its slope. ``"kalman"``: fixed-interval
-        smoother of a constant-acceleration model per axis, its noise found by maximum likelihood and its equivalent
-        window kept at `window_s` or above, since the noise of a navigation filter is coloured and likelihood takes
-        slow noise for motion.
-
-    Returns
-    -------
-    Motion
-        `valid` only where the whole window lies inside measured data.
-
-    Raises
-    ------
-    FerryIdError
-        For an unknown smoother, a window longer than every unbroken stretch, or constant signals.
-    """
-    return smooth_measured(measure(track, profile), window_s, smoother)
-
-
 def measure(track: Track, profile: Profile) -> Measured:
     """Return unsmoothed velocities and forces of a track.
 
@@ -137,7 +102,35 @@ def measure(track: Track, profile: Profile) -> Measured:
 
 
 def smooth_measured(measured: Measured, window_s: float, smoother: str = "square") -> Motion:
-    """Smooth what `measure` returned; see `smooth`."""
+    """Smooth one log and differentiate its velocities.
+
+    Position, velocity, applied and commanded force, wind and current all pass through the same zero-phase filter, so
+    that force and motion stay comparable; the force is formed before, from unsmoothed actuator signals. A payload is not
+    smoothed: it steps when somebody boards.
+
+    Parameters
+    ----------
+    measured
+        From `measure`.
+    window_s
+        Window [s]; 0 leaves the signals as they are.
+    smoother
+        ``"square"``: centred moving average over an odd number of rows, then the central difference, thesis (4.8).
+        ``"savgol"``: local cubic over the window (at least 5 rows), and its slope. ``"kalman"``: fixed-interval
+        smoother of a constant-acceleration model per axis, its noise found by maximum likelihood and its equivalent
+        window kept at `window_s` or above, since the noise of a navigation filter is coloured and likelihood takes
+        slow noise for motion.
+
+    Returns
+    -------
+    Motion
+        `valid` only where the whole window lies inside measured data.
+
+    Raises
+    ------
+    FerryIdError
+        For an unknown smoother, and for a window longer than every unbroken stretch.
+    """
     if smoother not in SMOOTHERS:
         raise FerryIdError(
             f'settings: there is no smoother called "{smoother}".{did_you_mean(smoother, SMOOTHERS)} '

@@ -92,16 +92,16 @@ def floor_of(free: int, tries: int = 1) -> float:
 class _Log:
     """A log in which several effects may be estimated."""
 
-    scene: Measurements
+    measurements: Measurements
 
     @cached_property
     def windows(self) -> Windows:
-        return windows(self.scene, *window_lengths(self.scene.profile))
+        return windows(self.measurements, *window_lengths(self.measurements.profile))
 
     @cached_property
     def trial(self) -> EstimationProblem:
         """The trial, with the noise that the hull alone leaves."""
-        plain, spread = prior_force_model(self.windows.scene, self.scene.profile)
+        plain, spread = prior_force_model(self.windows.measurements, self.measurements.profile)
         return estimation_problem(self.windows, plain, spread)
 
     @property
@@ -138,12 +138,12 @@ def _estimates(log: _Log, truths: Sequence[Truth]) -> OracleResult:
     oracles = _sensor_oracles()
     found: dict[tuple[str, str | None], OracleEstimate] = {}
     kinematic: dict[tuple[str, str | None], SensorEstimate] = {}
-    total, forces, scene = 0.0, list[Truth](), log.scene
+    total, forces, measurements = 0.0, list[Truth](), log.measurements
     for truth in truths:
         if truth.effect not in oracles:
             forces.append(truth)
             continue
-        one = oracles[truth.effect](scene)
+        one = oracles[truth.effect](measurements)
         # What position and velocity have in common, forces alone determine: both are tried then.
         tries = 2 if truth.effect in effects() else 1
         sure = one.gain > floor_of(one.free, tries)
@@ -155,9 +155,9 @@ def _estimates(log: _Log, truths: Sequence[Truth]) -> OracleResult:
             *truth.key, one.gain, one.free, floor_of(one.free, tries), dict(one.parameters), idle=one.idle
         )
         total += one.gain
-        scene = one.correct(scene) if sure else scene
+        measurements = one.correct(measurements) if sure else measurements
     if forces:
-        right = log if scene is log.scene else _Log(refilter_velocity(scene))
+        right = log if measurements is log.measurements else _Log(refilter_velocity(measurements))
         gain, recovered = _of_forces(right, forces)
         total += gain
         for made in recovered:
@@ -179,7 +179,7 @@ def _better(forces: OracleEstimate, kinematic: SensorEstimate | None) -> OracleE
 
 def _of_forces(log: _Log, truths: Sequence[Truth]) -> tuple[float, list[OracleEstimate]]:
     """Return the gain of some effects of force together, and what each makes of the log, added last."""
-    reasons = [log.too_short or effects()[truth.effect].cannot(log.scene) for truth in truths]
+    reasons = [log.too_short or effects()[truth.effect].cannot(log.measurements) for truth in truths]
     made = [
         OracleEstimate(truth.effect, truth.instance, 0.0, 0, floor_of(1), {}, reason)
         for truth, reason in zip(truths, reasons, strict=True)
@@ -188,7 +188,7 @@ def _of_forces(log: _Log, truths: Sequence[Truth]) -> tuple[float, list[OracleEs
     able = [truth for truth, reason in zip(truths, reasons, strict=True) if not reason]
     if not able:
         return 0.0, made
-    gain, gains = force_gains(log.trial, [_suspect(log.scene.profile, truth) for truth in able])
+    gain, gains = force_gains(log.trial, [_suspect(log.measurements.profile, truth) for truth in able])
     for truth, one in zip(able, gains, strict=True):
         parameters = dict(one.parameters)
         floor = floor_of(one.free)

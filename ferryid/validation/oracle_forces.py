@@ -99,7 +99,7 @@ def _mean_effects(trial: EstimationProblem, known: Sequence[Candidate]) -> list[
     """Return the means of unsteady effects that are not given: a gust is one of a wind, which is fitted with and without it."""
     there = {one.effect.id for one in known}
     missing = {one.effect.about for one in known} - there - {""}
-    profile = trial.plain.scene.profile
+    profile = trial.plain.measurements.profile
     return [Candidate(effects()[name], None, effects()[name].parameters_of(profile)) for name in sorted(missing)]
 
 
@@ -133,7 +133,7 @@ def _modelled(
     steady, unsteady
         Effects.
     pushing
-        The picture in which unsteady ones push; the fitted one where None.
+        The force model in which unsteady ones push; the fitted one where None.
     near
         Another hypothesis with these unsteady ones, at whose noise the search for theirs begins.
     """
@@ -185,10 +185,10 @@ def _with_processes(
     One after the other they are learnt together with each channel's own noise, the others as they are `near`; `worth` as in
     `ferryid.diagnose.inference.fit_noise_with`.
     """
-    picture = fitted_force_model(trial.plain, made)
-    within = picture if pushing is None else pushing
+    force_model = fitted_force_model(trial.plain, made)
+    within = force_model if pushing is None else pushing
     steps = trial.excerpt
-    gaps = steps.gap(picture)
+    gaps = steps.gap(force_model)
     states = {state.candidate.key: state for state in near}
     pushes = {suspect.key: _pushes(suspect, within) for suspect in (*unsteady, *(state.candidate for state in near))}
     noise = trial.filter
@@ -211,9 +211,9 @@ def _with_processes(
     return replace(trial, filter=noise, plain=plain), tuple(states.values())
 
 
-def _pushes(suspect: Candidate, picture: ForceModel) -> Processes:
+def _pushes(suspect: Candidate, force_model: ForceModel) -> Processes:
     assert suspect.effect.unsteady is not None
-    return suspect.effect.unsteady(picture)
+    return suspect.effect.unsteady(force_model)
 
 
 def _places(suspect: Candidate) -> list[Floats]:
@@ -232,7 +232,7 @@ def _estimate(trial: EstimationProblem, full: _Model, suspect: Candidate) -> For
     """Return what one effect of a hypothesis gains, added last."""
     others = [one for one in full.fit.candidates if one.key != suspect.key]
     shaking = [state.candidate for state in full.states if state.candidate.key != suspect.key]
-    untold = suspect.effect.untold(trial.plain.scene, suspect.start)
+    untold = suspect.effect.untold(trial.plain.measurements, suspect.start)
     free = sum(one.size > HELD and one.name not in untold for one in suspect.parameters)
     # Without the wind that they are one of, gusts push as they did about it.
     blown = any(one.effect.about == suspect.effect.id for one in shaking)
@@ -268,7 +268,7 @@ def _estimates(model: _Model, index: int) -> dict[str, Estimate]:
     """Return the parameters of a steady effect with intervals as a diagnosis tells them, those that the log tells."""
     suspect, values = model.fit.candidates[index], model.fit.values[index]
     followed = intervals(model.trial, model.fit, index) if suspect.effect.ridge and not suspect.times else {}
-    untold = suspect.effect.untold(model.trial.plain.scene, values)
+    untold = suspect.effect.untold(model.trial.plain.measurements, values)
     found = {}
     for one, value, error in zip(
         suspect.parameters, values.tolist(), model.fit.reported_errors(index).tolist(), strict=True

@@ -30,7 +30,7 @@ class SensorEstimate:
     parameters
         By name, with 95 % intervals.
     correct
-        Returns the scene without the error.
+        Returns the measurements without the error.
     idle
         True where the error is below the least size that a diagnosis names.
     """
@@ -38,7 +38,7 @@ class SensorEstimate:
     gain: float
     free: int
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
-    correct: Callable[[Measurements], Measurements] = lambda scene: scene
+    correct: Callable[[Measurements], Measurements] = lambda measurements: measurements
     idle: bool = False
 
 

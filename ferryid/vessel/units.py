@@ -31,21 +31,6 @@ KINDS: Final = MappingProxyType(
 )
 """Kind of quantity to unit name to factor. Canonical: m, rad, m/s, rad/s, rpm (rotation), N, N*m, kg, s, 1."""
 
-CANONICAL: Final = MappingProxyType(
-    {
-        "length": "m",
-        "angle": "rad",
-        "speed": "m/s",
-        "rate": "rad/s",
-        "rotation": "rpm",
-        "force": "N",
-        "moment": "N*m",
-        "mass": "kg",
-        "time": "s",
-        "fraction": "1",
-    }
-)
-
 _SPELLINGS: Final = MappingProxyType(
     {
         "metre": "m",

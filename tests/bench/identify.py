@@ -26,6 +26,7 @@ from ferryid.regression.resampling.bootstrap import Blocks, bootstrap_coefficien
 from ferryid.regression.simpls import fit_simpls
 from ferryid.signals.smooth import central_difference, moving_mean, odd_rows
 from tests.bench.page import Row, Section, duration, faster, within
+from tests.regression.rows import from_rows
 
 Floats = NDArray[np.float64]
 
@@ -64,14 +65,14 @@ def fits(n: int, repeats: int) -> Iterator[Row]:
     X, Y = regression(n)
 
     def ours() -> None:
-        fit_simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
+        fit_simpls(from_rows(CrossProducts, X, Y), COMPONENTS)
 
     yield once(f"fit, {n:,} rows", ours, "scikit-learn", lambda: PLSRegression(COMPONENTS).fit(X, Y), 80)
     yield faster(f"fit, {n:,} rows", ours, "ikpls", lambda: ImprovedKernel().fit(X, Y, COMPONENTS), 4, repeats)
     yield faster(f"fit, {n:,} rows", ours, "bare X'X", lambda: X.T @ X, None, repeats)
     yield faster(
         f"the same by chunk-wise QR, {n // 10:,} rows",
-        lambda: fit_simpls(QrFactor.from_rows(X[: n // 10], Y[: n // 10]), COMPONENTS),
+        lambda: fit_simpls(from_rows(QrFactor, X[: n // 10], Y[: n // 10]), COMPONENTS),
         "numpy QR of all rows",
         lambda: np.linalg.qr(np.hstack([X[: n // 10], Y[: n // 10]]), mode="r"),
         None,
@@ -110,7 +111,7 @@ def sweeps(n: int, repeats: int) -> Iterator[Row]:
 
     def folds_of_matrix() -> None:
         parts = np.linspace(0, n, FOLDS + 1).astype(int)
-        cross_validate([CrossProducts.from_rows(X[low:high], Y[low:high]) for low, high in pairwise(parts)])
+        cross_validate([from_rows(CrossProducts, X[low:high], Y[low:high]) for low, high in pairwise(parts)])
 
     yield faster(
         f"cross-validation, {FOLDS} folds × {MOST}, {n:,} rows",
@@ -142,7 +143,7 @@ def bootstraps(n: int, repeats: int) -> Iterator[Row]:
         what,
         ours,
         "one by one",
-        lambda: drawn(20, lambda x, y: fit_simpls(CrossProducts.from_rows(x, y), COMPONENTS)),
+        lambda: drawn(20, lambda x, y: fit_simpls(from_rows(CrossProducts, x, y), COMPONENTS)),
         300,
         times=DRAWS // 20,
         repeats=repeats,
@@ -156,7 +157,7 @@ def bootstraps(n: int, repeats: int) -> Iterator[Row]:
         DRAWS // 2,
     )
     blocks = [
-        CrossProducts.from_rows(X[i : i + BLOCK_ROWS], Y[i : i + BLOCK_ROWS])
+        from_rows(CrossProducts, X[i : i + BLOCK_ROWS], Y[i : i + BLOCK_ROWS])
         for i in range(0, count * BLOCK_ROWS, BLOCK_ROWS)
     ]
 
@@ -281,7 +282,7 @@ def every_number_refitted(X: Floats, Y: Floats) -> None:
 def extra_memory(n: int) -> int:
     X, Y = regression(n)
     tracemalloc.start()
-    fit_simpls(CrossProducts.from_rows(X, Y), COMPONENTS)
+    fit_simpls(from_rows(CrossProducts, X, Y), COMPONENTS)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return peak
@@ -295,7 +296,7 @@ def digits() -> Iterator[str]:
         X, Y = conditioned(200, MOST, 3, condition)
         want = reference(X, Y, MOST, True)
         by_products, by_qr = (
-            error(fit_simpls(kind.from_rows(X, Y), MOST), want).max() for kind in (CrossProducts, QrFactor)
+            error(fit_simpls(from_rows(kind, X, Y), MOST), want).max() for kind in (CrossProducts, QrFactor)
         )
         yield (
             f"Largest error of a coefficient at any of {MOST} components, condition {condition:g}, against 60 digits: "

@@ -11,9 +11,9 @@ import pytest
 from ferryid.diagnose.checks import screening
 from ferryid.diagnose.data import measurements
 from ferryid.diagnose.inference.baselines import HullBaseline
-from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_campaign
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.simulate import Scenario, load_scenario, parse_scenario, scenarios, simulate, write_log
 from ferryid.vessel import load_profile
 
@@ -84,7 +84,7 @@ def test_a_thruster_that_gives_up_half_way_and_a_breeze(tmp_path: Path) -> None:
     assert moved is not None
     # The profile's hull is the true one, so that no coefficient has reason to go beyond what chance lets it.
     assert 0.0 < abs(moved.deviations) < 3.0
-    assert moved.value - moved.before == pytest.approx(moved.deviations * INFERENCE.hull_spread * abs(moved.before))
+    assert moved.value - moved.before == pytest.approx(moved.deviations * EFFECTS.hull_spread * abs(moved.before))
 
 
 def test_gusts_make_a_delay_doubtful(tmp_path: Path) -> None:

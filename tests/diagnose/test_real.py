@@ -13,11 +13,11 @@ from ferryid.diagnose.checks import examine
 from ferryid.diagnose.data.measurements import read_measurements
 from ferryid.diagnose.inference.campaign import fit_campaign
 from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, fit_campaign_hull
-from ferryid.diagnose.judging.campaign_evidence import MIRRORED, placebos
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.vessel import load_profile
 from tests.diagnose.trials import averaged
+from tests.real.campaign_evidence import MIRRORED, placebos
 
 pytestmark = pytest.mark.slow
 
@@ -61,25 +61,27 @@ def test_zigzags_of_one_tanker_show_one_law_and_no_log_has_its_own(shared_data: 
     ("bag", "seconds"), [("exp52_v_2016-02-11-11-14-28", 30.0), ("exp39_1_2016-02-11-10-47-10", 4.0)]
 )
 def test_a_boat_driven_past_its_recorded_orders_is_noticed(bag: str, seconds: float, shared_data: Locate) -> None:
-    scene, _ = read_measurements(str(shared_data(f"vtec_usv/{bag}.bag")), load_profile("vtec-usv"), None)
-    found = {finding.effect: finding for finding in examine(scene)[0]}
+    measurements, _ = read_measurements(str(shared_data(f"vtec_usv/{bag}.bag")), load_profile("vtec-usv"), None)
+    found = {finding.effect: finding for finding in examine(measurements)[0]}
     assert found["unrecorded_force"].parameters["duration"].value == pytest.approx(seconds, abs=1.0)
 
 
 @pytest.mark.parametrize("bag", ["48000_2016-02-11-10-52-07", "52000_2016-02-11-10-40-10"])
 def test_a_position_on_a_grid_is_not_held(bag: str, shared_data: Locate) -> None:
-    scene, _ = read_measurements(str(shared_data(f"vtec_usv/{bag}.bag")), load_profile("vtec-usv"), None)
-    assert "held_samples" not in {finding.effect for finding in examine(scene)[0]}
+    measurements, _ = read_measurements(str(shared_data(f"vtec_usv/{bag}.bag")), load_profile("vtec-usv"), None)
+    assert "held_samples" not in {finding.effect for finding in examine(measurements)[0]}
 
 
 def test_equal_readings_in_gunnerus_interpolated_table_are_not_held(shared_data: Locate) -> None:
-    scene, _ = read_measurements(str(shared_data("gunnerus/RVG_ManeuveringTests.csv")), load_profile("gunnerus"), None)
-    assert "held_samples" not in {finding.effect for finding in examine(scene)[0]}
+    measurements, _ = read_measurements(
+        str(shared_data("gunnerus/RVG_ManeuveringTests.csv")), load_profile("gunnerus"), None
+    )
+    assert "held_samples" not in {finding.effect for finding in examine(measurements)[0]}
 
 
 def test_the_receiver_of_milliampere_is_late(shared_data: Locate) -> None:
-    scene, _ = read_measurements(str(shared_data("milliampere1")), load_profile("milliampere-2025"), None)
-    found = {finding.effect: finding for finding in examine(scene)[0]}
+    measurements, _ = read_measurements(str(shared_data("milliampere1")), load_profile("milliampere-2025"), None)
+    found = {finding.effect: finding for finding in examine(measurements)[0]}
     # Cross-correlation of the slope of the position with the velocity, on the raw rows: 0.25 to 0.30 s.
     late = found["clock_offset"].parameters["seconds"]
     assert late.low < -0.275 < late.high

@@ -25,7 +25,7 @@ sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 
 
 def candidate(problem: EstimationProblem, name: str, instance: str | None = None) -> Candidate:
-    return next(one for one in list_candidates(problem.plain.scene)[0] if one.key == (name, instance))
+    return next(one for one in list_candidates(problem.plain.measurements)[0] if one.key == (name, instance))
 
 
 def gain(problem: EstimationProblem, made: Fit) -> float:
@@ -87,7 +87,7 @@ def test_trap_3_what_hides_in_a_product_is_found_and_sized(inflow: EstimationPro
 
 
 def test_trap_4_gains_and_hull_free_at_once_do_not_shrink(clean: EstimationProblem) -> None:
-    both = [candidate(clean, "thruster_gain", name) for name in clean.plain.scene.names]
+    both = [candidate(clean, "thruster_gain", name) for name in clean.plain.measurements.names]
     made = fit(clean, both)
     np.testing.assert_allclose(np.concatenate(made.values), 1.0, atol=0.06)
     assert gain(clean, made) < 0.0
@@ -96,7 +96,7 @@ def test_trap_4_gains_and_hull_free_at_once_do_not_shrink(clean: EstimationProbl
 def test_trap_4_a_mass_that_would_cancel_the_acceleration_explains_nothing(clean: EstimationProblem) -> None:
     one = candidate(clean, "payload")
     assert gain(clean, fit(clean, [one])) < INFERENCE.prior_odds
-    # The more mass, the less acceleration does the picture have; what was measured stays.
+    # The more mass, the less acceleration does the force model have; what was measured stays.
     left = [float(np.sum(clean.white(one.act(clean.plain, np.array([mass, 0.0]))) ** 2)) for mass in (0.0, 2e3, 2e4)]
     assert left[0] < left[1] < left[2]
 
@@ -130,8 +130,8 @@ def test_trap_6_what_is_certain_but_void_is_no_finding(
 def test_trap_7_a_gain_that_a_reversed_heading_matches_names_nothing(clean: EstimationProblem) -> None:
     # Half a wind on the vessel as it turned, half one on a vessel that turned the other way: either explains as much.
     wind, plain = candidate(clean, "wind"), clean.plain
-    scene = plain.scene
-    turned = replace(plain, scene=replace(scene, eta=scene.eta * [1.0, 1.0, -1.0]))
+    measurements = plain.measurements
+    turned = replace(plain, measurements=replace(measurements, eta=measurements.eta * [1.0, 1.0, -1.0]))
     blown = [wind.act(one, np.array([-2.0, 1.4])).external - one.external for one in (plain, turned)]
     pushed = replace(clean, plain=replace(plain, external=plain.external + sum(blown)))
     made = fit(pushed, [wind])

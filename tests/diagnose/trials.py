@@ -33,7 +33,7 @@ OFF = {
 
 
 def sailed(folder: Path, name: str, scenario: str, seed: int) -> Measurements:
-    """Simulate a scenario, TOML without a true hull, and return the scene that its log shows."""
+    """Simulate a scenario, TOML without a true hull, and return the measurements that its log shows."""
     log = folder / f"{name}.mcap"
     write_log(simulate(replace(parse_scenario(scenario, name), true_hull=OFF), seed), log)
     return read_measurements(str(log), FERRY, None)[0]
@@ -51,7 +51,7 @@ def averaged(paths: Sequence[str], vessel: Profile, withhold: Sequence[str] = ()
     ]
 
 
-def trial_on(scene: Measurements) -> EstimationProblem:
-    """Return a scene ready for hypotheses."""
-    seen = windows(scene, *window_lengths(FERRY))
-    return estimation_problem(seen, *prior_force_model(seen.scene, FERRY))
+def trial_on(measurements: Measurements) -> EstimationProblem:
+    """Return measurements ready for hypotheses."""
+    seen = windows(measurements, *window_lengths(FERRY))
+    return estimation_problem(seen, *prior_force_model(seen.measurements, FERRY))

@@ -16,13 +16,14 @@ from ferryid.thresholds import BASES
 from tests.docs.pages import ROOT
 from tests.docs.thresholds import PAGE, page, stages
 
-PACKAGES = ("signals", "regression", "models", "identify", "compare", "diagnose")
+PACKAGES = ("signals", "effects", "regression", "models", "identify", "compare", "diagnose")
 """Packages that decide by thresholds."""
 NO_DECISION = {
     "constants of nature, of mathematics and of units": """
         signals.sampling GRAVITY
         signals.kalman WINDOW_PER_TIME
         diagnose.data.measurements WATER_DENSITY BLOCK_COEFFICIENT
+        effects.payload WATER WATERPLANE
         identify.adaptive.averaging NORMAL_95
         identify.split _GOLDEN
     """,
@@ -31,9 +32,18 @@ NO_DECISION = {
         diagnose.checks.kinematics SCALE ANGLE X Y LATE NORTH EAST NEUTRAL
         diagnose.checks.yaw_rate_scale NEUTRAL SIZE
         diagnose.inference.kalman OWN DIFFUSE
+        effects.effect HELD
+        effects.equations_of_motion MASSES DAMPED
+        effects.force_model _NO_FLOW _NO_LOAD _NO_FACTOR
         diagnose.inference.noise_model GROUPS
         regression.bases.term SURGE SWAY YAW DIMENSIONS
         regression.cross_validation.block_sums OUT
+    """,
+    "shapes of formulas, and priors of parameters": """
+        effects.shallow_water EDGE_M
+        effects.thruster_interaction SHARPNESS
+        effects.waves USUAL_HZ USUAL_M
+        effects.wind COEFFICIENTS
     """,
     "rounding, overflow and division by zero": """
         signals.grid EXACT_S
@@ -69,18 +79,19 @@ NO_DECISION = {
         diagnose.checks.contradiction SHIFTS_S MOST_ACTUATORS
         diagnose.checks.kinematics SIZE TINY STEPS
         diagnose.inference.campaign_hull ROUNDS STEPS TRUST TINY START
-        diagnose.inference.change_points MOST_BREAKS
+        diagnose.inference.change_points LEVELS
         diagnose.inference.estimation STEPS ANEW ENOUGH MOVED DAMPINGS NUDGE TRUST
         diagnose.inference.kalman SETTLED
-        diagnose.inference.noise_model STARTS GLIMPSE SIGHT SMALL LONGEST
-        diagnose.inference.onset_estimation FEWEST_PARTS PROMISING NEARBY_S FINEST_S GLANCE
+        diagnose.inference.noise_model STARTS SMALL
+        diagnose.inference.onset_estimation NEARBY_S FINEST_S GLANCE
         diagnose.inference.profile_likelihood FIRST GROWTH STEEP CLOSER PARTS
-        diagnose.inference.search FAR REJUDGED
+        diagnose.inference.search FAR
         diagnose.inference.stochastic_disturbance STRENGTHS BANDS
-        diagnose.judging.backward_elimination SWAPS
-        diagnose.judging.campaign_laws REFITS
-        diagnose.judging.findings TIME_DROP TIME_STEP TIME_FIT TIME_NEAR TIME_FINE_S
-        diagnose.judging.rivals NEAREST
+        diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S
+        effects.gusts STEP
+        effects.linear_evidence TINY
+        effects.shallow_water CELLS
+        effects.wind SPEEDS_MPS BEARINGS
         identify.settings WINDOWS_S
         models.forces.residual _PASSES
         regression.nipals MOST_ITERATIONS
@@ -91,12 +102,10 @@ NO_DECISION = {
         signals.quality _MEDIAN_OF
         signals.render _FIELDS_SHOWN
         diagnose.inference.folds DRAWS
-        diagnose.inference.noise_model EXCERPT PIECES
         diagnose.inference.onset_estimation MOST_NUMBERS
         diagnose.inference.simulation_baseline SHOWN_ROWS
         diagnose.judging.error_profiles SECTORS SPEEDS PLACES TIMES
         diagnose.judging.findings SHOWN_RIVALS
-        diagnose.judging.sparse_regression FLIPS SHIFTS
         diagnose.judging.unexplained SPANS
         identify.archive MOST_DRAWN
         identify.excitation SECTORS

@@ -13,6 +13,7 @@ from tests.docs.pages import ROOT
 PAGE = ROOT / "docs" / "thresholds.md"
 ORDER = (
     "signals",
+    "effects",
     "regression",
     "models",
     "identify",
@@ -29,7 +30,7 @@ Every number that decides what is found, left out, named, lowered to a hint or a
 rests on: *{BASES[0]}* from something else, a *{BASES[1]}* that stands for something, or *{BASES[2]}* data that led to
 the rule or to its value. This page is made from the dataclasses in the `thresholds` modules
 (`python -m tests.docs.thresholds`), and a test fails when it no longer agrees with them. Sizes of buffers, bounds of iterations
-and grids of searches are not here.
+and grids of searches are not here, and the priors of the effects' parameters stand in the effects' files.
 """
 
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ferryid.diagnose.data.measurements import read_measurements as scene_of
-from ferryid.diagnose.data.measurements import window_lengths
-from ferryid.diagnose.inference.estimation import estimation_problem as trial_of
-from ferryid.diagnose.inference.prior import prior_force_model as plain_picture
+from ferryid.diagnose.data.measurements import read_measurements, window_lengths
+from ferryid.diagnose.inference.estimation import estimation_problem
+from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import Search, search
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
@@ -32,7 +31,7 @@ controller = { delta = 0.7, sigma = 0.7 }
 HULL = ("m11", "m22", "m33", "X_u", "X_|u|u", "Y_v", "Y_|v|v", "Y_|r|v", "Y_|v|r", "N_r", "N_|r|r", "N_|r|v")
 """Coefficients that the true vessel has ten per cent off the profile's, either way."""
 NAMES = tuple(name for name, effect in effects().items() if effect.unsteady is None)
-"""Effects that change the picture; what comes and goes by chance is a state of the filter, and found as such."""
+"""Effects that change the force model; what comes and goes by chance is a state of the filter, and found as such."""
 MODERATE = {
     "payload": {"mass": 300.0, "x": 0.7},
     "mooring": {"stiffness_north": 6.0, "stiffness_east": 5.0, "north": 5.0, "east": -5.0},
@@ -66,10 +65,10 @@ def found_in(tables: dict[str, Any], seed: int, folder: Path) -> Search:
         hull[coefficient] = sign * hull.get(coefficient, 1.0)
     log = folder / "trial.mcap"
     write_log(simulate(replace(scenario, true_hull=hull), seed), log)
-    scene, _ = scene_of(str(log), FERRY, None)
-    seen = windows(scene, *window_lengths(FERRY))
-    plain, spread = plain_picture(seen.scene, FERRY)
-    return search(trial_of(seen, plain, spread), lambda stage: None)
+    measurements, _ = read_measurements(str(log), FERRY, None)
+    seen = windows(measurements, *window_lengths(FERRY))
+    plain, spread = prior_force_model(seen.measurements, FERRY)
+    return search(estimation_problem(seen, plain, spread), lambda stage: None)
 
 
 RELATED = ("fouling", "payload", "thruster_gain", "shallow_water", "hull_parameters")
@@ -106,10 +105,10 @@ def test_related_effects_are_not_mistaken_for_each_other(name: str, seed: int, t
 def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
     log = tmp_path / "trial.mcap"
     write_log(simulate(parse_scenario(BASE, "effect"), 1), log)
-    scene, _ = scene_of(str(log), FERRY, None)
-    seen = windows(scene, *window_lengths(FERRY))
-    plain, spread = plain_picture(seen.scene, FERRY)
-    result = search(trial_of(seen, replace(plain, hull=0.4 * plain.hull), 0.4 * spread), lambda stage: None)
+    measurements, _ = read_measurements(str(log), FERRY, None)
+    seen = windows(measurements, *window_lengths(FERRY))
+    plain, spread = prior_force_model(seen.measurements, FERRY)
+    result = search(estimation_problem(seen, replace(plain, hull=0.4 * plain.hull), 0.4 * spread), lambda stage: None)
     assert [one.effect.id for one in result.fit.candidates] == ["hull_parameters"]
     value, error = result.fit.values[0], result.fit.errors(0)
     certain = np.abs(value - 1.0) - 2.0 * error > result.fit.candidates[0].effect.least

@@ -1,4 +1,4 @@
-"""The picture of the forces: its two directions undo each other, and an onset leaves what was before."""
+"""The force model: its two directions undo each other, and an onset leaves what was before."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Candidate as Suspect
-from ferryid.diagnose.inference.estimation import apply_candidates as acted
+from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.effects import effects
 from ferryid.effects.force_model import (
     COEFFICIENTS,
@@ -26,8 +25,9 @@ from ferryid.effects.force_model import (
 )
 from ferryid.effects.wind import mean_load
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import damping, inverse_dynamics
+from ferryid.vessel.hull import inverse_dynamics
 from ferryid.vessel.wind import wind_force
+from tests.vessel.hull_matrices import damping
 
 FERRY = load_profile("milliampere")
 RNG = np.random.default_rng(4)
@@ -41,9 +41,9 @@ def draws_that_no_other_test_moves(monkeypatch: pytest.MonkeyPatch) -> None:
 N = 40
 
 
-def picture(*, flow: bool, load: bool, damped: bool) -> ForceModel:
+def force_model(*, flow: bool, load: bool, damped: bool) -> ForceModel:
     nu = RNG.normal(size=(N, 3)) * [1.0, 0.5, 0.2]
-    scene = Measurements(
+    measurements = Measurements(
         profile=FERRY,
         t=0.2 * np.arange(N),
         eta=RNG.normal(size=(N, 3)) * 3.0,
@@ -56,10 +56,10 @@ def picture(*, flow: bool, load: bool, damped: bool) -> ForceModel:
     x = RNG.normal(size=N)
     mass = 100.0 + 50.0 * RNG.random(N)
     return ForceModel(
-        scene,
+        measurements,
         hull_of(FERRY),
-        scene.parts,
-        scene.angles,
+        measurements.parts,
+        measurements.angles,
         RNG.normal(size=(N, 3)) * 50.0,
         RNG.normal(size=(N, 2)) * 0.3 if flow else None,
         aboard(np.column_stack([mass, x])) if load else None,
@@ -71,7 +71,7 @@ def picture(*, flow: bool, load: bool, damped: bool) -> ForceModel:
 @pytest.mark.parametrize("load", [False, True])
 @pytest.mark.parametrize("damped", [False, True])
 def test_the_force_for_an_acceleration_gives_that_acceleration(flow: bool, load: bool, damped: bool) -> None:
-    one = picture(flow=flow, load=load, damped=damped)
+    one = force_model(flow=flow, load=load, damped=damped)
     nu_dot = RNG.normal(size=(N, 3))
     needed = required_force(one, nu_dot)
     pushed = replace(one, parts=np.stack([0.3 * needed, 0.7 * needed], axis=1))
@@ -80,27 +80,27 @@ def test_the_force_for_an_acceleration_gives_that_acceleration(flow: bool, load:
 
 
 def test_the_force_is_that_of_inverse_dynamics() -> None:
-    one = replace(picture(flow=False, load=False, damped=False), external=np.zeros((N, 3)))
+    one = replace(force_model(flow=False, load=False, damped=False), external=np.zeros((N, 3)))
     nu_dot = RNG.normal(size=(N, 3))
     np.testing.assert_allclose(
-        required_force(one, nu_dot), inverse_dynamics(FERRY.hull, nu_dot, one.scene.nu), rtol=1e-9
+        required_force(one, nu_dot), inverse_dynamics(FERRY.hull, nu_dot, one.measurements.nu), rtol=1e-9
     )
 
 
 def test_what_begins_later_changes_nothing_before() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     after = effects()["payload"].apply(one, np.array([300.0, 0.5]), None)
     late = between(one, after, 4.0)
-    rows = one.scene.t >= 4.0
+    rows = one.measurements.t >= 4.0
     assert 0 < rows.sum() < N
     np.testing.assert_array_equal(acceleration(late)[~rows], acceleration(one)[~rows])
     np.testing.assert_array_equal(acceleration(late)[rows], acceleration(after)[rows])
 
 
 def test_what_ends_changes_nothing_afterwards_and_leaves_the_vessel_as_fast_as_it_is() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     payload, p = effects()["payload"], np.array([300.0, 0.5])
-    t = one.scene.t
+    t = one.measurements.t
     for onset_s, offset_s in ((0.0, float(t[20])), (float(t[5]), float(t[20]))):
         seen = acceleration(payload.act(one, p, None, onset_s, offset_s))
         aboard = (t >= onset_s) & (t < offset_s)
@@ -135,39 +135,41 @@ LIFTING = {"Y_uv": -300.0, "Y_ur": 200.0, "N_uv": -150.0, "N_ur": -80.0}
 
 
 def lifting(one: ForceModel, nu: tuple[float, float, float]) -> np.ndarray:
-    """Return the force of lift [N, N, N·m] alone at a steady velocity: what a picture with lift needs less."""
+    """Return the force of lift [N, N, N·m] alone at a steady velocity: what a force model with lift needs less."""
     hull = one.hull.copy()
     for name, value in LIFTING.items():
         hull[COEFFICIENTS.index(name)] = value
-    moving = replace(one, scene=replace(one.scene, nu=np.tile(nu, (N, 1))))
+    moving = replace(one, measurements=replace(one.measurements, nu=np.tile(nu, (N, 1))))
     rest = np.zeros((N, 3))
     return (required_force(moving, rest) - required_force(replace(moving, hull=hull), rest))[0]
 
 
 def test_lift_by_hand() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     assert lifting(one, (2.0, 0.5, 0.0)) == pytest.approx([0.0, -300.0, -150.0])
     assert lifting(one, (2.0, 0.0, 0.1)) == pytest.approx([0.0, 40.0, -16.0])
     assert lifting(one, (0.0, 0.5, 0.1)) == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_a_hull_and_its_mirror_image_lift_to_opposite_sides() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     to_starboard, to_port = lifting(one, (1.5, 0.4, 0.2)), lifting(one, (1.5, -0.4, -0.2))
     assert to_starboard == pytest.approx(-to_port)
     assert abs(to_starboard[1]) > 100.0
 
 
 def test_a_hull_lifts_in_the_water_that_it_moves_through() -> None:
-    one = picture(flow=False, load=False, damped=False)
-    aground = replace(one, scene=replace(one.scene, eta=np.zeros((N, 3))), flow=np.tile([-2.0, -0.5], (N, 1)))
+    one = force_model(flow=False, load=False, damped=False)
+    aground = replace(
+        one, measurements=replace(one.measurements, eta=np.zeros((N, 3))), flow=np.tile([-2.0, -0.5], (N, 1))
+    )
     assert lifting(aground, (0.0, 0.0, 0.0)) == pytest.approx([0.0, -300.0, -150.0])
 
 
 def test_lift_is_that_of_the_vessel_layer() -> None:
     lifts = replace(FERRY, hull=replace(FERRY.hull, D={**FERRY.hull.D, **LIFTING}))
-    one = replace(picture(flow=False, load=False, damped=False), hull=hull_of(lifts), external=np.zeros((N, 3)))
-    nu_dot, nu = RNG.normal(size=(N, 3)), one.scene.nu
+    one = replace(force_model(flow=False, load=False, damped=False), hull=hull_of(lifts), external=np.zeros((N, 3)))
+    nu_dot, nu = RNG.normal(size=(N, 3)), one.measurements.nu
     np.testing.assert_allclose(required_force(one, nu_dot), inverse_dynamics(lifts.hull, nu_dot, nu), rtol=1e-9)
     taken = damping(lifts.hull.D, nu) - damping(FERRY.hull.D, nu)
     alone = inverse_dynamics(lifts.hull, nu_dot, nu) - inverse_dynamics(FERRY.hull, nu_dot, nu)
@@ -175,14 +177,14 @@ def test_lift_is_that_of_the_vessel_layer() -> None:
 
 
 def test_a_load_that_lay_still_takes_its_share_of_the_momentum() -> None:
-    before = picture(flow=False, load=False, damped=False)
+    before = force_model(flow=False, load=False, damped=False)
     payload, p, row = effects()["payload"], np.array([300.0, 0.8]), 17
     assert payload.kick is not None
-    onset_s = float(before.scene.t[row])
+    onset_s = float(before.measurements.t[row])
     after = payload.apply(before, p, None)
     kicked = between(before, after, onset_s, kick=payload.kick(before, p))
-    change = (acceleration(kicked) - acceleration(between(before, after, onset_s))) * before.scene.step_s
-    nu = before.scene.nu[row]
+    change = (acceleration(kicked) - acceleration(between(before, after, onset_s))) * before.measurements.step_s
+    nu = before.measurements.nu[row]
     own = FERRY.hull.M
     load = np.array([[300.0, 0.0, 0.0], [0.0, 300.0, 240.0], [0.0, 240.0, 192.0]])
     # What the vessel had, vessel and load have together; the mass matrix has no surge row in common with the others.
@@ -192,14 +194,14 @@ def test_a_load_that_lay_still_takes_its_share_of_the_momentum() -> None:
 
 
 def test_an_acceleration_ahead_is_one_to_port_on_axes_turned_to_starboard() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     ahead = acceleration(one)
     turned = as_measured(replace(one, turned=np.pi / 2.0))
     np.testing.assert_allclose(turned, np.column_stack([ahead[:, 1], -ahead[:, 0], ahead[:, 2]]), atol=1e-12)
 
 
 def test_an_antenna_ahead_swings_to_starboard_where_the_vessel_begins_to_turn_so() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     rates = acceleration(one)
     apart = as_measured(replace(one, antenna=(2.0, 0.0))) - rates
     np.testing.assert_allclose(apart, np.column_stack([np.zeros(N), 2.0 * rates[:, 2], np.zeros(N)]), atol=1e-12)
@@ -207,29 +209,34 @@ def test_an_antenna_ahead_swings_to_starboard_where_the_vessel_begins_to_turn_so
     np.testing.assert_allclose(apart, np.column_stack([-1.5 * rates[:, 2], np.zeros(N), np.zeros(N)]), atol=1e-12)
 
 
-def suspect(name: str) -> Suspect:
-    return Suspect(effects()[name], None, effects()[name].parameters_of(FERRY))
+def suspect(name: str) -> Candidate:
+    return Candidate(effects()[name], None, effects()[name].parameters_of(FERRY))
 
 
 def test_what_corrects_the_measurements_acts_before_the_wind_whatever_the_order() -> None:
-    one = picture(flow=False, load=False, damped=False)
-    plain = replace(one, external=one.scene.air_load, ambient=lambda scene: scene.air_load)
+    one = force_model(flow=False, load=False, damped=False)
+    plain = replace(one, external=one.measurements.air_load, ambient=lambda measurements: measurements.air_load)
     wind, bias = np.array([-6.0, 3.0]), np.array([20.0])
     names, values = (suspect("wind"), suspect("heading_bias")), (wind, bias)
-    forth, back = acted(plain, names, values), acted(plain, names[::-1], values[::-1])
+    forth, back = apply_candidates(plain, names, values), apply_candidates(plain, names[::-1], values[::-1])
     np.testing.assert_array_equal(forth.external, back.external)
     # The same air on a vessel that points where it truly points.
-    true = wind_force(FERRY.wind, np.broadcast_to(wind, (N, 2)), one.scene.psi - np.radians(20.0), forth.scene.nu)
+    true = wind_force(
+        FERRY.wind, np.broadcast_to(wind, (N, 2)), one.measurements.psi - np.radians(20.0), forth.measurements.nu
+    )
     np.testing.assert_allclose(forth.external, true, atol=1e-9 * np.abs(true).max())
 
 
 def test_gusts_raise_the_mean_load_as_an_average_over_many_does() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     air, std = np.array([1.5, -2.5]), 1.2
-    found = mean_load(one.scene, air, std)
+    found = mean_load(one.measurements, air, std)
     draws, raised = air + std * RNG.normal(size=(20_000, 2)), []
     for row in (0, 7, 23):
-        psi, nu = (np.repeat(values[row : row + 1], len(draws), axis=0) for values in (one.scene.psi, one.scene.nu))
+        psi, nu = (
+            np.repeat(values[row : row + 1], len(draws), axis=0)
+            for values in (one.measurements.psi, one.measurements.nu)
+        )
         average = wind_force(FERRY.wind, draws, psi, nu).mean(axis=0)
         calm = wind_force(FERRY.wind, air[None], psi[:1], nu[:1])[0]
         scale = np.abs(average[:2]).max()
@@ -242,7 +249,7 @@ def test_gusts_raise_the_mean_load_as_an_average_over_many_does() -> None:
 @pytest.mark.parametrize("load", [False, True])
 @pytest.mark.parametrize("damped", [False, True])
 def test_changes_with_the_hull_are_those_of_a_hull_that_is_moved(flow: bool, load: bool, damped: bool) -> None:
-    one = replace(picture(flow=flow, load=load, damped=damped), turned=0.3, antenna=(1.5, -0.8))
+    one = replace(force_model(flow=flow, load=load, damped=damped), turned=0.3, antenna=(1.5, -0.8))
     places = np.array([3, 0, 25, *range(4, 25)])
     # Lift has coefficients that are zero.
     moves = 0.05 * np.where(one.hull[places] != 0.0, one.hull[places], 200.0)
@@ -260,7 +267,7 @@ def test_changes_with_the_hull_are_those_of_a_hull_that_is_moved(flow: bool, loa
 
 
 def test_rows_that_do_not_belong_together_are_refused() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     short = replace(one, external=one.external[:-1])
     for refused in (short, replace(one, load=np.ones((N - 1, 5))), replace(one, parts=one.parts[1:])):
         with pytest.raises(ValueError, match="other lengths"):
@@ -270,7 +277,7 @@ def test_rows_that_do_not_belong_together_are_refused() -> None:
 
 
 def test_a_deeper_hull_moves_more_water_and_is_damped_more() -> None:
-    one = picture(flow=False, load=False, damped=False)
+    one = force_model(flow=False, load=False, damped=False)
     mass, x, by_draught = 300.0, 0.5, 1.2
     seen = acceleration(effects()["payload"].apply(one, np.array([mass, x, by_draught]), None))
     hull = FERRY.hull

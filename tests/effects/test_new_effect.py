@@ -36,10 +36,10 @@ def parameters_of(profile):
     return tuple(Parameter(name, unit, 40.0, -1e4, 1e4) for name, unit in (("north", "N"), ("east", "N"), ("moment", "N·m")))
 
 
-def apply(picture, p, instance):
-    n = len(picture.scene.t)
-    X, Y = to_body(np.full(n, p[0]), np.full(n, p[1]), picture.scene.psi)
-    return replace(picture, external=picture.external + np.column_stack([X, Y, np.full(n, p[2])]))
+def apply(force_model, p, instance):
+    n = len(force_model.measurements.t)
+    X, Y = to_body(np.full(n, p[0]), np.full(n, p[1]), force_model.measurements.psi)
+    return replace(force_model, external=force_model.external + np.column_stack([X, Y, np.full(n, p[2])]))
 
 
 def load(p, t, x, y, psi, u, v, r, u_r, v_r):
@@ -67,7 +67,8 @@ def thrust(p, speed, force):
 
 
 EFFECT = Effect(
-    "stuck", "Dead band", lambda profile: (Parameter("ahead", "rpm", 50.0, 0.0, 500.0),), lambda picture, p, instance: picture,
+    "stuck", "Dead band", lambda profile: (Parameter("ahead", "rpm", 50.0, 0.0, 500.0),),
+    lambda force_model, p, instance: force_model,
     lambda values, instance: f"{instance} sticks.", partial(entry, "stuck"),
     instances=lambda profile: tuple(one.name for one in profile.actuators), simulated=Simulated(thrust=thrust),
 )

@@ -20,13 +20,13 @@ OUTWARD = dict(zip(SIDES, (-1.0, 1.0, -1.0, 1.0), strict=True))
 
 
 def sailed() -> ForceModel:
-    """Return the picture of a vessel that goes over waters from 0 to 100 m north and 0 to 40 m east."""
+    """Return the force model of a vessel that goes over waters from 0 to 100 m north and 0 to 40 m east."""
     rng = np.random.default_rng(3)
     eta = np.column_stack([rng.uniform(0.0, 100.0, N), rng.uniform(0.0, 40.0, N), rng.uniform(-3.0, 3.0, N)])
     nu = rng.normal(size=(N, 3)) * [1.0, 0.5, 0.2]
     rest = np.zeros((N, 2, 3))
-    scene = Measurements(FERRY, 0.2 * np.arange(N), eta, nu, nu, rest, np.zeros((N, 2)), np.ones(N, dtype=bool))
-    return ForceModel(scene, hull_of(FERRY), rest, scene.angles, np.zeros((N, 3)))
+    measurements = Measurements(FERRY, 0.2 * np.arange(N), eta, nu, nu, rest, np.zeros((N, 2)), np.ones(N, dtype=bool))
+    return ForceModel(measurements, hull_of(FERRY), rest, measurements.angles, np.zeros((N, 3)))
 
 
 def values(**sides: float) -> np.ndarray:
@@ -43,33 +43,33 @@ PLACES = [
 
 @pytest.mark.parametrize(("sides", "wanted"), PLACES)
 def test_sides_beyond_which_nobody_went_are_untold(sides: dict[str, float], wanted: set[str]) -> None:
-    picture = sailed()
-    assert EFFECT.untold(picture.scene, values(**sides)) == wanted | {HEAVIER.name}
-    here = acceleration(EFFECT.apply(picture, values(**sides), None))
+    force_model = sailed()
+    assert EFFECT.untold(force_model.measurements, values(**sides)) == wanted | {HEAVIER.name}
+    here = acceleration(EFFECT.apply(force_model, values(**sides), None))
     for name in SIDES:
         # Whatever the log could tell of a side would be told by a change of the forces there.
         farther = values(**{**sides, name: sides[name] + 7.0 * OUTWARD[name]})
-        same = np.array_equal(acceleration(EFFECT.apply(picture, farther, None)), here)
+        same = np.array_equal(acceleration(EFFECT.apply(force_model, farther, None)), here)
         assert same == (name in wanted), name
 
 
 def test_a_share_of_two_per_cent_of_what_was_measured_makes_a_side_told() -> None:
-    scene = sailed().scene
-    east = np.sort(scene.eta[:, 1])
+    measurements = sailed().measurements
+    east = np.sort(measurements.eta[:, 1])
     for beyond, wanted in ((N // 50 - 1, {"east"}), (N // 50, set())):
         # Half-way between two rows, so many of them beyond.
         side = float(0.5 * (east[-beyond - 1] + east[-beyond]))
         p = values(south=30.0, north=60.0, west=10.0, east=side)
-        assert EFFECT.untold(scene, p) == wanted | {HEAVIER.name}
+        assert EFFECT.untold(measurements, p) == wanted | {HEAVIER.name}
     # Where nothing was measured nobody is known to have been.
-    blind = replace(scene, usable=scene.eta[:, 0] < 60.0)
+    blind = replace(measurements, usable=measurements.eta[:, 0] < 60.0)
     assert EFFECT.untold(blind, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {"north", HEAVIER.name}
-    assert EFFECT.untold(scene, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {HEAVIER.name}
+    assert EFFECT.untold(measurements, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {HEAVIER.name}
 
 
 def test_a_place_that_was_visited_once_is_a_time_as_well() -> None:
-    picture = sailed()
-    t = picture.scene.t
+    force_model = sailed()
+    t = force_model.measurements.t
     there = np.column_stack([np.full(N, 50.0), np.full(N, 20.0), np.zeros(N)])
     p = values(south=40.0, north=60.0, west=10.0, east=30.0)
     for times, wanted in (
@@ -79,7 +79,7 @@ def test_a_place_that_was_visited_once_is_a_time_as_well() -> None:
     ):
         inside = np.any([(t >= first) & (t < last) for first, last in times], axis=0)
         eta = np.where(inside[:, None], there, there + np.array([0.0, 50.0, 0.0]))
-        assert EFFECT.once(replace(picture.scene, eta=eta), p) == wanted, times
+        assert EFFECT.once(replace(force_model.measurements, eta=eta), p) == wanted, times
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.estimation import Candidate as Suspect
-from ferryid.diagnose.inference.estimation import choose_parameters as settled
-from ferryid.diagnose.inference.estimation import estimation_problem as trial_of
-from ferryid.diagnose.inference.estimation import fit
+from ferryid.diagnose.inference.estimation import Candidate, choose_parameters, estimation_problem, fit
 from ferryid.effects import effects
 from ferryid.effects.wind import SPEEDS_MPS
 from tests.diagnose.judging.test_unexplained import FERRY, pushes, trial_with
@@ -18,7 +15,7 @@ from tests.diagnose.judging.test_unexplained import FERRY, pushes, trial_with
 pytestmark = pytest.mark.slow
 
 WIND = effects()["wind"]
-BREEZE = Suspect(WIND, None, WIND.parameters_of(FERRY))
+BREEZE = Candidate(WIND, None, WIND.parameters_of(FERRY))
 
 
 @pytest.mark.parametrize("speed", [0.0, 7.0])
@@ -29,8 +26,8 @@ def test_a_search_begins_on_the_side_that_the_wind_blows_to(towards_deg: float, 
     towards = np.radians(towards_deg)
     blown = BREEZE.act(calm.plain, speed * np.array([np.cos(towards), np.sin(towards)]))
     lacking = replace(calm.plain, external=calm.plain.external - (blown.external - calm.plain.external))
-    trial = trial_of(calm.windows, lacking, calm.hull_spread)
-    chosen = settled(trial, fit(trial, ()), BREEZE)
+    trial = estimation_problem(calm.windows, lacking, calm.hull_spread)
+    chosen = choose_parameters(trial, fit(trial, ()), BREEZE)
     north, east = chosen.start[:2].tolist()
     if speed == 0.0:
         assert (north, east) == (0.0, 0.0)

@@ -12,6 +12,7 @@ from ferryid.regression.collinearity import singular_values, undetermined_terms
 from ferryid.regression.cross_products import CrossProducts
 from ferryid.regression.qr import QrFactor
 from ferryid.signals.track import Motion
+from tests.regression.rows import from_rows
 
 Floats = NDArray[np.float64]
 KINDS = (CrossProducts, QrFactor)
@@ -23,7 +24,7 @@ def independent(n: int = 800, K: int = 5) -> Floats:
 
 
 def source(kind, X: Floats) -> CrossProducts | QrFactor:
-    return kind.from_rows(X, np.zeros((len(X), 1)))
+    return from_rows(kind, X, np.zeros((len(X), 1)))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -140,7 +141,7 @@ def test_excitation_of_masked_logs() -> None:
     eta[:, 2] = np.linspace(0.0, 2.0 * np.pi, n)
     motion = Motion("a", np.arange(n) / 10.0, 10.0, eta, nu, nu, nu, np.ones(n, dtype=bool), nu)
     mask = np.arange(n) < 120
-    cross = CrossProducts.from_rows(np.hstack([nu, nu[:, :1]])[mask], nu[mask])
+    cross = from_rows(CrossProducts, np.hstack([nu, nu[:, :1]])[mask], nu[mask])
     vip = np.ones(4)
     found = assess_excitation(cross, ("u", "v", "r", "w"), vip, [motion, motion], [mask, mask])
     assert found.heading_coverage == pytest.approx(0.5)

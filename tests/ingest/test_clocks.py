@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ferryid.ingest.clocks import ClockReport, repair, repair_all
+from ferryid.ingest.clocks import ClockReport, repair_all
 from ferryid.ingest.log import Series
 
 SECOND = 1_000_000_000
@@ -29,6 +29,10 @@ def received(stamps: Times, latency_s: float = 0.005, jitter_s: float = 0.0, see
 
 def series(topic: str, receive: Times, stamp: Times | None) -> Series:
     return Series(topic, receive, stamp, {})
+
+
+def repair(receive: Times, stamp: Times | None) -> tuple[Times, NDArray[np.int64], ClockReport]:
+    return repair_all({"/one": series("/one", receive, stamp)})["/one"]
 
 
 def test_healthy_stamps_are_used_as_they_are() -> None:

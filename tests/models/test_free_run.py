@@ -12,7 +12,7 @@ from ferryid.models.forces.estimator import Estimator
 from ferryid.models.prediction.free_run import run_free
 from ferryid.signals.track import Motion
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import coriolis, damping
+from tests.vessel.hull_matrices import coriolis, damping
 
 pytestmark = pytest.mark.slow
 

@@ -13,8 +13,9 @@ from ferryid.errors import FerryIdError
 from ferryid.models.forces.residual import base_force, compute_residual, motion_force, scale_hull
 from ferryid.signals.track import Motion
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import current_in_body, forward, inverse_dynamics
+from ferryid.vessel.hull import current_in_body, inverse_dynamics
 from ferryid.vessel.wind import wind_force
+from tests.vessel.hull_matrices import forward
 
 Floats = NDArray[np.float64]
 

@@ -270,10 +270,12 @@ def milliampere() -> str:
     """Return the section on the ferry with four thrusters."""
     folder = DATA / MILLIAMPERE
     profile = load_profile("milliampere-2025")
-    scene = read_measurements(str(folder), profile, None)[0]
-    lag, gain = witnesses.velocity_lag(scene), witnesses.slow_gain(scene)
-    at, offsets, used = witnesses.antenna(folder), witnesses.encoder_offsets(folder), witnesses.sectors(scene)
-    sectors = "; ".join(f"{name} {low:.0f} to {high:.0f}" for name, (low, high) in zip(scene.names, used, strict=True))
+    measurements = read_measurements(str(folder), profile, None)[0]
+    lag, gain = witnesses.velocity_lag(measurements), witnesses.slow_gain(measurements)
+    at, offsets, used = witnesses.antenna(folder), witnesses.encoder_offsets(folder), witnesses.sectors(measurements)
+    sectors = "; ".join(
+        f"{name} {low:.0f} to {high:.0f}" for name, (low, high) in zip(measurements.names, used, strict=True)
+    )
 
     def judge(one: Diagnosis, finding: Finding) -> str:
         if finding.effect == "clock_offset":
@@ -414,13 +416,13 @@ def pool() -> str:
     ]
     steps, shown = [], None
     for log in logs:
-        scene = read_measurements(log, profile, None)[0]
+        measurements = read_measurements(log, profile, None)[0]
         steps.append(witnesses.position_steps(_poses(log)))
-        told_ = witnesses.idle(scene)
+        told_ = witnesses.idle(measurements)
         if told_ is not None:
             lines.append(f"| {Path(log).stem} | {told_[0]:.0f} | {told_[1]:.2f}, {told_[2]:.2f} |")
             if shown is None or told_[2] - told_[1] > shown[0]:
-                shown = (told_[2] - told_[1], log, scene)
+                shown = (told_[2] - told_[1], log, measurements)
     if shown is not None:
         (FOLDER / "diagnosis-vtec-usv-driven.svg").write_text(pictures.driven(shown[2]), encoding="utf-8")
         lines += [

@@ -16,13 +16,13 @@ from ferryid.diagnose.inference.campaign_hull import CampaignHull, Member, fit_c
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.campaign_evidence import Gains, held_out_gains, placebos, turn_heading
 from ferryid.effects.effect import Parameter
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.signals.smooth import moving_mean
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.trials import averaged
+from tests.real.campaign_evidence import Gains, held_out_gains, placebos, turn_heading
 from tests.real.places import DATA
 
 Floats = NDArray[np.float64]
@@ -99,7 +99,7 @@ def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]
     kept = sorted(joint.place, key=lambda path: joint.place[path])
     members = list(joint.members)
     hidden = [hidden_wind(path, member) for path, member in zip(kept, members, strict=True)]
-    usable = [wind[member.windows.scene.usable] for wind, member in zip(hidden, members, strict=True)]
+    usable = [wind[member.windows.measurements.usable] for wind, member in zip(hidden, members, strict=True)]
     spread, induced_size = np.split(joint.hull.spread, [len(COEFFICIENTS)])
     controls = placebos(members)
     winds = {FOUND: winds_of(joint.hull)}
@@ -126,18 +126,22 @@ def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]
 
 
 def hidden_wind(path: str, member: Member) -> Floats:
-    """Return the wind that a run measured, on the rows of its windows' scene, shape (n, 2)."""
-    scene, _ = read_measurements(path, ESSO, None)
-    corrected = windows(replace(examine(replace(scene, wind=None))[1], wind=scene.wind), *window_lengths(ESSO)).scene
+    """Return the wind that a run measured, on the rows of its windows' measurements, shape (n, 2)."""
+    measurements, _ = read_measurements(path, ESSO, None)
+    corrected = windows(
+        replace(examine(replace(measurements, wind=None))[1], wind=measurements.wind), *window_lengths(ESSO)
+    ).measurements
     assert corrected.wind is not None
-    assert np.allclose(corrected.t, member.windows.scene.t)
+    assert np.allclose(corrected.t, member.windows.measurements.t)
     return corrected.wind
 
 
 def blown(member: Member, wind: Floats) -> Member:
-    """Return a run in whose picture a wind blows, shape (n, 2)."""
-    scene = member.windows.scene
-    return replace(member, plain=replace(member.plain, external=wind_force(AREAS, wind, scene.psi, scene.nu)))
+    """Return a run in whose force model a wind blows, shape (n, 2)."""
+    measurements = member.windows.measurements
+    return replace(
+        member, plain=replace(member.plain, external=wind_force(AREAS, wind, measurements.psi, measurements.nu))
+    )
 
 
 def winds_of(hull: CampaignHull) -> Winds:
@@ -149,18 +153,18 @@ def courses(members: Sequence[Member], hidden: Sequence[Floats], spread: Floats,
     """Fit all runs together with a wind that changes in the course of time, on true or mirrored headings."""
     varying, series = zip(*(changing(member) for member in members), strict=True)
     group = [
-        replace(member, candidates=(turn_heading(one, -member.windows.scene.psi) if mirrored else one,))
+        replace(member, candidates=(turn_heading(one, -member.windows.measurements.psi) if mirrored else one,))
         for member, one in zip(members, varying, strict=True)
     ]
     made = fit_campaign_hull(group, *np.split(spread, [len(COEFFICIENTS)]))
     told = []
     for member, wind, values, of in zip(members, hidden, made.values, series, strict=True):
-        scene = member.windows.scene
-        rows = 2 * round(0.5 * NODES_S / scene.step_s) + 1
+        measurements = member.windows.measurements
+        rows = 2 * round(0.5 * NODES_S / measurements.step_s) + 1
         steady = moving_mean(np.pad(wind, ((rows // 2, rows // 2), (0, 0)), mode="edge"), rows)[
             rows // 2 : -(rows // 2)
         ]
-        told.append(Course(scene.t, of @ values[0].reshape(2, -1).T, steady))
+        told.append(Course(measurements.t, of @ values[0].reshape(2, -1).T, steady))
     return told
 
 
@@ -179,7 +183,7 @@ def changing(member: Member) -> tuple[Candidate, Floats]:
 
     Parameters are the mean and independent numbers of unit variance, north first; the matrix is (rows, parameters / 2).
     """
-    t = member.windows.scene.t
+    t = member.windows.measurements.t
     nodes = np.arange(t[0], t[-1] + NODES_S, NODES_S)
     covariance = GUST_MPS**2 * np.exp(-np.abs(nodes[:, None] - nodes) / MEMORY_S)
     root = np.linalg.cholesky(covariance + 1e-9 * np.eye(len(nodes)))
@@ -191,11 +195,14 @@ def changing(member: Member) -> tuple[Candidate, Floats]:
     for parameter in mean:
         parameters += [parameter, *(Parameter(f"{parameter.name} {k}", "-", 1.0, -9.0, 9.0) for k in range(len(nodes)))]
 
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        scene = picture.scene
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        measurements = force_model.measurements
         air = series @ p.reshape(2, -1).T
-        still = wind_force(AREAS, np.zeros_like(air), scene.psi, scene.nu)
-        return replace(picture, external=picture.external + wind_force(AREAS, air, scene.psi, scene.nu) - still)
+        still = wind_force(AREAS, np.zeros_like(air), measurements.psi, measurements.nu)
+        return replace(
+            force_model,
+            external=force_model.external + wind_force(AREAS, air, measurements.psi, measurements.nu) - still,
+        )
 
     return replace(wind, effect=replace(wind.effect, apply=apply), parameters=tuple(parameters)), series
 
@@ -207,5 +214,5 @@ def bearing(wind: Floats) -> Floats:
 
 def spread_of(members: Sequence[Member]) -> Floats:
     """Return what is believed of the hull of these runs before them, induced drag included, shape (h,)."""
-    coefficients = np.max([prior_force_model(one.windows.scene, ESSO)[1] for one in members], axis=0)
+    coefficients = np.max([prior_force_model(one.windows.measurements, ESSO)[1] for one in members], axis=0)
     return np.concatenate([coefficients, induced_spread(ESSO.hull.length_m, ESSO.hull.draught_m)])

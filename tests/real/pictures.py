@@ -68,13 +68,13 @@ def lag(found: Sequence[Lag], names: Sequence[str]) -> str:
         return _svg(figure)
 
 
-def driven(scene: Measurements) -> str:
+def driven(measurements: Measurements) -> str:
     """Draw recorded force and surge velocity."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 3.6), layout="constrained")
         above, below = figure.subplots(2, 1, sharex=True)
-        above.plot(scene.t, scene.parts.sum(axis=1)[:, 0], color=BLUE)
-        below.plot(scene.t, scene.nu_raw[:, 0], color=ORANGE)
+        above.plot(measurements.t, measurements.parts.sum(axis=1)[:, 0], color=BLUE)
+        below.plot(measurements.t, measurements.nu_raw[:, 0], color=ORANGE)
         above.set_ylabel("force ordered [N]")
         below.set(ylabel="surge velocity [m/s]", xlabel="time [s]")
         return _svg(figure)

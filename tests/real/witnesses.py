@@ -29,17 +29,17 @@ class Lag:
     correlations: Floats
 
 
-def velocity_lag(scene: Measurements, reach_s: float = 2.0) -> Lag:
+def velocity_lag(measurements: Measurements, reach_s: float = 2.0) -> Lag:
     """Correlate the slope of positions with velocities turned north and east, shifted row by row."""
-    rate = 1.0 / scene.step_s
+    rate = 1.0 / measurements.step_s
     rows = 2 * round(0.5 * SLOPE_S * rate) + 1
-    slope = savgol_filter(scene.eta[:, :2], rows, 1, deriv=1, delta=scene.step_s, axis=0)
-    c, s = np.cos(scene.psi), np.sin(scene.psi)
-    u, v = savgol_filter(scene.nu_raw[:, :2], rows, 1, axis=0).T
+    slope = savgol_filter(measurements.eta[:, :2], rows, 1, deriv=1, delta=measurements.step_s, axis=0)
+    c, s = np.cos(measurements.psi), np.sin(measurements.psi)
+    u, v = savgol_filter(measurements.nu_raw[:, :2], rows, 1, axis=0).T
     ground = np.column_stack([c * u - s * v, s * u + c * v])
     reach = round(reach_s * rate)
     inner = slice(rows + reach, len(c) - rows - reach)
-    known = scene.usable[inner]
+    known = measurements.usable[inner]
     shifts = np.arange(-reach, reach + 1)
     # A velocity that is late by k rows belongs to the slope k rows earlier.
     found = [
@@ -50,19 +50,21 @@ def velocity_lag(scene: Measurements, reach_s: float = 2.0) -> Lag:
     # The top of the parabola through the highest three.
     before, top, after = found[best - 1 : best + 2]
     between = 0.5 * (before - after) / (before - 2.0 * top + after)
-    return Lag(float((shifts[best] + between) * scene.step_s), float(top), shifts * scene.step_s, np.array(found))
+    return Lag(
+        float((shifts[best] + between) * measurements.step_s), float(top), shifts * measurements.step_s, np.array(found)
+    )
 
 
-def slow_gain(scene: Measurements, below_hz: float = 0.06) -> Floats:
+def slow_gain(measurements: Measurements, below_hz: float = 0.06) -> Floats:
     """Return velocity over slope of position where both are slow, north and east: there the position is exact."""
-    c, s = np.cos(scene.psi), np.sin(scene.psi)
-    u, v = scene.nu_raw[:, :2].T
+    c, s = np.cos(measurements.psi), np.sin(measurements.psi)
+    u, v = measurements.nu_raw[:, :2].T
     gains = []
-    for place, velocity in ((scene.eta[:, 0], c * u - s * v), (scene.eta[:, 1], s * u + c * v)):
-        slope = np.gradient(place, scene.step_s)
-        rows = round(40.0 / scene.step_s)
-        frequency, both = csd(slope, velocity, 1.0 / scene.step_s, nperseg=rows)
-        alone = welch(slope, 1.0 / scene.step_s, nperseg=rows)[1]
+    for place, velocity in ((measurements.eta[:, 0], c * u - s * v), (measurements.eta[:, 1], s * u + c * v)):
+        slope = np.gradient(place, measurements.step_s)
+        rows = round(40.0 / measurements.step_s)
+        frequency, both = csd(slope, velocity, 1.0 / measurements.step_s, nperseg=rows)
+        alone = welch(slope, 1.0 / measurements.step_s, nperseg=rows)[1]
         slow = (frequency > 0.0) & (frequency <= below_hz)
         gains.append(float(np.sum(np.abs(both[slow])) / np.sum(alone[slow])))
     return np.array(gains)
@@ -105,13 +107,13 @@ def encoder_offsets(folder: Path) -> Floats:
     return np.array(found)
 
 
-def sectors(scene: Measurements) -> Floats:
+def sectors(measurements: Measurements) -> Floats:
     """Return the range of angles that each azimuth thruster used while it pushed [deg], shape (k, 2)."""
     used = []
-    for k in range(scene.parts.shape[1]):
-        size = np.hypot(scene.parts[:, k, 0], scene.parts[:, k, 1])
-        pushing = scene.usable & (size > 0.2 * np.quantile(size, 0.95))
-        used.append(np.degrees(np.quantile(scene.angles[pushing, k], [0.025, 0.975])))
+    for k in range(measurements.parts.shape[1]):
+        size = np.hypot(measurements.parts[:, k, 0], measurements.parts[:, k, 1])
+        pushing = measurements.usable & (size > 0.2 * np.quantile(size, 0.95))
+        used.append(np.degrees(np.quantile(measurements.angles[pushing, k], [0.025, 0.975])))
     return np.array(used)
 
 
@@ -133,14 +135,14 @@ def position_pace(table: pd.DataFrame, rows: int) -> Floats:
     return np.quantile(ways[0] / ways[1], [0.05, 0.25, 0.5, 0.75, 0.95])
 
 
-def idle(scene: Measurements, least_s: float = 3.0) -> tuple[float, float, float] | None:
+def idle(measurements: Measurements, least_s: float = 3.0) -> tuple[float, float, float] | None:
     """Return the longest time without any recorded force [s], and the surge speeds at its slowest and fastest after [m/s]."""
-    still = np.abs(scene.parts).sum(axis=(1, 2)) == 0.0
+    still = np.abs(measurements.parts).sum(axis=(1, 2)) == 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8))).reshape(-1, 2)
     best = None
     for first, end in edges.tolist():
-        seconds = (end - first) * scene.step_s
-        surge = np.abs(scene.nu_raw[first:end, 0])
+        seconds = (end - first) * measurements.step_s
+        surge = np.abs(measurements.nu_raw[first:end, 0])
         slowest = int(np.argmin(surge))
         fastest = float(surge[slowest:].max())
         if seconds >= least_s and (best is None or fastest - surge[slowest] > best[2] - best[1]):

@@ -19,6 +19,7 @@ from ferryid.regression.resampling.bootstrap import (
 from ferryid.regression.simpls import fit_simpls
 from ferryid.regression.thresholds import REGRESSION
 from ferryid.types import Flags
+from tests.regression.rows import from_rows
 
 Floats = NDArray[np.float64]
 
@@ -65,13 +66,13 @@ def test_every_draw_is_a_fit_to_the_rows_drawn(allowed) -> None:
     X[:, 3] = X[:, 2]
     Y = X @ rng.standard_normal((5, 2)) + rng.standard_normal((1200, 2))
     cuts = np.array_split(np.arange(1200), 12)
-    blocks = [CrossProducts.from_rows(X[rows], Y[rows]) for rows in cuts]
+    blocks = [from_rows(CrossProducts, X[rows], Y[rows]) for rows in cuts]
     options = {"allowed": allowed, "scale": False}
     got = bootstrap_coefficients(blocks, 3, draws=40, seed=7, level=1.0 - 1e-12, **options)
     fits = []
     for picked in np.random.default_rng(7).integers(0, 12, (40, 12)):
         rows = np.concatenate([cuts[i] for i in picked])
-        fits.append(fit_simpls(CrossProducts.from_rows(X[rows], Y[rows]), 3, **options))
+        fits.append(fit_simpls(from_rows(CrossProducts, X[rows], Y[rows]), 3, **options))
     theta = np.array([fit.coefficients[-1] for fit in fits])
     intercept = np.array([fit.intercepts[-1] for fit in fits])
     np.testing.assert_allclose(got.low, theta.min(axis=0), atol=1e-9)
@@ -175,13 +176,13 @@ def test_blocks_of_several_logs_cover_the_masked_rows_once() -> None:
     mask[300:500] = False
     parts = [Rows((X[:400],), Y[:400], mask[:400]), Rows((X[400:],), Y[400:], mask[400:]), Rows.of(X[:0], Y[:0])]
     blocks = Blocks.of(parts, [10.0, 20.0, 10.0], 3.0)
-    whole = CrossProducts.from_rows(X[mask], Y[mask])
+    whole = from_rows(CrossProducts, X[mask], Y[mask])
     assert blocks.n.sum() == whole.n
     assert np.all(np.abs(blocks.n - np.where(np.arange(len(blocks.n)) < round(mask[:400].sum() / 30), 30, 60)) < 8)
     for got, want in zip(blocks.whole().moments(), whole.moments(), strict=True):
         np.testing.assert_allclose(got, want, rtol=1e-10)
-    stacked = Blocks.stack([CrossProducts.from_rows(X[i : i + 100], Y[i : i + 100]) for i in range(0, 1000, 100)])
-    np.testing.assert_allclose(stacked.whole().moments(), CrossProducts.from_rows(X, Y).moments(), rtol=1e-10)
+    stacked = Blocks.stack([from_rows(CrossProducts, X[i : i + 100], Y[i : i + 100]) for i in range(0, 1000, 100)])
+    np.testing.assert_allclose(stacked.whole().moments(), from_rows(CrossProducts, X, Y).moments(), rtol=1e-10)
 
 
 def test_constant_and_duplicate_terms_draw_no_noise() -> None:
@@ -205,7 +206,7 @@ def test_a_seed_gives_the_same_bits_and_another_does_not() -> None:
 def test_one_block_is_refused() -> None:
     X, Y, _ = trial(0, n=50)
     with pytest.raises(FerryIdError, match=r"trial: intervals by block bootstrap need two blocks or more, found 1"):
-        bootstrap_coefficients([CrossProducts.from_rows(X, Y)], 2, where="trial")
+        bootstrap_coefficients([from_rows(CrossProducts, X, Y)], 2, where="trial")
     with pytest.raises(FerryIdError, match="no rows to draw from"):
         Blocks.of([Rows.of(X[:0], Y[:0])], [10.0], 1.0)
 

@@ -27,6 +27,7 @@ from ferryid.regression.qr import QrFactor
 from ferryid.regression.simpls import fit_simpls
 from ferryid.types import RunContext
 from tests.identify.rounds import PROFILE, motion
+from tests.regression.rows import from_rows
 
 Floats = NDArray[np.float64]
 State = dict[str, float]
@@ -202,7 +203,7 @@ def test_a_coupled_truth_is_found_again(name: str) -> None:
     functions = built(name)
     theta = truth(functions, 3)
     X = functions.evaluate(*states(4000))
-    found = fit_simpls(QrFactor.from_rows(X, X @ theta), len(functions.terms)).coefficients[-1]
+    found = fit_simpls(from_rows(QrFactor, X, X @ theta), len(functions.terms)).coefficients[-1]
     np.testing.assert_allclose(found, theta, rtol=1e-7, atol=1e-6)
 
 

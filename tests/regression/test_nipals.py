@@ -11,6 +11,7 @@ from ferryid.errors import FerryIdError
 from ferryid.regression.cross_products import CrossProducts
 from ferryid.regression.nipals import component_covariances, fit_nipals
 from ferryid.regression.simpls import fit_simpls
+from tests.regression.rows import from_rows
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ def test_one_output_is_simpls() -> None:
     X, Y = data(1)
     np.testing.assert_allclose(
         fit_nipals(X, Y, 8).coefficients,
-        fit_simpls(CrossProducts.from_rows(X, Y), 8).coefficients,
+        fit_simpls(from_rows(CrossProducts, X, Y), 8).coefficients,
         rtol=1e-8,
         atol=1e-10,
     )
@@ -148,7 +149,7 @@ def test_covariance_is_the_largest_with_any_combination_of_outputs() -> None:
 def test_simpls_holds_no_less_covariance_in_its_second_component(seed: int) -> None:
     # Both second scores are orthogonal to the same first ones, and SIMPLS takes the best of all such (De Jong 1993).
     X, Y = data(seed=seed)
-    ours = component_covariances(fit_simpls(CrossProducts.from_rows(X, Y), 2).weights[0], X, Y)
+    ours = component_covariances(fit_simpls(from_rows(CrossProducts, X, Y), 2).weights[0], X, Y)
     theirs = component_covariances(fit_nipals(X, Y, 2, tolerance=1e-26, most_iterations=20000).rotations, X, Y)
     assert ours[0] == pytest.approx(theirs[0], rel=1e-9)
     assert ours[1] > theirs[1]

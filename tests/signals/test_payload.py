@@ -10,7 +10,7 @@ from ferryid.ingest.clocks import ClockReport
 from ferryid.signals.align import align
 from ferryid.signals.data_quality import data_quality
 from ferryid.signals.parquet import unit_of
-from ferryid.signals.smooth import SMOOTHERS, smooth
+from ferryid.signals.smooth import SMOOTHERS, measure, smooth_measured
 from ferryid.signals.stream import Recording, Stream
 from ferryid.signals.track import Motion, Track
 from ferryid.vessel import load_profile
@@ -72,7 +72,7 @@ def aligned(time_s: np.ndarray, mass: np.ndarray, x: np.ndarray | None = None) -
 
 
 def motion(**columns: np.ndarray) -> Motion:
-    return smooth(trial(**columns), PROFILE, 1.0)
+    return smooth_measured(measure(trial(**columns), PROFILE), 1.0)
 
 
 def test_holds_between_samples_however_far_apart() -> None:
@@ -134,10 +134,10 @@ def test_boarding_is_no_implausible_step_but_a_wild_sample_is() -> None:
 @pytest.mark.parametrize("smoother", SMOOTHERS)
 def test_a_boarding_step_is_not_smoothed(smoother: str) -> None:
     steps = np.where(np.arange(2400) < 1200, 0.0, 400.0)
-    moved = smooth(trial(payload_kg=steps, payload_x=np.full(2400, 0.5)), PROFILE, 1.0, smoother)
+    moved = smooth_measured(measure(trial(payload_kg=steps, payload_x=np.full(2400, 0.5)), PROFILE), 1.0, smoother)
     assert moved.payload is not None
     np.testing.assert_array_equal(moved.payload, np.column_stack([steps, np.full(2400, 0.5)]))
-    bare = smooth(trial(), PROFILE, 1.0, smoother)
+    bare = smooth_measured(measure(trial(), PROFILE), 1.0, smoother)
     np.testing.assert_array_equal(moved.nu_dot, bare.nu_dot)
     assert bare.payload is None
 

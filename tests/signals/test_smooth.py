@@ -20,10 +20,9 @@ from ferryid.signals.smooth import (
     measure,
     moving_mean,
     odd_rows,
-    smooth,
     smooth_measured,
 )
-from ferryid.signals.track import Track
+from ferryid.signals.track import Motion, Track
 from ferryid.vessel import load_profile
 
 Floats = NDArray[np.float64]
@@ -31,6 +30,10 @@ Floats = NDArray[np.float64]
 PROFILE = load_profile("milliampere")
 RATE = 20.0
 SMOOTHERS = ("square", "savgol", "kalman")
+
+
+def smoothed(track: Track, window_s: float, smoother: str = "square") -> Motion:
+    return smooth_measured(measure(track, PROFILE), window_s, smoother)
 
 
 def trial(n: int = 2400, **changes: Floats) -> Track:
@@ -88,11 +91,11 @@ def test_no_digits_are_lost_on_a_long_log_with_a_large_offset() -> None:
 
 def test_the_window_is_rounded_to_an_odd_number_of_rows_and_told() -> None:
     assert [odd_rows(w, 20.0) for w in (0.0, 0.05, 0.1, 0.25, 0.5, 1.0, 1.05, 1.5)] == [1, 1, 3, 5, 11, 21, 21, 31]
-    said = smooth(trial(), PROFILE, 1.0).repairs[-1]
+    said = smoothed(trial(), 1.0).repairs[-1]
     assert (
         said == "Smoothing: square window of 21 rows, 1.05 s at 20 Hz (asked for 1 s; the number of rows must be odd)."
     )
-    assert smooth(trial(), PROFILE, 0.0).repairs[-1] == "Smoothing: none (window 0)."
+    assert smoothed(trial(), 0.0).repairs[-1] == "Smoothing: none (window 0)."
 
 
 def response(smoother: str, window_s: float, hertz: float) -> tuple[complex, complex]:
@@ -101,7 +104,7 @@ def response(smoother: str, window_s: float, hertz: float) -> tuple[complex, com
     wave = np.exp(2j * np.pi * hertz * t)
     answers = []
     for part in (wave.real, wave.imag):
-        motion = smooth(trial(u=part), PROFILE, window_s, smoother)
+        motion = smoothed(trial(u=part), window_s, smoother)
         answers.append((motion.nu[1200, 0], motion.nu_dot[1200, 0]))
     value, slope = (a + 1j * b for a, b in zip(*answers, strict=True))
     return value / wave[1200], slope / (2j * np.pi * hertz * wave[1200])
@@ -145,7 +148,7 @@ def test_polynomials_pass_unchanged(smoother: str, degree: int) -> None:
     t = np.arange(2400) / RATE - 60.0
     u = np.polynomial.polynomial.polyval(t / 60, np.arange(1.0, degree + 2))
     slope = np.polynomial.polynomial.polyval(t / 60, np.polynomial.polynomial.polyder(np.arange(1.0, degree + 2))) / 60
-    motion = smooth(trial(u=u), PROFILE, 1.0, smoother)
+    motion = smoothed(trial(u=u), 1.0, smoother)
     np.testing.assert_allclose(motion.nu[motion.valid, 0], u[motion.valid], rtol=0, atol=1e-10)
     np.testing.assert_allclose(motion.nu_dot[motion.valid, 0], slope[motion.valid], rtol=0, atol=1e-9)
 
@@ -159,7 +162,7 @@ def test_polynomials_pass_unchanged(smoother: str, degree: int) -> None:
 )
 def test_white_noise_is_reduced_as_theory_says(smoother: str, gain: float, slope_gain: float | None) -> None:
     noise = np.random.default_rng(5).normal(size=60_000)
-    motion = smooth(trial(60_000, u=noise), PROFILE, 1.0, smoother)
+    motion = smoothed(trial(60_000, u=noise), 1.0, smoother)
     assert np.var(motion.nu[motion.valid, 0]) == pytest.approx(gain, rel=0.1)
     if slope_gain is not None:
         # Two averages that are two rows apart share all but two samples at either end: four samples remain.
@@ -172,7 +175,7 @@ def test_rows_whose_window_meets_a_gap_are_not_valid(smoother: str, window_s: fl
     track = trial()
     u = track.columns["u"].copy()
     u[1000:1040] = np.nan
-    motion = smooth(trial(u=u), PROFILE, window_s, smoother)
+    motion = smoothed(trial(u=u), window_s, smoother)
     half = odd_rows(window_s, RATE) // 2
     assert not motion.valid[1000 - half : 1040 + half].any()
     assert not motion.valid[:half].any()
@@ -180,7 +183,7 @@ def test_rows_whose_window_meets_a_gap_are_not_valid(smoother: str, window_s: fl
     for values in (motion.nu, motion.nu_dot, motion.tau, motion.eta):
         assert np.isfinite(values[motion.valid]).all()
     # Far from the gap, nothing of it is felt.
-    untouched = smooth(track, PROFILE, window_s, smoother)
+    untouched = smoothed(track, window_s, smoother)
     if smoother != "kalman":
         np.testing.assert_array_equal(motion.nu[motion.valid], untouched.nu[motion.valid])
 
@@ -199,7 +202,7 @@ def test_force_and_motion_pass_through_the_same_filter(smoother: str) -> None:
 
 
 def test_the_force_is_that_of_the_unsmoothed_actuators() -> None:
-    motion = smooth(trial(), PROFILE, 0.0)
+    motion = smoothed(trial(), 0.0)
     n = trial().columns["n_thruster1"]
     n2 = trial().columns["n_thruster2"]
 
@@ -281,26 +284,26 @@ def test_the_kalman_window_is_never_below_the_one_asked_for() -> None:
 
 def test_too_short_a_log_and_unknown_smoothers_are_refused() -> None:
     with pytest.raises(FerryIdError, match=r"trial: log shorter than the smoothing window, found 0\.90 s .*Fix: "):
-        smooth(trial(18), PROFILE, 1.0)
+        smoothed(trial(18), 1.0)
     with pytest.raises(FerryIdError, match=r'no smoother called "sqare". Did you mean "square"\?'):
-        smooth(trial(), PROFILE, 1.0, "sqare")
+        smoothed(trial(), 1.0, "sqare")
 
 
 def test_a_constant_velocity_is_refused() -> None:
     with pytest.raises(FerryIdError, match=r"trial: constant signal u.*Fix: "):
-        smooth(trial(u=np.full(2400, 0.5)), PROFILE, 1.0)
+        smoothed(trial(u=np.full(2400, 0.5)), 1.0)
 
 
 def test_wind_that_is_mostly_missing_is_left_out_and_short_losses_cost_their_rows() -> None:
     north = np.full(2400, 3.0)
     north[100:150] = np.nan
     east = np.ones(2400)
-    motion = smooth(trial(wind_N=north, wind_E=east), PROFILE, 1.0)
+    motion = smoothed(trial(wind_N=north, wind_E=east), 1.0)
     assert motion.wind is not None
     assert not motion.valid[95:155].any()
     assert any("50 rows (2.5 s) are not used: the wind was not measured." in said for said in motion.repairs)
     north[:2000] = np.nan
-    motion = smooth(trial(wind_N=north, wind_E=east), PROFILE, 1.0)
+    motion = smoothed(trial(wind_N=north, wind_E=east), 1.0)
     assert motion.wind is None
     assert any("The wind was measured on 17 % of the rows only and is left out." in said for said in motion.repairs)
 
@@ -330,7 +333,7 @@ def test_valid_rows_are_numbers_however_broken_the_log(smoother: str) -> None:
     u = trial().columns["u"].copy()
     u[rng.choice(2400, 900, replace=False)] = np.nan
     u[1500:1700] = 0.5 + 0.1 * np.sin(np.arange(200.0))
-    motion = smooth(trial(u=u), PROFILE, 0.0, smoother)
+    motion = smoothed(trial(u=u), 0.0, smoother)
     assert motion.valid.sum() > 100
     for values in (motion.nu, motion.nu_dot, motion.tau):
         assert np.isfinite(values[motion.valid]).all()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.effects.effect import DEFINITION
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
 from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.validation.case import Truth
@@ -104,7 +104,7 @@ def test_the_gain_grows_with_the_square_of_the_size(log: Logs) -> None:
     for each in gains:
         factor = each.parameters["factor"]
         away, error = factor.value - 1.0, (factor.high - factor.low) / (2.0 * 1.96)
-        deviate = away * INFERENCE.posterior_factor / np.sqrt(error**2 - (DEFINITION * away) ** 2)
+        deviate = away * INFERENCE.posterior_factor / np.sqrt(error**2 - (EFFECTS.definition_error * away) ** 2)
         assert each.gain == pytest.approx(0.5 * deviate**2, rel=0.25)
 
 

@@ -44,15 +44,15 @@ def act(plant, conditions, rng):
         plant.reports.append(report)
 
 
-def oracle(scene):
+def oracle(measurements):
     from ferryid.diagnose.data.estimate import Estimate
     from ferryid.validation.oracle_sensors import SensorEstimate, gain_of_score
 
-    edges = np.linspace(0, len(scene.t) - 1, BLOCKS + 1).astype(int)
-    heading = np.unwrap(scene.psi)
+    edges = np.linspace(0, len(measurements.t) - 1, BLOCKS + 1).astype(int)
+    heading = np.unwrap(measurements.psi)
     off = [
-        np.degrees(np.trapezoid(scene.nu_raw[a : b + 1, 2], scene.t[a : b + 1]) - (heading[b] - heading[a]))
-        / (scene.t[b] - scene.t[a])
+        np.degrees(np.trapezoid(measurements.nu_raw[a : b + 1, 2], measurements.t[a : b + 1]) - (heading[b] - heading[a]))
+        / (measurements.t[b] - measurements.t[a])
         for a, b in zip(edges[:-1], edges[1:])
     ]
     bias, error = float(np.mean(off)), float(np.std(off, ddof=1) / np.sqrt(BLOCKS))

@@ -95,15 +95,15 @@ def test_a_mass_aboard_leaves_the_force_that_moves_it(base: Base) -> None:
     term = _named(base, "mass aboard")
     loaded = term.added(base)
     assert loaded.load is not None
-    scene = base.picture.scene
-    mass = np.column_stack([loaded.load[:, 0], np.zeros(len(scene.t))])
-    expected = payload_force(mass, as_measured(loaded), scene.nu)
+    measurements = base.force_model.measurements
+    mass = np.column_stack([loaded.load[:, 0], np.zeros(len(measurements.t))])
+    expected = payload_force(mass, as_measured(loaded), measurements.nu)
     np.testing.assert_allclose(term.column(base)[base.rows], expected[base.rows], atol=1e-9)
     assert np.sqrt(np.mean(expected[base.rows, 0] ** 2)) > 1.0
 
 
 def test_a_stronger_thruster_leaves_its_force_and_a_turned_one_that_turned(base: Base) -> None:
-    own = base.picture.parts[:, 0]
+    own = base.force_model.parts[:, 0]
     gain = _named(base, "thruster_gain thruster1 factor").column(base)
     np.testing.assert_allclose(gain, -0.2 * own, atol=1e-6)
     turned = _named(base, "azimuth_offset thruster1 angle").column(base)
@@ -114,7 +114,7 @@ def test_a_stronger_thruster_leaves_its_force_and_a_turned_one_that_turned(base:
 
 def test_a_term_with_an_onset_is_nothing_before_it(base: Base) -> None:
     later = next(one for one in candidates(base) if one.effect == "thruster_gain" and one.onset_s > 100.0)
-    column, t = later.column(base), base.picture.scene.t
+    column, t = later.column(base), base.force_model.measurements.t
     assert not column[t < later.onset_s].any()
     first = _named(base, "thruster_gain thruster1 factor").column(base)
     np.testing.assert_allclose(column[t >= later.onset_s], first[t >= later.onset_s], atol=1e-9)
@@ -164,7 +164,7 @@ def test_of_a_mass_the_force_holds_what_the_measured_acceleration_takes(base: Ba
     assert unit is not None
     more = base.expected(combined(base, [added, added], np.array([0.25, 0.25]))).tau - base.prediction.tau
     expected = payload_force(
-        np.column_stack([0.5 * unit[:, 0], np.zeros(len(unit))]), motion.nu_dot, base.picture.scene.nu
+        np.column_stack([0.5 * unit[:, 0], np.zeros(len(unit))]), motion.nu_dot, base.force_model.measurements.nu
     )
     np.testing.assert_allclose(more[base.rows], expected[base.rows], atol=1e-9)
 
@@ -199,7 +199,7 @@ def test_of_two_fits_the_one_with_the_truer_force_is_taken(base: Base) -> None:
 def test_a_start_without_mass_is_gone_only_so_far(base: Base) -> None:
     unit = _named(base, "mass aboard").added(base)
     found = joint_coefficients(base, [unit], np.array([-50.0]), np.flatnonzero(base.rows), np.ones(3))
-    hull, load = base.picture.hull, unit.load
+    hull, load = base.force_model.hull, unit.load
     assert load is not None
     assert hull[0] + found[0] * load[0, 0] > 0.0
 
@@ -235,7 +235,7 @@ def test_the_thesis_names_nothing_and_fits(windy: tuple[str, Path], profile: Pro
 
 
 def _term(label: str, effect: str) -> Candidate:
-    return Candidate(label, effect, None, lambda picture: picture)
+    return Candidate(label, effect, None, lambda force_model: force_model)
 
 
 @pytest.mark.parametrize(("stronger", "named"), [("wind", "wind"), ("mooring", "mooring")])

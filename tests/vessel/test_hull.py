@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from ferryid.types import Floats
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import coriolis, current_in_body, damping, forward, inverse_dynamics
+from ferryid.vessel.hull import current_in_body, inverse_dynamics
 from ferryid.vessel.profile import Hull
+from tests.vessel.hull_matrices import coriolis, damping, forward
 
 MILLIAMPERE = load_profile("milliampere").hull
 SPEEDS = st.tuples(*(st.floats(-3.0, 3.0) for _ in range(3))).map(np.array)

@@ -10,8 +10,9 @@ from ferryid.errors import FerryIdError
 from ferryid.ingest.log import Series, Topic
 from ferryid.types import Floats
 from ferryid.vessel import check_profile, convert, describe, load_profile, parse_profile, resolve, resolve_notes, survey
-from ferryid.vessel.hull import coriolis, payload_force, payload_mass
+from ferryid.vessel.hull import payload_force, payload_mass
 from ferryid.vessel.profile import Profile
+from tests.vessel.hull_matrices import coriolis
 
 BOAT = """schema = "ferryid.vessel/1"
 name = "boat"

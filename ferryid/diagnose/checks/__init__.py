@@ -37,40 +37,45 @@ def checks() -> tuple[Check, ...]:
     return tuple(sorted(found, key=lambda check: (check.place, check.id)))
 
 
-def examine(scene: Measurements) -> tuple[tuple[SensorFinding, ...], Measurements]:
-    """Return what is wrong with the sensors of a scene, and the scene without it.
+def examine(measurements: Measurements) -> tuple[tuple[SensorFinding, ...], Measurements]:
+    """Return the errors of the sensors, and the measurements corrected for them.
 
     Raises
     ------
     FerryIdError
         For frames of the wrong hand, which say nothing of their true axes, and for actuators that push the wrong way.
     """
-    wrong, says = mirrored(scene.eta, scene.nu_raw, scene.usable, 1.0 / scene.step_s)
+    wrong, says = mirrored(measurements.eta, measurements.nu_raw, measurements.usable, 1.0 / measurements.step_s)
     if wrong:
         raise FerryIdError(
-            f"{scene.profile.path}: signals contradict each other, so nothing can be learnt from them. {says} "
-            f"Fix: correct the frame of [signals.{wrong}] in the profile {scene.profile.name}, or of what it is held against"
+            f"{measurements.profile.path}: signals contradict each other, so nothing can be learnt from them. {says} "
+            f"Fix: correct the frame of [signals.{wrong}] in the profile {measurements.profile.name}, or of what it is "
+            "held against"
         )
     findings = []
     for check in checks():
-        finding = check.find(scene)
+        finding = check.find(measurements)
         if finding is not None:
             findings.append(finding)
-            scene = finding.correct(scene)
+            measurements = finding.correct(measurements)
     if SPOILS & {finding.effect for finding in findings}:
-        scene = refilter_velocity(scene)
-    if says := opposed(scene):
+        measurements = refilter_velocity(measurements)
+    if says := opposed(measurements):
         raise FerryIdError(
-            f"{scene.profile.path}: force and motion contradict each other, so nothing can be learnt from them. {says} "
-            f"Fix: correct the sign of the speeds or angles in the profile {scene.profile.name}, or the clocks of the log"
+            f"{measurements.profile.path}: force and motion contradict each other, so nothing can be learnt from them. {says} "
+            f"Fix: correct the sign of the speeds or angles in the profile {measurements.profile.name}, or the clocks of "
+            "the log"
         )
-    return tuple(findings), scene
+    return tuple(findings), measurements
 
 
-def refilter_velocity(scene: Measurements) -> Measurements:
-    """Return a scene whose velocity that enters products is made anew, of what is corrected now."""
-    rate = 1.0 / scene.step_s
-    eta = np.where(scene.usable[:, None], scene.eta, np.nan)
+def refilter_velocity(measurements: Measurements) -> Measurements:
+    """Return measurements whose velocity that enters products is made anew, of what is corrected now."""
+    rate = 1.0 / measurements.step_s
+    eta = np.where(measurements.usable[:, None], measurements.eta, np.nan)
     return replace(
-        scene, nu=complementary_filter(steady_mean(scene.nu_raw, odd_rows(MEAN_S, rate)), scene.nu_raw, eta, rate)
+        measurements,
+        nu=complementary_filter(
+            steady_mean(measurements.nu_raw, odd_rows(MEAN_S, rate)), measurements.nu_raw, eta, rate
+        ),
     )

@@ -78,28 +78,28 @@ def restored(angle: Floats, step_deg: float, step_s: float) -> Floats:
     return np.asarray((1.0 - back) * straight + back * level)
 
 
-def corrected(scene: Measurements, steps_deg: Sequence[float]) -> Measurements:
-    """Return a scene whose angles, and the directions of the forces, are what rounded ones most likely stand for.
+def corrected(measurements: Measurements, steps_deg: Sequence[float]) -> Measurements:
+    """Return measurements whose angles, and the directions of the forces, are what rounded ones most likely stand for.
 
     Parameters
     ----------
-    scene
+    measurements
         As measured.
     steps_deg
         Step of each actuator's angle [deg], 0 for none.
     """
-    parts, angles = scene.parts.copy(), scene.angles.copy()
-    for i, (one, actuator) in enumerate(zip(steps_deg, scene.profile.actuators, strict=True)):
+    parts, angles = measurements.parts.copy(), measurements.angles.copy()
+    for i, (one, actuator) in enumerate(zip(steps_deg, measurements.profile.actuators, strict=True)):
         if one == 0.0:
             continue
-        angles[:, i] = restored(scene.angles[:, i], one, scene.step_s)
-        turn = angles[:, i] - scene.angles[:, i]
+        angles[:, i] = restored(measurements.angles[:, i], one, measurements.step_s)
+        turn = angles[:, i] - measurements.angles[:, i]
         c, s = np.cos(turn), np.sin(turn)
-        X, Y = scene.parts[:, i, 0], scene.parts[:, i, 1]
+        X, Y = measurements.parts[:, i, 0], measurements.parts[:, i, 1]
         x, y = actuator.position_m
         parts[:, i, 0], parts[:, i, 1] = c * X - s * Y, s * X + c * Y
         parts[:, i, 2] = x * parts[:, i, 1] - y * parts[:, i, 0]
-    return replace(scene, parts=parts, angles=angles)
+    return replace(measurements, parts=parts, angles=angles)
 
 
 def error_of(step: float) -> float:
@@ -107,9 +107,9 @@ def error_of(step: float) -> float:
     return float(np.radians(step) / np.sqrt(12.0))
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return the step of the coarsest azimuth angle, where it matters to the direction of the force."""
-    steps = [step_of(angle) for angle in scene.angles.T]
+    steps = [step_of(angle) for angle in measurements.angles.T]
     step = max(steps, default=0.0)
     error = error_of(step)
     if error < CHECKS.least_azimuth_error:
@@ -122,7 +122,7 @@ def find(scene: Measurements) -> SensorFinding | None:
         f"The azimuth angles are read in steps of {step:g} deg: at any moment the force points {100.0 * error:.0f} % of itself "
         "to one side or the other.",
         lambda seen: corrected(seen, steps),
-        {"time_s": scene.t, "angle_deg": np.degrees(scene.angles[:, k])},
+        {"time_s": measurements.t, "angle_deg": np.degrees(measurements.angles[:, k])},
     )
 
 

@@ -23,7 +23,7 @@ class SensorFinding:
     says
         One sentence in plain words.
     correct
-        Returns the scene without the error.
+        Returns the measurements without the error.
     evidence
         Columns for the figure that shows it: name to values.
     """
@@ -44,7 +44,7 @@ class Check:
     id, title
         Name in results, and for people.
     find
-        Returns what is wrong with a scene, None where nothing is, or where the scene cannot tell.
+        Returns what is wrong with measurements, None where nothing is, or where the measurements cannot tell.
     place
         Checks act in ascending order, each on what those before it corrected.
     """

@@ -17,9 +17,9 @@ from ferryid.types import Floats
 from ferryid.vessel.frames import to_body, to_world
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return how late the positions are."""
-    found = kinematics(scene)
+    found = kinematics(measurements)
     if found is None or not found.found(LATE, CHECKS.least_delay_s):
         return None
     late = found.solution.estimate(LATE, "s")

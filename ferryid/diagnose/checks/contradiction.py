@@ -23,29 +23,32 @@ MOST_ACTUATORS = 6
 SHIFTS_S = np.arange(-60.0, 61.0)
 
 
-def opposed(scene: Measurements) -> str:
+def opposed(measurements: Measurements) -> str:
     """Return a sentence on what is certainly the wrong way round between force and motion, empty where nothing is.
 
     Parameters
     ----------
-    scene
+    measurements
         Sensors corrected.
     """
-    force = np.nan_to_num(scene.parts[:, :, 0] + 1j * scene.parts[:, :, 1]) / scene.profile.hull.mass_kg
-    declared = _left(scene, force.sum(axis=1)) if force.any() else 0.0
-    if declared < CHECKS.opposed_left or len(scene.names) > MOST_ACTUATORS:
+    force = (
+        np.nan_to_num(measurements.parts[:, :, 0] + 1j * measurements.parts[:, :, 1])
+        / measurements.profile.hull.mass_kg
+    )
+    declared = _left(measurements, force.sum(axis=1)) if force.any() else 0.0
+    if declared < CHECKS.opposed_left or len(measurements.names) > MOST_ACTUATORS:
         return ""
-    azimuths = np.array([actuator.kind == "azimuth" for actuator in scene.profile.actuators])
+    azimuths = np.array([actuator.kind == "azimuth" for actuator in measurements.profile.actuators])
     mirrored = np.where(azimuths, np.conj(force), force)
     tried = []
-    for signs in product((1.0, -1.0), repeat=len(scene.names)):
+    for signs in product((1.0, -1.0), repeat=len(measurements.names)):
         sign = np.array(signs)
-        against = f"against the force of {_listed(scene, sign < 0.0)}" if min(signs) < 0.0 else ""
-        tried.append((_left(scene, force @ sign), against))
+        against = f"against the force of {_listed(measurements, sign < 0.0)}" if min(signs) < 0.0 else ""
+        tried.append((_left(measurements, force @ sign), against))
         if azimuths.any():
-            other = f"as if the angle of {_listed(scene, azimuths)} counted the other way round"
-            tried.append((_left(scene, mirrored @ sign), " and ".join(filter(None, (other, against)))))
-    when = _apart(scene, force.sum(axis=1))
+            other = f"as if the angle of {_listed(measurements, azimuths)} counted the other way round"
+            tried.append((_left(measurements, mirrored @ sign), " and ".join(filter(None, (other, against)))))
+    when = _apart(measurements, force.sum(axis=1))
     if when is not None:
         left, late_s = when
         tried.append(
@@ -58,15 +61,18 @@ def opposed(scene: Measurements) -> str:
     return f"The vessel moves {says} (that explains {100.0 * (1.0 - best):.0f} % of its accelerations; as declared {not_so})."
 
 
-def _apart(scene: Measurements, force: NDArray[np.complexfloating[Any, Any]]) -> tuple[float, float] | None:
+def _apart(measurements: Measurements, force: NDArray[np.complexfloating[Any, Any]]) -> tuple[float, float] | None:
     """Return what is left if force and motion are shifted in time, and by how much [s]; None where that is no offset of clocks.
 
     A force that answers a swell fits at many shifts, and one that lags at several; clocks are apart by one time.
     """
     left = {}
     for late_s in SHIFTS_S.tolist():
-        rows = round(late_s / scene.step_s)
-        moved = replace(scene, usable=scene.usable & np.roll(scene.usable, rows) & _inside(len(scene.t), rows))
+        rows = round(late_s / measurements.step_s)
+        moved = replace(
+            measurements,
+            usable=measurements.usable & np.roll(measurements.usable, rows) & _inside(len(measurements.t), rows),
+        )
         left[late_s] = _left(moved, np.roll(force, rows))
     best = min(left, key=lambda late_s: left[late_s])
     others = min(share for late_s, share in left.items() if abs(late_s - best) > CHECKS.opposed_span_s)
@@ -80,25 +86,25 @@ def _inside(count: int, rows: int) -> NDArray[np.bool_]:
     return np.asarray((place >= 0) & (place < count))
 
 
-def _listed(scene: Measurements, chosen: NDArray[np.bool_]) -> str:
-    return " and ".join(name for name, one in zip(scene.names, chosen.tolist(), strict=True) if one)
+def _listed(measurements: Measurements, chosen: NDArray[np.bool_]) -> str:
+    return " and ".join(name for name, one in zip(measurements.names, chosen.tolist(), strict=True) if one)
 
 
-def _left(scene: Measurements, push: NDArray[np.complexfloating[Any, Any]]) -> float:
+def _left(measurements: Measurements, push: NDArray[np.complexfloating[Any, Any]]) -> float:
     """Return the share of the accelerations that a push along the body leaves unexplained; 1 if it does not push that way.
 
     Shares are of what drag, a steady push and the lift of a turning hull leave: that lift is against a stern thruster's force.
     """
-    span = max(2, round(CHECKS.opposed_span_s / scene.step_s))
-    starts = np.arange(0, len(scene.t) - span, span)
-    gone = np.concatenate([[0], np.cumsum(~scene.usable)])
+    span = max(2, round(CHECKS.opposed_span_s / measurements.step_s))
+    starts = np.arange(0, len(measurements.t) - span, span)
+    gone = np.concatenate([[0], np.cumsum(~measurements.usable)])
     starts = starts[gone[starts + span + 1] == gone[starts]]
     if len(starts) < CHECKS.opposed_windows:
         return 1.0
-    turn = np.exp(1j * scene.psi)
-    u, v, r = scene.nu_raw.T
+    turn = np.exp(1j * measurements.psi)
+    u, v, r = measurements.nu_raw.T
     velocity = (u + 1j * v) * turn
-    change = (velocity[starts + span] - velocity[starts]) / (span * scene.step_s)
+    change = (velocity[starts + span] - velocity[starts]) / (span * measurements.step_s)
     lift = 1j * turn * u
     columns = np.column_stack(
         [push * turn, velocity, np.abs(velocity) * velocity, np.ones_like(velocity), lift * v, lift * r]

@@ -17,9 +17,9 @@ from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.effects.force_model import Measurements
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return the heading's bias against the velocity's axes, positive where the heading measured is too large."""
-    found = kinematics(scene)
+    found = kinematics(measurements)
     if found is None or not found.found(ANGLE, np.radians(CHECKS.least_angle_deg)):
         return None
     angle = found.solution.estimate(ANGLE, "deg", degrees(1.0))

@@ -17,9 +17,9 @@ from ferryid.types import Floats
 from ferryid.vessel.frames import wrap
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return how many samples lie within a turn of heading that the yaw rate knows nothing of."""
-    inside, psi = repaired(scene)
+    inside, psi = repaired(measurements)
     count = float(inside.sum())
     if count == 0.0:
         return None
@@ -33,14 +33,14 @@ def find(scene: Measurements) -> SensorFinding | None:
         f"The heading was interpolated the long way round at the wrap: {counted(int(count), 'sample')} in "
         f"between {verb(count, 'is')} false.",
         correct,
-        {"time_s": scene.t[inside], "heading_rad": scene.psi[inside], "repaired_rad": psi[inside]},
+        {"time_s": measurements.t[inside], "heading_rad": measurements.psi[inside], "repaired_rad": psi[inside]},
     )
 
 
-def repaired(scene: Measurements) -> tuple[NDArray[np.bool_], Floats]:
+def repaired(measurements: Measurements) -> tuple[NDArray[np.bool_], Floats]:
     """Return which headings are false, and all headings with these interpolated the short way."""
-    psi, dt = scene.psi.copy(), scene.step_s
-    rate = np.where(np.isfinite(scene.nu_raw[:, 2]), scene.nu_raw[:, 2], 0.0)
+    psi, dt = measurements.psi.copy(), measurements.step_s
+    rate = np.where(np.isfinite(measurements.nu_raw[:, 2]), measurements.nu_raw[:, 2], 0.0)
     odd = np.abs(np.diff(psi) - 0.5 * dt * (rate[1:] + rate[:-1])) > CHECKS.wrap_rate_radps * dt
     inside = np.zeros(len(psi), dtype=np.bool_)
     # A step that looks right between two that do not is part of the same turn.

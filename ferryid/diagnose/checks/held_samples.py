@@ -18,16 +18,16 @@ from ferryid.types import Floats
 NAMES = ("north", "east", "heading", "surge", "sway", "yaw rate")
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return the share of the log in which some channel is held, and the longest time of it."""
-    columns = np.column_stack([scene.eta, scene.nu_raw])
-    held = np.column_stack([held_rows(column, scene.usable, scene.step_s) for column in columns.T])
+    columns = np.column_stack([measurements.eta, measurements.nu_raw])
+    held = np.column_stack([held_rows(column, measurements.usable, measurements.step_s) for column in columns.T])
     # A position is one sample: what repeats in one direction only is motion across it, or a resolution.
     held[:, :2] &= held[:, :2].all(axis=1, keepdims=True)
     rows = held.any(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8))).reshape(-1, 2)
-    share = float(rows.sum()) / max(int(scene.usable.sum()), 1)
-    longest = float((edges[:, 1] - edges[:, 0]).max(initial=0)) * scene.step_s
+    share = float(rows.sum()) / max(int(measurements.usable.sum()), 1)
+    longest = float((edges[:, 1] - edges[:, 0]).max(initial=0)) * measurements.step_s
     if share < (CHECKS.long_held_share if longest >= CHECKS.long_held_s else CHECKS.least_held_share):
         return None
     names = [name for name, column in zip(NAMES, held.T, strict=True) if column.any()]
@@ -45,7 +45,7 @@ def find(scene: Measurements) -> SensorFinding | None:
         f"Old samples were repeated {counted(len(edges), 'time')}, for up to {longest:.1f} s, "
         f"{percent:.1f} % of the log ({', '.join(names)}).",
         correct,
-        {"first_s": scene.t[edges[:, 0]], "last_s": scene.t[edges[:, 1] - 1]},
+        {"first_s": measurements.t[edges[:, 0]], "last_s": measurements.t[edges[:, 1] - 1]},
     )
 
 

@@ -121,35 +121,35 @@ class _Data:
 
 
 class _Same:
-    """A scene that equals itself only, as several checks ask for the kinematics of the same one."""
+    """Measurements compared by identity, as several checks ask for the kinematics of the same ones."""
 
-    def __init__(self, scene: Measurements) -> None:
-        self.scene = scene
+    def __init__(self, measurements: Measurements) -> None:
+        self.measurements = measurements
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.scene is self.scene
+        return isinstance(other, _Same) and other.measurements is self.measurements
 
     def __hash__(self) -> int:
-        return id(self.scene)
+        return id(self.measurements)
 
 
-def kinematics(scene: Measurements, told: tuple[int, ...] = ()) -> Kinematics | None:
-    """Compare positions and velocities; None where the scene has too little of them.
+def kinematics(measurements: Measurements, told: tuple[int, ...] = ()) -> Kinematics | None:
+    """Compare positions and velocities; None where the measurements have too little of them.
 
     Parameters
     ----------
-    scene
+    measurements
         From a log.
     told
         Parameters that are let in from the start, because it is known that they are off.
     """
-    return _compared(_Same(scene), told)
+    return _compared(_Same(measurements), told)
 
 
 @lru_cache(maxsize=1)
 def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
-    scene = same.scene
-    problem, both = spans(scene, np.hstack([scene.eta, scene.nu_raw[:, :2]]))
+    measurements = same.measurements
+    problem, both = spans(measurements, np.hstack([measurements.eta, measurements.nu_raw[:, :2]]))
     if len(problem.starts) < 8:
         return None
     eta, velocity = both[:, :3], both[:, 3:]

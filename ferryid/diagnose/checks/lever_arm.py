@@ -17,18 +17,18 @@ from ferryid.effects.force_model import Measurements
 from ferryid.vessel.frames import to_world
 
 
-def least_m(scene: Measurements) -> float:
+def least_m(measurements: Measurements) -> float:
     """Return the least lever arm along an axis that is worth a name [m]."""
-    length = scene.profile.hull.length_m
+    length = measurements.profile.hull.length_m
     return max(CHECKS.least_arm_m, CHECKS.least_arm_share * length) if np.isfinite(length) else CHECKS.least_arm_m
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return where positions were measured, seen from where velocities were."""
-    found = kinematics(scene)
+    found = kinematics(measurements)
     if found is None:
         return None
-    least = least_m(scene)
+    least = least_m(measurements)
     if not (found.found(X, least) or found.found(Y, least)):
         return None
     x, y = found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")

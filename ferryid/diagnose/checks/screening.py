@@ -18,14 +18,14 @@ class ScreenedLog:
     ----------
     measured
         As it was measured.
-    scene
+    measurements
         Without the sensors' errors.
     sensors
         These.
     """
 
     measured: MeasuredLog
-    scene: Measurements
+    measurements: Measurements
     sensors: tuple[SensorFinding, ...]
 
 
@@ -38,5 +38,5 @@ def screen_sensors(log: MeasuredLog, progress: Callable[[str], None]) -> Screene
         Where signals contradict each other, so that nothing can be learnt from the log.
     """
     progress("checking the sensors against each other")
-    sensors, scene = examine(log.scene)
-    return ScreenedLog(log, scene, sensors)
+    sensors, measurements = examine(log.measurements)
+    return ScreenedLog(log, measurements, sensors)

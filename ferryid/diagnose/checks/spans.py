@@ -68,12 +68,12 @@ class Spans:
         return np.asarray(rows @ weight) * self.step_s
 
 
-def spans(scene: Measurements, needed: Floats) -> tuple[Spans, Floats]:
+def spans(measurements: Measurements, needed: Floats) -> tuple[Spans, Floats]:
     """Return the windows in which all of some measurements are finite and usable, and these at `RATE_HZ`.
 
     Parameters
     ----------
-    scene
+    measurements
         Where they come from.
     needed
         Measurements, shape (n, c).
@@ -85,11 +85,11 @@ def spans(scene: Measurements, needed: Floats) -> tuple[Spans, Floats]:
     Floats
         Measurements, zero where not finite, shape (n', c).
     """
-    every = max(1, round(1.0 / (RATE_HZ * scene.step_s)))
+    every = max(1, round(1.0 / (RATE_HZ * measurements.step_s)))
     n = len(needed) // every
     thin = needed[: n * every].reshape(n, every, -1).mean(axis=1)
-    good = scene.usable[: n * every].reshape(n, every).all(axis=1) & np.isfinite(thin).all(axis=1)
-    dt = scene.step_s * every
+    good = measurements.usable[: n * every].reshape(n, every).all(axis=1) & np.isfinite(thin).all(axis=1)
+    dt = measurements.step_s * every
     m = max(8, round(LENGTH_S / dt))
     x = (np.arange(m) + 0.5) / m
     T = m * dt
@@ -102,6 +102,6 @@ def spans(scene: Measurements, needed: Floats) -> tuple[Spans, Floats]:
     stride = max(1, round(STRIDE_S / dt))
     starts = np.arange(0, n - m + 1, stride, dtype=np.int64)
     starts = starts[until[starts + m] - until[starts] == m]
-    middle_s = scene.t[0] + (starts + 0.5 * m) * dt - 0.5 * scene.step_s
+    middle_s = measurements.t[0] + (starts + 0.5 * m) * dt - 0.5 * measurements.step_s
     found = Spans(starts, middle_s, scale * weight, scale * slope, scale * bend, dt, stride)
     return found, np.where(good[:, None], np.where(np.isfinite(thin), thin, 0.0), 0.0)

@@ -19,27 +19,27 @@ from ferryid.effects.force_model import Measurements
 from ferryid.signals.smooth import moving_mean, odd_rows
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return for how long the vessel was driven by what was not recorded, and how hard."""
-    size = np.abs(scene.parts).sum(axis=1)[:, :2].max(axis=1)
-    ahead = np.abs(scene.parts.sum(axis=1)[:, 0])
-    if not scene.usable.any():
+    size = np.abs(measurements.parts).sum(axis=1)[:, :2].max(axis=1)
+    ahead = np.abs(measurements.parts.sum(axis=1)[:, 0])
+    if not measurements.usable.any():
         return None
-    largest = float(np.quantile(ahead[scene.usable], 0.95))
+    largest = float(np.quantile(ahead[measurements.usable], 0.95))
     if largest <= 0.0:
         return None
-    idle = scene.usable & (size < CHECKS.idle_share * float(size[scene.usable].max()))
-    rows = np.zeros(len(scene.t), dtype=np.bool_)
+    idle = measurements.usable & (size < CHECKS.idle_share * float(size[measurements.usable].max()))
+    rows = np.zeros(len(measurements.t), dtype=np.bool_)
     hardest = 0.0
     for first, end in _stretches(idle):
-        slope, gain = _speeding(scene, first, end)
-        force = scene.profile.hull.mass_kg * slope
+        slope, gain = _speeding(measurements, first, end)
+        force = measurements.profile.hull.mass_kg * slope
         if gain > CHECKS.idle_gain_mps and force > CHECKS.idle_force * largest:
             rows[first:end] = True
             hardest = max(hardest, force)
     if not rows.any():
         return None
-    seconds = float(rows.sum()) * scene.step_s
+    seconds = float(rows.sum()) * measurements.step_s
     share = 100.0 * hardest / largest
 
     def correct(seen: Measurements) -> Measurements:
@@ -51,7 +51,11 @@ def find(scene: Measurements) -> SensorFinding | None:
         f"For {seconds:.0f} s every recorded actuator was idle, yet the vessel speeded up as with {hardest:.0f} N, {share:.0f} "
         "% of the most that was recorded: it was driven by something that was not recorded.",
         correct,
-        {"time_s": scene.t, "surge_mps": scene.nu[:, 0], "recorded_N": scene.parts.sum(axis=1)[:, 0]},
+        {
+            "time_s": measurements.t,
+            "surge_mps": measurements.nu[:, 0],
+            "recorded_N": measurements.parts.sum(axis=1)[:, 0],
+        },
     )
 
 
@@ -60,14 +64,14 @@ def _stretches(idle: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(end)) for first, end in edges]
 
 
-def _speeding(scene: Measurements, first: int, end: int) -> tuple[float, float]:
+def _speeding(measurements: Measurements, first: int, end: int) -> tuple[float, float]:
     """Return how fast the bow's speed grows at most [m/s²], astern or ahead, and by how much in all [m/s]."""
-    width = odd_rows(CHECKS.idle_mean_s, 1.0 / scene.step_s)
-    if (end - first) * scene.step_s < CHECKS.idle_s or end - first < 3 * width:
+    width = odd_rows(CHECKS.idle_mean_s, 1.0 / measurements.step_s)
+    if (end - first) * measurements.step_s < CHECKS.idle_s or end - first < 3 * width:
         return 0.0, 0.0
-    speed = moving_mean(np.abs(scene.nu_raw[first:end, :1]), width)[:, 0]
+    speed = moving_mean(np.abs(measurements.nu_raw[first:end, :1]), width)[:, 0]
     speed = speed[np.isfinite(speed)]
-    slope = (speed[width:] - speed[:-width]) / (width * scene.step_s)
+    slope = (speed[width:] - speed[:-width]) / (width * measurements.step_s)
     return float(slope.max()), float((speed - np.minimum.accumulate(speed)).max())
 
 

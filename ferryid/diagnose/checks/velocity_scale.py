@@ -20,9 +20,9 @@ UNITS = {
 """Factors of mistaken units, measured over true."""
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return the factor, measured over true, where speed over ground is not what positions give."""
-    found = kinematics(scene)
+    found = kinematics(measurements)
     if found is None or not found.found(SCALE, CHECKS.least_scale):
         return None
     factor = found.solution.estimate(SCALE, "-")

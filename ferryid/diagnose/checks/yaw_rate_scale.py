@@ -53,13 +53,13 @@ class Rates:
         return min(abs(one), abs(other)) if one * other > 0.0 else 0.0
 
 
-def compared(scene: Measurements) -> Rates | None:
-    """Compare the rates of heading and gyro; None where the scene has too little of them.
+def compared(measurements: Measurements) -> Rates | None:
+    """Compare the rates of heading and gyro; None where the measurements have too little of them.
 
     A bias and a delay of the gyro are solved for along with the factor. Noise of the heading makes the factor of a regression
     on the heading too small, noise of the rate that of the other regression too large: the truth lies between.
     """
-    problem, both = spans(scene, np.column_stack([scene.psi, scene.nu_raw[:, 2]]))
+    problem, both = spans(measurements, np.column_stack([measurements.psi, measurements.nu_raw[:, 2]]))
     if len(problem.starts) < 8:
         return None
     rate, bend, measured = problem.rate(both[:, 0]), problem.curvature(both[:, 0]), problem.mean(both[:, 1])
@@ -80,15 +80,15 @@ def compared(scene: Measurements) -> Rates | None:
     return Rates(solved, float(other.values[0]), problem.middle_s, rate, measured)
 
 
-def corrected(scene: Measurements, factor: float) -> Measurements:
-    """Return a scene whose yaw rate is divided by a factor."""
+def corrected(measurements: Measurements, factor: float) -> Measurements:
+    """Return measurements whose yaw rate is divided by a factor."""
     scale = np.array([1.0, 1.0, factor])
-    return replace(scene, nu_raw=scene.nu_raw / scale, nu=scene.nu / scale)
+    return replace(measurements, nu_raw=measurements.nu_raw / scale, nu=measurements.nu / scale)
 
 
-def find(scene: Measurements) -> SensorFinding | None:
+def find(measurements: Measurements) -> SensorFinding | None:
     """Return the factor of the yaw rate, measured over true."""
-    rates = compared(scene)
+    rates = compared(measurements)
     if rates is None or rates.off < CHECKS.least_rate_scale or not rates.solution.certain(0, 1.0):
         return None
     factor = rates.solution.estimate(0, "-")

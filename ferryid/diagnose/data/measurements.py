@@ -42,7 +42,7 @@ BLOCK_COEFFICIENT = 0.7
 
 @dataclass(frozen=True)
 class Survey:
-    """What is known of a log besides its scene.
+    """What is known of a log besides its measurements.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Survey:
     left_out
         Which rows are not used and why, as sentences.
     t0_ns
-        Absolute time of the scene's first row [ns].
+        Absolute time of the measurements' first row [ns].
     """
 
     recording: Recording
@@ -74,7 +74,7 @@ class MeasuredLog:
     """A log as it was measured: the first stage of a diagnosis."""
 
     path: str
-    scene: Measurements
+    measurements: Measurements
     survey: Survey
 
 
@@ -107,7 +107,7 @@ def read_measurements(
     verify: bool = False,
     progress: Callable[[str], None] = quiet,
 ) -> tuple[Measurements, Survey]:
-    """Return the scene that a log shows, and what else is known of the log.
+    """Return the measurements that a log shows, and what else is known of the log.
 
     Positions, heading and `nu_raw` are as measured; `nu`, wind and current pass through a moving mean, as they enter
     products. Across gaps all signals are bridged so that filters can run on, but no row there is `usable`.
@@ -147,14 +147,16 @@ def read_measurements(
     track, hidden = _without(track, withhold)
     measured = measure(track, profile)
     motion = smooth_measured(measured, window_s)
-    scene = _scene(track, measured, profile, window_s)
+    measurements = _measurements(track, measured, profile, window_s)
     doubts = doubts_of(recording, track)
     # Windows of a diagnosis end at a gap, so that smoothing loses nothing beside it; but they need the pose.
-    placeless = LeftOut.of("the position or heading was not measured", measured.usable & ~scene.usable, track.rate_hz)
+    placeless = LeftOut.of(
+        "the position or heading was not measured", measured.usable & ~measurements.usable, track.rate_hz
+    )
     motion = replace(motion, left_out=(*measured.left_out, *placeless))
-    said = left_out_sentences(recording, motion.left_out, scene.usable)
+    said = left_out_sentences(recording, motion.left_out, measurements.usable)
     survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns, said)
-    return scene, survey
+    return measurements, survey
 
 
 def window_lengths(profile: Profile) -> tuple[float, float]:
@@ -200,7 +202,7 @@ def _without(track: Track, withhold: Sequence[str]) -> tuple[Track, dict[str, Fl
     return replace(track, columns=columns), hidden
 
 
-def _scene(track: Track, measured: Measured, profile: Profile, window_s: float) -> Measurements:
+def _measurements(track: Track, measured: Measured, profile: Profile, window_s: float) -> Measurements:
     rows = odd_rows(window_s, track.rate_hz)
     usable = measured.usable & np.isfinite(measured.eta[:, 2])
     if not usable.any():

@@ -45,10 +45,10 @@ def compare_paths(simulated: Measurements, recorded: Measurements) -> PathCompar
     Paths or str
         The reason, where they are not of the same manoeuvre, or there is no position.
     """
-    scenes = (simulated, recorded)
-    if not all(np.isfinite(one.eta[one.usable, :2]).all() for one in scenes):
+    pair = (simulated, recorded)
+    if not all(np.isfinite(one.eta[one.usable, :2]).all() for one in pair):
         return "a log has no positions"
-    lengths = [float(one.t[one.usable][-1] - one.t[one.usable][0]) for one in scenes]
+    lengths = [float(one.t[one.usable][-1] - one.t[one.usable][0]) for one in pair]
     if abs(lengths[0] - lengths[1]) > DATA.length_difference * max(lengths):
         return f"the simulation lasts {lengths[0]:.0f} s, the recording {lengths[1]:.0f} s"
     step = 1.0 / RATE_HZ
@@ -73,10 +73,10 @@ def compare_paths(simulated: Measurements, recorded: Measurements) -> PathCompar
     return PathComparison(shift, t, np.hypot(away[:, 0], away[:, 1]), wrap(away[:, 2]), away[:, 3])
 
 
-def _sampled(scene: Measurements, t: Floats) -> Floats:
+def _sampled(measurements: Measurements, t: Floats) -> Floats:
     """Return north, east, heading and speed at some times, NaN outside of what was measured, shape (n, 4)."""
-    columns = np.column_stack([scene.eta, np.hypot(scene.nu[:, 0], scene.nu[:, 1])])
-    known = scene.usable
-    inside = np.interp(t, scene.t, known.astype(np.float64), left=0.0, right=0.0) > 0.5
-    found = np.column_stack([np.interp(t, scene.t[known], column[known]) for column in columns.T])
+    columns = np.column_stack([measurements.eta, np.hypot(measurements.nu[:, 0], measurements.nu[:, 1])])
+    known = measurements.usable
+    inside = np.interp(t, measurements.t, known.astype(np.float64), left=0.0, right=0.0) > 0.5
+    found = np.column_stack([np.interp(t, measurements.t[known], column[known]) for column in columns.T])
     return np.where(inside[:, None], found, np.nan)

@@ -46,7 +46,7 @@ class HullBaseline:
         """Return the forces of the hull, in still air and water where none was measured."""
         seen = log.windows
         sha256 = log.screened.measured.survey.recording.sha256
-        return Expectation(*prior_force_model(seen.scene, self.profile, self.model, sha256), _library(log))
+        return Expectation(*prior_force_model(seen.measurements, self.profile, self.model, sha256), _library(log))
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class SimulationBaseline:
     @property
     def hull_known(self) -> bool:
         """True where the profile has a hull model."""
-        return self.simulated.scene.profile.hull.has_model
+        return self.simulated.measurements.profile.hull.has_model
 
     @property
     def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
@@ -69,14 +69,14 @@ class SimulationBaseline:
 
     def expect(self, log: AveragedLog) -> Expectation:
         """Return the simulation's forces, with its own conditions as neutral values of the candidates."""
-        scene, seen = log.screened.scene, log.windows
-        path_errors = compare_paths(self.simulated.scene, scene)
+        measurements, seen = log.screened.measurements, log.windows
+        path_errors = compare_paths(self.simulated.measurements, measurements)
         shift_s = path_errors.shift_s if isinstance(path_errors, PathComparison) else 0.0
         comparison = simulation_as_json(self.simulated, path_errors)
         return Expectation(
-            *simulated_force_model(self.simulated, seen.scene, shift_s),
-            tuple(differing_candidates(self.simulated, seen.scene, shift_s)),
-            (comparison["says"], *difference_notes(self.simulated, scene)),
+            *simulated_force_model(self.simulated, seen.measurements, shift_s),
+            tuple(differing_candidates(self.simulated, seen.measurements, shift_s)),
+            (comparison["says"], *difference_notes(self.simulated, measurements)),
             comparison,
         )
 
@@ -102,10 +102,10 @@ class CampaignBaseline:
 
     def expect(self, log: AveragedLog) -> Expectation:
         """Return the forces of the hull that the other logs speak for."""
-        plain, _ = prior_force_model(log.windows.scene, self.profile)
-        picture, spread = self.campaign.picture(log.path, plain)
-        return Expectation(picture, spread, _library(log), (self.campaign.says(log.path),))
+        plain, _ = prior_force_model(log.windows.measurements, self.profile)
+        force_model, spread = self.campaign.force_model(log.path, plain)
+        return Expectation(force_model, spread, _library(log), (self.campaign.says(log.path),))
 
 
 def _library(log: AveragedLog) -> tuple[Candidate, ...]:
-    return tuple(list_candidates(log.windows.scene)[0])
+    return tuple(list_candidates(log.windows.measurements)[0])

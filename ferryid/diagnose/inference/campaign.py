@@ -34,9 +34,9 @@ class Campaign:
     hull: CampaignHull
     place: Mapping[str, int]
 
-    def picture(self, path: str, plain: ForceModel) -> tuple[ForceModel, Floats]:
-        """Return a log's picture with the hull that the other logs speak for, as `CampaignHull.picture` does."""
-        return self.hull.picture(plain, self.place.get(path))
+    def force_model(self, path: str, plain: ForceModel) -> tuple[ForceModel, Floats]:
+        """Return a log's force model with the hull that the other logs speak for, as `CampaignHull.force_model` does."""
+        return self.hull.force_model(plain, self.place.get(path))
 
     def says(self, path: str) -> str:
         """Return a sentence on where the hull comes from that a log is diagnosed with."""
@@ -76,7 +76,7 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
         seen = log.windows
         if len(seen.starts) < INFERENCE.campaign_windows or log.path in place:
             continue
-        plain, spread = prior_force_model(seen.scene, profile)
+        plain, spread = prior_force_model(seen.measurements, profile)
         place[log.path] = len(members)
         members.append(Member(seen, plain, own_candidates(seen, profile)))
         spreads.append(spread)
@@ -94,4 +94,4 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
 def own_candidates(seen: Windows, profile: Profile) -> tuple[Candidate, ...]:
     """Return what a log is given of its own while the hull is fitted to all."""
     effect = effects()[OWN]
-    return () if effect.cannot(seen.scene) else (Candidate(effect, None, effect.parameters_of(profile)),)
+    return () if effect.cannot(seen.measurements) else (Candidate(effect, None, effect.parameters_of(profile)),)

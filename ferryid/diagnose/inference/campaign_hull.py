@@ -42,7 +42,7 @@ START = 0.4
 
 @dataclass(frozen=True)
 class Member:
-    """One log of a vessel: its windows, its picture without effects, and the effects that are its own."""
+    """One log of a vessel: its windows, its force model without effects, and the effects that are its own."""
 
     windows: Windows
     plain: ForceModel
@@ -119,16 +119,16 @@ class CampaignHull:
         known = np.eye(len(A)) + (A - np.eye(len(A))) / max(1.0, self.disagreement)
         return z, np.asarray(np.linalg.inv(known))
 
-    def picture(self, plain: ForceModel, without: int | None = None) -> tuple[ForceModel, Floats]:
-        """Return a log's picture with the hull that is believed in, and the standard deviations of `COEFFICIENTS`.
+    def force_model(self, plain: ForceModel, without: int | None = None) -> tuple[ForceModel, Floats]:
+        """Return a log's force model with the hull that is believed in, and the standard deviations of `COEFFICIENTS`.
 
         The induced drag is an external force at the measured motion. Standard deviations alone say less than the covariance
         does: `candidate` keeps all of it.
         """
         mean, covariance = self.belief(without)
         h = len(COEFFICIENTS)
-        pictured = induced(replace(plain, hull=mean[:h]), mean[h:])
-        return pictured, np.sqrt(np.diag(covariance))[:h]
+        modelled = induced(replace(plain, hull=mean[:h]), mean[h:])
+        return modelled, np.sqrt(np.diag(covariance))[:h]
 
     def candidate(self, without: int | None = None) -> Candidate:
         """Return the hull as a candidate with the whole covariance, for `ferryid.diagnose.inference.estimation.fit`.
@@ -139,9 +139,9 @@ class CampaignHull:
         mean, root = self.before + self.spread * z, self.spread[:, None] * np.linalg.cholesky(covariance)
         h = len(COEFFICIENTS)
 
-        def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
             now = mean + root @ p
-            return induced(replace(picture, hull=now[:h]), now[h:])
+            return induced(replace(force_model, hull=now[:h]), now[h:])
 
         parameters = tuple(Parameter(name, "-", 1.0, -np.inf, np.inf) for name in self.names)
         effect = Effect("hull", "Hull", lambda profile: parameters, apply, _says, lambda values, instance: {})
@@ -152,13 +152,13 @@ def _says(values: Values, instance: str | None) -> str:
     return "The hull is that of the vessel's other logs."
 
 
-def induced(picture: ForceModel, coefficients: Floats) -> ForceModel:
-    """Return the picture with induced drag in it, from coefficients in the order of `INDUCED`; in still water."""
-    _, v, r = picture.scene.nu.T
+def induced(force_model: ForceModel, coefficients: Floats) -> ForceModel:
+    """Return the force model with induced drag in it, from coefficients in the order of `INDUCED`; in still water."""
+    _, v, r = force_model.measurements.nu.T
     X_vr, X_vv = coefficients
     still = np.zeros_like(v)
     force = np.column_stack([(X_vr * r + X_vv * v) * v, still, still])
-    return replace(picture, external=picture.external + force)
+    return replace(force_model, external=force_model.external + force)
 
 
 def induced_spread(length_m: float, draught_m: float, water_density: float = 1000.0) -> Floats:
@@ -175,7 +175,7 @@ def fit_campaign_hull(members: Sequence[Member], spread: Floats, induced_size: F
     members
         The logs, all of one vessel.
     spread
-        Standard deviations of what is believed of `COEFFICIENTS`, about those of the first log's picture, shape (26,).
+        Standard deviations of what is believed of `COEFFICIENTS`, about those of the first log's force model, shape (26,).
     induced_size
         Those of `INDUCED`, about zero, shape (2,).
     """
@@ -198,22 +198,6 @@ def fit_campaign_hull(members: Sequence[Member], spread: Floats, induced_size: F
     return joint.result(z, own, noise)
 
 
-def residual_gaps(member: Member, hull: CampaignHull, place: int) -> Floats:
-    """Return the gaps that are left in some windows of a log, shape (J, c), with its hull and effects fitted elsewhere.
-
-    Parameters
-    ----------
-    member
-        With the windows to judge.
-    hull, place
-        The fit, and the log's place in it.
-    """
-    h = len(COEFFICIENTS)
-    mean = hull.before + hull.spread * hull.step
-    picture = induced(replace(member.plain, hull=mean[:h]), mean[h:])
-    return member.windows.gap(apply_candidates(picture, member.candidates, hull.values[place]))
-
-
 @dataclass(frozen=True)
 class _Joint:
     """All logs with the belief about their hull; z is the hull in spreads, own[i] the effects of log i in sizes."""
@@ -225,8 +209,8 @@ class _Joint:
     def gap(self, i: int, z: Floats, own: Floats) -> Floats:
         member, h = self.members[i], len(COEFFICIENTS)
         hull = self.before + self.spread * z
-        picture = induced(replace(member.plain, hull=hull[:h]), hull[h:])
-        return member.windows.gap(apply_candidates(picture, member.candidates, self.values(i, own)))
+        force_model = induced(replace(member.plain, hull=hull[:h]), hull[h:])
+        return member.windows.gap(apply_candidates(force_model, member.candidates, self.values(i, own)))
 
     def values(self, i: int, own: Floats) -> tuple[Floats, ...]:
         found, first = [], 0

@@ -28,9 +28,9 @@ class Term:
     force_unit
         Unit of the force; empty where it is a share of an actuator's.
     value
-        ``value(picture)`` is the quantity, shape (n,).
+        ``value(force_model)`` is the quantity, shape (n,).
     force
-        ``force(picture)`` is what a coefficient of 1 gives [N, N, N·m], shape (n, 3).
+        ``force(force_model)`` is what a coefficient of 1 gives [N, N, N·m], shape (n, 3).
     """
 
     on: str
@@ -58,8 +58,8 @@ class Term:
         )
 
 
-def terms_of(scene: Measurements) -> tuple[Term, ...]:
-    """Return all terms that a scene offers.
+def terms_of(measurements: Measurements) -> tuple[Term, ...]:
+    """Return all terms that measurements offer.
 
     On every axis: a constant, polynomials and moduli of the velocity through the water up to the third order, and harmonics of
     the heading. Tied over the axes: forces that are constant along north or east or grow with the place as a spring's do, and
@@ -71,18 +71,18 @@ def terms_of(scene: Measurements) -> tuple[Term, ...]:
             made.append(_on_axis(axis, name, unit, quantity))
     for name, along in (("north", 0), ("east", 1)):
         made.append(_of_world(name, "", along, _one))
-    if np.isfinite(scene.eta[scene.usable, :2]).all():
+    if np.isfinite(measurements.eta[measurements.usable, :2]).all():
         for name, along in (("north", 0), ("east", 1)):
             made.append(_of_world(name, "m", along, _place(along)))
-    for k, name in enumerate(scene.names):
+    for k, name in enumerate(measurements.names):
         made += _of_thruster(k, name)
     return tuple(made)
 
 
-def through_water(picture: ForceModel) -> tuple[Floats, Floats, Floats]:
+def through_water(force_model: ForceModel) -> tuple[Floats, Floats, Floats]:
     """Return the velocity through the water [m/s, m/s, rad/s], shape (n,) each."""
-    u_c, v_c = body_current(picture)
-    u, v, r = picture.scene.nu.T
+    u_c, v_c = body_current(force_model)
+    u, v, r = force_model.measurements.nu.T
     return u - u_c, v - v_c, r
 
 
@@ -109,17 +109,17 @@ def _motions() -> list[tuple[str, str, Quantity]]:
     return made
 
 
-def _one(picture: ForceModel) -> Floats:
-    return np.ones(len(picture.scene.t))
+def _one(force_model: ForceModel) -> Floats:
+    return np.ones(len(force_model.measurements.t))
 
 
 def _velocity(i: int, function: Callable[[Floats], Floats]) -> Quantity:
-    return lambda picture: np.asarray(function(through_water(picture)[i]))
+    return lambda force_model: np.asarray(function(through_water(force_model)[i]))
 
 
 def _product(i: int, j: int, modulus: int | None) -> Quantity:
-    def quantity(picture: ForceModel) -> Floats:
-        nu = through_water(picture)
+    def quantity(force_model: ForceModel) -> Floats:
+        nu = through_water(force_model)
         first, second = (np.abs(nu[k]) if k == modulus else nu[k] for k in (i, j))
         return np.asarray(first * second)
 
@@ -127,63 +127,63 @@ def _product(i: int, j: int, modulus: int | None) -> Quantity:
 
 
 def _harmonic(times: int, function: Callable[[Floats], Floats]) -> Quantity:
-    return lambda picture: np.asarray(function(times * picture.scene.psi))
+    return lambda force_model: np.asarray(function(times * force_model.measurements.psi))
 
 
 def _place(along: int) -> Quantity:
-    def quantity(picture: ForceModel) -> Floats:
-        place = picture.scene.eta[:, along]
-        return np.asarray(place - place[picture.scene.usable].mean())
+    def quantity(force_model: ForceModel) -> Floats:
+        place = force_model.measurements.eta[:, along]
+        return np.asarray(place - place[force_model.measurements.usable].mean())
 
     return quantity
 
 
 def _on_axis(axis: int, name: str, unit: str, quantity: Quantity) -> Term:
-    def force(picture: ForceModel) -> Floats:
-        values = np.zeros((len(picture.scene.t), 3))
-        values[:, axis] = quantity(picture)
+    def force(force_model: ForceModel) -> Floats:
+        values = np.zeros((len(force_model.measurements.t), 3))
+        values[:, axis] = quantity(force_model)
         return values
 
     return Term(AXES[axis], name, unit, FORCE[axis], quantity, force)
 
 
 def _of_world(name: str, unit: str, along: int, quantity: Quantity) -> Term:
-    def force(picture: ForceModel) -> Floats:
-        push = [np.zeros(len(picture.scene.t)), np.zeros(len(picture.scene.t))]
-        push[along] = quantity(picture)
-        X, Y = to_body(push[0], push[1], picture.scene.psi)
+    def force(force_model: ForceModel) -> Floats:
+        push = [np.zeros(len(force_model.measurements.t)), np.zeros(len(force_model.measurements.t))]
+        push[along] = quantity(force_model)
+        X, Y = to_body(push[0], push[1], force_model.measurements.psi)
         return np.column_stack([X, Y, np.zeros_like(X)])
 
     return Term(name, name if unit else "1", unit, "N", quantity, force)
 
 
 def _of_thruster(k: int, name: str) -> list[Term]:
-    def size(picture: ForceModel) -> Floats:
-        return np.asarray(np.hypot(picture.parts[:, k, 0], picture.parts[:, k, 1]))
+    def size(force_model: ForceModel) -> Floats:
+        return np.asarray(np.hypot(force_model.parts[:, k, 0], force_model.parts[:, k, 1]))
 
-    def speed(picture: ForceModel) -> Floats:
-        u, v, _ = through_water(picture)
+    def speed(force_model: ForceModel) -> Floats:
+        u, v, _ = through_water(force_model)
         return np.asarray(np.hypot(u, v))
 
-    def inflow(picture: ForceModel) -> Floats:
-        u, v, r = through_water(picture)
-        x, y = picture.scene.profile.actuators[k].position_m
-        X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
-        return np.asarray((X * (u - r * y) + Y * (v + r * x)) / np.maximum(size(picture), 1e-9))
+    def inflow(force_model: ForceModel) -> Floats:
+        u, v, r = through_water(force_model)
+        x, y = force_model.measurements.profile.actuators[k].position_m
+        X, Y = force_model.parts[:, k, 0], force_model.parts[:, k, 1]
+        return np.asarray((X * (u - r * y) + Y * (v + r * x)) / np.maximum(size(force_model), 1e-9))
 
     def along(quantity: Quantity) -> Callable[[ForceModel], Floats]:
-        return lambda picture: picture.parts[:, k] * quantity(picture)[:, None]
+        return lambda force_model: force_model.parts[:, k] * quantity(force_model)[:, None]
 
-    def across(picture: ForceModel) -> Floats:
-        x, y = picture.scene.profile.actuators[k].position_m
-        X, Y = picture.parts[:, k, 0], picture.parts[:, k, 1]
+    def across(force_model: ForceModel) -> Floats:
+        x, y = force_model.measurements.profile.actuators[k].position_m
+        X, Y = force_model.parts[:, k, 0], force_model.parts[:, k, 1]
         return np.column_stack([-Y, X, x * X + y * Y])
 
     quantities: list[tuple[str, str, Quantity]] = [
         ("1", "", _one),
         ("its size", "N", size),
         ("speed", "m/s", speed),
-        ("speed²", "(m/s)²", lambda picture: speed(picture) ** 2),
+        ("speed²", "(m/s)²", lambda force_model: speed(force_model) ** 2),
         ("inflow", "m/s", inflow),
     ]
     made = [Term(f"force of {name}", what, unit, "", value, along(value)) for what, unit, value in quantities]

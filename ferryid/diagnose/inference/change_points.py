@@ -10,7 +10,8 @@ import numpy as np
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.types import Floats
 
-MOST_BREAKS = 6
+LEVELS = 3
+"""Levels of the segmentation."""
 
 
 def active_intervals(
@@ -36,7 +37,7 @@ def active_intervals(
     """
     # Large squares are rare and heavy: their roots vary less, and of bursts above noise the roots of these.
     judged = np.sign(strength) * np.abs(strength) ** (0.25 if steady else 0.5)
-    edges = [0, *sorted(_breaks(judged, 0, len(strength), MOST_BREAKS)), len(strength)]
+    edges = [0, *sorted(_breaks(judged, 0, len(strength), LEVELS)), len(strength)]
     means = [float(strength[a:b].mean()) for a, b in pairwise(edges)]
     calm = min(means) if steady and len(means) > 1 else 0.0
     top = max(means)
@@ -55,9 +56,9 @@ def active_intervals(
     return tuple(found)
 
 
-def _breaks(values: Floats, first: int, end: int, most: int) -> list[int]:
+def _breaks(values: Floats, first: int, end: int, levels: int) -> list[int]:
     n = end - first
-    if n < 4 * INFERENCE.interval_windows or most <= 0:
+    if n < 4 * INFERENCE.interval_windows or levels == 0:
         return []
     part = values[first:end]
     away = np.concatenate([[0.0], np.cumsum(part - part.mean())])
@@ -69,7 +70,7 @@ def _breaks(values: Floats, first: int, end: int, most: int) -> list[int]:
     if not cuts or away.max() - away.min() <= INFERENCE.change_statistic * deviation * sqrt(n):
         return []
     ends = [first, *(first + k for k in cuts), end]
-    further = [k for a, b in pairwise(ends) for k in _breaks(values, a, b, most // 2)]
+    further = [k for a, b in pairwise(ends) for k in _breaks(values, a, b, levels - 1)]
     return [*ends[1:-1], *further]
 
 

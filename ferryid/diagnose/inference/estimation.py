@@ -77,9 +77,9 @@ class Candidate:
         """Parameters with which a search begins."""
         return np.array([one.neutral if one.start is None else one.start for one in self.parameters])
 
-    def act(self, picture: ForceModel, p: Floats) -> ForceModel:
-        """Return the picture with the effect in it."""
-        return self.effect.act(picture, p, self.instance, self.onset_s, self.offset_s)
+    def act(self, force_model: ForceModel, p: Floats) -> ForceModel:
+        """Return the force model with the effect in it."""
+        return self.effect.act(force_model, p, self.instance, self.onset_s, self.offset_s)
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class EstimationProblem:
     windows
         For judging and showing what is left over.
     plain
-        The picture without effects.
+        The force model without effects.
     noise
         Of the windows.
     hull_spread
@@ -171,10 +171,10 @@ class EstimationProblem:
 
     @cached_property
     def by_hull(self) -> Floats:
-        """`hull_slopes` of the plain picture."""
+        """`hull_slopes` of the plain force model."""
         return self.hull_slopes(self.plain)
 
-    def hull_slopes(self, picture: ForceModel) -> Floats:
+    def hull_slopes(self, force_model: ForceModel) -> Floats:
         """Return derivatives of the prediction errors by the hull's coefficients, in their spreads, shape (w, 26).
 
         Coefficients that cannot move have none.
@@ -183,18 +183,22 @@ class EstimationProblem:
         every = np.zeros((self.steps.measured[:, self.steps.channels].size, len(self.hull_spread)))
         if free.size:
             moves = MOVED * self.hull_spread[free]
-            every[:, free] = self.whitening_filter.white(self.steps.hull_changes(picture, free, moves) / MOVED)
+            every[:, free] = self.whitening_filter.white(self.steps.hull_changes(force_model, free, moves) / MOVED)
         return every
 
-    def white(self, picture: ForceModel) -> Floats:
-        """Return the whitened prediction errors of a picture, flat."""
-        return self.whitening_filter.white(self.steps.gap(picture))
+    def white(self, force_model: ForceModel) -> Floats:
+        """Return the whitened prediction errors of a force model, flat."""
+        return self.whitening_filter.white(self.steps.gap(force_model))
 
     def with_noise_of(self, made: Fit) -> EstimationProblem:
         """Return the trial with the noise that a fit leaves; a filter that has shared disturbances stays as it is."""
-        picture = fitted_force_model(self.plain, made)
-        own = self.filter if self.filter.processes else fit_noise(self.excerpt, self.excerpt.gap(picture), self.filter)
-        return replace(self, noise=fit_autoregression(self.windows.gap(picture), self.windows.runs), filter=own)
+        force_model = fitted_force_model(self.plain, made)
+        own = (
+            self.filter
+            if self.filter.processes
+            else fit_noise(self.excerpt, self.excerpt.gap(force_model), self.filter)
+        )
+        return replace(self, noise=fit_autoregression(self.windows.gap(force_model), self.windows.runs), filter=own)
 
     def part(self, windows: Windows) -> EstimationProblem:
         """Return the trial of some of its windows, with the same noise."""
@@ -250,12 +254,14 @@ def fit(
     # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
     bends = any(candidate.effect.bends_hull for candidate in candidates)
 
-    def picture_of(z: Floats) -> ForceModel:
-        picture = replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])
-        return apply_candidates(picture, candidates, np.split(neutral + size * z[h:], cuts)) if every else picture
+    def force_model_of(z: Floats) -> ForceModel:
+        force_model = replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])
+        return (
+            apply_candidates(force_model, candidates, np.split(neutral + size * z[h:], cuts)) if every else force_model
+        )
 
     def white(z: Floats) -> Floats:
-        return problem.white(picture_of(z))
+        return problem.white(force_model_of(z))
 
     z = np.zeros(h + q)
     if every:
@@ -274,14 +280,14 @@ def fit(
     of_hull = by_hull.T @ by_hull
     for count in range(max(steps, 1)):
         if count > 0 and (bends or count % ANEW == 0):
-            by_hull, fresh = problem.hull_slopes(picture_of(z))[:, moving], True
+            by_hull, fresh = problem.hull_slopes(force_model_of(z))[:, moving], True
             of_hull = by_hull.T @ by_hull
         by_effects = np.empty((len(w), 0))
         if free.size:
             d = np.where(z[h + free] + NUDGE <= high[free], NUDGE, -NUDGE)
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
-            gaps = np.stack([problem.steps.gap(picture_of(one)) for one in moved], axis=2)
+            gaps = np.stack([problem.steps.gap(force_model_of(one)) for one in moved], axis=2)
             by_effects = (problem.whitening_filter.white(gaps) - w[:, None]) / d
         across = by_hull.T @ by_effects
         A = np.eye(h + q)
@@ -307,7 +313,7 @@ def fit(
         if gained < ENOUGH:
             if fresh or steps <= ANEW:
                 break
-            by_hull, fresh = problem.hull_slopes(picture_of(z))[:, moving], True
+            by_hull, fresh = problem.hull_slopes(force_model_of(z))[:, moving], True
             of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - problem.whitening_filter.log_scale
@@ -349,15 +355,15 @@ def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candid
 
 
 def fitted_force_model(plain: ForceModel, made: Fit) -> ForceModel:
-    """Return the picture that a fit has of the log."""
+    """Return the force model that a fit has of the log."""
     return apply_candidates(replace(plain, hull=made.hull), made.candidates, made.values)
 
 
-def apply_candidates(picture: ForceModel, candidates: Sequence[Candidate], values: Sequence[Floats]) -> ForceModel:
-    """Return the picture with some candidates in it, each in its turn."""
+def apply_candidates(force_model: ForceModel, candidates: Sequence[Candidate], values: Sequence[Floats]) -> ForceModel:
+    """Return the force model with some candidates in it, each in its turn."""
     for candidate, p in sorted(zip(candidates, values, strict=True), key=lambda one: one[0].effect.turn):
-        picture = candidate.act(picture, p)
-    return picture
+        force_model = candidate.act(force_model, p)
+    return force_model
 
 
 def estimation_problem(windows: Windows, plain: ForceModel, hull_spread: Floats) -> EstimationProblem:

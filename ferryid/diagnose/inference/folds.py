@@ -36,7 +36,7 @@ class Folds:
 
 def block_s(windows: Windows) -> float:
     """Return how long a block is that is held out [s], in a log that is long enough."""
-    return INFERENCE.block_windows * len(windows.weight) * windows.scene.step_s
+    return INFERENCE.block_windows * len(windows.weight) * windows.measurements.step_s
 
 
 def folds_of(windows: Windows) -> Folds | None:
@@ -46,9 +46,9 @@ def folds_of(windows: Windows) -> Folds | None:
     """
     if len(windows.starts) == 0:
         return None
-    scene = windows.scene
-    width_s = len(windows.weight) * scene.step_s
-    stride_s = float(np.median(np.diff(windows.starts))) * scene.step_s if len(windows.starts) > 1 else width_s
+    measurements = windows.measurements
+    width_s = len(windows.weight) * measurements.step_s
+    stride_s = float(np.median(np.diff(windows.starts))) * measurements.step_s if len(windows.starts) > 1 else width_s
     seconds = len(windows.starts) * stride_s
     number = round(seconds / (INFERENCE.block_windows * width_s))
     if number < INFERENCE.fewest_blocks:

@@ -11,10 +11,10 @@ from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats
 
 
-def force_errors(windows: Windows, picture: ForceModel, plain: ForceModel) -> Floats:
-    """Return a picture's force less the one that the velocities show [N, N, N·m], in every window, shape (J, 3)."""
+def force_errors(windows: Windows, force_model: ForceModel, plain: ForceModel) -> Floats:
+    """Return a force model's force less the one that the velocities show [N, N, N·m], in every window, shape (J, 3)."""
     velocities = replace(windows, channels=np.repeat([False, True], 3))
-    return np.asarray(velocities.gap(picture) @ mass_of(plain.hull).T)
+    return np.asarray(velocities.gap(force_model) @ mass_of(plain.hull).T)
 
 
 def mass_of(hull: Floats) -> Floats:

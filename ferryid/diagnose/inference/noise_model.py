@@ -17,6 +17,7 @@ import numpy as np
 
 from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains, predictions_alone
 from ferryid.diagnose.inference.newton_step import newton_step
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.parallel import over
 from ferryid.effects.effect import Process
@@ -28,14 +29,8 @@ GROUPS = (0, 0, 1)
 STARTS = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5))
 """Where the search for a channel's noise begins: white error, as a share of all; time constant of the coloured, in steps; and
 disturbance, as a share of the acceleration left over."""
-GLIMPSE, SIGHT = 12, 12.0
-"""Steps of the search for a disturbance after which it is given up if the likelihood is farther than this from being enough."""
 SMALL = 1e-4
 """Move of a parameter's logarithm by which a slope is found."""
-EXCERPT, PIECES = 3600, 8
-"""Steps from which noise is learnt, of longer logs from so many stretches: with more its sizes are hardly known better."""
-LONGEST = 500.0
-"""Longest time constant, in steps."""
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-2, 1e-5, 1e5
 """Damping of the steps of the search for the likeliest noise, as a share of the information."""
 LONGEST_STEP = 2.0
@@ -59,13 +54,13 @@ class NoiseModel:
         As `ferryid.diagnose.inference.kalman.gains` takes it, shape (c, 5).
     processes
         Shared disturbances.
-    picture
+    force_model
         In which these push.
     """
 
     channels: Floats
     processes: tuple[Process, ...] = ()
-    picture: ForceModel | None = None
+    force_model: ForceModel | None = None
 
 
 @dataclass(frozen=True)
@@ -128,7 +123,7 @@ def make_whitening_filter(noise: NoiseModel, steps: Windows, pushes: Floats | No
     """
     h, integrals = stride_s(steps), integrals_of(steps)
     scale = _scales(steps)
-    if noise.processes and noise.picture is not None:
+    if noise.processes and noise.force_model is not None:
         columns = disturbance_columns(noise, steps) if pushes is None else pushes
         blocks, drive = _blocks(noise.processes, h)
         by_run = tuple(
@@ -148,11 +143,11 @@ def make_whitening_filter(noise: NoiseModel, steps: Windows, pushes: Floats | No
 
 def disturbance_columns(noise: NoiseModel, steps: Windows) -> Floats:
     """Return the acceleration of every channel by a unit of every state of the shared disturbances, shape (J, c, states)."""
-    assert noise.picture is not None
+    assert noise.force_model is not None
     columns = []
     for process in noise.processes:
-        pushed = replace(noise.picture, external=noise.picture.external + process.force)
-        column = (steps.gap(pushed) - steps.gap(noise.picture))[:, :, None]
+        pushed = replace(noise.force_model, external=noise.force_model.external + process.force)
+        column = (steps.gap(pushed) - steps.gap(noise.force_model))[:, :, None]
         columns.append(column)
         if process.frequency_hz > 0.0:
             columns.append(np.zeros_like(column))
@@ -207,7 +202,7 @@ def fit_noise_with(
     alone: NoiseModel,
     made: Callable[[Floats], tuple[Process, ...]],
     start: Floats,
-    picture: ForceModel,
+    force_model: ForceModel,
     worth: float = -np.inf,
 ) -> tuple[NoiseModel, Floats, Floats, float]:
     """Return the noise that gaps have if disturbances push beside each channel's own noise.
@@ -222,7 +217,7 @@ def fit_noise_with(
         The further processes, from positive parameters.
     start
         These to begin with, shape (k,).
-    picture
+    force_model
         In which all push.
     worth
         Logarithm of the likelihood that has to come into sight before the search goes on to its end.
@@ -243,10 +238,10 @@ def fit_noise_with(
 
     def noise(z: Floats) -> NoiseModel:
         own, rest = np.exp(z[: 5 * len(first)].reshape(-1, 5)), np.exp(z[5 * len(first) :])
-        return NoiseModel(own[list(GROUPS)], (*alone.processes, *made(rest)), picture)
+        return NoiseModel(own[list(GROUPS)], (*alone.processes, *made(rest)), force_model)
 
     # How a disturbance pushes does not depend on its parameters.
-    pushes = disturbance_columns(NoiseModel(alone.channels, (*alone.processes, *made(start)), picture), steps)
+    pushes = disturbance_columns(NoiseModel(alone.channels, (*alone.processes, *made(start)), force_model), steps)
 
     def cost(z: Floats) -> float:
         return -likelihood(noise(z), steps, gaps, pushes)
@@ -273,8 +268,10 @@ def fit_noise_with(
         return predictions(full)
 
     z = begin.copy()
-    best, z[some] = _most_likely(predictions_of_some, begin[some], [bounds[k] for k in some], most=GLIMPSE)
-    if -best > worth - SIGHT:
+    best, z[some] = _most_likely(
+        predictions_of_some, begin[some], [bounds[k] for k in some], most=INFERENCE.screening_iterations
+    )
+    if -best > worth - INFERENCE.screening_gain:
         best, z = _most_likely(predictions, z, bounds)
     # What is not worth it need not be known.
     width = _widths(cost, z, len(start), best) if -best > worth else np.full(len(start), np.inf)
@@ -284,12 +281,12 @@ def fit_noise_with(
 def excerpt(steps: Windows) -> Windows:
     """Return the steps from which noise is learnt: all of a short log, evenly spread stretches of a long one."""
     n = len(steps.starts)
-    if n <= EXCERPT:
+    if n <= INFERENCE.noise_steps:
         return steps
-    length = EXCERPT // PIECES
+    length = INFERENCE.noise_steps // INFERENCE.noise_stretches
     runs: list[tuple[int, int]] = []
     rows: list[int] = []
-    for middle in np.linspace(0.0, n, 2 * PIECES + 1)[1::2]:
+    for middle in np.linspace(0.0, n, 2 * INFERENCE.noise_stretches + 1)[1::2]:
         first, end = int(middle) - length // 2, int(middle) + length // 2
         for a, b in steps.runs:
             own = range(max(a, first), min(b, end))
@@ -331,7 +328,7 @@ def integrals_of(steps: Windows) -> int:
 
 def stride_s(steps: Windows) -> float:
     """Return the time between two steps [s]; a position's weight is two of them long, a velocity's one."""
-    return (len(steps.weight) - 1) // integrals_of(steps) * steps.scene.step_s
+    return (len(steps.weight) - 1) // integrals_of(steps) * steps.measurements.step_s
 
 
 def summed(gaps: Floats, steps: Windows) -> Floats:
@@ -391,7 +388,7 @@ def _most_likely(
 
 
 def _bounds(start: Floats, h: float) -> list[tuple[float, float]]:
-    times = (float(np.log(0.5 * h)), float(np.log(LONGEST * h)))
+    times = (float(np.log(0.5 * h)), float(np.log(INFERENCE.longest_memory * h)))
     return [(one - 12.0, one + 6.0) if k not in (2, 4) else times for k, one in enumerate(start.tolist())]
 
 

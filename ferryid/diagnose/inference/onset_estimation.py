@@ -26,13 +26,8 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel, as_measured
 from ferryid.types import Floats, Ints
 
-FEWEST_PARTS = 24
-"""Parts of `INFERENCE.span_s` into which a log is cut at least: an effect begins and ends between two of them. In a calm log
-seconds matter: what acts too long or too short by them leaves a push that nothing explains."""
 MOST_NUMBERS = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
-PROMISING = 3
-"""Spans that are handed on to be fitted."""
 NEARBY_S, FINEST_S = 8.0, 0.2
 """Steps [s] with which a time is searched for nearby, from the first down to the last."""
 GLANCE = 3
@@ -45,7 +40,7 @@ class Linearisation:
 
     Attributes
     ----------
-    picture
+    force_model
         That the fit has of the log.
     left
         What it leaves, whitened, shape (w,).
@@ -55,7 +50,7 @@ class Linearisation:
         Of their cross-products and the prior, shape (k, k).
     """
 
-    picture: ForceModel
+    force_model: ForceModel
     left: Floats
     slopes: Floats
     inverse: Floats
@@ -63,10 +58,10 @@ class Linearisation:
 
 def linearise(problem: EstimationProblem, made: Fit, begin: StartingPoint) -> Linearisation:
     """Return a fit linearised; `begin` is `ferryid.diagnose.inference.estimation.starting_point` of it."""
-    picture = fitted_force_model(problem.plain, made)
+    force_model = fitted_force_model(problem.plain, made)
     slopes = np.column_stack([begin.by_hull, effect_slopes(problem, made)])
     inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
-    return Linearisation(picture, problem.white(picture), slopes, np.asarray(inverse, dtype=np.float64))
+    return Linearisation(force_model, problem.white(force_model), slopes, np.asarray(inverse, dtype=np.float64))
 
 
 def promising_spans(problem: EstimationProblem, ground: Linearisation, candidate: Candidate) -> list[Candidate]:
@@ -88,7 +83,7 @@ def promising_spans(problem: EstimationProblem, ground: Linearisation, candidate
     gain -= ((a > 0).astype(np.float64) + (b < parts)) * log(len(problem.windows.starts))
     found: list[tuple[int, int]] = []
     for k in np.argsort(-gain).tolist():
-        if gain[k] <= 0.0 or len(found) == PROMISING:
+        if gain[k] <= 0.0 or len(found) == INFERENCE.fitted_spans:
             break
         # A neighbour tells nothing new.
         if all(max(abs(int(a[k]) - i), abs(int(b[k]) - j)) > 1 for i, j in found):
@@ -121,7 +116,7 @@ def _edges(problem: EstimationProblem, candidate: Candidate) -> Floats:
     """Return where the log is cut [s], into parts of as many steps each: in a gap nothing begins or ends."""
     times = problem.steps.middle_s
     most = MOST_NUMBERS / (len(times) * problem.steps.channels.sum() * len(candidate.parameters))
-    parts = max(FEWEST_PARTS, int(min(len(times) * stride_s(problem.steps) / INFERENCE.span_s, most)))
+    parts = max(INFERENCE.span_parts, int(min(len(times) * stride_s(problem.steps) / INFERENCE.span_s, most)))
     return np.interp(np.linspace(0.0, len(times) - 1.0, parts + 1), np.arange(len(times)), times)
 
 
@@ -132,12 +127,12 @@ def _cross_products(
     steps, start = problem.steps, candidate.start
     part = np.clip(np.searchsorted(edges, steps.middle_s, side="right") - 1, 0, len(edges) - 2)
     own = part[:, None, None] == np.arange(len(edges) - 1)
-    there = as_measured(candidate.effect.apply(ground.picture, start, candidate.instance))
+    there = as_measured(candidate.effect.apply(ground.force_model, start, candidate.instance))
     columns = []
     for k, one in enumerate(candidate.parameters):
         moved = start.copy()
         moved[k] += NUDGE * one.size
-        change = as_measured(candidate.effect.apply(ground.picture, moved, candidate.instance)) - there
+        change = as_measured(candidate.effect.apply(ground.force_model, moved, candidate.instance)) - there
         columns.append(steps.mean(steps.along(change))[:, :, None] / NUDGE * own)
     p = len(columns)
     C = problem.whitening_filter.white(np.stack(columns, axis=3).reshape(len(steps.starts), -1, (len(edges) - 1) * p))

@@ -8,9 +8,9 @@ from math import sqrt
 import numpy as np
 
 from ferryid.diagnose.data.measurements import BLOCK_COEFFICIENT, WATER_DENSITY, WINDOW_LENGTH_M, dimensions
-from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel, Measurements, hull_of
 from ferryid.effects.measurements import hull_force_model
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
 from ferryid.models.forces import ModelForces
@@ -19,16 +19,16 @@ from ferryid.vessel.profile import Profile
 
 
 def prior_force_model(
-    scene: Measurements, profile: Profile, model: Model | None = None, sha256: str = ""
+    measurements: Measurements, profile: Profile, model: Model | None = None, sha256: str = ""
 ) -> tuple[ForceModel, Floats]:
-    """Return the picture before any candidate, and how far each of its hull's coefficients is believed to be off.
+    """Return the force model before any candidate, and how far each of its hull's coefficients is believed to be off.
 
     The air is still where no wind was measured, and the water too. A model is taken as `ModelForces` has it, with its
     vessel's properties and, in a log that it was diagnosed on, that log's conditions.
 
     Parameters
     ----------
-    scene
+    measurements
         From `read_measurements`.
     profile
         The vessel.
@@ -42,7 +42,7 @@ def prior_force_model(
     ForceModel
         Without candidates.
     ndarray
-        Standard deviations, shape (26,), in the units of the coefficients: `INFERENCE.hull_spread` of each where a hull model
+        Standard deviations, shape (26,), in the units of the coefficients: `EFFECTS.hull_spread` of each where a hull model
         is known (with the model's own intervals added), and what a vessel of this size may have at most where it is not.
 
     Raises
@@ -51,15 +51,17 @@ def prior_force_model(
         For a model of another vessel, or one whose inertia couples surge to sway and yaw.
     """
     if model is not None:
-        return _modelled(scene, profile, model, sha256)
-    bare = hull_force_model(scene, hull_of(profile))
+        return _modelled(measurements, profile, model, sha256)
+    bare = hull_force_model(measurements, hull_of(profile))
     spread = (
-        INFERENCE.hull_spread * np.abs(bare.hull) if profile.hull.has_model else default_hull_spread(scene, profile)
+        EFFECTS.hull_spread * np.abs(bare.hull)
+        if profile.hull.has_model
+        else default_hull_spread(measurements, profile)
     )
-    return replace(bare, external=scene.air_load, ambient=lambda now: now.air_load), spread
+    return replace(bare, external=measurements.air_load, ambient=lambda now: now.air_load), spread
 
 
-def default_hull_spread(scene: Measurements, profile: Profile) -> Floats:
+def default_hull_spread(measurements: Measurements, profile: Profile) -> Floats:
     """Return how large the hull's coefficients may be for a vessel of this size and speed, shape (26,).
 
     Added mass of a half-immersed cylinder of the hull's draught, cross-flow drag with a coefficient of 1 along the hull, lift
@@ -69,7 +71,9 @@ def default_hull_spread(scene: Measurements, profile: Profile) -> Floats:
     """
     length, beam, draught = dimensions(profile)
     hull = profile.hull
-    speed = float(np.quantile(np.hypot(scene.nu[scene.usable, 0], scene.nu[scene.usable, 1]), 0.9))
+    speed = float(
+        np.quantile(np.hypot(measurements.nu[measurements.usable, 0], measurements.nu[measurements.usable, 1]), 0.9)
+    )
     usual = max(speed, 0.1 * sqrt(9.81 * length) * 0.5)
     turning = usual / length
     time_s = 20.0 * sqrt(length / WINDOW_LENGTH_M)
@@ -114,17 +118,17 @@ def default_hull_spread(scene: Measurements, profile: Profile) -> Floats:
     return np.array([every[name] for name in COEFFICIENTS])
 
 
-def _modelled(scene: Measurements, profile: Profile, model: Model, sha256: str) -> tuple[ForceModel, Floats]:
+def _modelled(measurements: Measurements, profile: Profile, model: Model, sha256: str) -> tuple[ForceModel, Floats]:
     known = ModelForces(model)
     if known.force.profile.name != profile.name:
         raise FerryIdError(
             f"{model.label}: a model of {known.force.profile.name} says nothing about {profile.name}. "
             "Fix: give a model and logs of one vessel"
         )
-    plain = replace(known.plain(scene), ambient=lambda now: known.plain(now).external)
-    picture = known.altered(plain, sha256).picture
-    spread = np.sqrt((INFERENCE.hull_spread * picture.hull) ** 2 + known.variance)
+    plain = replace(known.plain(measurements), ambient=lambda now: known.plain(now).external)
+    force_model = known.altered(plain, sha256).force_model
+    spread = np.sqrt((EFFECTS.hull_spread * force_model.hull) ** 2 + known.variance)
     if not known.force.profile.hull.has_model:
         # What the base does not know, the fit had to learn; terms that it left out may be anything.
-        spread = np.where(picture.hull == 0.0, default_hull_spread(scene, profile), spread)
-    return picture, spread
+        spread = np.where(force_model.hull == 0.0, default_hull_spread(measurements, profile), spread)
+    return force_model, spread

@@ -39,8 +39,6 @@ from ferryid.types import Floats
 
 FAR = 8
 """Steps of a fit by which candidates are sorted from afar, `GLANCE` from nearby; the best are then fitted to the end."""
-REJUDGED = 5
-"""Candidates whose evidence is weighed under the noise that each leaves itself."""
 
 
 @dataclass(frozen=True)
@@ -87,16 +85,16 @@ class Search:
     states: tuple[DisturbanceState, ...] = ()
 
 
-def list_candidates(scene: Measurements) -> tuple[list[Candidate], dict[str, str]]:
-    """Return every effect that the scene can show, and why it cannot show the others."""
+def list_candidates(measurements: Measurements) -> tuple[list[Candidate], dict[str, str]]:
+    """Return every effect that the measurements can show, and why it cannot show the others."""
     candidates, untested = [], {}
     for effect in effects().values():
-        reason = effect.cannot(scene)
+        reason = effect.cannot(measurements)
         if reason:
             untested[effect.id] = reason
             continue
-        parameters = effect.parameters_of(scene.profile)
-        candidates += [Candidate(effect, instance, parameters) for instance in effect.instances(scene.profile)]
+        parameters = effect.parameters_of(measurements.profile)
+        candidates += [Candidate(effect, instance, parameters) for instance in effect.instances(measurements.profile)]
     return candidates, untested
 
 
@@ -114,7 +112,7 @@ def search(
     known
         The candidates; the whole library where None.
     """
-    candidates, untested = list_candidates(problem.plain.scene)
+    candidates, untested = list_candidates(problem.plain.measurements)
     if known is not None:
         candidates = list(known)
     steady = [candidate for candidate in candidates if candidate.effect.unsteady is None]
@@ -192,8 +190,8 @@ def _weighed(problem: EstimationProblem, chosen: Fit, candidates: Sequence[Candi
     ground = linearise(problem, current, begin)
     found = over(partial(_best, problem, current, begin, ground), candidates)
     found.sort(key=lambda one: -one.gain)
-    fair = over(partial(_fairly, problem), found[:REJUDGED])
-    return sorted([*fair, *found[REJUDGED:]], key=lambda one: -one.gain)
+    fair = over(partial(_fairly, problem), found[: INFERENCE.compared_candidates])
+    return sorted([*fair, *found[INFERENCE.compared_candidates :]], key=lambda one: -one.gain)
 
 
 def _fairly(problem: EstimationProblem, one: ScoredCandidate) -> ScoredCandidate:
@@ -250,7 +248,7 @@ def is_negligible(problem: EstimationProblem, made: Fit, index: int = -1) -> boo
     """Tell whether an effect of a fit, the last one if not another, moves the vessel too little to matter to anybody."""
     candidate, seen = made.candidates[index], problem.windows
     named = zip(made.values[index].tolist(), candidate.parameters, strict=True)
-    untold = candidate.effect.untold(problem.plain.scene, made.values[index])
+    untold = candidate.effect.untold(problem.plain.measurements, made.values[index])
     away = [
         abs(value - one.neutral)
         for value, one in named

@@ -1,7 +1,7 @@
-"""A recording against a simulation of it: the simulation's picture of the trial, learnt from its log, is the base.
+"""A recording against a simulation of it: the simulation's force model of the trial, learnt from its log, is the base.
 
 The simulated log is data like any other, of a world that is the simulator's. What its hull and its conditions are is found in
-the weak form as it would be for a recording, and put into the picture of the recording: what the diagnosis then finds is
+the weak form as it would be for a recording, and put into the force model of the recording: what the diagnosis then finds is
 the difference. An effect that the simulation has already has the simulation's values for its neutral ones.
 """
 
@@ -30,6 +30,7 @@ from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Values
 from ferryid.effects.force_model import ForceModel, Measurements
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
@@ -58,7 +59,7 @@ class Simulation:
     ----------
     log
         Its name.
-    scene
+    measurements
         What it holds, at its full rate.
     hull, spread
         Coefficients of its hull, shape (26,), and how far off they may be.
@@ -69,7 +70,7 @@ class Simulation:
     """
 
     log: str
-    scene: Measurements
+    measurements: Measurements
     hull: Floats
     spread: Floats
     conditions: tuple[Condition, ...]
@@ -79,7 +80,7 @@ class Simulation:
 def learn_simulation(
     path: str, profile: Profile, out: Path | None, *, verify: bool = False, progress: Callable[[str], None]
 ) -> Simulation:
-    """Return the picture that a simulated log shows.
+    """Return the force model that a simulated log shows.
 
     Parameters
     ----------
@@ -95,10 +96,10 @@ def learn_simulation(
     FerryIdError
         For a log that cannot be used, is too short, or moves like no vessel of this profile.
     """
-    scene, survey = read_measurements(path, profile, out, verify=verify, progress=progress)
-    sensors, scene = examine(scene)
+    measurements, survey = read_measurements(path, profile, out, verify=verify, progress=progress)
+    sensors, measurements = examine(measurements)
     name = survey.motion.log
-    seen = windows(scene, *window_lengths(profile))
+    seen = windows(measurements, *window_lengths(profile))
     if len(seen.starts) < INFERENCE.fewest_windows:
         raise FerryIdError(
             f"{name}: --against needs a simulation long enough to learn its model from, found "
@@ -106,7 +107,7 @@ def learn_simulation(
             f"{window_lengths(profile)[0]:.0f} s without a gap where {INFERENCE.fewest_windows} are needed. "
             "Fix: simulate and record the whole trial"
         )
-    plain, spread = prior_force_model(seen.scene, profile)
+    plain, spread = prior_force_model(seen.measurements, profile)
     wide = INFERENCE.simulator_hull_factor * spread if profile.hull.has_model else spread
     progress(f"learning what {name} simulates")
     result = search(estimation_problem(seen, plain, wide), progress)
@@ -129,10 +130,10 @@ def learn_simulation(
     posterior = np.sqrt(np.diag(np.linalg.inv(result.problem.by_hull.T @ result.problem.by_hull + np.eye(len(wide)))))
     return Simulation(
         name,
-        scene,
+        measurements,
         hull,
-        np.hypot(INFERENCE.hull_spread * hull, posterior * wide),
-        (*_measured(scene), *conditions),
+        np.hypot(EFFECTS.hull_spread * hull, posterior * wide),
+        (*_measured(measurements), *conditions),
         sensors,
     )
 
@@ -149,19 +150,23 @@ def _size(measured: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
-def _measured(scene: Measurements) -> tuple[Condition, ...]:
+def _measured(measurements: Measurements) -> tuple[Condition, ...]:
     """Return the conditions that a simulation records, by their means, for a recording that lacks their sensors.
 
     Of a payload it is the mean while it was aboard.
     """
     found = []
-    for name, values in (("wind", scene.wind), ("current", scene.current), ("payload", scene.payload)):
+    for name, values in (
+        ("wind", measurements.wind),
+        ("current", measurements.current),
+        ("payload", measurements.payload),
+    ):
         if values is None:
             continue
         effect = effects()[name]
-        candidate, rows = Candidate(effect, None, effect.parameters_of(scene.profile)), scene.usable
+        candidate, rows = Candidate(effect, None, effect.parameters_of(measurements.profile)), measurements.usable
         if name == "payload":
-            rows, ends = aboard(scene.t, values, rows)
+            rows, ends = aboard(measurements.t, values, rows)
             candidate = replace(candidate, onset_s=ends.get("onset", 0.0), offset_s=ends.get("offset", inf))
         mean = np.asarray(values[rows].mean(axis=0))
         found.append(Condition(candidate, mean, np.zeros_like(mean)))
@@ -169,9 +174,9 @@ def _measured(scene: Measurements) -> tuple[Condition, ...]:
 
 
 def simulated_force_model(
-    simulated: Simulation, scene: Measurements, shift_s: float = 0.0
+    simulated: Simulation, measurements: Measurements, shift_s: float = 0.0
 ) -> tuple[ForceModel, Floats]:
-    """Return the simulation's picture of what a recording shows, and how far its hull's coefficients may be off.
+    """Return the simulation's force model of what a recording shows, and how far its hull's coefficients may be off.
 
     What the recording measured itself (wind, current, payload) is the recording's.
 
@@ -179,23 +184,23 @@ def simulated_force_model(
     ----------
     simulated
         From `learn`.
-    scene
+    measurements
         The recording's.
     shift_s
         What is added to the simulation's times, of onsets and offsets.
     """
-    plain, _ = prior_force_model(scene, scene.profile)
-    picture = replace(plain, hull=simulated.hull)
-    for one in _carried(simulated, scene, shift_s):
-        picture = one.candidate.act(picture, one.values)
-    return picture, simulated.spread
+    plain, _ = prior_force_model(measurements, measurements.profile)
+    force_model = replace(plain, hull=simulated.hull)
+    for one in _carried(simulated, measurements, shift_s):
+        force_model = one.candidate.act(force_model, one.values)
+    return force_model, simulated.spread
 
 
-def _carried(simulated: Simulation, scene: Measurements, shift_s: float) -> list[Condition]:
+def _carried(simulated: Simulation, measurements: Measurements, shift_s: float) -> list[Condition]:
     return [
         replace(one, candidate=_later(one.candidate, shift_s))
         for one in simulated.conditions
-        if not one.in_hull and not one.candidate.effect.cannot(scene)
+        if not one.in_hull and not one.candidate.effect.cannot(measurements)
     ]
 
 
@@ -205,29 +210,29 @@ def _later(candidate: Candidate, shift_s: float) -> Candidate:
     return candidate
 
 
-def differing_candidates(simulated: Simulation, scene: Measurements, shift_s: float = 0.0) -> list[Candidate]:
+def differing_candidates(simulated: Simulation, measurements: Measurements, shift_s: float = 0.0) -> list[Candidate]:
     """Return every candidate of a recording, those that the simulation has already as differences to it."""
-    plain, _ = prior_force_model(scene, scene.profile)
+    plain, _ = prior_force_model(measurements, measurements.profile)
     bare = replace(plain, hull=simulated.hull)
-    carried = _carried(simulated, scene, shift_s)
+    carried = _carried(simulated, measurements, shift_s)
     known = {one.candidate.key: k for k, one in enumerate(carried)}
-    candidates, _ = list_candidates(scene)
+    candidates, _ = list_candidates(measurements)
     return [_relative(one, carried, known[one.key], bare) if one.key in known else one for one in candidates]
 
 
-def difference_notes(simulated: Simulation, scene: Measurements) -> list[str]:
+def difference_notes(simulated: Simulation, measurements: Measurements) -> list[str]:
     """Return the errors of the simulation's sensors, and conditions that differ by what was measured, in sentences."""
     told = [f"The simulation's log: {one.says}" for one in simulated.sensors]
     return told + [
         f"The {one.candidate.effect.id} differs by what was measured, and is no finding: "
-        f"{_described(one, simulated.scene)} in the simulation; the recording's own is part of its picture."
+        f"{_described(one, simulated.measurements)} in the simulation; the recording's own is part of its force model."
         for one in simulated.conditions
-        if one.candidate.effect.cannot(scene) and not one.in_hull
+        if one.candidate.effect.cannot(measurements) and not one.in_hull
     ]
 
 
-def _described(one: Condition, scene: Measurements) -> str:
-    untold = one.candidate.effect.untold(scene, one.values)
+def _described(one: Condition, measurements: Measurements) -> str:
+    untold = one.candidate.effect.untold(measurements, one.values)
     return ", ".join(
         f"{parameter.name} {_told(value, parameter.unit)}"
         for parameter, value in zip(one.candidate.parameters, one.values.tolist(), strict=True)
@@ -236,18 +241,18 @@ def _described(one: Condition, scene: Measurements) -> str:
 
 
 def _relative(candidate: Candidate, carried: Sequence[Condition], index: int, bare: ForceModel) -> Candidate:
-    """Return an effect that takes the simulation's values for neutral, and changes a picture from these to its own."""
+    """Return an effect that takes the simulation's values for neutral, and changes a force model from these to its own."""
     own = carried[index]
     neutral = dict(zip((one.name for one in candidate.parameters), own.values.tolist(), strict=True))
 
-    def pictured(hull: Floats, p: Floats) -> ForceModel:
-        picture = replace(bare, hull=hull)
+    def modelled(hull: Floats, p: Floats) -> ForceModel:
+        force_model = replace(bare, hull=hull)
         for k, one in enumerate(carried):
-            picture = one.candidate.act(picture, p if k == index else one.values)
-        return picture
+            force_model = one.candidate.act(force_model, p if k == index else one.values)
+        return force_model
 
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        return _changed(picture, pictured(picture.hull, own.values), pictured(picture.hull, p))
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        return _changed(force_model, modelled(force_model.hull, own.values), modelled(force_model.hull, p))
 
     def says(values: Values, instance: str | None) -> str:
         name = candidate.effect.title + (f" ({instance})" if instance else "")
@@ -259,10 +264,10 @@ def _relative(candidate: Candidate, carried: Sequence[Condition], index: int, ba
         ]
         return f"{name} differs: {'; '.join(parts)}."
 
-    def kick(picture: ForceModel, p: Floats) -> Floats:
+    def kick(force_model: ForceModel, p: Floats) -> Floats:
         # What the simulation has aboard already gives none.
         assert candidate.effect.kick is not None
-        return candidate.effect.kick(picture, p) - candidate.effect.kick(picture, own.values)
+        return candidate.effect.kick(force_model, p) - candidate.effect.kick(force_model, own.values)
 
     # Where the simulation has it for a while, no other span of it can be told, and its own has its own kick.
     kicks = candidate.effect.kick is not None and not own.candidate.times
@@ -275,15 +280,19 @@ def _told(value: float, unit: str) -> str:
     return f"{value:.2f}" + ("" if unit == "-" else f" {unit}")
 
 
-def _changed(picture: ForceModel, old: ForceModel, new: ForceModel) -> ForceModel:
-    """Return a picture changed as `old` becomes `new`: hull and factors by the ratio, all else by the difference."""
-    scene = picture.scene
-    if new.scene is not old.scene:
-        scene = replace(scene, eta=scene.eta + new.scene.eta - old.scene.eta, nu=scene.nu + new.scene.nu - old.scene.nu)
-    changed: dict[str, Any] = {"scene": scene}
-    for field in fields(picture):
-        own, before, after = (getattr(one, field.name) for one in (picture, old, new))
-        if field.name == "scene" or before is after:
+def _changed(force_model: ForceModel, old: ForceModel, new: ForceModel) -> ForceModel:
+    """Return a force model changed as `old` becomes `new`: hull and factors by the ratio, all else by the difference."""
+    measurements = force_model.measurements
+    if new.measurements is not old.measurements:
+        measurements = replace(
+            measurements,
+            eta=measurements.eta + new.measurements.eta - old.measurements.eta,
+            nu=measurements.nu + new.measurements.nu - old.measurements.nu,
+        )
+    changed: dict[str, Any] = {"measurements": measurements}
+    for field in fields(force_model):
+        own, before, after = (getattr(one, field.name) for one in (force_model, old, new))
+        if field.name == "measurements" or before is after:
             continue
         if field.name in ("hull", "damping_factor"):
             upper, lower = (np.ones(1) if one is None else one for one in (after, before))
@@ -293,7 +302,7 @@ def _changed(picture: ForceModel, old: ForceModel, new: ForceModel) -> ForceMode
         else:
             change = (0.0 if after is None else after) - (0.0 if before is None else before)
             changed[field.name] = change if own is None else own + change
-    return replace(picture, **changed)
+    return replace(force_model, **changed)
 
 
 def simulation_as_json(simulated: Simulation, compared: PathComparison | str) -> dict[str, Any]:
@@ -309,7 +318,7 @@ def simulation_as_json(simulated: Simulation, compared: PathComparison | str) ->
                 for parameter, value, error in zip(
                     one.candidate.parameters, one.values.tolist(), one.errors.tolist(), strict=True
                 )
-                if parameter.name not in one.candidate.effect.untold(simulated.scene, one.values)
+                if parameter.name not in one.candidate.effect.untold(simulated.measurements, one.values)
             },
         }
         for one in simulated.conditions

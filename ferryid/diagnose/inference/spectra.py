@@ -63,14 +63,14 @@ class Burst:
 
 
 def bands_of(
-    problem: EstimationProblem, pictures: Sequence[ForceModel], scene: Measurements | None
+    problem: EstimationProblem, force_models: Sequence[ForceModel], measurements: Measurements | None
 ) -> tuple[Band, ...]:
     """Return the power of the force errors in frequency bands, by windows short enough to let them through.
 
     The weight of a window of length T passes frequencies up to about 1/T; the power of each is that of the filtered error.
     """
-    short = fine_windows(problem, problem.windows.scene if scene is None else scene)
-    spectra = [spectrum_of(short, force_errors(short, picture, problem.plain)) for picture in pictures]
+    short = fine_windows(problem, problem.windows.measurements if measurements is None else measurements)
+    spectra = [spectrum_of(short, force_errors(short, force_model, problem.plain)) for force_model in force_models]
     if not spectra[0][0].size:
         return ()
     frequency = spectra[0][0]
@@ -83,31 +83,31 @@ def bands_of(
     return tuple(bands)
 
 
-def fine_windows(problem: EstimationProblem, scene: Measurements) -> Windows:
-    """Return windows of the scene that are short enough to show what is fast."""
-    step_s = problem.windows.scene.step_s
-    return windows(scene, max(len(problem.windows.weight) * step_s / FINE, 8.0 * step_s), step_s)
+def fine_windows(problem: EstimationProblem, measurements: Measurements) -> Windows:
+    """Return windows of the measurements that are short enough to show what is fast."""
+    step_s = problem.windows.measurements.step_s
+    return windows(measurements, max(len(problem.windows.weight) * step_s / FINE, 8.0 * step_s), step_s)
 
 
-def bursts_of(problem: EstimationProblem, picture: ForceModel, scene: Measurements) -> Burst | None:
+def bursts_of(problem: EstimationProblem, force_model: ForceModel, measurements: Measurements) -> Burst | None:
     """Return the most telling band in which the power of the force error comes and goes; None where there are no bands.
 
     The power of blocks is compared with an even one, as that of noise would be: of a band of width B, a block of length T holds
     2 B T independent values, of which the mean square's logarithm has a known variance.
     """
-    short = fine_windows(problem, scene)
-    errors = force_errors(short, picture, problem.plain)
+    short = fine_windows(problem, measurements)
+    errors = force_errors(short, force_model, problem.plain)
     found = []
     for low, high in pairwise(BURST_HZ):
         block_s = max(BURST_S, BURST_PERIODS / high)
-        if high < 0.5 / short.scene.step_s:
+        if high < 0.5 / short.measurements.step_s:
             found.append(_uneven(short, errors, low, high, block_s))
     told = [one for one in found if one is not None]
     return max(told, key=lambda one: one.deviations, default=None)
 
 
 def _uneven(short: Windows, errors: Floats, low_hz: float, high_hz: float, block_s: float) -> Burst | None:
-    step_s = short.scene.step_s
+    step_s = short.measurements.step_s
     size = round(block_s / step_s)
     edges, detection_powers, times, forces = [], [], [], []
     for a, b in short.runs:
@@ -157,7 +157,7 @@ def spectrum_of(short: Windows, errors: Floats) -> tuple[Floats, Floats]:
     size = min(longest, 512)
     if size < 16:
         return np.empty(0), np.empty((0, 3))
-    step_s = float(np.median(np.diff(short.starts))) * short.scene.step_s
+    step_s = float(np.median(np.diff(short.starts))) * short.measurements.step_s
     taper = np.sin(np.pi * (np.arange(size) + 0.5) / size)[:, None]
     total, count = np.zeros((size // 2 + 1, 3)), 0
     for a, b in short.runs:

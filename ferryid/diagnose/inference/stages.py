@@ -41,7 +41,7 @@ class Expectation:
 
     Attributes
     ----------
-    picture
+    force_model
         The forces that the baseline holds to act.
     hull_spread
         How far its hull's coefficients may be off: standard deviations, shape (26,).
@@ -53,7 +53,7 @@ class Expectation:
         Of a simulation: it and its path against the recording's, as plain values; empty else.
     """
 
-    picture: ForceModel
+    force_model: ForceModel
     hull_spread: Floats
     library: tuple[Candidate, ...]
     notes: tuple[str, ...] = ()
@@ -119,14 +119,14 @@ class SelectedLog:
 
 def average(log: ScreenedLog) -> AveragedLog:
     """Average a log over the weak form's windows."""
-    return AveragedLog(log, windows(log.scene, *window_lengths(log.scene.profile)))
+    return AveragedLog(log, windows(log.measurements, *window_lengths(log.measurements.profile)))
 
 
 def estimate(log: AveragedLog, baseline: Baseline) -> EstimatedLog:
     """Estimate the hull and the noise of a log as if nothing were missing."""
     expectation = baseline.expect(log)
     return EstimatedLog(
-        log, baseline, expectation, estimation_problem(log.windows, expectation.picture, expectation.hull_spread)
+        log, baseline, expectation, estimation_problem(log.windows, expectation.force_model, expectation.hull_spread)
     )
 
 

@@ -70,17 +70,17 @@ def fit_disturbances(
     made
         What has been found.
     candidates
-        Disturbances that the scene can show.
+        Disturbances that the measurements can show.
     calm
-        The plain picture without any of them.
+        The plain force model without any of them.
     least
         Evidence that the first of them must show: what else explains as much is looked at before it.
     near
         What they were beside another fit: where the search begins.
     """
-    picture = fitted_force_model(problem.plain, made)
+    force_model = fitted_force_model(problem.plain, made)
     steps = problem.excerpt
-    gaps = steps.gap(picture)
+    gaps = steps.gap(force_model)
     noise = fit_noise(steps, gaps, problem.filter)
     before = {state.candidate.key: [state.values] for state in near}
     best = likelihood(noise, steps, gaps)
@@ -91,14 +91,14 @@ def fit_disturbances(
         tried = []
         for candidate in left:
             assert candidate.effect.unsteady is not None
-            processes = candidate.effect.unsteady(picture)
+            processes = candidate.effect.unsteady(force_model)
             if not processes(_sizes(candidate)):
                 continue
             places = before.get(candidate.key, _starts(candidate))
-            begin = max(places, key=lambda one: _glance(steps, gaps, noise, processes(one), picture))
+            begin = max(places, key=lambda one: _glance(steps, gaps, noise, processes(one), force_model))
             price = 0.5 * len(begin) * log(len(steps.starts))
             told, values, widths, after = fit_noise_with(
-                steps, gaps, noise, processes, begin, picture, best + price + worth
+                steps, gaps, noise, processes, begin, force_model, best + price + worth
             )
             gain = after - best - price
             if _seen(candidate, values, widths, stride_s(steps)):
@@ -142,9 +142,9 @@ def _strengths(candidate: Candidate) -> NDArray[np.bool_]:
 
 
 def _glance(
-    steps: Windows, gaps: Floats, noise: NoiseModel, processes: tuple[Process, ...], picture: ForceModel
+    steps: Windows, gaps: Floats, noise: NoiseModel, processes: tuple[Process, ...], force_model: ForceModel
 ) -> float:
-    return likelihood(NoiseModel(noise.channels, (*noise.processes, *processes), picture), steps, gaps)
+    return likelihood(NoiseModel(noise.channels, (*noise.processes, *processes), force_model), steps, gaps)
 
 
 def _starts(candidate: Candidate) -> list[Floats]:

@@ -11,12 +11,6 @@ from ferryid.thresholds import threshold
 class InferenceThresholds:
     """Diagnosis: inference."""
 
-    hull_spread: float = threshold(
-        0.12,
-        "of the coefficient",
-        "standard deviation of the prior of the hull's coefficients",
-        "convention: how well a hull model is known",
-    )
     posterior_factor: float = threshold(
         1.5,
         "-",
@@ -44,6 +38,12 @@ class InferenceThresholds:
         "log evidence above which an effect is selected before gusts and waves are searched for",
         "convention: gusts and waves look like nothing so clear",
     )
+    compared_candidates: int = threshold(
+        5,
+        "candidates",
+        "best candidates of a round that are compared under the noise that each leaves",
+        "convention: bounds the time of a search",
+    )
     void_share: float = threshold(
         0.02,
         "of the measured acceleration",
@@ -55,6 +55,36 @@ class InferenceThresholds:
         "nat",
         "log evidence that a stochastic disturbance must gain",
         "tuned on real recordings: raised from 8 after waves were named in a towing tank",
+    )
+    screening_iterations: int = threshold(
+        12,
+        "iterations",
+        "of the search for a disturbance over few sizes, after which it is given up or all parameters are searched",
+        "convention: bounds the time of a search",
+    )
+    screening_gain: float = threshold(
+        12.0,
+        "nat",
+        "log evidence that a disturbance may then lack and is searched further",
+        "convention: bounds the time of a search; lowered from 20 for speed",
+    )
+    noise_steps: int = threshold(
+        3600,
+        "steps",
+        "most from which noise is estimated: 24 minutes for a vessel of 5 m",
+        "convention: more determine its sizes hardly better; 1800 before",
+    )
+    noise_stretches: int = threshold(
+        8,
+        "stretches",
+        "into which they are divided, evenly spread over a longer log",
+        "convention: noise may differ over a log; 3 before",
+    )
+    longest_memory: float = threshold(
+        500.0,
+        "steps",
+        "longest time constant of coloured errors and disturbances",
+        "convention: 200 s for a vessel of 5 m; far longer than a window, in which it is an offset",
     )
     fastest_share: float = threshold(
         0.4, "of the filter's rate", "highest frequency of a disturbance", "derived: half of the rate is aliased"
@@ -115,6 +145,18 @@ class InferenceThresholds:
         "s",
         "parts of a log between which an effect may begin or end, and the shortest span that is tried",
         "convention: a window of a vessel of 5 m",
+    )
+    span_parts: int = threshold(
+        24,
+        "parts",
+        "least number of parts of a log between which an effect may begin or end",
+        "convention: short logs are cut finer than by `span_s`, as an end that is off by seconds leaves an error",
+    )
+    fitted_spans: int = threshold(
+        3,
+        "spans",
+        "most spans of a candidate that are fitted after the linear scan",
+        "convention: bounds the time of a search",
     )
     profile_drop: float = threshold(
         4.0,

@@ -2,7 +2,7 @@
 
 A window's weight w and its first derivatives vanish at both ends, so that integration by parts moves every derivative
 onto w: ``∫ w p'' = ∫ w'' p`` for a position, ``∫ w nu' = -∫ w' nu`` for a velocity. Either is compared with the
-acceleration that a picture of the forces gives, averaged with the same weight. Where positions were measured they alone
+acceleration that a force model gives, averaged with the same weight. Where positions were measured they alone
 are used: what they leave is steadier over the seconds in which forces act. Long windows show and judge what is left over;
 hypotheses are fitted in short steps, by the filter of `ferryid.diagnose.inference.noise_model`.
 
@@ -31,11 +31,11 @@ CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows of a scene.
+    """Windows of measurements.
 
     Attributes
     ----------
-    scene
+    measurements
         What was measured, at the rate of the forces.
     starts
         First row of every window, shape (J,); every window lies in measured data.
@@ -49,7 +49,7 @@ class Windows:
         Which of them are used: those of position and heading, or the others where there is no position, shape (6,).
     """
 
-    scene: Measurements
+    measurements: Measurements
     starts: NDArray[np.int64]
     runs: tuple[tuple[int, int], ...]
     weight: Floats
@@ -59,17 +59,17 @@ class Windows:
     @property
     def middle_s(self) -> Floats:
         """Time of the middle of every window [s], shape (J,)."""
-        return self.scene.t[self.starts] + 0.5 * (len(self.weight) - 1) * self.scene.step_s
+        return self.measurements.t[self.starts] + 0.5 * (len(self.weight) - 1) * self.measurements.step_s
 
     def mean(self, values: Floats) -> Floats:
         """Return ``∫ w f dt`` in every window, shape (J,) or (J, c), of values with n rows."""
-        return _means(values, self.weight, self.starts, self.scene.step_s)
+        return _means(values, self.weight, self.starts, self.measurements.step_s)
 
-    def gap(self, picture: ForceModel) -> Floats:
-        """Return the picture's acceleration less the measured one in every window, shape (J, channels)."""
-        rates = as_measured(picture)
+    def gap(self, force_model: ForceModel) -> Floats:
+        """Return the force model's acceleration less the measured one in every window, shape (J, channels)."""
+        rates = as_measured(force_model)
         if self.channels[0]:
-            rates = rates + self.scene.turning
+            rates = rates + self.measurements.turning
         return self.mean(self.along(rates)) - self.measured[:, self.channels]
 
     def along(self, rates: Floats) -> Floats:
@@ -77,17 +77,17 @@ class Windows:
         if not self.channels[0]:
             return rates
         turned = rates[:, :, None].copy()
-        to_ground(turned, *self.scene.pointing)
+        to_ground(turned, *self.measurements.pointing)
         return turned[:, :, 0]
 
-    def hull_changes(self, picture: ForceModel, places: Ints, moves: Floats) -> Floats:
+    def hull_changes(self, force_model: ForceModel, places: Ints, moves: Floats) -> Floats:
         """Return by how much `gap` changes if coefficients of the hull move one by one, shape (J, channels, q).
 
         `places` and `moves` as in `ferryid.effects.force_model.hull_changes`.
         """
-        changes = hull_changes(picture, places, moves)
+        changes = hull_changes(force_model, places, moves)
         if self.channels[0]:
-            to_ground(changes, *self.scene.pointing)
+            to_ground(changes, *self.measurements.pointing)
         return self.mean(changes)
 
 
@@ -96,14 +96,14 @@ FORCES_HZ = 5.0
 """Rate at which forces are averaged over windows; they change slowly against it, and hypotheses cost a quarter."""
 
 
-def windows(scene: Measurements, length_s: float, stride_s: float) -> Windows:
+def windows(measurements: Measurements, length_s: float, stride_s: float) -> Windows:
     """Return windows of `length_s` every `stride_s` seconds, as many as lie wholly in measured data.
 
     The weight is ``sin^4``: it and its first three derivatives vanish at the ends. Measured motion is averaged at the full
-    rate, and the scene for the forces is thinned to `FORCES_HZ`.
+    rate, and the measurements for the forces are thinned to `FORCES_HZ`.
     """
-    every = max(1, round(1.0 / (FORCES_HZ * scene.step_s)))
-    thin = _thinned(scene, every)
+    every = max(1, round(1.0 / (FORCES_HZ * measurements.step_s)))
+    thin = _thinned(measurements, every)
     m = max(8, round(length_s / thin.step_s))
     stride = max(1, round(stride_s / thin.step_s))
     starts: list[int] = []
@@ -114,15 +114,15 @@ def windows(scene: Measurements, length_s: float, stride_s: float) -> Windows:
         if len(starts) > before:
             runs.append((before, len(starts)))
     rows = np.array(starts, dtype=np.int64)
-    known = bool(np.isfinite(scene.eta[scene.usable, :2]).all())
+    known = bool(np.isfinite(measurements.eta[measurements.usable, :2]).all())
     # A controller answers the errors of the velocity with thrust within a window, so that they and the force belong
     # together and a delay is seen where none is; those of the position are shorter and hardly felt.
     channels = np.repeat([known, not known], 3)
-    eta = np.where(np.isfinite(scene.eta), scene.eta, 0.0)
-    nu = np.where(np.isfinite(scene.nu_raw), scene.nu_raw, 0.0)
-    _, slope, bend = _weights(m * every, scene.step_s)
+    eta = np.where(np.isfinite(measurements.eta), measurements.eta, 0.0)
+    nu = np.where(np.isfinite(measurements.nu_raw), measurements.nu_raw, 0.0)
+    _, slope, bend = _weights(m * every, measurements.step_s)
     measured = np.hstack(
-        [_means(eta, bend, rows * every, scene.step_s), -_means(nu, slope, rows * every, scene.step_s)]
+        [_means(eta, bend, rows * every, measurements.step_s), -_means(nu, slope, rows * every, measurements.step_s)]
     )
     return Windows(thin, rows, tuple(runs), _weights(m, thin.step_s)[0], measured, channels)
 
@@ -133,8 +133,8 @@ def steps_of(seen: Windows) -> Windows:
     With a triangle as its weight, ``∫ w p''`` is the second difference of a position; with a box, ``∫ w nu'`` is the first of
     a velocity. A step is a `STEPS_A_WINDOW`-th of a window.
     """
-    scene = seen.scene
-    covered = np.zeros(len(scene.t), dtype=np.bool_)
+    measurements = seen.measurements
+    covered = np.zeros(len(measurements.t), dtype=np.bool_)
     for start in seen.starts:
         covered[start : start + len(seen.weight)] = True
     m = max(1, round(len(seen.weight) / STEPS_A_WINDOW))
@@ -148,16 +148,18 @@ def steps_of(seen: Windows) -> Windows:
             runs.append((len(starts), len(starts) + len(rows)))
             starts += rows
     at = np.array(starts, dtype=np.int64)
-    h = m * scene.step_s
+    h = m * measurements.step_s
     if placed:
         weight = np.concatenate([np.arange(m + 1), np.arange(m)[::-1]]).astype(np.float64)
-        differences = scene.eta[at + 2 * m] - 2.0 * scene.eta[at + m] + scene.eta[at]
+        differences = measurements.eta[at + 2 * m] - 2.0 * measurements.eta[at + m] + measurements.eta[at]
     else:
         weight = np.concatenate([[0.5], np.ones(m - 1), [0.5]])
-        differences = scene.nu_raw[at + m] - scene.nu_raw[at]
+        differences = measurements.nu_raw[at + m] - measurements.nu_raw[at]
     differences = np.where(np.isfinite(differences), differences, 0.0) / h ** (2 if placed else 1)
     measured = np.hstack([differences, differences])
-    return Windows(scene, at, tuple(runs), weight / (weight.sum() * scene.step_s), measured, seen.channels)
+    return Windows(
+        measurements, at, tuple(runs), weight / (weight.sum() * measurements.step_s), measured, seen.channels
+    )
 
 
 def _weights(m: int, step_s: float) -> tuple[Floats, Floats, Floats]:
@@ -189,11 +191,11 @@ def weighed(values: Floats, weight: Floats, starts: Ints) -> Floats:
     return out
 
 
-def _thinned(scene: Measurements, every: int) -> Measurements:
-    """Return the scene with every so many rows replaced by their mean; a row is usable where all of them are."""
+def _thinned(measurements: Measurements, every: int) -> Measurements:
+    """Return the measurements with every so many rows replaced by their mean; a row is usable where all of them are."""
     if every == 1:
-        return scene
-    n = len(scene.t) // every
+        return measurements
+    n = len(measurements.t) // every
 
     def mean(values: Floats) -> Floats:
         return np.asarray(values[: n * every].reshape(n, every, *values.shape[1:]).mean(axis=1))
@@ -202,17 +204,17 @@ def _thinned(scene: Measurements, every: int) -> Measurements:
         return None if values is None else mean(values)
 
     return replace(
-        scene,
-        t=mean(scene.t),
-        eta=mean(scene.eta),
-        nu_raw=mean(scene.nu_raw),
-        nu=mean(scene.nu),
-        parts=mean(scene.parts),
-        angles=mean(scene.angles),
-        usable=np.asarray(scene.usable[: n * every].reshape(n, every).all(axis=1)),
-        wind=some(scene.wind),
-        current=some(scene.current),
-        payload=some(scene.payload),
+        measurements,
+        t=mean(measurements.t),
+        eta=mean(measurements.eta),
+        nu_raw=mean(measurements.nu_raw),
+        nu=mean(measurements.nu),
+        parts=mean(measurements.parts),
+        angles=mean(measurements.angles),
+        usable=np.asarray(measurements.usable[: n * every].reshape(n, every).all(axis=1)),
+        wind=some(measurements.wind),
+        current=some(measurements.current),
+        payload=some(measurements.payload),
     )
 
 

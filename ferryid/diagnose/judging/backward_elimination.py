@@ -10,11 +10,9 @@ from ferryid.diagnose.inference.search import is_negligible, prune
 from ferryid.diagnose.judging.axis_consistency import check_axis_consistency
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, held_out_evidence
 from ferryid.diagnose.judging.rivals import RivalComparison, compare_rivals
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.unexplained import find_displaced
 from ferryid.effects.wording import listed
-
-SWAPS = 6
-"""Times that a rival takes a place: physics without a name here may send one effect after the other to stand in for it."""
 
 PLACEBO = (
     "a placebo (the same force at other times, or on mirrored headings) does as well on stretches kept from the fit"
@@ -69,7 +67,7 @@ def eliminate_backward(
         standings = tuple(compare_rivals(problem, kept, i, library) for i in range(len(kept.candidates)))
         better = [one for standing in standings for one in standing.rivals[:1] if one.gain > 0.0]
         better = [one for one in better if one.fit.keys not in tried]
-        if better and swaps < SWAPS:
+        if better and swaps < JUDGING.most_replacements:
             # What was selected first may be less likely beside what was selected later than another in its place.
             best = max(better, key=lambda one: one.gain)
             tried.add(best.fit.keys)

@@ -24,9 +24,6 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import HELD
 from ferryid.types import Floats
 
-REFITS = 2
-"""Times that the logs are fitted anew beside a law: a hull that stood in for it has its masses wrong, and so the law's size."""
-
 
 @dataclass(frozen=True)
 class LogInformation:
@@ -35,7 +32,7 @@ class LogInformation:
     Attributes
     ----------
     terms
-        Those that its scene offers, k in all.
+        Those that its measurements offer, k in all.
     normal, slope
         Second derivatives of the negative log-likelihood by the coefficients, shape (k, k), and first ones of the
         log-likelihood where there is no law, shape (k,).
@@ -172,7 +169,7 @@ def find_campaign_laws(logs: Mapping[str, tuple[EstimationProblem, Fit]]) -> dic
         law = select_campaign_law(said, best)
         if law is None:
             break
-        for _ in range(REFITS):
+        for _ in range(JUDGING.law_refits):
             again = tuple(log_information(problem, kept, law) for problem, kept in logs.values())
             law = _fitted(again, law.terms)
         if not law.holds:
@@ -182,7 +179,7 @@ def find_campaign_laws(logs: Mapping[str, tuple[EstimationProblem, Fit]]) -> dic
 
 
 def log_information(problem: EstimationProblem, kept: Fit, law: VesselLaw | None = None) -> LogInformation:
-    """Return what a log says of all terms that its scene offers, beside a fit.
+    """Return what a log says of all terms that its measurements offer, beside a fit.
 
     The slopes are those where there is no law. If one is known, all derivatives are taken where it acts, and the hull does not
     have to stand in for it.
@@ -190,7 +187,7 @@ def log_information(problem: EstimationProblem, kept: Fit, law: VesselLaw | None
     if law is not None:
         kept = _with(problem, kept, law.terms, law.values)
         problem = problem.with_noise_of(kept)
-    terms = terms_of(problem.plain.scene)
+    terms = terms_of(problem.plain.measurements)
     lines = linearise_terms(problem, kept, terms)
     pushes, seen = lines.terms * lines.sizes, problem.windows
     left, known, columns = (problem.noise.white(one, seen.runs) for one in (lines.gaps, lines.known, pushes))

@@ -67,7 +67,7 @@ def _too_short(log: AveragedLog, baseline: Baseline, campaign: tuple[frozenset[K
     screened = log.screened
     figures = LogFigures(joint=baseline.joint, campaign=campaign, baseline_sensors=baseline.sensors)
     findings, notes = apply_rules(sensor_claims(screened.sensors), figures)
-    profile, window_s = screened.scene.profile, _window_s(log.windows.weight, log.windows.scene.step_s)
+    profile, window_s = screened.measurements.profile, _window_s(log.windows.weight, log.windows.measurements.step_s)
     short = (
         f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion. "
         "Record at least ten minutes that excite every axis."
@@ -91,7 +91,7 @@ def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosi
     selected, stands = log.selected, log.stands
     estimated = selected.estimated
     screened, problem, kept = estimated.averaged.screened, selected.search.problem, stands.fit
-    scene, survey = screened.scene, screened.measured.survey
+    measurements, survey = screened.measurements, screened.measured.survey
     figures = replace(log.figures, campaign=campaign)
     findings, rule_notes = apply_rules(log.claims, figures)
     chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
@@ -111,15 +111,15 @@ def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosi
     updates = estimated.baseline.updates_model
     return Diagnosis(
         survey.motion.log,
-        scene.profile.name,
+        measurements.profile.name,
         verdict_of(findings, remainder),
         findings,
         before,
         after,
         notes,
         evidence=_leftover(problem, log.base, kept),
-        located=locate(problem, log.base, kept, scene) if kept.candidates else log.unknown.left,
-        withheld=compare_hidden_signals(survey.hidden, scene, findings),
+        located=locate(problem, log.base, kept, measurements) if kept.candidates else log.unknown.left,
+        withheld=compare_hidden_signals(survey.hidden, measurements, findings),
         against=estimated.expectation.comparison,
         moved=_moved(problem, kept) if kept.candidates else None,
         duration_s=_duration_s(screened),
@@ -132,7 +132,9 @@ def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosi
 def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
     """Return what was noted of a log as it was read: doubts, rows left out, and actuators that leave their thrust curves."""
     survey = log.measured.survey
-    names = tuple(f"{actuator.name}{end}" for actuator in log.scene.profile.actuators for end in (": ", " never "))
+    names = tuple(
+        f"{actuator.name}{end}" for actuator in log.measurements.profile.actuators for end in (": ", " never ")
+    )
     return (
         *survey.doubts,
         *survey.left_out,
@@ -143,7 +145,7 @@ def survey_notes(log: ScreenedLog) -> tuple[str, ...]:
 def _scores(
     problem: EstimationProblem, base: Fit, kept: Fit, proof: HeldOutEvidence | None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    window_s = _window_s(problem.windows.weight, problem.windows.scene.step_s)
+    window_s = _window_s(problem.windows.weight, problem.windows.measurements.step_s)
     if proof is None:
         errors = force_errors(problem.windows, fitted_force_model(problem.plain, base), problem.plain)
         mse = dict(zip(AXES, np.mean(errors**2, axis=0).tolist(), strict=True))
@@ -173,7 +175,7 @@ def _left_shares(problem: EstimationProblem, mse: Mapping[str, float]) -> dict[s
     """
     seen = problem.windows
     inertia = seen.measured[:, 3:] @ mass_of(problem.plain.hull).T
-    thrust = seen.mean(seen.scene.parts.sum(axis=1))
+    thrust = seen.mean(seen.measurements.parts.sum(axis=1))
     moves = np.maximum(np.mean(inertia**2, axis=0), np.mean(thrust**2, axis=0))
     return {axis: mse[axis] / float(size) for axis, size in zip(AXES, moves, strict=True) if size > 0.0}
 
@@ -193,7 +195,7 @@ def _window_s(weight: Floats, step_s: float) -> float:
 
 
 def _duration_s(log: ScreenedLog) -> float:
-    return float(log.scene.t[-1] - log.scene.t[0])
+    return float(log.measurements.t[-1] - log.measurements.t[0])
 
 
 def _free_run(runs: FreeRuns, errors: Floats) -> dict[str, Any]:
@@ -206,8 +208,8 @@ def _free_run(runs: FreeRuns, errors: Floats) -> dict[str, Any]:
 
 def _leftover(problem: EstimationProblem, base: Fit, kept: Fit) -> dict[str, Any]:
     seen = problem.windows
-    psi = seen.mean(seen.scene.psi[:, None])[:, 0]
-    speed = seen.mean(np.hypot(seen.scene.nu[:, 0], seen.scene.nu[:, 1])[:, None])[:, 0]
+    psi = seen.mean(seen.measurements.psi[:, None])[:, 0]
+    speed = seen.mean(np.hypot(seen.measurements.nu[:, 0], seen.measurements.nu[:, 1])[:, None])[:, 0]
     return {
         "t": seen.middle_s,
         "before": force_errors(seen, fitted_force_model(problem.plain, base), problem.plain),

@@ -65,8 +65,8 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
     library
         The candidates; those that were found are left out.
     """
-    picture = fitted_force_model(problem.plain, kept)
-    before = problem.white(picture)
+    force_model = fitted_force_model(problem.plain, kept)
+    before = problem.white(force_model)
     nuisance = np.column_stack([problem.by_hull, effect_slopes(problem, kept)])
     inner = nuisance.T @ nuisance + np.eye(nuisance.shape[1])
 
@@ -81,13 +81,14 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
         size = np.array([one.size for one in candidate.parameters])
         chance = 1.0
         for usual in _usual(candidate):
-            there = problem.white(candidate.act(picture, usual))
+            there = problem.white(candidate.act(force_model, usual))
             change = apart(there - before)
             if not change.any():
-                # Of what comes and goes by chance a picture holds no force: it is found in the noise, and not here.
+                # Of what comes and goes by chance a force model holds no force: it is found in the noise, and not here.
                 break
             columns = [
-                (problem.white(candidate.act(picture, usual + NUDGE * step)) - there) / NUDGE for step in np.diag(size)
+                (problem.white(candidate.act(force_model, usual + NUDGE * step)) - there) / NUDGE
+                for step in np.diag(size)
             ]
             information = np.column_stack(columns).T @ apart(np.column_stack(columns))
             strength = float(change @ change)

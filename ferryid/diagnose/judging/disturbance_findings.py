@@ -23,7 +23,7 @@ from ferryid.types import AXES, Floats
 
 
 def disturbance_claims(
-    problem: EstimationProblem, made: Fit, states: Sequence[DisturbanceState], scene: Measurements
+    problem: EstimationProblem, made: Fit, states: Sequence[DisturbanceState], measurements: Measurements
 ) -> list[Claim]:
     """Return disturbances as findings; each pushes all along, on the axes on which it is strong against what is left over.
 
@@ -35,10 +35,10 @@ def disturbance_claims(
         What else was found.
     states
         The disturbances.
-    scene
-        The log's scene at its full rate.
+    measurements
+        The log's measurements at its full rate.
     """
-    short = fine_windows(problem, scene)
+    short = fine_windows(problem, measurements)
     frequency, power = spectrum_of(short, force_errors(short, fitted_force_model(problem.plain, made), problem.plain))
     return [_claim(problem, state, short, frequency, power) for state in states]
 
@@ -57,7 +57,7 @@ def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[
     """Return `evidence` and `labels` of a disturbance: the spectrum of what is left over, and its own by its parameters."""
     if frequency.size < 2:
         return {}
-    step_s = short.scene.step_s
+    step_s = short.measurements.step_s
     turns = np.exp(-2j * np.pi * np.outer(frequency, step_s * np.arange(len(short.weight))))
     passed = np.abs(turns @ short.weight * step_s) ** 2
     # A mean is no part of what comes and goes, and what the windows stop tells nothing.
@@ -82,15 +82,15 @@ def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[
 def _claim(
     problem: EstimationProblem, state: DisturbanceState, short: Windows, frequency: Floats, spectrum: Floats
 ) -> Claim:
-    scene = problem.windows.scene
+    measurements = problem.windows.measurements
     candidate = state.candidate
     assert candidate.effect.unsteady is not None
     parameters = {name: one for name, one in state.estimates.items() if name in state.known}
-    picture = problem.filter.picture or problem.plain
-    pushes = candidate.effect.unsteady(picture)(state.values)
+    force_model = problem.filter.force_model or problem.plain
+    pushes = candidate.effect.unsteady(force_model)(state.values)
     pushed = [np.mean((one.std * one.force) ** 2, axis=0) for one in pushes]
     # Newtons and newton metres compare as what they do to the vessel.
-    arm = np.array([1.0, 1.0, np.sqrt(picture.hull[0] / picture.hull[4])])
+    arm = np.array([1.0, 1.0, np.sqrt(force_model.hull[0] / force_model.hull[4])])
     power = np.sum(pushed, axis=0) * arm**2
     values = {name: one.value for name, one in parameters.items()}
     shown = _columns(short, frequency, spectrum, pushes, int(np.argmax(power)))
@@ -100,7 +100,7 @@ def _claim(
         probability=1.0 / (1.0 + exp(min(INFERENCE.disturbance_gain - state.gain, 50.0))),
         parameters=parameters,
         axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
-        intervals=((float(scene.t[0]), float(scene.t[-1])),),
+        intervals=((float(measurements.t[0]), float(measurements.t[-1])),),
         onset_s=None,
         regime="",
         improvement={},

@@ -110,22 +110,25 @@ def _deviations(chi_squared: float, free: int) -> float:
 
 
 def profiles_of(windows_: Windows, kept: Ints, white: Floats, calm: Floats, errors: Floats) -> tuple[Profiled, ...]:
-    scene = windows_.scene
+    measurements = windows_.measurements
     rows = windows_.starts[kept] + len(windows_.weight) // 2
     chosen = errors[kept]
     turn: Floats = np.linspace(0.0, 360.0, SECTORS + 1)
-    heading = np.asarray(np.degrees(scene.psi[rows]) % 360.0, dtype=np.float64)
+    heading = np.asarray(np.degrees(measurements.psi[rows]) % 360.0, dtype=np.float64)
     made = [profile_of("heading", "deg", heading, turn, white, calm, chosen)]
-    speed = np.hypot(scene.nu[rows, 0], scene.nu[rows, 1])
+    speed = np.hypot(measurements.nu[rows, 0], measurements.nu[rows, 1])
     sorted_by: list[tuple[str, str, Floats, int]] = [
         ("speed", "m/s", speed, SPEEDS),
-        ("yaw rate", "deg/s", np.degrees(scene.nu[rows, 2]), SPEEDS),
+        ("yaw rate", "deg/s", np.degrees(measurements.nu[rows, 2]), SPEEDS),
     ]
     sorted_by.append(("time", "s", windows_.middle_s[kept], TIMES))
-    if np.isfinite(scene.eta[rows, :2]).all():
-        sorted_by += [("north", "m", scene.eta[rows, 0], PLACES), ("east", "m", scene.eta[rows, 1], PLACES)]
-    for k, name in enumerate(scene.names):
-        angle, part = scene.angles[rows, k], scene.parts[rows, k]
+    if np.isfinite(measurements.eta[rows, :2]).all():
+        sorted_by += [
+            ("north", "m", measurements.eta[rows, 0], PLACES),
+            ("east", "m", measurements.eta[rows, 1], PLACES),
+        ]
+    for k, name in enumerate(measurements.names):
+        angle, part = measurements.angles[rows, k], measurements.parts[rows, k]
         strength = np.hypot(part[:, 0], part[:, 1])
         sorted_by.append((f"{name} force", "N", strength, SPEEDS))
         if np.isfinite(angle).all():

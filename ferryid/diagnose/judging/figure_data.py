@@ -24,7 +24,7 @@ def figure_columns(
     place
         Where the errors without the finding differ from those with it.
     regressor
-        Label and values on the rows of the scene, shape (n,), of the quantity that gives the finding away.
+        Label and values on the rows of the measurements, shape (n,), of the quantity that gives the finding away.
     alone
         True where nothing explains what is left over.
     """
@@ -53,11 +53,11 @@ def best_axis(place: Location) -> int:
 
 
 def figure_regressor(
-    candidate: Candidate, picture: ForceModel, values: Floats, place: Location
+    candidate: Candidate, force_model: ForceModel, values: Floats, place: Location
 ) -> tuple[str, Floats] | None:
     """Return label and values of the quantity that gives an effect away, where the effect names one."""
     name = candidate.effect.regressor
-    return None if name is None else name(picture, values, candidate.instance, AXES[best_axis(place)])
+    return None if name is None else name(force_model, values, candidate.instance, AXES[best_axis(place)])
 
 
 def _in_windows(problem: EstimationProblem, label: str, values: Floats) -> Floats:

@@ -33,16 +33,14 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import Measurements
 from ferryid.types import AXES, Floats
 
-TIME_DROP = 50.0
-"""Fall of the logarithm of the evidence as of which no time farther away comes into question; smaller dips may lie between."""
 TIME_STEP, TIME_FIT = 0.125, 3
 """Step between times that are weighed, in lengths of a window, and steps of the fit for each."""
-TIME_NEAR, TIME_FINE_S = 10.0, 0.2
-"""Fall of the logarithm of the evidence up to which times are weighed in fine steps, and these [s]: the forces' own."""
+TIME_FINE_S = 0.2
+"""Fine step between times that are compared [s]: that of the forces."""
 SHOWN_RIVALS = 3
 
 
-def force_claims(problem: EstimationProblem, stands: Elimination, scene: Measurements) -> list[Claim]:
+def force_claims(problem: EstimationProblem, stands: Elimination, measurements: Measurements) -> list[Claim]:
     """Return the findings of forces with their figures, that which removes most of the error first.
 
     Parameters
@@ -51,18 +49,19 @@ def force_claims(problem: EstimationProblem, stands: Elimination, scene: Measure
         With the noise that the selection leaves.
     stands
         What is left of the selection.
-    scene
-        The log's scene at its full rate.
+    measurements
+        The log's measurements at its full rate.
     """
     removed = removed_shares(problem, stands)
     claims = [
-        _force_claim(problem, stands, scene, i, removed.get(one.key, {})) for i, one in enumerate(stands.fit.candidates)
+        _force_claim(problem, stands, measurements, i, removed.get(one.key, {}))
+        for i, one in enumerate(stands.fit.candidates)
     ]
     return sorted(claims, key=lambda one: -sum(one.finding.improvement.values()))
 
 
 def _force_claim(
-    problem: EstimationProblem, stands: Elimination, scene: Measurements, i: int, removed: Mapping[str, float]
+    problem: EstimationProblem, stands: Elimination, measurements: Measurements, i: int, removed: Mapping[str, float]
 ) -> Claim:
     kept, standing = stands.fit, stands.standings[i]
     candidate, values = kept.candidates[i], kept.values[i]
@@ -79,7 +78,7 @@ def _force_claim(
         candidates=tuple(kept.candidates[j] for j in others),
         values=tuple(kept.values[j] for j in others),
     )
-    place = locate(problem, bare, kept, scene)
+    place = locate(problem, bare, kept, measurements)
     estimates = _estimates(problem, candidate, kept, i)
     by_name = dict(zip((p.name for p in candidate.parameters), values.tolist(), strict=True))
     told = {name: value for name, value in by_name.items() if name in estimates}
@@ -125,7 +124,7 @@ def _figures(
         removed=removed,
         lasts_s=lasts_s(problem, candidate) if candidate.times else inf,
         block_s=block_s(problem.windows),
-        once=candidate.effect.once(problem.plain.scene, values),
+        once=candidate.effect.once(problem.plain.measurements, values),
         passes=passes,
         **shown,
     )
@@ -155,7 +154,7 @@ def removed_shares(problem: EstimationProblem, stands: Elimination) -> dict[tupl
 def _estimates(problem: EstimationProblem, candidate: Candidate, kept: Fit, index: int) -> dict[str, Estimate]:
     error = kept.reported_errors(index)
     estimates = {}
-    untold = candidate.effect.untold(problem.plain.scene, kept.values[index])
+    untold = candidate.effect.untold(problem.plain.measurements, kept.values[index])
     followed = intervals(problem, kept, index) if candidate.effect.ridge and not candidate.times else {}
     for parameter, value, spread in zip(candidate.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
         low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
@@ -190,7 +189,7 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
     """
     candidate = kept.candidates[index]
     times = problem.windows.middle_s
-    step = TIME_STEP * len(problem.windows.weight) * problem.windows.scene.step_s
+    step = TIME_STEP * len(problem.windows.weight) * problem.windows.measurements.step_s
 
     begin = starting_point(problem, kept)
 
@@ -207,12 +206,12 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
         time = here + side * step
         while first < time < last:
             tried[time] = evidence_at(time)
-            if tried[time] < max(tried.values()) - TIME_DROP:
+            if tried[time] < max(tried.values()) - JUDGING.time_drop:
                 break
             time += side * step
     # About the likeliest it changes within a step.
     top = max(tried.values())
-    for time in [time for time, evidence in tried.items() if evidence > top - TIME_NEAR]:
+    for time in [time for time, evidence in tried.items() if evidence > top - JUDGING.fine_time_drop]:
         for near_by in (
             time + TIME_FINE_S * np.arange(-round(step / TIME_FINE_S), round(step / TIME_FINE_S) + 1)
         ).tolist():
@@ -227,11 +226,11 @@ def _time(problem: EstimationProblem, kept: Fit, index: int, end: str) -> Estima
     shares = np.concatenate([[0.0], np.cumsum(weights) / weights.sum()])
     low, middle, high = np.interp([0.025, 0.5, 0.975], shares, edges).tolist()
     # Forces have a value a row: within one, nothing is known of when they change.
-    row_s = problem.windows.scene.step_s
+    row_s = problem.windows.measurements.step_s
     return Estimate(middle, max(low - row_s, 0.0), high + row_s, "s")
 
 
 def _intervals(problem: EstimationProblem, estimates: Mapping[str, Estimate]) -> tuple[tuple[float, float], ...]:
-    t = problem.windows.scene.t
+    t = problem.windows.measurements.t
     begun, ended = _value(estimates, "onset"), _value(estimates, "offset")
     return ((max(begun or 0.0, float(t[0])), float(t[-1]) if ended is None else min(ended, float(t[-1]))),)

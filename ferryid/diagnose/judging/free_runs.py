@@ -41,10 +41,10 @@ class FreeRuns:
 
 
 def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], after: Sequence[Fit]) -> FreeRuns:
-    """Integrate the pictures of two hypotheses from many starts in held-out blocks and compare them with the log.
+    """Integrate the force models of two hypotheses from many starts in held-out blocks and compare them with the log.
 
-    From its start a run knows the forces that the picture holds to act along the measured path, and integrates hull, load and
-    flow from there with Heun's rule; a run stays in its block. Both hypotheses start alike, from the smoothed velocity.
+    A run is given the forces that act along the measured path by the force model, and integrates hull, load and flow with
+    Heun's rule from its start; it stays in its block. Both hypotheses start alike, from the smoothed velocity.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], a
     before, after
         Fits for every fold.
     """
-    windows, scene = problem.windows, problem.windows.scene
-    width_s = len(windows.weight) * scene.step_s
+    windows, measurements = problem.windows, problem.windows.measurements
+    width_s = len(windows.weight) * measurements.step_s
     horizons = width_s * np.array([0.5, 1.0, 2.0, 4.0])
-    stride = max(1, round(width_s / 40.0 / scene.step_s))
-    steps = np.maximum(1, np.round(horizons / scene.step_s / stride).astype(int))
+    stride = max(1, round(width_s / 40.0 / measurements.step_s))
+    steps = np.maximum(1, np.round(horizons / measurements.step_s / stride).astype(int))
     starts, last, block = _starts(windows, folds, stride * int(steps[0]))
-    horizons = steps * stride * scene.step_s
+    horizons = steps * stride * measurements.step_s
     errors = np.full((2, len(starts), len(steps), 4), np.nan)
     for k in range(INFERENCE.folds):
         own = np.flatnonzero(block % INFERENCE.folds == k)
@@ -70,7 +70,7 @@ def free_runs(problem: EstimationProblem, folds: Folds, before: Sequence[Fit], a
             for h, count in enumerate(steps):
                 rows = starts[own] + stride * int(count)
                 inside = rows <= last[own]
-                errors[which, own[inside], h] = _error(scene, rows[inside], path[int(count), inside])
+                errors[which, own[inside], h] = _error(measurements, rows[inside], path[int(count), inside])
     # A run that left the numbers behind counts for neither.
     bad = ~np.isfinite(errors[:, :, :, 1:]).all(axis=(0, 3))
     errors[:, bad] = np.nan
@@ -91,48 +91,50 @@ def _starts(windows: Windows, folds: Folds, shortest: int) -> tuple[Ints, Ints, 
     return np.array(starts, dtype=np.int64), np.array(last, dtype=np.int64), np.array(block, dtype=np.int64)
 
 
-def _run(picture: ForceModel, starts: Ints, stride: int, steps: int) -> Floats:
+def _run(force_model: ForceModel, starts: Ints, stride: int, steps: int) -> Floats:
     """Return states of all runs, shape (steps + 1, starts, 6)."""
-    scene = picture.scene
-    end, dt = len(scene.t) - 1, stride * scene.step_s
-    state = np.hstack([np.nan_to_num(scene.eta[starts]), scene.nu[starts]])
+    measurements = force_model.measurements
+    end, dt = len(measurements.t) - 1, stride * measurements.step_s
+    state = np.hstack([np.nan_to_num(measurements.eta[starts]), measurements.nu[starts]])
     path = np.empty((steps + 1, len(starts), 6))
     path[0] = state
-    rate = _rates(picture, np.minimum(starts, end), state)
+    rate = _rates(force_model, np.minimum(starts, end), state)
     for k in range(steps):
         following = np.minimum(starts + (k + 1) * stride, end)
-        after = _rates(picture, following, state + dt * rate)
+        after = _rates(force_model, following, state + dt * rate)
         state = state + 0.5 * dt * (rate + after)
         # What diverges is stopped, and left out where errors are judged.
         state = np.where(np.abs(state) < 1e6, state, np.nan)
         path[k + 1] = state
-        rate = _rates(picture, following, state)
+        rate = _rates(force_model, following, state)
     return path
 
 
-def _rates(picture: ForceModel, rows: Ints, state: Floats) -> Floats:
+def _rates(force_model: ForceModel, rows: Ints, state: Floats) -> Floats:
     """Return the derivative of states, shape (s, 6), with the forces of some rows."""
     nu, psi = state[:, 3:], state[:, 2]
-    now: Measurements = replace(picture.scene, t=picture.scene.t[rows], eta=state[:, :3], nu=nu, nu_raw=nu)
+    now: Measurements = replace(
+        force_model.measurements, t=force_model.measurements.t[rows], eta=state[:, :3], nu=nu, nu_raw=nu
+    )
     at = replace(
-        picture,
-        scene=now,
-        parts=picture.parts[rows],
-        external=picture.external[rows],
-        flow=None if picture.flow is None else picture.flow[rows],
-        load=None if picture.load is None else picture.load[rows],
-        damping_factor=None if picture.damping_factor is None else picture.damping_factor[rows],
+        force_model,
+        measurements=now,
+        parts=force_model.parts[rows],
+        external=force_model.external[rows],
+        flow=None if force_model.flow is None else force_model.flow[rows],
+        load=None if force_model.load is None else force_model.load[rows],
+        damping_factor=None if force_model.damping_factor is None else force_model.damping_factor[rows],
     )
     c, s = np.cos(psi), np.sin(psi)
     velocity = np.column_stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1], nu[:, 2]])
     return np.hstack([velocity, acceleration(at)])
 
 
-def _error(scene: Measurements, rows: Ints, state: Floats) -> Floats:
+def _error(measurements: Measurements, rows: Ints, state: Floats) -> Floats:
     """Return errors of position, heading, speed and yaw rate, shape (s, 4)."""
-    away = state[:, :2] - scene.eta[rows, :2]
-    turned = np.abs(state[:, 2] - scene.psi[rows])
-    slip = state[:, 3:] - scene.nu[rows]
+    away = state[:, :2] - measurements.eta[rows, :2]
+    turned = np.abs(state[:, 2] - measurements.psi[rows])
+    slip = state[:, 3:] - measurements.nu[rows]
     return np.column_stack(
         [np.hypot(away[:, 0], away[:, 1]), turned, np.hypot(slip[:, 0], slip[:, 1]), np.abs(slip[:, 2])]
     )

@@ -5,7 +5,7 @@ windows of the other folds that stay a purge gap away, and judged on the windows
 a fit that has not seen it. Which effects were chosen, and when they begin, is known from the whole log.
 
 Errors are judged in the weak form: ``M (a_picture - a_measured)`` averaged over a window, with the velocities' first derivative
-moved onto the window's weight and the mass matrix of the plain picture, before and after alike. That is a force along the
+moved onto the window's weight and the mass matrix of the plain force model, before and after alike. That is a force along the
 vessel's axes, in N and N·m; no noisy signal was differentiated for it, and a refitted mass cannot shrink its own error. Where
 positions were fitted, it is judged by velocities that the fit has not seen at all.
 """
@@ -71,7 +71,7 @@ class Improvement:
         Mean squares by axis, shape (3,) [N², N², N²m²].
     removed, low, high
         Fraction of the mean square that was removed, with its 95 % block-bootstrap interval, shape (3,).
-    score, score_low, score_high
+    score, score_low
         Gain in log-likelihood of all channels under the noise of the better fit, with the same interval; positive where the
         second hypothesis predicts better.
     """
@@ -85,7 +85,6 @@ class Improvement:
     high: Floats
     score: float
     score_low: float
-    score_high: float
 
 
 @dataclass(frozen=True)
@@ -189,9 +188,9 @@ def held_out(
     fits = over(made_of, folds.training)
     for k, made in enumerate(fits):
         own = folds.fold == k
-        judged, picture = subset(problem.windows, own), fitted_force_model(problem.plain, made)
-        gaps[own] = judged.gap(picture)
-        errors[own] = force_errors(judged, picture, problem.plain)
+        judged, force_model = subset(problem.windows, own), fitted_force_model(problem.plain, made)
+        gaps[own] = judged.gap(force_model)
+        errors[own] = force_errors(judged, force_model, problem.plain)
     return HeldOut(gaps, errors, tuple(fits))
 
 
@@ -203,7 +202,7 @@ def compare_held_out(problem: EstimationProblem, folds: Folds, before: HeldOut, 
     drawn = 1.0 - (picks @ sums[1]) / (picks @ sums[0])
     low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
     gains = _gains(problem, folds, before.gaps, after.gaps)
-    score_low, score_high = np.quantile(picks @ gains, [0.025, 0.975])
+    score_low = np.quantile(picks @ gains, 0.025)
     return Improvement(
         before.errors,
         after.errors,
@@ -214,7 +213,6 @@ def compare_held_out(problem: EstimationProblem, folds: Folds, before: HeldOut, 
         high,
         float(gains.sum()),
         float(score_low),
-        float(score_high),
     )
 
 
@@ -225,13 +223,13 @@ def placebos(problem: EstimationProblem, candidate: Candidate, values: Floats) -
     on the heading at all. Each has the parameters of the candidate, to be fitted like it; but what is fitted beside an effect
     and never reported, by how much its formula is off, stays as it was found: a placebo is the same force, elsewhere.
     """
-    untold = candidate.effect.untold(problem.plain.scene, values)
+    untold = candidate.effect.untold(problem.plain.measurements, values)
     parameters = tuple(
         replace(one, size=HELD, neutral=value, start=value) if one.name in untold else one
         for one, value in zip(candidate.parameters, values.tolist(), strict=True)
     )
     candidate = replace(candidate, parameters=parameters)
-    seconds = float(problem.windows.scene.t[-1] - problem.windows.scene.t[0])
+    seconds = float(problem.windows.measurements.t[-1] - problem.windows.measurements.t[0])
     made = {f"{share * seconds:.0f} s late": _shifted(candidate, share) for share in JUDGING.placebo_shifts}
     mirrored = _mirrored(candidate)
     true = candidate.act(problem.plain, values)
@@ -323,25 +321,25 @@ def _gains(problem: EstimationProblem, folds: Folds, before: Floats, after: Floa
 
 
 def _shifted(candidate: Candidate, share: float) -> Candidate:
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        force = _force_of(candidate, picture, p)
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        force = _force_of(candidate, force_model, p)
         late = np.roll(force, round(share * len(force)), axis=0)
-        return replace(picture, external=picture.external + late)
+        return replace(force_model, external=force_model.external + late)
 
     return replace(candidate, effect=replace(candidate.effect, apply=apply), onset_s=0.0, offset_s=inf)
 
 
 def _mirrored(candidate: Candidate) -> Candidate:
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        scene = picture.scene
-        eta = np.column_stack([scene.eta[:, :2], -scene.psi])
-        force = _force_of(candidate, replace(picture, scene=replace(scene, eta=eta)), p)
-        return replace(picture, external=picture.external + force)
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        measurements = force_model.measurements
+        eta = np.column_stack([measurements.eta[:, :2], -measurements.psi])
+        force = _force_of(candidate, replace(force_model, measurements=replace(measurements, eta=eta)), p)
+        return replace(force_model, external=force_model.external + force)
 
     return replace(candidate, effect=replace(candidate.effect, apply=apply), onset_s=0.0, offset_s=inf)
 
 
-def _force_of(candidate: Candidate, picture: ForceModel, p: Floats) -> Floats:
+def _force_of(candidate: Candidate, force_model: ForceModel, p: Floats) -> Floats:
     """Return what an effect changes, as a force [N, N, N·m], shape (n, 3)."""
-    more = as_measured(candidate.act(picture, p)) - as_measured(picture)
-    return np.asarray(more @ mass_of(picture.hull).T)
+    more = as_measured(candidate.act(force_model, p)) - as_measured(force_model)
+    return np.asarray(more @ mass_of(force_model.hull).T)

@@ -16,7 +16,7 @@ from ferryid.types import Floats
 
 
 def compare_hidden_signals(
-    hidden: Mapping[str, Floats], scene: Measurements, findings: Sequence[Finding]
+    hidden: Mapping[str, Floats], measurements: Measurements, findings: Sequence[Finding]
 ) -> tuple[Withheld, ...]:
     """Return every hidden signal beside the finding of the same name.
 
@@ -24,19 +24,19 @@ def compare_hidden_signals(
     ----------
     hidden
         By signal, two columns: north and east [m/s], of a payload mass [kg] and place [m], shape (n, 2).
-    scene
+    measurements
         What was measured otherwise.
     findings
         Of the log.
     """
-    return tuple(_beside(signal, values, scene, findings) for signal, values in hidden.items())
+    return tuple(_beside(signal, values, measurements, findings) for signal, values in hidden.items())
 
 
-def _beside(signal: str, values: Floats, scene: Measurements, findings: Sequence[Finding]) -> Withheld:
+def _beside(signal: str, values: Floats, measurements: Measurements, findings: Sequence[Finding]) -> Withheld:
     # A signal has the name of the effect that it measures.
     finding = next((one for one in findings if one.effect == signal), None)
-    t = scene.t[: len(values)]
-    rows = scene.usable[: len(values)] & np.isfinite(values).all(axis=1)
+    t = measurements.t[: len(values)]
+    rows = measurements.usable[: len(values)] & np.isfinite(values).all(axis=1)
     measured: dict[str, float] = {}
     if signal == "payload":
         rows, measured = aboard(t, values, rows)
@@ -44,7 +44,7 @@ def _beside(signal: str, values: Floats, scene: Measurements, findings: Sequence
     else:
         names, when = ("north", "east"), "on average"
     measured = {**dict(zip(names, np.mean(values[rows], axis=0).tolist(), strict=True)), **measured}
-    units = {one.name: one.unit for one in effects()[signal].parameters_of(scene.profile)}
+    units = {one.name: one.unit for one in effects()[signal].parameters_of(measurements.profile)}
     found: dict[str, Estimate] = {}
     if finding is not None:
         found = {name: one for name, one in finding.parameters.items() if name in measured}

@@ -62,15 +62,15 @@ def judge(logs: Sequence[SelectedLog], progress: Callable[[str], None]) -> tuple
 def _judged(
     log: SelectedLog, stands: Elimination, laws: CampaignLaws | None, progress: Callable[[str], None]
 ) -> JudgedLog:
-    problem, states, scene = log.search.problem, log.search.states, log.estimated.averaged.screened.scene
+    problem, states, measurements = log.search.problem, log.search.states, log.estimated.averaged.screened.measurements
     base = fit(problem, ())
     progress("looking for what has no name")
-    unknown = find_unexplained(problem, stands.fit, scene, laws)
+    unknown = find_unexplained(problem, stands.fit, measurements, laws)
     progress("locating")
     claims = (
         *sensor_claims(log.estimated.averaged.screened.sensors),
-        *force_claims(problem, stands, scene),
-        *disturbance_claims(problem, stands.fit, states, scene),
+        *force_claims(problem, stands, measurements),
+        *disturbance_claims(problem, stands.fit, states, measurements),
         *unknown.claims,
     )
     baseline = log.estimated.baseline

@@ -61,7 +61,7 @@ class Location:
     regime: str
 
 
-def locate(problem: EstimationProblem, before: Fit, after: Fit, scene: Measurements | None = None) -> Location:
+def locate(problem: EstimationProblem, before: Fit, after: Fit, measurements: Measurements | None = None) -> Location:
     """Return where and when the errors of one hypothesis exceed those of a better one.
 
     Parameters
@@ -70,11 +70,11 @@ def locate(problem: EstimationProblem, before: Fit, after: Fit, scene: Measureme
         The log.
     before, after
         Fits without and with what was found; the same one where nothing was.
-    scene
-        The log's scene at its full rate, for frequencies above those of the trial's windows; the trial's own where None.
+    measurements
+        The log's measurements at its full rate, for frequencies above those of the trial's windows; the trial's own where None.
     """
-    pictures = [fitted_force_model(problem.plain, made) for made in (before, after)]
-    first, second = (force_errors(problem.windows, picture, problem.plain) for picture in pictures)
+    force_models = [fitted_force_model(problem.plain, made) for made in (before, after)]
+    first, second = (force_errors(problem.windows, force_model, problem.plain) for force_model in force_models)
     kept, (white, calm) = whitened((first, second), problem.windows.runs)
     unexplained = before is after
     power_before, power_after = np.mean(white**2, axis=0), np.mean(calm**2, axis=0)
@@ -89,8 +89,8 @@ def locate(problem: EstimationProblem, before: Fit, after: Fit, scene: Measureme
     shares = _shared(np.maximum(uneven, 0.0) if unexplained else excess)
     axes = shares if shares.any() else np.full(3, 1.0 / 3.0)
     strength = (white**2 if unexplained else white**2 - calm**2) @ axes
-    middle, seconds = problem.windows.middle_s, problem.windows.scene.t
-    reach = 0.5 * len(problem.windows.weight) * problem.windows.scene.step_s
+    middle, seconds = problem.windows.middle_s, problem.windows.measurements.t
+    reach = 0.5 * len(problem.windows.weight) * problem.windows.measurements.step_s
     intervals = active_intervals(
         middle[kept], strength, reach, (float(seconds[0]), float(seconds[-1])), steady=unexplained
     )
@@ -106,7 +106,7 @@ def locate(problem: EstimationProblem, before: Fit, after: Fit, scene: Measureme
         onset,
         offset,
         profiles,
-        bands_of(problem, pictures, scene),
+        bands_of(problem, force_models, measurements),
         in_words(profiles, axes),
     )
 

@@ -73,7 +73,7 @@ def update_model(
     start = blank_model(profile, name) if model is None else replace(model, name=name)
     hull, covariance = _hull(logs)
     if model is not None and model.vessel_effects:
-        # The picture that was refitted had these effects in it, which multiply coefficients and come on top again.
+        # The force model that was refitted had these effects in it, which multiply coefficients and come on top again.
         known = ModelForces(model)
         factor = np.divide(known.altered_hull(), known.hull, out=np.ones_like(hull), where=known.hull != 0.0)
         hull, covariance = hull / factor, covariance / np.outer(factor, factor)

@@ -101,7 +101,7 @@ def posterior_of(
             )
             # A fault that passed within the log is no property that others have.
             lasts = candidate.effect.vessel and source.offset_s is None
-            untold = candidate.effect.untold(problem.plain.scene, kept.values[i])
+            untold = candidate.effect.untold(problem.plain.measurements, kept.values[i])
             errors = [
                 nan if one.name in untold else error
                 for one, error in zip(candidate.parameters, kept.reported_errors(i).tolist(), strict=True)

@@ -18,10 +18,8 @@ from ferryid.diagnose.inference.estimation import (
 from ferryid.diagnose.inference.onset_estimation import brief
 from ferryid.diagnose.inference.search import FAR
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
-
-NEAREST = 4
-"""Rivals that are fitted to the end."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     rivals = over(instead, [other for other in library if other.key not in taken])
     rivals.sort(key=lambda one: -one.gain)
     # How far behind the others are does not matter to the digit.
-    rivals[:NEAREST] = over(settled_in, rivals[:NEAREST])
+    rivals[: JUDGING.fitted_rivals] = over(settled_in, rivals[: JUDGING.fitted_rivals])
     rivals.sort(key=lambda one: -one.gain)
     against = none + sum(exp(min(one.gain, 50.0)) for one in rivals)
     return RivalComparison(tuple(rivals), 1.0 / (1.0 + against))

@@ -28,9 +28,6 @@ from ferryid.effects.effect import Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Flags, Floats, Ints
 
-FLIPS, SHIFTS = 100, 31
-"""Placebos of either kind."""
-
 
 @dataclass(frozen=True)
 class Law:
@@ -100,7 +97,7 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
         What an effect moves the gaps by, shape (J, c): no term that says the same, as a share of a thruster's force says what a
         weak thruster does. Any will do where None.
     """
-    terms = list(terms_of(problem.plain.scene))
+    terms = list(terms_of(problem.plain.measurements))
     if unlike is not None:
         terms = _unlike(problem, kept, terms, unlike)
     chosen: list[Term] = []
@@ -157,11 +154,11 @@ def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) 
 
     A coefficient's usual size gives a force as large as the thrusters' is in the root mean square, on the axis of the term.
     """
-    picture = fitted_force_model(problem.plain, kept)
-    thrust = np.sqrt(np.mean(picture.parts.sum(axis=1) ** 2, axis=0))
+    force_model = fitted_force_model(problem.plain, kept)
+    thrust = np.sqrt(np.mean(force_model.parts.sum(axis=1) ** 2, axis=0))
     parameters = []
     for term in terms:
-        size = np.sqrt(np.mean(term.force(picture) ** 2, axis=0))
+        size = np.sqrt(np.mean(term.force(force_model) ** 2, axis=0))
         axis = int(np.argmax(size / np.maximum(thrust, 1e-9)))
         usual = float(max(thrust[axis], 1e-9) / max(size[axis], 1e-9))
         parameters.append(
@@ -169,11 +166,11 @@ def law_candidate(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) 
         )
     made = tuple(parameters)
 
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        external = picture.external.copy()
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        external = force_model.external.copy()
         for coefficient, term in zip(p.tolist(), terms, strict=True):
-            external += coefficient * term.force(picture)
-        return replace(picture, external=external)
+            external += coefficient * term.force(force_model)
+        return replace(force_model, external=external)
 
     effect = Effect(
         "unknown",
@@ -222,7 +219,7 @@ def _best(
     gained = _gains(tried, known, lines.centre, columns, parts)
     best = int(np.argmax(gained[:, 0]))
     most = gained.max(axis=0)
-    flipped, late = most[1 : 1 + FLIPS], most[1 + FLIPS :]
+    flipped, late = np.split(most[1:], [JUDGING.law_sign_placebos])
     chance = (
         float(np.median(flipped)) if plain else float(max(np.quantile(flipped, JUDGING.law_beats), np.median(late)))
     )
@@ -232,11 +229,15 @@ def _best(
 def linearise_terms(problem: EstimationProblem, made: Fit, terms: Sequence[Term]) -> LinearTerms:
     """Return a fit's gaps and what they change by with hull, effects and the coefficients of terms."""
     seen = problem.windows
-    picture = fitted_force_model(problem.plain, made)
-    base = seen.gap(picture)
+    force_model = fitted_force_model(problem.plain, made)
+    base = seen.gap(force_model)
     known, centre = nuisance_columns(problem, made)
     pushes = np.stack(
-        [seen.gap(replace(picture, external=picture.external + term.force(picture))) - base for term in terms], axis=-1
+        [
+            seen.gap(replace(force_model, external=force_model.external + term.force(force_model))) - base
+            for term in terms
+        ],
+        axis=-1,
     )
     sizes = np.maximum(np.sqrt(np.mean(pushes**2, axis=(0, 1))), 1e-12)
     return LinearTerms(base, known, centre, pushes / sizes, sizes)
@@ -283,14 +284,16 @@ def _noise_of_the_rest(problem: EstimationProblem, lines: LinearTerms) -> Autore
 
 
 def _placebos(left: Floats, block: Ints, rng: np.random.Generator) -> Floats:
-    """Return what is left; with signs drawn anew for every block; and late by parts of the log: shape (w, 1 + FLIPS + SHIFTS).
+    """Return what is left; with signs drawn anew for every block; and late by parts of the log: shape (w, 1 + placebos).
 
     Shifts cannot tell what is the same at all times or comes round again; signs can.
     """
     made = [left]
-    for _ in range(FLIPS):
+    for _ in range(JUDGING.law_sign_placebos):
         made.append(left * rng.choice([-1.0, 1.0], int(block.max()) + 1)[block][:, None])
-    made += [np.roll(left, round(share * len(left)), axis=0) for share in np.linspace(0.1, 0.9, SHIFTS)]
+    made += [
+        np.roll(left, round(share * len(left)), axis=0) for share in np.linspace(0.1, 0.9, JUDGING.law_shift_placebos)
+    ]
     return np.stack([one.reshape(-1) for one in made], axis=-1)
 
 

@@ -20,6 +20,18 @@ class JudgingThresholds:
         "rivals whose log evidence is less than this behind are unresolved",
         "convention: a Bayes factor of 20, strong evidence in the scale of Kass and Raftery (1995)",
     )
+    fitted_rivals: int = threshold(
+        4,
+        "rivals",
+        "best rivals of a finding that are fitted to convergence",
+        "convention: bounds the time of a search",
+    )
+    most_replacements: int = threshold(
+        6,
+        "replacements",
+        "most candidates that a rival replaces in backward elimination",
+        "convention: physics that has no name may be explained by one candidate after the other",
+    )
     missing_share: float = threshold(
         0.6,
         "-",
@@ -76,6 +88,24 @@ class JudgingThresholds:
     )
     law_errors: float = threshold(
         3.0, "standard errors", "by which a law's coefficient must differ from zero", "convention: 99.7 % confidence"
+    )
+    law_sign_placebos: int = threshold(
+        100,
+        "placebos",
+        "with random signs, one a block, against which a term is compared",
+        "derived: the least number with a quantile of `law_beats`",
+    )
+    law_shift_placebos: int = threshold(
+        31,
+        "placebos",
+        "delayed by shares of the log, whose median a term must exceed",
+        "convention: enough for a median",
+    )
+    law_refits: int = threshold(
+        2,
+        "fits",
+        "of every log of a campaign beside a law, each with the coefficients of the one before",
+        "convention: a hull that stood in for the law has other masses at first",
     )
     law_terms: int = threshold(3, "terms", "most terms of a law", "convention: a law that can be read and checked")
     law_limit: float = threshold(
@@ -189,6 +219,18 @@ class JudgingThresholds:
         "-",
         "posterior over prior standard deviation of some combination of coefficients below which an axis is excited",
         "convention: the log has three times the information of the prior",
+    )
+    time_drop: float = threshold(
+        50.0,
+        "nat",
+        "fall of the log evidence beyond which the search for an onset or end stops",
+        "convention: smaller dips may lie between two maxima",
+    )
+    fine_time_drop: float = threshold(
+        10.0,
+        "nat",
+        "fall of the log evidence within which onset and end are searched in the steps of the forces",
+        "convention: times farther down have about one per cent of the largest density, by the posterior factor",
     )
     bin_windows: int = threshold(
         4, "windows", "least windows in a bin of an error profile", "convention: fewer have no scatter to judge by"

@@ -54,7 +54,7 @@ class Unexplained:
 
 
 def find_unexplained(
-    problem: EstimationProblem, kept: Fit, scene: Measurements, laws: CampaignLaws | None = None
+    problem: EstimationProblem, kept: Fit, measurements: Measurements, laws: CampaignLaws | None = None
 ) -> Unexplained:
     """Return what is left of a log beside what was named.
 
@@ -64,8 +64,8 @@ def find_unexplained(
         With the noise that the named effects leave.
     kept
         Hull and named effects.
-    scene
-        The log's scene at its full rate.
+    measurements
+        The log's measurements at its full rate.
     laws
         What the vessel's other logs say; None where there are none.
     """
@@ -73,18 +73,18 @@ def find_unexplained(
     folds = folds_of(problem.windows)
     after, seen = kept, problem
     if folds is not None and laws is not None and (common := laws.common(problem, kept, folds)) is not None:
-        shared = _lawful(common, after, scene, f"that holds in all {counted(laws.able, 'log')} that can show it")
+        shared = _lawful(common, after, measurements, f"that holds in all {counted(laws.able, 'log')} that can show it")
         claims.append(Claim(shared, Figures("law")))
         after, seen = common.fit, common.problem
     if folds is not None and (law := select_law(seen, after, folds)) is not None:
-        own = _lawful(law, after, scene, "that was seen in this log only")
+        own = _lawful(law, after, measurements, "that was seen in this log only")
         claims.append(Claim(own, Figures("law", other_logs=None if laws is None else OtherLogs(*laws.of_others(law)))))
         after, seen = law.fit, law.problem
-    left = locate(seen, after, after, scene)
-    # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the picture.
+    left = locate(seen, after, after, measurements)
+    # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the force model.
     known = bool(problem.filter.processes)
     uneven = bool(left.profiles) and left.profiles[0].statistic >= JUDGING.regime_errors
-    burst = bursts_of(seen, fitted_force_model(seen.plain, after), scene)
+    burst = bursts_of(seen, fitted_force_model(seen.plain, after), measurements)
     if burst is not None and burst.deviations >= JUDGING.burst_deviations:
         uneven = True
         if not known:
@@ -130,19 +130,19 @@ def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) 
     return better and with_both - with_law < INFERENCE.prior_odds
 
 
-def _lawful(law: Law, kept: Fit, scene: Measurements, whose: str) -> Finding:
+def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str) -> Finding:
     problem = law.problem
     # The hull stays as it is with the law: refitted without, it would bend to it on axes where it does not act.
     before = replace(law.fit, candidates=law.fit.candidates[:-1], values=law.fit.values[:-1])
-    place = locate(problem, before, law.fit, scene)
-    picture = fitted_force_model(problem.plain, before)
+    place = locate(problem, before, law.fit, measurements)
+    force_model = fitted_force_model(problem.plain, before)
     terms = [
-        _told(term, picture, problem, float(value), float(error))
+        _told(term, force_model, problem, float(value), float(error))
         for term, value, error in zip(law.terms, law.values, law.errors, strict=True)
     ]
     first = law.terms[0]
     size = "" if first.name == "1" else f"{first.name} [{first.unit}]" if first.unit else first.name
-    regressor = (size, first.value(picture)) if size else None
+    regressor = (size, first.value(force_model)) if size else None
     parts = [one.says for one in terms]
     told = "; ".join(parts)
     return Finding(
@@ -151,7 +151,7 @@ def _lawful(law: Law, kept: Fit, scene: Measurements, whose: str) -> Finding:
         probability=1.0 - exp(-min(law.gain - max(law.chance, 0.0), 700.0)),
         parameters={},
         axes=dict(zip(AXES, place.shares.tolist(), strict=True)),
-        intervals=((float(problem.windows.scene.t[0]), float(problem.windows.scene.t[-1])),),
+        intervals=((float(problem.windows.measurements.t[0]), float(problem.windows.measurements.t[-1])),),
         onset_s=None,
         regime=place.regime,
         improvement=dict(zip(AXES, law.held_out.removed.tolist(), strict=True)),
@@ -166,9 +166,9 @@ def _lawful(law: Law, kept: Fit, scene: Measurements, whose: str) -> Finding:
     )
 
 
-def _told(term: Term, picture: ForceModel, problem: EstimationProblem, value: float, error: float) -> LawTerm:
+def _told(term: Term, force_model: ForceModel, problem: EstimationProblem, value: float, error: float) -> LawTerm:
     """Return a term as people read it: its force where its quantity is as large as it usually gets."""
-    quantity = term.value(picture)[problem.windows.scene.usable]
+    quantity = term.value(force_model)[problem.windows.measurements.usable]
     at = 1.0 if term.name == "1" else float(f"{np.quantile(np.abs(quantity), JUDGING.usual_quantile):.1g}")
     low, high = value - 1.96 * error, value + 1.96 * error
     share = not term.force_unit

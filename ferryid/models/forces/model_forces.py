@@ -1,4 +1,4 @@
-"""A model as a picture of the forces: its hull, what else it knows of them, and the effects that a diagnosis put into it."""
+"""A stored model as a force model: hull, other forces, and the effects that a diagnosis put into it."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from ferryid.vessel import parse_profile
 
 @dataclass(frozen=True)
 class ActingEffects:
-    """A picture with a model's effects in it, those that act, and those that do not with the reason."""
+    """A force model with a model's effects in it, those that act, and those that do not with the reason."""
 
-    picture: ForceModel
+    force_model: ForceModel
     acting: tuple[StoredEffect, ...]
     idle: tuple[tuple[StoredEffect, str], ...]
 
 
 @dataclass(frozen=True)
 class ModelForces:
-    """A model, ready to be imagined in scenes.
+    """A model, ready to be applied to measurements.
 
     Raises
     ------
@@ -73,52 +73,52 @@ class ModelForces:
             variance = np.nan_to_num(((ends[:, 1] - ends[:, 0]) / 3.92) ** 2)
         return variance
 
-    def plain(self, scene: Measurements) -> ForceModel:
-        """Return the picture of a scene without effects.
+    def plain(self, measurements: Measurements) -> ForceModel:
+        """Return the force model of measurements without effects.
 
         The model's coefficients of acceleration and damping become the hull's; all the rest of it, such as its own Coriolis
-        terms, wind terms and intercept, is an external force, so that the picture's force at the measured motion is the
+        terms, wind terms and intercept, is an external force, so that the force model's force at the measured motion is the
         model's. The air is still where no wind was measured and the model does not say otherwise.
         """
-        bare = hull_force_model(scene, self.hull)
+        bare = hull_force_model(measurements, self.hull)
         functions = self.force.basis
-        still = np.zeros((len(scene.t), 2))
-        wind, current = scene.wind, scene.current
+        still = np.zeros((len(measurements.t), 2))
+        wind, current = measurements.wind, measurements.current
         if wind is None and (functions is None or functions.needs_wind):
             wind = still
         if current is None and functions is not None and functions.needs_current:
             current = still
-        at_rest = np.zeros_like(scene.nu)
-        needed = self.force(at_rest, scene.nu, scene.psi, wind, current)
-        # What the picture's own hull needs for the same motion.
+        at_rest = np.zeros_like(measurements.nu)
+        needed = self.force(at_rest, measurements.nu, measurements.psi, wind, current)
+        # What the force model's own hull needs for the same motion.
         alone = required_force(replace(bare, load=None), at_rest)
         return replace(bare, external=alone - needed)
 
-    def altered(self, picture: ForceModel, sha256: str, *, righted: bool = False) -> ActingEffects:
-        """Return the plain picture of a log with the conditions of that log and the properties of the vessel in it.
+    def altered(self, force_model: ForceModel, sha256: str, *, righted: bool = False) -> ActingEffects:
+        """Return the plain force model of a log with the conditions of that log and the properties of the vessel in it.
 
-        A condition that the log itself measures is not put into it again. With `righted`, the picture's scene comes from
-        `righted` already, and errors of the sensors are left out.
+        A condition that the log itself measures is not put into it again. With `righted`, the measurements come from `righted`
+        already, and errors of the sensors are left out.
         """
         acting, idle = [], []
         for stored in self._effects(sha256):
-            reason = effects()[stored.effect].cannot(picture.scene)
+            reason = effects()[stored.effect].cannot(force_model.measurements)
             if reason:
                 idle.append((stored, reason))
                 continue
-            after = stored.act(picture, sha256)
-            if not righted or after.scene is picture.scene:
-                picture = after
+            after = stored.act(force_model, sha256)
+            if not righted or after.measurements is force_model.measurements:
+                force_model = after
             acting.append(stored)
-        return ActingEffects(picture, tuple(acting), tuple(idle))
+        return ActingEffects(force_model, tuple(acting), tuple(idle))
 
-    def righted(self, scene: Measurements, sha256: str) -> Measurements:
-        """Return the scene as sensors without the errors that the model knows would have measured it."""
-        picture = hull_force_model(scene, self.hull)
+    def righted(self, measurements: Measurements, sha256: str) -> Measurements:
+        """Return the measurements as sensors without the errors that the model knows would have measured it."""
+        force_model = hull_force_model(measurements, self.hull)
         for stored in self._effects(sha256):
-            if not effects()[stored.effect].cannot(scene):
-                picture = replace(picture, scene=stored.act(picture, sha256).scene)
-        return picture.scene
+            if not effects()[stored.effect].cannot(measurements):
+                force_model = replace(force_model, measurements=stored.act(force_model, sha256).measurements)
+        return force_model.measurements
 
     def _effects(self, sha256: str) -> tuple[StoredEffect, ...]:
         every = (*self.model.conditions_of(sha256), *self.model.vessel_effects)
@@ -129,7 +129,7 @@ class ModelForces:
         profile = self.force.profile
         k, rows = len(profile.actuators), 2
         rest = np.zeros((rows, 3))
-        scene = Measurements(
+        measurements = Measurements(
             profile=profile,
             t=np.arange(float(rows)),
             eta=rest,
@@ -139,10 +139,10 @@ class ModelForces:
             angles=np.zeros((rows, k)),
             usable=np.ones(rows, dtype=bool),
         )
-        picture = hull_force_model(scene, self.hull)
+        force_model = hull_force_model(measurements, self.hull)
         for stored in self.model.vessel_effects:
-            picture = stored.act(picture, "")
-        return picture.hull
+            force_model = stored.act(force_model, "")
+        return force_model.hull
 
 
 def acting_estimator(model: Model) -> Estimator:
@@ -165,7 +165,7 @@ def force_law(known: ModelForces, hull: Floats) -> ForceLaw:
         nu_dot: Floats, nu: Floats, psi: Floats, wind: Floats | None, current: Floats | None, held: Floats | None = None
     ) -> Floats:
         n = len(nu)
-        scene = Measurements(
+        measurements = Measurements(
             profile=profile,
             t=np.zeros(n),
             eta=np.column_stack([np.zeros((n, 2)), psi]),
@@ -177,9 +177,9 @@ def force_law(known: ModelForces, hull: Floats) -> ForceLaw:
             wind=wind,
             current=current,
         )
-        picture = replace(known.plain(scene), hull=hull)
+        force_model = replace(known.plain(measurements), hull=hull)
         if held is not None:
-            picture = replace(picture, load=held[:, :5], damping_factor=held[:, 5])
-        return required_force(picture, nu_dot)
+            force_model = replace(force_model, load=held[:, :5], damping_factor=held[:, 5])
+        return required_force(force_model, nu_dot)
 
     return force

@@ -113,7 +113,7 @@ def signal_map(model: Model, profile: Profile | None) -> Profile:
 def predict_with_effects(
     model: Model, prepared: Prepared, profile: Profile, *, window_s: float, smoother: str
 ) -> Prediction:
-    """Return what a model expects of a log by way of a picture of the forces; see `predict`.
+    """Return what a model expects of a log by way of a force model; see `predict`.
 
     Of a model without a diagnosis this is what the diagnosis started from: the force of its estimator, and the drag of still
     air where no wind was measured and the model has no terms of its own.
@@ -125,22 +125,25 @@ def predict_with_effects(
             "found none in the log. Fix: map [signals.heading] in the profile, or use a log that has it"
         )
     known, sha256 = ModelForces(model), prepared.recording.sha256
-    scene = measurements_of_motion(track, motion, profile)
-    right = known.righted(scene, sha256)
-    if right is not scene:
+    measurements = measurements_of_motion(track, motion, profile)
+    right = known.righted(measurements, sha256)
+    if right is not measurements:
         slope = central_difference(right.nu, motion.rate_hz)
         motion = replace(motion, eta=right.eta, nu=right.nu, nu_dot=np.where(np.isfinite(motion.nu_dot), slope, np.nan))
     plain = known.plain(right)
     found = known.altered(plain, sha256, righted=True)
-    picture, tau = found.picture, motion.tau
-    if picture.parts is not scene.parts:
+    force_model, tau = found.force_model, motion.tau
+    if force_model.parts is not measurements.parts:
         measured = measure(track, profile)
-        more = picture.parts.sum(axis=1) - scene.parts.sum(axis=1)
+        more = force_model.parts.sum(axis=1) - measurements.parts.sum(axis=1)
         tau = smooth_measured(replace(measured, tau=measured.tau + more), window_s, smoother).tau
     seen = replace(
-        motion, tau=tau + picture.external - plain.external, current=picture.flow, payload=payload_and_damping(picture)
+        motion,
+        tau=tau + force_model.external - plain.external,
+        current=force_model.flow,
+        payload=payload_and_damping(force_model),
     )
-    force = force_law(known, picture.hull)
+    force = force_law(known, force_model.hull)
     needed = force(seen.nu_dot, seen.nu, seen.eta[:, 2], seen.wind, seen.current, seen.payload)
     own = {id(one) for one in model.vessel_effects}
     return Prediction(

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
-Matrix = tuple[Triple, Triple, Triple]
 
 NONE, NSCA, PSEUDO_INVERSE = 0, 1, 2
 

@@ -33,15 +33,15 @@ class Base:
         The log.
     prediction
         What the profile's hull expects of it, in still air where no wind was measured.
-    picture
-        The same as a picture, with the thrusters' forces smoothed as the motion was.
+    force_model
+        The same as a force model, with the thrusters' forces smoothed as the motion was.
     known
         The profile's hull as a model.
     """
 
     prepared: Prepared
     prediction: Prediction
-    picture: ForceModel
+    force_model: ForceModel
     known: ModelForces
 
     @property
@@ -57,26 +57,26 @@ class Base:
     @cached_property
     def rates(self) -> Floats:
         """Acceleration that the base model gives at the measured velocities and thrusts, shape (n, 3)."""
-        return as_measured(self.picture)
+        return as_measured(self.force_model)
 
-    def force_between(self, picture: ForceModel) -> Floats:
-        """Return by how much more force a picture moves the vessel than the base model does [N, N, N·m], shape (n, 3).
+    def force_between(self, force_model: ForceModel) -> Floats:
+        """Return by how much more force a force model moves the vessel than the base model does [N, N, N·m], shape (n, 3).
 
         Both at the measured velocities and thrusts. The measured acceleration plays no part in it: terms that held it beside
         those of the thrusters would add up to what is to be explained, whatever that is.
         """
-        plain = self.picture
-        return np.asarray(required_force(plain, as_measured(picture)) - required_force(plain, self.rates))
+        plain = self.force_model
+        return np.asarray(required_force(plain, as_measured(force_model)) - required_force(plain, self.rates))
 
-    def expected(self, picture: ForceModel) -> Prediction:
-        """Return what a picture expects that has another hull, load, damping or external force than the base model's.
+    def expected(self, force_model: ForceModel) -> Prediction:
+        """Return what a force model expects that has another hull, load, damping or external force than the base model's.
 
         External forces are taken as they were along the measured path, as for a diagnosed model.
         """
         motion, seen = self.prepared.motion, self.prediction.motion
-        more = picture.external - self.picture.external
-        seen = replace(seen, tau=seen.tau + more, payload=payload_and_damping(picture))
-        force = force_law(self.known, picture.hull)
+        more = force_model.external - self.force_model.external
+        seen = replace(seen, tau=seen.tau + more, payload=payload_and_damping(force_model))
+        force = force_law(self.known, force_model.hull)
         needed = force(seen.nu_dot, seen.nu, seen.eta[:, 2], seen.wind, seen.current, seen.payload)
         return Prediction(motion.tau - (seen.tau - needed), seen, force)
 
@@ -98,7 +98,7 @@ def base_of(prepared: Prepared, profile: Profile) -> Base:
     prediction = predict_with_effects(model, prepared, profile, window_s=WINDOW_S, smoother=SMOOTHER)
     assert prepared.track is not None  # or there was no prediction
     known, motion = ModelForces(model), prepared.motion
-    scene = measurements_of_motion(prepared.track, motion, profile)
-    n, k, _ = scene.parts.shape
-    parts = steady_mean(scene.parts.reshape(n, 3 * k), odd_rows(WINDOW_S, motion.rate_hz)).reshape(n, k, 3)
-    return Base(prepared, prediction, known.plain(replace(scene, parts=parts)), known)
+    measurements = measurements_of_motion(prepared.track, motion, profile)
+    n, k, _ = measurements.parts.shape
+    parts = steady_mean(measurements.parts.reshape(n, 3 * k), odd_rows(WINDOW_S, motion.rate_hz)).reshape(n, k, 3)
+    return Base(prepared, prediction, known.plain(replace(measurements, parts=parts)), known)

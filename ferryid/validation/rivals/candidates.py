@@ -1,6 +1,6 @@
 """The library of terms that sparse regression chooses from: what an analyst would write down who knows what may go wrong.
 
-Each candidate is a unit of one piece of physics in a picture, so that its column holds all three axes and it has one
+Each candidate is a unit of one piece of physics in a force model, so that its column holds all three axes and it has one
 coefficient. What comes and goes by chance, as gusts and waves do, has no column and cannot be chosen.
 """
 
@@ -57,7 +57,7 @@ class Candidate:
     effect, instance
         What it would speak for, an effect id and a thruster; an empty id where no physics has its form.
     unit
-        The picture with a unit of it: another hull, load, damping, external force or, to be linearised, any change.
+        The force model with a unit of it: another hull, load, damping, external force or, to be linearised, any change.
     onset_s
         When it sets in [s since the log's start].
     """
@@ -69,10 +69,14 @@ class Candidate:
     onset_s: float = 0.0
 
     def added(self, base: Base) -> ForceModel:
-        """Return the base model's picture with a unit of the term in it, thrusters and measurements as they were."""
-        plain = base.picture
+        """Return the base model's force model with a unit of the term in it, thrusters and measurements as they were."""
+        plain = base.force_model
         after = self.unit(plain)
-        if after.parts is not plain.parts or after.scene is not plain.scene or after.flow is not plain.flow:
+        if (
+            after.parts is not plain.parts
+            or after.measurements is not plain.measurements
+            or after.flow is not plain.flow
+        ):
             after = replace(plain, external=plain.external + base.force_between(after))
         return between(plain, after, self.onset_s) if self.onset_s > 0.0 else after
 
@@ -83,8 +87,8 @@ class Candidate:
 
 def candidates(base: Base) -> tuple[Candidate, ...]:
     """Return the terms for a log; those that it cannot have are left out."""
-    scene = base.picture.scene
-    times = scene.t[base.rows]
+    measurements = base.force_model.measurements
+    times = measurements.t[base.rows]
     later = np.linspace(times[0], times[-1], ONSETS + 2)[1:-1].tolist()
     steady = [*_hull(base), *_effects(base), *_wind(base), *_places(base), *_constants()]
     stepping = [*_load(base), *_world(base), *(one for one in steady if one.effect == "thruster_gain")]
@@ -114,25 +118,25 @@ def distinct_columns(columns: Floats) -> list[int]:
 def _hull(base: Base) -> Iterator[Candidate]:
     """Yield the damping of second order by axis, which fouling multiplies, and the hull's coefficients one by one."""
     fouling = effects()["fouling"]
-    if not fouling.cannot(base.picture.scene):
+    if not fouling.cannot(base.force_model.measurements):
         for j, axis in enumerate(("surge", "sway", "yaw")):
             factors = np.where(np.arange(3) == j, 2.0, 1.0)
             yield Candidate(f"damping of second order in {axis}", fouling.id, None, _applied(fouling, factors, None))
-    known = base.picture.hull
+    known = base.force_model.hull
     for k, name in enumerate(COEFFICIENTS):
         unit = MODERATE * abs(known[k]) if known[k] else 1.0
         yield Candidate(name, "hull_parameters", None, partial(_with_coefficient, k, unit))
 
 
-def _with_coefficient(k: int, unit: float, picture: ForceModel) -> ForceModel:
-    return replace(picture, hull=picture.hull + np.where(np.arange(len(COEFFICIENTS)) == k, unit, 0.0))
+def _with_coefficient(k: int, unit: float, force_model: ForceModel) -> ForceModel:
+    return replace(force_model, hull=force_model.hull + np.where(np.arange(len(COEFFICIENTS)) == k, unit, 0.0))
 
 
 def _load(base: Base) -> Iterator[Candidate]:
     """Yield mass and its moment; the second moment is the hull's own inertia in yaw."""
-    if effects()["payload"].cannot(base.picture.scene):
+    if effects()["payload"].cannot(base.force_model.measurements):
         return
-    mass, place, *_ = (one.size for one in effects()["payload"].parameters_of(base.picture.scene.profile))
+    mass, place, *_ = (one.size for one in effects()["payload"].parameters_of(base.force_model.measurements.profile))
     for label, unit in (
         ("mass aboard", mass * np.array([1.0, 1.0, 0.0, 0.0, 0.0])),
         ("mass aboard times its place", mass * place * np.array([0.0, 0.0, 1.0, 1.0, 0.0])),
@@ -140,31 +144,31 @@ def _load(base: Base) -> Iterator[Candidate]:
         yield Candidate(label, "payload", None, partial(_with_load, unit))
 
 
-def _with_load(unit: Floats, picture: ForceModel) -> ForceModel:
-    more = np.tile(unit, (len(picture.scene.t), 1))
-    return replace(picture, load=more if picture.load is None else picture.load + more)
+def _with_load(unit: Floats, force_model: ForceModel) -> ForceModel:
+    more = np.tile(unit, (len(force_model.measurements.t), 1))
+    return replace(force_model, load=more if force_model.load is None else force_model.load + more)
 
 
 def _world(base: Base) -> Iterator[Candidate]:
     """Yield forces that are constant over ground, or in proportion to the place."""
-    scene = base.picture.scene
-    cause = "wind" if scene.wind is None else "mooring"
+    measurements = base.force_model.measurements
+    cause = "wind" if measurements.wind is None else "mooring"
     for axis, label in enumerate(("north", "east")):
         yield Candidate(f"{CONSTANT} {label}", cause, None, partial(_pulled, axis, None))
-    if effects()["mooring"].cannot(scene):
+    if effects()["mooring"].cannot(measurements):
         return
-    start = scene.eta[np.flatnonzero(base.rows)[0], :2]
+    start = measurements.eta[np.flatnonzero(base.rows)[0], :2]
     for axis, label in enumerate(("north", "east")):
         yield Candidate(f"spring {label}", "mooring", None, partial(_pulled, axis, float(start[axis])))
 
 
-def _pulled(axis: int, start: float | None, picture: ForceModel) -> ForceModel:
+def _pulled(axis: int, start: float | None, force_model: ForceModel) -> ForceModel:
     """Add a force of 1 N along north or east, or one against the way from `start` of 1 N/m."""
-    scene = picture.scene
-    pull = np.zeros((len(scene.t), 2))
-    pull[:, axis] = 1.0 if start is None else start - scene.eta[:, axis]
-    X, Y = to_body(pull[:, 0], pull[:, 1], scene.psi)
-    return replace(picture, external=picture.external + np.column_stack([X, Y, np.zeros_like(X)]))
+    measurements = force_model.measurements
+    pull = np.zeros((len(measurements.t), 2))
+    pull[:, axis] = 1.0 if start is None else start - measurements.eta[:, axis]
+    X, Y = to_body(pull[:, 0], pull[:, 1], measurements.psi)
+    return replace(force_model, external=force_model.external + np.column_stack([X, Y, np.zeros_like(X)]))
 
 
 def _wind(base: Base) -> Iterator[Candidate]:
@@ -172,11 +176,11 @@ def _wind(base: Base) -> Iterator[Candidate]:
 
     A moment by the heading takes their place where the profile does not know the areas.
     """
-    scene = base.picture.scene
+    measurements = base.force_model.measurements
     wind = effects()["wind"]
-    if scene.wind is not None:
+    if measurements.wind is not None:
         return
-    if wind.cannot(scene):
+    if wind.cannot(measurements):
         for label, of in (("cos", np.cos), ("sin", np.sin)):
             for times in (1, 2):
                 turned = partial(_turned, of, times)
@@ -192,27 +196,29 @@ def _wind(base: Base) -> Iterator[Candidate]:
         yield Candidate(f"load {label}", wind.id, None, partial(_blown, WIND_MPS * np.array(towards), sign))
 
 
-def _turned(of: Callable[[Floats], Floats], times: int, picture: ForceModel) -> ForceModel:
-    moment = of(times * picture.scene.psi)
+def _turned(of: Callable[[Floats], Floats], times: int, force_model: ForceModel) -> ForceModel:
+    moment = of(times * force_model.measurements.psi)
     nothing = np.zeros_like(moment)
-    return replace(picture, external=picture.external + np.column_stack([nothing, nothing, moment]))
+    return replace(force_model, external=force_model.external + np.column_stack([nothing, nothing, moment]))
 
 
-def _blown(towards: Floats, sign: float, picture: ForceModel) -> ForceModel:
+def _blown(towards: Floats, sign: float, force_model: ForceModel) -> ForceModel:
     wind = effects()["wind"]
-    with_it, against_it = (wind.act(picture, one, None).external - picture.external for one in (towards, -towards))
-    return replace(picture, external=picture.external + 0.5 * (with_it + sign * against_it))
+    with_it, against_it = (
+        wind.act(force_model, one, None).external - force_model.external for one in (towards, -towards)
+    )
+    return replace(force_model, external=force_model.external + 0.5 * (with_it + sign * against_it))
 
 
 def _effects(base: Base) -> Iterator[Candidate]:
     """Yield a moderate size of each parameter of the effects that are nearly linear."""
-    scene = base.picture.scene
+    measurements = base.force_model.measurements
     for effect in (effects()[name] for name in LINEAR):
-        if effect.cannot(scene):
+        if effect.cannot(measurements):
             continue
-        parameters = effect.parameters_of(scene.profile)
+        parameters = effect.parameters_of(measurements.profile)
         neutral = np.array([one.neutral for one in parameters])
-        for instance in effect.instances(scene.profile):
+        for instance in effect.instances(measurements.profile):
             for j, one in enumerate(parameters):
                 values = neutral + np.where(np.arange(len(parameters)) == j, one.size, 0.0)
                 label = " ".join(filter(None, (effect.id, instance, one.name)))
@@ -220,18 +226,18 @@ def _effects(base: Base) -> Iterator[Candidate]:
 
 
 def _applied(effect: Effect, values: Floats, instance: str | None) -> Change:
-    def change(picture: ForceModel) -> ForceModel:
-        return effect.act(picture, values, instance)
+    def change(force_model: ForceModel) -> ForceModel:
+        return effect.act(force_model, values, instance)
 
     return change
 
 
 def _places(base: Base) -> Iterator[Candidate]:
     """Yield the damping in each cell of the visited waters."""
-    scene = base.picture.scene
-    if effects()["shallow_water"].cannot(scene):
+    measurements = base.force_model.measurements
+    if effects()["shallow_water"].cannot(measurements):
         return
-    place = scene.eta[base.rows, :2]
+    place = measurements.eta[base.rows, :2]
     lines = np.linspace(place.min(axis=0), place.max(axis=0), CELLS + 1)
     for i in range(CELLS):
         for j in range(CELLS):
@@ -240,10 +246,10 @@ def _places(base: Base) -> Iterator[Candidate]:
             yield Candidate(label, "shallow_water", None, partial(_damped, np.array(low), np.array(high)))
 
 
-def _damped(low: Floats, high: Floats, picture: ForceModel) -> ForceModel:
-    place = picture.scene.eta[:, :2]
+def _damped(low: Floats, high: Floats, force_model: ForceModel) -> ForceModel:
+    place = force_model.measurements.eta[:, :2]
     inside = ((place >= low) & (place < high)).all(axis=1)
-    return replace(picture, damping_factor=np.where(inside, 2.0, 1.0))
+    return replace(force_model, damping_factor=np.where(inside, 2.0, 1.0))
 
 
 def _constants() -> Iterator[Candidate]:
@@ -252,5 +258,5 @@ def _constants() -> Iterator[Candidate]:
         yield Candidate(f"constant in {axis}", "", None, partial(_pushed, j))
 
 
-def _pushed(j: int, picture: ForceModel) -> ForceModel:
-    return replace(picture, external=picture.external + np.eye(3)[j])
+def _pushed(j: int, force_model: ForceModel) -> ForceModel:
+    return replace(force_model, external=force_model.external + np.eye(3)[j])

@@ -20,9 +20,9 @@ PROBE = 1e-3
 
 
 def combined(base: Base, units: Sequence[ForceModel], coefficients: Floats) -> ForceModel:
-    """Return the base model's picture with terms in it, each as many units as its coefficient says."""
-    plain = base.picture
-    n = len(plain.scene.t)
+    """Return the base model's force model with terms in it, each as many units as its coefficient says."""
+    plain = base.force_model
+    n = len(plain.measurements.t)
     hull, external = plain.hull.copy(), plain.external.copy()
     load = np.zeros((n, 5)) if plain.load is None else plain.load.copy()
     damping = np.ones(n)
@@ -55,10 +55,10 @@ def least_error(
     """
 
     def error(coefficients: Floats) -> float:
-        picture = combined(base, units, coefficients)
-        if not _has_mass(picture):
+        force_model = combined(base, units, coefficients)
+        if not _has_mass(force_model):
             return np.inf
-        left = base.prepared.motion.tau - base.expected(picture).tau
+        left = base.prepared.motion.tau - base.expected(force_model).tau
         return float(np.sum((left[rows] / by_axis) ** 2))
 
     return min(several, key=error)
@@ -78,10 +78,10 @@ def joint_coefficients(base: Base, units: Sequence[ForceModel], start: Floats, r
     """
 
     def left(coefficients: Floats) -> Floats:
-        picture = combined(base, units, coefficients)
-        if not _has_mass(picture):
+        force_model = combined(base, units, coefficients)
+        if not _has_mass(force_model):
             return np.full(3 * len(rows), np.inf)
-        return np.asarray(((base.residual + base.force_between(picture))[rows] / by_axis).ravel())
+        return np.asarray(((base.residual + base.force_between(force_model))[rows] / by_axis).ravel())
 
     found: Floats = np.zeros_like(start)
     rest = left(found)
@@ -100,7 +100,9 @@ def joint_coefficients(base: Base, units: Sequence[ForceModel], start: Floats, r
     return found
 
 
-def _has_mass(picture: ForceModel) -> bool:
+def _has_mass(force_model: ForceModel) -> bool:
     """Return True where the mass matrix is positive on every row."""
-    m11, m22, m23, m32, m33 = (picture.hull[:5] + (np.zeros((1, 5)) if picture.load is None else picture.load)).T
+    m11, m22, m23, m32, m33 = (
+        force_model.hull[:5] + (np.zeros((1, 5)) if force_model.load is None else force_model.load)
+    ).T
     return bool(min(m11.min(), m22.min(), (m22 * m33 - m23 * m32).min()) > 0.0)

@@ -29,7 +29,7 @@ def read(angle: Floats, step_deg: float) -> Floats:
     return np.asarray(step * np.round(angle / step))
 
 
-def scene(angle: Floats, step_deg: float) -> Measurements:
+def measurements(angle: Floats, step_deg: float) -> Measurements:
     n = len(angle)
     seen = read(angle, step_deg)
     force = 100.0 * np.stack([np.cos(seen), np.sin(seen), 1.8 * np.sin(seen)], axis=1)
@@ -59,7 +59,7 @@ def test_the_true_angle_comes_back_nearer(seed: int, step_deg: float) -> None:
 
 def test_a_coarse_step_is_found_and_the_force_turned() -> None:
     angle = true_angle(3)
-    seen = scene(angle, 15.0)
+    seen = measurements(angle, 15.0)
     finding = find(seen)
     assert finding is not None
     assert finding.parameters["step"].value == pytest.approx(15.0)
@@ -73,8 +73,8 @@ def test_a_coarse_step_is_found_and_the_force_turned() -> None:
 
 
 def test_whole_degrees_make_no_difference_and_are_no_finding() -> None:
-    assert find(scene(true_angle(3), 1.0)) is None
-    assert find(scene(true_angle(3), 3.5)) is None
+    assert find(measurements(true_angle(3), 1.0)) is None
+    assert find(measurements(true_angle(3), 3.5)) is None
 
 
 @pytest.mark.parametrize("step_deg", [4.1, 11.5, 17.0])

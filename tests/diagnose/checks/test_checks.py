@@ -58,8 +58,8 @@ def quiet(seed: int) -> Measurements:
     return sailed(seed, noise=QUIET)
 
 
-def alone(scene: Measurements, effect: str) -> SensorFinding:
-    findings, _ = examine(scene)
+def alone(measurements: Measurements, effect: str) -> SensorFinding:
+    findings, _ = examine(measurements)
     assert [finding.effect for finding in findings] == [effect]
     assert findings[0].says.endswith(".")
     return findings[0]
@@ -71,29 +71,31 @@ def holds(finding: SensorFinding, **truth: float) -> None:
         assert found.low <= value <= found.high, (name, found)
 
 
-def turned(scene: Measurements, degrees: float) -> Measurements:
-    return replace(scene, eta=scene.eta + np.array([0.0, 0.0, np.radians(degrees)]))
+def turned(measurements: Measurements, degrees: float) -> Measurements:
+    return replace(measurements, eta=measurements.eta + np.array([0.0, 0.0, np.radians(degrees)]))
 
 
-def armed(scene: Measurements, x: float, y: float) -> Measurements:
-    one = np.ones(len(scene.t))
-    return replace(scene, eta=scene.eta + np.column_stack([*to_world(x * one, y * one, scene.psi), 0.0 * one]))
+def armed(measurements: Measurements, x: float, y: float) -> Measurements:
+    one = np.ones(len(measurements.t))
+    return replace(
+        measurements, eta=measurements.eta + np.column_stack([*to_world(x * one, y * one, measurements.psi), 0.0 * one])
+    )
 
 
-def late(scene: Measurements, seconds: float) -> Measurements:
-    places = [np.interp(scene.t - seconds, scene.t, scene.eta[:, k]) for k in (0, 1)]
-    return replace(scene, eta=np.column_stack([*places, scene.psi]))
+def late(measurements: Measurements, seconds: float) -> Measurements:
+    places = [np.interp(measurements.t - seconds, measurements.t, measurements.eta[:, k]) for k in (0, 1)]
+    return replace(measurements, eta=np.column_stack([*places, measurements.psi]))
 
 
-def scaled(scene: Measurements, *factors: float) -> Measurements:
-    return replace(scene, nu_raw=scene.nu_raw * np.array(factors), nu=scene.nu * np.array(factors))
+def scaled(measurements: Measurements, *factors: float) -> Measurements:
+    return replace(measurements, nu_raw=measurements.nu_raw * np.array(factors), nu=measurements.nu * np.array(factors))
 
 
-def interpolated_heading(scene: Measurements, every: int) -> Measurements:
+def interpolated_heading(measurements: Measurements, every: int) -> Measurements:
     """Return the heading logged wrapped at every so many rows, and interpolated as if it were no angle."""
-    n = len(scene.t)
-    logged = np.interp(np.arange(n), np.arange(0, n, every), wrap(scene.psi[::every] + 3.0))
-    return replace(scene, eta=np.column_stack([scene.eta[:, :2], np.unwrap(logged)]))
+    n = len(measurements.t)
+    logged = np.interp(np.arange(n), np.arange(0, n, every), wrap(measurements.psi[::every] + 3.0))
+    return replace(measurements, eta=np.column_stack([measurements.eta[:, :2], np.unwrap(logged)]))
 
 
 def test_every_check_is_registered_once_and_in_order() -> None:
@@ -118,10 +120,10 @@ def test_clean_trials_have_no_findings(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_gyro_that_reads_too_much(seed: int) -> None:
-    scene = sailed(seed, navigation=Navigation(yaw_rate_factor=1.06), noise=QUIET)
-    finding = alone(scene, "yaw_rate_scale")
+    measurements = sailed(seed, navigation=Navigation(yaw_rate_factor=1.06), noise=QUIET)
+    finding = alone(measurements, "yaw_rate_scale")
     holds(finding, factor=1.06)
-    assert examine(finding.correct(scene))[0] == ()
+    assert examine(finding.correct(measurements))[0] == ()
 
 
 def test_a_gyro_of_the_wrong_sign() -> None:
@@ -134,13 +136,13 @@ def test_a_gyro_of_the_wrong_sign() -> None:
 @pytest.mark.parametrize(
     ("spoil", "effect", "truth"),
     [
-        (lambda scene: turned(scene, 6.0), "heading_bias", {"angle": 6.0}),
-        (lambda scene: turned(scene, 170.0), "heading_bias", {"angle": 170.0}),
-        (lambda scene: armed(scene, 1.2, -0.4), "lever_arm", {"x": 1.2, "y": -0.4}),
-        (lambda scene: late(scene, 0.5), "clock_offset", {"seconds": 0.5}),
-        (lambda scene: late(scene, -0.5), "clock_offset", {"seconds": -0.5}),
-        (lambda scene: scaled(scene, 1.1, 1.1, 1.0), "velocity_scale", {"factor": 1.1}),
-        (lambda scene: scaled(scene, 1.0, 1.0, 0.94), "yaw_rate_scale", {"factor": 0.94}),
+        (lambda measurements: turned(measurements, 6.0), "heading_bias", {"angle": 6.0}),
+        (lambda measurements: turned(measurements, 170.0), "heading_bias", {"angle": 170.0}),
+        (lambda measurements: armed(measurements, 1.2, -0.4), "lever_arm", {"x": 1.2, "y": -0.4}),
+        (lambda measurements: late(measurements, 0.5), "clock_offset", {"seconds": 0.5}),
+        (lambda measurements: late(measurements, -0.5), "clock_offset", {"seconds": -0.5}),
+        (lambda measurements: scaled(measurements, 1.1, 1.1, 1.0), "velocity_scale", {"factor": 1.1}),
+        (lambda measurements: scaled(measurements, 1.0, 1.0, 0.94), "yaw_rate_scale", {"factor": 0.94}),
     ],
     ids=["turned", "backwards", "antenna", "late positions", "late velocities", "scale", "gyro"],
 )
@@ -149,10 +151,10 @@ def test_an_error_is_found_alone_and_its_intervals_hold_the_truth(
 ) -> None:
     within = dict.fromkeys(truth, 0)
     for seed in TRIALS:
-        scene = spoil(quiet(seed))
-        finding = alone(scene, effect)
+        measurements = spoil(quiet(seed))
+        finding = alone(measurements, effect)
         if seed < 4:
-            assert examine(finding.correct(scene))[0] == ()
+            assert examine(finding.correct(measurements))[0] == ()
         for name, value in truth.items():
             within[name] += finding.parameters[name].low <= value <= finding.parameters[name].high
     # Of 12 intervals of 95 %, fewer than 10 hold the truth in 2 of 100 cases.
@@ -169,8 +171,8 @@ def test_knots_for_metres_per_second_are_named() -> None:
 
 @pytest.mark.slow
 def test_several_errors_at_once_are_told_apart() -> None:
-    scene = scaled(turned(armed(sailed(1, noise=QUIET), 1.5, 0.0), 8.0), 1.1, 1.1, 0.9)
-    findings = {finding.effect: finding for finding in examine(scene)[0]}
+    measurements = scaled(turned(armed(sailed(1, noise=QUIET), 1.5, 0.0), 8.0), 1.1, 1.1, 0.9)
+    findings = {finding.effect: finding for finding in examine(measurements)[0]}
     assert set(findings) == {"yaw_rate_scale", "velocity_scale", "heading_bias", "lever_arm"}
     holds(findings["yaw_rate_scale"], factor=0.9)
     holds(findings["velocity_scale"], factor=1.1)
@@ -191,21 +193,21 @@ def test_what_position_velocity_and_heading_share_is_left_to_forces(navigation: 
 def test_a_heading_interpolated_through_the_wrap_is_repaired() -> None:
     clean = sailed(1, noise=QUIET)
     true = np.unwrap(wrap(clean.psi + 3.0))
-    scene = interpolated_heading(clean, 4)
-    finding = next(found for found in examine(scene)[0] if found.effect == "heading_wrap")
-    repaired = finding.correct(scene)
-    assert np.abs(scene.psi - true).max() > 1.0
+    measurements = interpolated_heading(clean, 4)
+    finding = next(found for found in examine(measurements)[0] if found.effect == "heading_wrap")
+    repaired = finding.correct(measurements)
+    assert np.abs(measurements.psi - true).max() > 1.0
     assert np.abs(wrap(repaired.psi - true)).max() < 0.05
     assert np.abs(repaired.psi - true).max() < 0.05
 
 
 @pytest.mark.slow
 def test_repeats_of_an_old_state_are_no_measurement() -> None:
-    scene = sailed(1, navigation=Navigation(dropouts_per_min=1.0, dropout_s=1.0))
-    finding = alone(scene, "held_samples")
-    held = np.flatnonzero(~finding.correct(scene).usable)
+    measurements = sailed(1, navigation=Navigation(dropouts_per_min=1.0, dropout_s=1.0))
+    finding = alone(measurements, "held_samples")
+    held = np.flatnonzero(~finding.correct(measurements).usable)
     assert held.size > 0
-    assert np.array_equal(scene.eta[held], scene.eta[held - 1])
+    assert np.array_equal(measurements.eta[held], measurements.eta[held - 1])
     assert finding.parameters["longest"].value == pytest.approx(1.0, abs=0.11)
 
 
@@ -214,23 +216,23 @@ def _coarse(values: Floats, step: float) -> Floats:
 
 
 def test_a_coarse_or_slow_sensor_holds_nothing() -> None:
-    scene = sailed(1)
-    eta = np.column_stack([_coarse(scene.eta[:, :2], 0.02), _coarse(scene.psi, np.radians(0.5))])
-    slow = np.repeat(scene.nu_raw[::10], 10, axis=0)[: len(scene.t)]
-    assert examine(replace(scene, eta=eta, nu_raw=slow, nu=slow))[0] == ()
+    measurements = sailed(1)
+    eta = np.column_stack([_coarse(measurements.eta[:, :2], 0.02), _coarse(measurements.psi, np.radians(0.5))])
+    slow = np.repeat(measurements.nu_raw[::10], 10, axis=0)[: len(measurements.t)]
+    assert examine(replace(measurements, eta=eta, nu_raw=slow, nu=slow))[0] == ()
 
 
 def test_a_log_without_positions_still_has_its_gyro_checked() -> None:
-    scene = scaled(sailed(1, noise=QUIET), 1.0, 1.0, 1.1)
-    blind = replace(scene, eta=np.column_stack([np.full((len(scene.t), 2), np.nan), scene.psi]))
+    measurements = scaled(sailed(1, noise=QUIET), 1.0, 1.0, 1.1)
+    blind = replace(measurements, eta=np.column_stack([np.full((len(measurements.t), 2), np.nan), measurements.psi]))
     holds(alone(blind, "yaw_rate_scale"), factor=1.1)
 
 
 def test_a_vessel_at_rest_and_a_short_log_tell_nothing() -> None:
-    scene = sailed(1, 12.0)
-    assert examine(scene)[0] == ()
-    still = np.zeros((len(scene.t), 3))
-    assert examine(replace(scene, eta=still, nu_raw=still, nu=still))[0] == ()
+    measurements = sailed(1, 12.0)
+    assert examine(measurements)[0] == ()
+    still = np.zeros((len(measurements.t), 3))
+    assert examine(replace(measurements, eta=still, nu_raw=still, nu=still))[0] == ()
 
 
 @pytest.mark.slow

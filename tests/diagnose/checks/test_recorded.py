@@ -18,7 +18,7 @@ FERRY = load_profile("milliampere")
 
 
 def straight(surge: Floats, pushed: Floats, step_s: float = 0.1) -> Measurements:
-    """Return a scene in which the vessel goes north with a surge velocity, shape (n,), under a force ahead [N], shape (n,)."""
+    """Return measurements of a vessel that goes north, by its surge velocity and the force ahead [N], shape (n,) each."""
     n = len(surge)
     zero = np.zeros(n)
     nu = np.column_stack([surge, zero, zero])
@@ -61,35 +61,35 @@ def test_a_vessel_that_stops_or_drifts_with_idle_actuators_is_left_alone() -> No
 
 def test_an_actuator_that_pushes_explains_its_own_motion() -> None:
     ramp = np.interp(0.1 * np.arange(300), [0.0, 10.0, 15.0, 30.0], [0.0, 0.0, 1.5, 1.5])
-    scene = run(ramp)
-    parts = scene.parts.copy()
+    measurements = run(ramp)
+    parts = measurements.parts.copy()
     parts[600:, 0, 0] = 300.0
-    assert unrecorded(replace(scene, parts=parts)) is None
+    assert unrecorded(replace(measurements, parts=parts)) is None
 
 
 def test_positions_on_a_coarse_grid_are_not_held() -> None:
-    scene = sailed(3, 300.0)
+    measurements = sailed(3, 300.0)
     turn = np.array([[np.cos(0.03), -np.sin(0.03)], [np.sin(0.03), np.cos(0.03)]])
     grid = np.array([0.22, 0.06])
     # The grid of a receiver that gives degrees in single precision, not quite along north and east.
-    coarse = np.round(scene.eta[:, :2] @ turn / grid) * grid @ turn.T
-    assert held(replace(scene, eta=np.column_stack([coarse, scene.psi]))) is None
+    coarse = np.round(measurements.eta[:, :2] @ turn / grid) * grid @ turn.T
+    assert held(replace(measurements, eta=np.column_stack([coarse, measurements.psi]))) is None
 
 
 def test_equal_readings_in_an_interpolated_table_are_not_held() -> None:
-    scene = sailed(4, 300.0)
-    rows = np.arange(len(scene.t))
+    measurements = sailed(4, 300.0)
+    rows = np.arange(len(measurements.t))
     some = rows[::15]
-    slow = np.column_stack([np.interp(rows, some, np.round(column[some], 2)) for column in scene.nu_raw.T])
-    assert held(replace(scene, nu_raw=slow)) is None
+    slow = np.column_stack([np.interp(rows, some, np.round(column[some], 2)) for column in measurements.nu_raw.T])
+    assert held(replace(measurements, nu_raw=slow)) is None
 
 
 def test_a_position_that_stands_still_while_the_vessel_moves_is_held() -> None:
-    scene = sailed(5, 300.0)
-    eta = scene.eta.copy()
-    fast = int(np.argmax(np.abs(scene.nu[200:-200, 0]))) + 200
+    measurements = sailed(5, 300.0)
+    eta = measurements.eta.copy()
+    fast = int(np.argmax(np.abs(measurements.nu[200:-200, 0]))) + 200
     eta[fast - 60 : fast + 60, :2] = eta[fast - 60, :2]
-    finding = held(replace(scene, eta=eta))
+    finding = held(replace(measurements, eta=eta))
     assert finding is not None
     assert "north, east" in finding.says
     assert "heading" not in finding.says

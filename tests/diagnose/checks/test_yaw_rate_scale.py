@@ -36,11 +36,13 @@ def test_six_per_cent_are_found_and_none_is_not(seed: int) -> None:
 
 
 def test_an_error_that_grows_with_the_rate_widens_the_interval() -> None:
-    scene = sailed(2, 1.06)
-    even = find(scene)
-    slow = np.repeat(np.random.default_rng(2).standard_normal(len(scene.t) // 300 + 1), 300)[: len(scene.t)]
-    uneven = scene.nu_raw + np.column_stack([0.0 * slow, 0.0 * slow, 0.08 * slow * scene.nu_raw[:, 2]])
-    wide = find(replace(scene, nu_raw=uneven))
+    measurements = sailed(2, 1.06)
+    even = find(measurements)
+    slow = np.repeat(np.random.default_rng(2).standard_normal(len(measurements.t) // 300 + 1), 300)[
+        : len(measurements.t)
+    ]
+    uneven = measurements.nu_raw + np.column_stack([0.0 * slow, 0.0 * slow, 0.08 * slow * measurements.nu_raw[:, 2]])
+    wide = find(replace(measurements, nu_raw=uneven))
     assert even is not None
     assert wide is None or wide.parameters["factor"].high - wide.parameters["factor"].low > 1.3 * (
         even.parameters["factor"].high - even.parameters["factor"].low

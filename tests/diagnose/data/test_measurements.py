@@ -1,4 +1,4 @@
-"""From a log to a scene, and the plain picture of a profile or a model."""
+"""From a log to measurements, and the plain force model of a profile or a model."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from ferryid.models.forces.estimator import model_estimator
 from ferryid.models.model import Model
 from ferryid.regression.bases.basis import make_basis
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
+from tests.vessel.hull_matrices import forward
 
 SHORT = str(Path(__file__).resolve().parents[3] / "fixtures" / "short.mcap")
 FERRY = load_profile("milliampere")
@@ -26,7 +26,7 @@ FERRY = load_profile("milliampere")
 
 @pytest.fixture(scope="module")
 def short() -> Measurements:
-    """The scene of the short fixture, nothing smoothed."""
+    """The measurements of the short fixture, nothing smoothed."""
     return read_measurements(SHORT, FERRY, None, window_s=0.0)[0]
 
 
@@ -70,16 +70,16 @@ def test_each_thruster_pushes_along_its_angle_and_turns_by_its_lever(short: Meas
 
 
 def test_the_thrusters_together_are_the_applied_force() -> None:
-    scene, survey = read_measurements(SHORT, FERRY, None, window_s=0.0)
-    rows = survey.motion.valid & scene.usable
-    np.testing.assert_allclose(scene.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
+    measurements, survey = read_measurements(SHORT, FERRY, None, window_s=0.0)
+    rows = survey.motion.valid & measurements.usable
+    np.testing.assert_allclose(measurements.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
 
 
 def test_the_velocity_is_kept_as_measured_beside_the_calmer_one() -> None:
-    scene, survey = read_measurements(SHORT, FERRY, None)
-    np.testing.assert_array_equal(scene.nu_raw[scene.usable], survey.motion.raw_nu[scene.usable])
-    assert np.isfinite(scene.nu).all()
-    rough, calm = (np.abs(np.diff(values, axis=0)).mean(axis=0) for values in (scene.nu_raw, scene.nu))
+    measurements, survey = read_measurements(SHORT, FERRY, None)
+    np.testing.assert_array_equal(measurements.nu_raw[measurements.usable], survey.motion.raw_nu[measurements.usable])
+    assert np.isfinite(measurements.nu).all()
+    rough, calm = (np.abs(np.diff(values, axis=0)).mean(axis=0) for values in (measurements.nu_raw, measurements.nu))
     assert np.all(calm < rough)
 
 
@@ -110,34 +110,34 @@ def test_a_vessel_without_actuators_is_refused() -> None:
         read_measurements(SHORT, replace(FERRY, actuators=()), None)
 
 
-def test_the_plain_picture_moves_as_the_hull_in_the_measured_wind(short: Measurements) -> None:
-    picture, spread = prior_force_model(replace(short, current=None, payload=None), FERRY)
+def test_the_plain_force_model_moves_as_the_hull_in_the_measured_wind(short: Measurements) -> None:
+    force_model, spread = prior_force_model(replace(short, current=None, payload=None), FERRY)
     assert FERRY.wind is not None
     assert short.wind is not None
     tau = short.parts.sum(axis=1) + wind_force(FERRY.wind, short.wind, short.psi, short.nu)
-    np.testing.assert_allclose(acceleration(picture), forward(FERRY.hull, short.nu, tau), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(spread, 0.12 * np.abs(picture.hull))
+    np.testing.assert_allclose(acceleration(force_model), forward(FERRY.hull, short.nu, tau), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(spread, 0.12 * np.abs(force_model.hull))
 
 
 def test_without_wind_the_air_is_still(short: Measurements) -> None:
-    picture, _ = prior_force_model(replace(short, wind=None, current=None, payload=None), FERRY)
+    force_model, _ = prior_force_model(replace(short, wind=None, current=None, payload=None), FERRY)
     assert FERRY.wind is not None
     # Still air meets a vessel from ahead.
-    assert np.all(picture.external[short.nu[:, 0] > 0.1, 0] < 0.0)
+    assert np.all(force_model.external[short.nu[:, 0] > 0.1, 0] < 0.0)
 
 
 @pytest.mark.parametrize("weather", [False, True])
-def test_a_model_becomes_a_picture_of_the_same_force(short: Measurements, weather: bool) -> None:
+def test_a_model_becomes_a_force_model_of_the_same_force(short: Measurements, weather: bool) -> None:
     def around(shape: tuple[int, int]) -> np.ndarray:
         return 30.0 * np.random.default_rng(1).standard_normal(shape)
 
-    scene = replace(short, payload=None, current=None, wind=short.wind if weather else None)
+    measurements = replace(short, payload=None, current=None, wind=short.wind if weather else None)
     model = model_of("decoupled", around)
-    picture, spread = prior_force_model(scene, FERRY, model)
-    nu_dot = acceleration(picture)
-    needed = model_estimator(model)(nu_dot, scene.nu, scene.psi, scene.wind, None)
-    np.testing.assert_allclose(needed, scene.parts.sum(axis=1), atol=1e-6)
-    fitted = dict(zip(COEFFICIENTS, picture.hull, strict=True))
+    force_model, spread = prior_force_model(measurements, FERRY, model)
+    nu_dot = acceleration(force_model)
+    needed = model_estimator(model)(nu_dot, measurements.nu, measurements.psi, measurements.wind, None)
+    np.testing.assert_allclose(needed, measurements.parts.sum(axis=1), atol=1e-6)
+    fitted = dict(zip(COEFFICIENTS, force_model.hull, strict=True))
     surge = model.theta[:, 0]
     assert fitted["m11"] == pytest.approx(1.1 / 1.05 * FERRY.hull.M[0, 0] + surge[model.terms.index("u_dot")])
     assert fitted["X_u"] == pytest.approx(0.8 / 1.05 * FERRY.hull.D["X_u"] - surge[model.terms.index("u")])
@@ -191,11 +191,11 @@ def test_broad_beliefs_hold_what_was_measured_of_a_ferry(short: Measurements) ->
     assert np.all(np.abs(known) < 5.0 * spread)
 
 
-def test_a_tanker_with_propeller_and_rudder_has_a_scene(shared_data: Callable[[str], Path]) -> None:
+def test_a_tanker_with_propeller_and_rudder_is_measured(shared_data: Callable[[str], Path]) -> None:
     log = shared_data("esso_osaka/random/random_06-Aug-2020_16_24_25_1.csv")
     profile = load_profile("esso-osaka")
-    scene, survey = read_measurements(str(log), profile, None, withhold=("wind",), window_s=0.0)
-    rows = survey.motion.valid & scene.usable
-    np.testing.assert_allclose(scene.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
-    assert np.isnan(scene.angles).all()
+    measurements, survey = read_measurements(str(log), profile, None, withhold=("wind",), window_s=0.0)
+    rows = survey.motion.valid & measurements.usable
+    np.testing.assert_allclose(measurements.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
+    assert np.isnan(measurements.angles).all()
     assert np.isfinite(survey.hidden["wind"]).mean() > 0.9

@@ -15,7 +15,6 @@ from ferryid.diagnose.inference.campaign import Campaign, fit_campaign
 from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, Member, fit_campaign_hull
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
@@ -23,6 +22,7 @@ from ferryid.errors import FerryIdError
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.judging.test_held_out import sailed
+from tests.real.campaign_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 
 FERRY = load_profile("milliampere")
 WIND = effects()["wind"]
@@ -39,20 +39,20 @@ def members(factor: float = 1.0) -> tuple[Member, ...]:
     made = []
     for number, wind in enumerate(WINDS):
         # Each log begins elsewhere in the same forces, so that they are three.
-        scene = sailed(300.0 + 60.0 * number, np.array(wind))
+        measurements = sailed(300.0 + 60.0 * number, np.array(wind))
         rows = slice(300 * number, None)
-        scene = replace(
-            scene,
-            t=scene.t[rows],
-            eta=scene.eta[rows],
-            nu_raw=scene.nu_raw[rows],
-            nu=scene.nu[rows],
-            parts=scene.parts[rows] * (factor if number == 2 else 1.0),
-            angles=scene.angles[rows],
-            usable=scene.usable[rows],
+        measurements = replace(
+            measurements,
+            t=measurements.t[rows],
+            eta=measurements.eta[rows],
+            nu_raw=measurements.nu_raw[rows],
+            nu=measurements.nu[rows],
+            parts=measurements.parts[rows] * (factor if number == 2 else 1.0),
+            angles=measurements.angles[rows],
+            usable=measurements.usable[rows],
         )
-        seen = windows(scene, *window_lengths(FERRY))
-        thin = seen.scene
+        seen = windows(measurements, *window_lengths(FERRY))
+        thin = seen.measurements
         still = wind_force(FERRY.wind, np.zeros((len(thin.t), 2)), thin.psi, thin.nu)  # type: ignore[arg-type]
         wrong = hull_of(FERRY) * np.where(np.arange(len(SPREAD)) % 2, 1.15, 0.85)
         made.append(Member(seen, ForceModel(thin, wrong, thin.parts, thin.angles, still), (SUSPECT,)))
@@ -125,7 +125,7 @@ def test_the_hull_as_a_suspect_has_the_same_mean_and_covariance() -> None:
 def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
     hull = fitted()
     first = members()[0]
-    plain, spread = hull.picture(first.plain, without=0)
+    plain, spread = hull.force_model(first.plain, without=0)
     made = fit(estimation_problem(first.windows, plain, spread), [SUSPECT])
     assert made.values[0] == pytest.approx(WINDS[0], abs=0.35)
 

@@ -23,9 +23,9 @@ from ferryid.vessel import load_profile
 FERRY = load_profile("milliampere")
 
 
-def push(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def push(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """A constant force ahead: exactly linear."""
-    return replace(picture, external=picture.external + np.array([p[0], 0.0, 0.0]))
+    return replace(force_model, external=force_model.external + np.array([p[0], 0.0, 0.0]))
 
 
 PUSH = Candidate(
@@ -56,8 +56,8 @@ def problem(true_force: float, seed: int = 0) -> EstimationProblem:
     t = np.arange(0.0, 300.0, 0.2)
     zero = np.zeros((len(t), 3))
     parts, ahead = np.zeros((len(t), 2, 3)), np.zeros((len(t), 2))
-    scene = Measurements(FERRY, t, zero, zero, zero, parts, ahead, np.ones(len(t), dtype=bool))
-    seen = windows(scene, 8.0, 2.0)
+    measurements = Measurements(FERRY, t, zero, zero, zero, parts, ahead, np.ones(len(t), dtype=bool))
+    seen = windows(measurements, 8.0, 2.0)
     steps = steps_of(seen)
     n, h = len(steps.starts), stride_s(steps)
     random = np.random.default_rng(seed)
@@ -70,9 +70,13 @@ def problem(true_force: float, seed: int = 0) -> EstimationProblem:
         gaps += true_force / FERRY.hull.M[0, 0] if j == 0 else 0.0
         path = np.concatenate([np.zeros(2), np.cumsum(np.cumsum(gaps)) * h * h])
         position[: often * (n + 2) : often, j] = path
-    moved = replace(seen, scene=replace(seen.scene, eta=position))
+    moved = replace(seen, measurements=replace(seen.measurements, eta=position))
     plain = ForceModel(
-        seen.scene, hull_of(FERRY), seen.scene.parts, seen.scene.angles, np.zeros((len(seen.scene.t), 3))
+        seen.measurements,
+        hull_of(FERRY),
+        seen.measurements.parts,
+        seen.measurements.angles,
+        np.zeros((len(seen.measurements.t), 3)),
     )
     white = AutoregressiveNoise(np.zeros((3, ORDER)), np.eye(3))
     # Next to no freedom of the hull, so that the case stays the linear one of the formula.
@@ -116,13 +120,15 @@ def test_evidence_weighs_filters_against_each_other() -> None:
 
 def test_slopes_by_the_hull_are_those_of_whitened_gaps() -> None:
     case = problem(60.0)
-    n = len(case.plain.scene.t)
+    n = len(case.plain.measurements.t)
     moving = np.random.default_rng(1).normal(size=(n, 3)) * [1.0, 0.5, 0.2]
-    steps = replace(case.steps, scene=replace(case.plain.scene, nu=moving))
-    plain = replace(case.plain, scene=steps.scene, external=np.full((n, 3), 30.0))
+    steps = replace(case.steps, measurements=replace(case.plain.measurements, nu=moving))
+    plain = replace(case.plain, measurements=steps.measurements, external=np.full((n, 3), 30.0))
     spread = 0.12 * np.abs(plain.hull)
     spread[6] = 0.0
-    case = replace(case, windows=replace(case.windows, scene=steps.scene), plain=plain, hull_spread=spread)
+    case = replace(
+        case, windows=replace(case.windows, measurements=steps.measurements), plain=plain, hull_spread=spread
+    )
     found = case.hull_slopes(plain)
     assert not found[:, spread == 0.0].any()
     for k in np.flatnonzero(spread):
@@ -138,17 +144,18 @@ def test_limits_are_kept() -> None:
 
 
 def test_a_limit_does_not_keep_the_others_from_their_best() -> None:
-    def shove(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        more = np.zeros((len(picture.scene.t), 3))
+    def shove(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        more = np.zeros((len(force_model.measurements.t), 3))
         # The second is all but the first, so that a step that leaves its limit aside goes far off in both.
-        more[:, 0] = p[0] + p[1] * (1.0 + 0.5 * (picture.scene.t > 150.0))
-        return replace(picture, external=picture.external + more)
+        more[:, 0] = p[0] + p[1] * (1.0 + 0.5 * (force_model.measurements.t > 150.0))
+        return replace(force_model, external=force_model.external + more)
 
     both = (Parameter("force", "N", 500.0, -1e4, 1e4), Parameter("more", "N", 500.0, 0.0, 1e4))
 
     case = problem(60.0)
     drifting = replace(
-        case.plain, external=case.plain.external + np.array([60.0, 0.0, 0.0]) * (case.plain.scene.t > 150.0)[:, None]
+        case.plain,
+        external=case.plain.external + np.array([60.0, 0.0, 0.0]) * (case.plain.measurements.t > 150.0)[:, None],
     )
     case = replace(case, plain=drifting)
     effect = replace(PUSH.effect, apply=shove)
@@ -162,7 +169,7 @@ def test_an_onset_leaves_what_was_before_it_alone() -> None:
     late = replace(PUSH, onset_s=150.0)
     case = problem(0.0)
     after = late.act(case.plain, np.array([30.0]))
-    rows = case.plain.scene.t >= 150.0
+    rows = case.plain.measurements.t >= 150.0
     assert (after.external[~rows, 0] == 0.0).all()
     assert (after.external[rows, 0] == 30.0).all()
 

@@ -14,8 +14,6 @@ from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit
 from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains, predictions_alone
 from ferryid.diagnose.inference.noise_model import (
-    EXCERPT,
-    PIECES,
     NoiseModel,
     _widths,
     excerpt,
@@ -24,6 +22,7 @@ from ferryid.diagnose.inference.noise_model import (
     make_whitening_filter,
     stride_s,
 )
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, steps_of, windows
 from ferryid.effects import effects
 from ferryid.effects.effect import Effect, Parameter, Process
@@ -38,14 +37,14 @@ OTHER = np.array([[0.02, 0.01, 3.0, 0.02, 4.0], [0.005, 0.03, 0.8, 0.005, 20.0],
 
 
 def at_rest(seconds: float, placed: bool = True, usable: np.ndarray | None = None) -> tuple[Windows, ForceModel]:
-    """Return steps of a vessel that lies still, and its picture without any force."""
+    """Return steps of a vessel that lies still, and its force model without any force."""
     t = np.arange(0.0, seconds, STEP_S)
     zero = np.zeros((len(t), 3))
     eta = zero if placed else np.column_stack([np.full((len(t), 2), np.nan), zero[:, 2]])
     every = np.ones(len(t), dtype=bool) if usable is None else usable
-    scene = Measurements(FERRY, t, eta, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), every)
-    seen = windows(scene, 8.0, 2.0)
-    thin = seen.scene
+    measurements = Measurements(FERRY, t, eta, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), every)
+    seen = windows(measurements, 8.0, 2.0)
+    thin = seen.measurements
     return steps_of(seen), ForceModel(thin, hull_of(FERRY), thin.parts, thin.angles, np.zeros((len(thin.t), 3)))
 
 
@@ -147,7 +146,7 @@ def test_predictions_under_several_noises_are_those_of_each_alone(integrals: int
 def test_shared_disturbances_have_the_likelihood_of_their_dense_covariance(placed: bool) -> None:
     steps, plain = at_rest(26.0, placed)
     n, h, integrals = len(steps.starts), stride_s(steps), 2 if placed else 1
-    t = plain.scene.t
+    t = plain.measurements.t
     rng = np.random.default_rng(1)
     gaps = 0.05 * rng.standard_normal((n, 3))
     # The channels of the filter are in the order of what was measured, whose scale says how vague a start is.
@@ -247,7 +246,7 @@ def test_a_break_of_a_run_starts_the_filter_anew() -> None:
     assert len(steps.runs) == 2
     gaps = np.random.default_rng(5).standard_normal((len(steps.starts), 3))
     steps = replace(steps, measured=np.tile(gaps, 2))
-    shared = Process(np.broadcast_to([0.0, 20.0, -30.0], (len(plain.scene.t), 3)), 2.0, 4.0, 0.3)
+    shared = Process(np.broadcast_to([0.0, 20.0, -30.0], (len(plain.measurements.t), 3)), 2.0, 4.0, 0.3)
     for noise in (NoiseModel(TRUE), NoiseModel(TRUE, (shared,), plain)):
         together = make_whitening_filter(noise, steps).white(gaps).reshape(-1, 3)
         changed = gaps.copy()
@@ -276,7 +275,7 @@ def marked(seconds: float, *breaks: float) -> Windows:
 
 def test_a_short_log_is_its_own_excerpt() -> None:
     steps = marked(1430.0, 200.0)
-    assert EXCERPT - 100 < len(steps.starts) <= EXCERPT
+    assert INFERENCE.noise_steps - 100 < len(steps.starts) <= INFERENCE.noise_steps
     assert excerpt(steps) is steps
 
 
@@ -294,10 +293,10 @@ def test_an_excerpt_of_a_long_log_is_spread_evenly_and_crosses_no_break(
 ) -> None:
     steps = marked(seconds, *breaks)
     n, stride = len(steps.starts), int(steps.starts[1] - steps.starts[0])
-    assert n > EXCERPT
+    assert n > INFERENCE.noise_steps
     assert len(steps.runs) == len(breaks) + 1
     part = excerpt(steps)
-    assert len(part.starts) == EXCERPT
+    assert len(part.starts) == INFERENCE.noise_steps
     np.testing.assert_array_equal(part.measured[:, 0], part.middle_s)
     assert set(part.starts.tolist()) <= set(steps.starts.tolist())
     assert (np.diff(part.starts) > 0).all()
@@ -308,24 +307,24 @@ def test_an_excerpt_of_a_long_log_is_spread_evenly_and_crosses_no_break(
     for first, end in part.runs:
         assert end - first > DIFFUSE
         assert (np.diff(part.starts[first:end]) == stride).all()
-        assert part.scene.usable[part.starts[first] : part.starts[end - 1] + len(part.weight)].all()
+        assert part.measurements.usable[part.starts[first] : part.starts[end - 1] + len(part.weight)].all()
     # An equal part of the excerpt in the middle of each part of the log, by count.
     where = np.searchsorted(steps.starts, part.starts)
-    for k, one in enumerate(np.array_split(where, PIECES)):
-        assert np.mean(one) == pytest.approx((k + 0.5) * n / PIECES, abs=0.01 * n)
+    for k, one in enumerate(np.array_split(where, INFERENCE.noise_stretches)):
+        assert np.mean(one) == pytest.approx((k + 0.5) * n / INFERENCE.noise_stretches, abs=0.01 * n)
 
 
 @pytest.mark.parametrize("sliver", range(5))
 def test_what_only_starts_a_filter_is_left_out_of_an_excerpt(sliver: int) -> None:
     longer = marked(3002.0)
     n = len(longer.starts) - 5
-    first = int(n / (2 * PIECES)) - EXCERPT // PIECES // 2
+    first = int(n / (2 * INFERENCE.noise_stretches)) - INFERENCE.noise_steps // INFERENCE.noise_stretches // 2
     # The first piece begins so many steps before a break.
     kept = np.delete(np.arange(n + 5), np.arange(first + sliver, first + sliver + 5))
     runs = ((0, first + sliver), (first + sliver, n))
     part = excerpt(replace(longer, starts=longer.starts[kept], measured=longer.measured[kept], runs=runs))
-    assert len(part.starts) == EXCERPT - (sliver if sliver <= DIFFUSE else 0)
-    assert len(part.runs) == PIECES + (sliver > DIFFUSE)
+    assert len(part.starts) == INFERENCE.noise_steps - (sliver if sliver <= DIFFUSE else 0)
+    assert len(part.runs) == INFERENCE.noise_stretches + (sliver > DIFFUSE)
     np.testing.assert_array_equal(part.measured[:, 0], part.middle_s)
 
 
@@ -416,13 +415,13 @@ def looped(tick_s: float) -> tuple[Floats, Floats, Floats]:
     return STEP_S * np.arange(len(seen)), seen, force
 
 
-def late(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def late(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Scale the force of the first thruster, and let it be late."""
-    t = picture.scene.t
-    parts = picture.parts.copy()
+    t = force_model.measurements.t
+    parts = force_model.parts.copy()
     for j in range(2):
-        parts[:, 0, j] = p[0] * np.interp(t - p[1], t, picture.parts[:, 0, j])
-    return replace(picture, parts=parts)
+        parts[:, 0, j] = p[0] * np.interp(t - p[1], t, force_model.parts[:, 0, j])
+    return replace(force_model, parts=parts)
 
 
 LATE = Candidate(
@@ -436,7 +435,7 @@ KNOWN = np.array([[0.004, 0.005, 0.6, 0.02, 4.0], [0.004, 0.005, 0.6, 0.02, 4.0]
 
 
 def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[EstimationProblem, ForceModel]]:
-    """Return a trial for every seed, with the noise that there is, and its picture without effects."""
+    """Return a trial for every seed, with the noise that there is, and its force model without effects."""
     hull = np.zeros(len(COEFFICIENTS))
     hull[[0, 1, 4]] = MASS
     zero = np.zeros((len(t), 3))
@@ -445,9 +444,13 @@ def trials(seen: Floats, force: Floats, t: Floats) -> list[tuple[EstimationProbl
         eta, parts = zero.copy(), np.zeros((len(t), 2, 3))
         eta[:, :2], parts[:, 0, :2] = seen[:, k], force[:, k]
         eta[:, 2] = 1e-6 * np.random.default_rng(k).standard_normal(len(t))
-        scene = Measurements(FERRY, t, eta, zero, zero, parts, np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
-        cut = windows(scene, 8.0, 2.0)
-        plain = ForceModel(cut.scene, hull, cut.scene.parts, cut.scene.angles, zero[: len(cut.scene.t)])
+        measurements = Measurements(
+            FERRY, t, eta, zero, zero, parts, np.zeros((len(t), 2)), np.ones(len(t), dtype=bool)
+        )
+        cut = windows(measurements, 8.0, 2.0)
+        plain = ForceModel(
+            cut.measurements, hull, cut.measurements.parts, cut.measurements.angles, zero[: len(cut.measurements.t)]
+        )
         held = np.where(np.arange(len(COEFFICIENTS)) == 0, 1e-9, 0.0)
         blank = AutoregressiveNoise(np.zeros((3, ORDER)), np.eye(3))
         made.append((EstimationProblem(cut, plain, blank, held, NoiseModel(KNOWN)), plain))
@@ -502,8 +505,8 @@ def test_the_thrusters_lag_is_that_of_its_equation(time_constant_s: float) -> No
         x, y = FERRY.actuators[k].position_m
         parts[:, k, 0], parts[:, k, 1] = along * np.cos(angles[:, k]), along * np.sin(angles[:, k])
         parts[:, k, 2] = x * parts[:, k, 1] - y * parts[:, k, 0]
-    scene = Measurements(FERRY, t, zero, zero, zero, parts, angles, np.ones(len(t), dtype=bool))
-    plain = ForceModel(scene, hull_of(FERRY), parts, angles, zero)
+    measurements = Measurements(FERRY, t, zero, zero, zero, parts, angles, np.ones(len(t), dtype=bool))
+    plain = ForceModel(measurements, hull_of(FERRY), parts, angles, zero)
     after = effects()["thruster_lag"].apply(plain, np.array([time_constant_s]), None)
 
     def rate(now: float, force: np.ndarray) -> np.ndarray:

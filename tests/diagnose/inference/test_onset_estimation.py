@@ -31,10 +31,10 @@ sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
 def pushed(force: float, first_s: float, last_s: float) -> EstimationProblem:
     """The trial of a vessel at rest that a force was said to push, but for some time only."""
     case = problem(force)
-    t = case.plain.scene.t
+    t = case.plain.measurements.t
     missing = (t < first_s) | (t >= last_s)
     away = case.plain.external + np.array([force, 0.0, 0.0]) * missing[:, None]
-    # What is not there pushes the other way in the picture: measured and pictured differ within the span only.
+    # What is not there pushes the other way in the force model: measured and modelled differ within the span only.
     return replace(case, plain=replace(case.plain, external=away))
 
 
@@ -108,11 +108,11 @@ def test_the_gain_of_a_span_is_that_of_its_fit(monkeypatch: pytest.MonkeyPatch) 
 
 def test_in_a_gap_nothing_begins_or_ends() -> None:
     case = problem(0.0)
-    t = case.plain.scene.t
-    seen = windows(replace(case.plain.scene, usable=(t < 100.0) | (t >= 200.0)), 8.0, 2.0)
-    # At rest in the log, pushed back in the picture.
+    t = case.plain.measurements.t
+    seen = windows(replace(case.plain.measurements, usable=(t < 100.0) | (t >= 200.0)), 8.0, 2.0)
+    # At rest in the log, pushed back in the force model.
     pushed_back = np.outer((t >= 60.0) & (t < 240.0), [-240.0, 0.0, 0.0])
-    gappy = replace(case, windows=seen, plain=replace(case.plain, scene=seen.scene, external=pushed_back))
+    gappy = replace(case, windows=seen, plain=replace(case.plain, measurements=seen.measurements, external=pushed_back))
     bare = fit(gappy, ())
     spans = promising_spans(gappy, linearise(gappy, bare, starting_point(gappy, bare)), PUSH)
     assert spans
@@ -127,7 +127,7 @@ def test_in_a_gap_nothing_begins_or_ends() -> None:
 def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None:
     load = "[[payload]]\nmass_kg = 300\nx_m = 0.6\nuntil_s = 400\n"
     case = trial_on(sailed(tmp_path, "leaves", TWELVE + load, 5))
-    known = [one for one in list_candidates(case.plain.scene)[0] if one.effect.onset]
+    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("payload", None)]
     (one,) = found.candidates
@@ -140,7 +140,7 @@ def test_a_load_that_leaves_is_no_fault_of_the_thrusters(tmp_path: Path) -> None
 def test_a_fault_that_passes_is_found_with_both_its_ends(tmp_path: Path) -> None:
     fault = '[[thrusters.faults]]\nthruster = "thruster2"\nfactor = 0.55\nfrom_s = 260\nuntil_s = 400\n'
     case = trial_on(sailed(tmp_path, "passes", TWELVE + fault, 6))
-    known = [one for one in list_candidates(case.plain.scene)[0] if one.effect.onset]
+    known = [one for one in list_candidates(case.plain.measurements)[0] if one.effect.onset]
     found = search(case, lambda stage: None, known=known).fit
     assert [one.key for one in found.candidates] == [("thruster_gain", "thruster2")]
     (one,) = found.candidates

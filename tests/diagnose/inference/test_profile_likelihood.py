@@ -19,9 +19,9 @@ from tests.diagnose.inference.test_estimation import PUSH, problem
 pytestmark = pytest.mark.slow
 
 
-def both(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+def both(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """A constant force ahead, the product of two factors."""
-    return replace(picture, external=picture.external + np.array([p[0] * p[1], 0.0, 0.0]))
+    return replace(force_model, external=force_model.external + np.array([p[0] * p[1], 0.0, 0.0]))
 
 
 FACTORS = Candidate(

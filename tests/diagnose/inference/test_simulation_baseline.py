@@ -73,8 +73,10 @@ def simulated(windy: str) -> Simulation:
 
 def found(simulated: Simulation, log: str) -> Search:
     seen = windows(read_measurements(log, FERRY, None)[0], *window_lengths(FERRY))
-    plain, spread = simulated_force_model(simulated, seen.scene)
-    return search(estimation_problem(seen, plain, spread), quietly, known=differing_candidates(simulated, seen.scene))
+    plain, spread = simulated_force_model(simulated, seen.measurements)
+    return search(
+        estimation_problem(seen, plain, spread), quietly, known=differing_candidates(simulated, seen.measurements)
+    )
 
 
 @pytest.mark.slow
@@ -132,18 +134,18 @@ def test_a_simulated_hull_of_seven_tenths_hides_no_fault(folder: Path) -> None:
 
 
 def test_an_effect_that_both_have_is_taken_out_and_put_in_exactly(simulated: Simulation) -> None:
-    scene = windows(simulated.scene, 8.0, 2.0).scene
-    picture, _ = simulated_force_model(simulated, scene)
-    (one,) = [one for one in differing_candidates(simulated, scene) if one.effect.id == "wind"]
+    measurements = windows(simulated.measurements, 8.0, 2.0).measurements
+    force_model, _ = simulated_force_model(simulated, measurements)
+    (one,) = [one for one in differing_candidates(simulated, measurements) if one.effect.id == "wind"]
     neutral = np.array([parameter.neutral for parameter in one.parameters])
-    np.testing.assert_allclose(acceleration(one.act(picture, neutral)), acceleration(picture), atol=1e-12)
-    still = replace(prior_force_model(scene, FERRY)[0], hull=simulated.hull)
-    np.testing.assert_allclose(acceleration(one.act(picture, np.zeros(2))), acceleration(still), atol=1e-12)
+    np.testing.assert_allclose(acceleration(one.act(force_model, neutral)), acceleration(force_model), atol=1e-12)
+    still = replace(prior_force_model(measurements, FERRY)[0], hull=simulated.hull)
+    np.testing.assert_allclose(acceleration(one.act(force_model, np.zeros(2))), acceleration(still), atol=1e-12)
 
 
 def test_a_clock_that_started_later_is_found_from_the_path(simulated: Simulation) -> None:
-    scene = simulated.scene
-    compared = compare_paths(replace(scene, t=scene.t - 12.0), scene)
+    measurements = simulated.measurements
+    compared = compare_paths(replace(measurements, t=measurements.t - 12.0), measurements)
     assert isinstance(compared, PathComparison)
     assert compared.shift_s == pytest.approx(12.0, abs=0.5)
     assert np.sqrt(np.mean(compared.position_m**2)) < 0.05
@@ -151,13 +153,13 @@ def test_a_clock_that_started_later_is_found_from_the_path(simulated: Simulation
 
 def test_paths_of_another_manoeuvre_are_not_compared(simulated: Simulation) -> None:
     def moved(eta: np.ndarray) -> Measurements:
-        return replace(simulated.scene, eta=eta)
+        return replace(simulated.measurements, eta=eta)
 
-    eta = simulated.scene.eta
-    assert "apart" in str(compare_paths(moved(eta[:, [1, 0, 2]] * [-3.0, 3.0, 1.0]), simulated.scene))
-    assert "no positions" in str(compare_paths(moved(np.full_like(eta, np.nan)), simulated.scene))
-    half = replace(simulated.scene, usable=simulated.scene.usable & (simulated.scene.t < 200.0))
-    assert "lasts" in str(compare_paths(half, simulated.scene))
+    eta = simulated.measurements.eta
+    assert "apart" in str(compare_paths(moved(eta[:, [1, 0, 2]] * [-3.0, 3.0, 1.0]), simulated.measurements))
+    assert "no positions" in str(compare_paths(moved(np.full_like(eta, np.nan)), simulated.measurements))
+    half = replace(simulated.measurements, usable=simulated.measurements.usable & (simulated.measurements.t < 200.0))
+    assert "lasts" in str(compare_paths(half, simulated.measurements))
 
 
 def test_a_simulation_too_short_to_learn_from_is_refused() -> None:
@@ -183,9 +185,9 @@ def test_a_load_that_a_simulation_records_for_a_part_of_it_is_aboard_for_that_pa
     t = np.arange(0.0, 100.0)
     zero, usable = np.zeros((len(t), 3)), np.ones(len(t), dtype=bool)
     load = np.where(((t >= 30.0) & (t < 80.0))[:, None], [300.0, 0.5], 0.0)
-    scene = Measurements(
+    measurements = Measurements(
         FERRY, t, zero, zero, zero, np.zeros((len(t), 2, 3)), np.zeros((len(t), 2)), usable, payload=load
     )
-    (one,) = against._measured(scene)
+    (one,) = against._measured(measurements)
     assert one.values == pytest.approx([300.0, 0.5])
     assert (one.candidate.onset_s, one.candidate.offset_s) == (30.0, 79.0)

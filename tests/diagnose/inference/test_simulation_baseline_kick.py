@@ -23,7 +23,7 @@ def test_only_the_difference_to_the_simulations_load_comes_aboard() -> None:
     ferry = load_profile("milliampere")
     n, k = 1000, len(ferry.actuators)
     nu = np.tile([1.0, 0.0, 0.0], (n, 1))
-    scene = Measurements(
+    measurements = Measurements(
         profile=ferry, t=0.2 * np.arange(n), eta=np.zeros((n, 3)), nu_raw=nu, nu=nu, parts=np.zeros((n, k, 3)),
         angles=np.zeros((n, k)), usable=np.ones(n, dtype=bool),
     )  # fmt: skip
@@ -31,12 +31,12 @@ def test_only_the_difference_to_the_simulations_load_comes_aboard() -> None:
     own = Candidate(payload, None, payload.parameters_of(ferry))
     hull = hull_of(ferry)
     simulated = Simulation(
-        "s", scene, hull, 0.1 * np.abs(hull), (Condition(own, np.array([300.0, 0.0]), np.zeros(2)),), ()
+        "s", measurements, hull, 0.1 * np.abs(hull), (Condition(own, np.array([300.0, 0.0]), np.zeros(2)),), ()
     )
-    base, _ = simulated_force_model(simulated, scene)
+    base, _ = simulated_force_model(simulated, measurements)
     late = replace(
-        next(one for one in differing_candidates(simulated, scene) if one.effect.id == "payload"), onset_s=100.0
+        next(one for one in differing_candidates(simulated, measurements) if one.effect.id == "payload"), onset_s=100.0
     )
     for mass, taken in ((300.0, 0.0), (400.0, -100.0)):
         more = late.act(base, np.array([mass, 0.0])).external - base.external
-        assert more.sum(axis=0)[0] * scene.step_s == pytest.approx(taken)
+        assert more.sum(axis=0)[0] * measurements.step_s == pytest.approx(taken)

@@ -39,10 +39,10 @@ IMITATORS = ("wind", "gusts", "waves", "time_delay", "thruster_lag")
 def found_in(environment: str, seed: int, folder: Path) -> Search:
     log = folder / "trial.mcap"
     write_log(simulate(parse_scenario(BASE + environment, "unsteady"), seed), log)
-    scene, _ = read_measurements(str(log), FERRY, None)
-    seen = windows(scene, *window_lengths(FERRY))
-    plain, spread = prior_force_model(seen.scene, FERRY)
-    candidates, _ = list_candidates(seen.scene)
+    measurements, _ = read_measurements(str(log), FERRY, None)
+    seen = windows(measurements, *window_lengths(FERRY))
+    plain, spread = prior_force_model(seen.measurements, FERRY)
+    candidates, _ = list_candidates(seen.measurements)
     known = [one for one in candidates if one.effect.id in IMITATORS]
     assert {one.effect.id for one in known} == set(IMITATORS)
     return search(estimation_problem(seen, plain, spread), lambda stage: None, known=known)
@@ -54,7 +54,7 @@ def values_of(state: DisturbanceState) -> dict[str, float]:
 
 def spectrum_in(result: Search) -> Mapping[str, Floats]:
     """Return the figure of the only disturbance."""
-    (claim,) = disturbance_claims(result.problem, result.fit, result.states, result.problem.windows.scene)
+    (claim,) = disturbance_claims(result.problem, result.fit, result.states, result.problem.windows.measurements)
     finding = claim.finding
     assert (np.diff(finding.evidence["frequency"]) > 0.0).all()
     return finding.evidence

@@ -20,7 +20,7 @@ RATE_HZ = 20.0
 
 
 def sailed(seconds: float = 60.0, current: tuple[float, float] = (0.0, 0.0)) -> tuple[Measurements, Floats]:
-    """Return a scene of a hull under smooth forces of two thrusters, its motion from SciPy, and these forces (n, 2, 3)."""
+    """Return measurements of a hull under smooth forces of two thrusters, its motion from SciPy, and these forces (n, 2, 3)."""
     p = hydrodynamics(FERRY.hull)
     M = FERRY.hull.M
 
@@ -44,37 +44,43 @@ def sailed(seconds: float = 60.0, current: tuple[float, float] = (0.0, 0.0)) -> 
     return Measurements(FERRY, t, y[:, :3], y[:, 3:], y[:, 3:], parts, angles, np.ones(len(t), dtype=bool)), parts
 
 
-def still_air(scene: Measurements) -> ForceModel:
-    return ForceModel(scene, hull_of(FERRY), scene.parts, scene.angles, np.zeros((len(scene.t), 3)))
+def still_air(measurements: Measurements) -> ForceModel:
+    return ForceModel(
+        measurements, hull_of(FERRY), measurements.parts, measurements.angles, np.zeros((len(measurements.t), 3))
+    )
 
 
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
-def test_the_right_picture_leaves_no_gap(placed: bool) -> None:
-    scene, _ = sailed()
+def test_the_right_force_model_leaves_no_gap(placed: bool) -> None:
+    measurements, _ = sailed()
     if not placed:
-        scene = replace(scene, eta=np.column_stack([np.full((len(scene.t), 2), np.nan), scene.eta[:, 2]]))
-    seen = windows(scene, 8.0, 2.0)
-    gap = seen.gap(still_air(seen.scene))
+        measurements = replace(
+            measurements, eta=np.column_stack([np.full((len(measurements.t), 2), np.nan), measurements.eta[:, 2]])
+        )
+    seen = windows(measurements, 8.0, 2.0)
+    gap = seen.gap(still_air(seen.measurements))
     assert np.abs(gap).max() < 2e-4
     assert np.abs(seen.measured[:, seen.channels]).max() > 0.03
 
 
-def test_a_current_leaves_no_gap_once_it_is_in_the_picture() -> None:
-    scene, _ = sailed(current=(0.3, -0.2))
-    seen = windows(scene, 8.0, 2.0)
-    plain = still_air(seen.scene)
-    flow = np.broadcast_to([0.3, -0.2], (len(seen.scene.t), 2))
+def test_a_current_leaves_no_gap_once_it_is_in_the_force_model() -> None:
+    measurements, _ = sailed(current=(0.3, -0.2))
+    seen = windows(measurements, 8.0, 2.0)
+    plain = still_air(seen.measurements)
+    flow = np.broadcast_to([0.3, -0.2], (len(seen.measurements.t), 2))
     assert np.abs(seen.gap(replace(plain, flow=flow))).max() < 2e-4
     assert np.abs(seen.gap(plain)).max() > 2e-3
 
 
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
 def test_changes_with_the_hull_are_those_of_the_gap(placed: bool) -> None:
-    scene, _ = sailed(30.0)
+    measurements, _ = sailed(30.0)
     if not placed:
-        scene = replace(scene, eta=np.column_stack([np.full((len(scene.t), 2), np.nan), scene.eta[:, 2]]))
-    seen = windows(scene, 8.0, 2.0)
-    plain = still_air(seen.scene)
+        measurements = replace(
+            measurements, eta=np.column_stack([np.full((len(measurements.t), 2), np.nan), measurements.eta[:, 2]])
+        )
+    seen = windows(measurements, 8.0, 2.0)
+    plain = still_air(seen.measurements)
     places = np.flatnonzero(plain.hull)
     moves = 0.1 * plain.hull[places]
     found = seen.hull_changes(plain, places, moves)
@@ -90,29 +96,34 @@ def test_windows_average_derivatives_of_polynomials_exactly() -> None:
     eta = np.column_stack([0.5 * 0.3 * t**2, 7.0 + 0.0 * t, 0.02 * t])
     nu = np.column_stack([0.1 * t, 0.2 * t - 3.0, 0.0 * t])
     blank = np.zeros((len(t), 2, 3))
-    scene = Measurements(FERRY, t, eta, nu, nu, blank, blank[:, :, 0], np.ones(len(t), dtype=bool))
-    measured = windows(scene, 8.0, 2.0).measured
+    measurements = Measurements(FERRY, t, eta, nu, nu, blank, blank[:, :, 0], np.ones(len(t), dtype=bool))
+    measured = windows(measurements, 8.0, 2.0).measured
     np.testing.assert_allclose(measured, np.broadcast_to([0.3, 0.0, 0.0, 0.1, 0.2, 0.0], measured.shape), atol=1e-9)
 
 
 @pytest.mark.slow
 def test_no_window_reaches_over_unusable_rows() -> None:
-    scene, _ = sailed()
-    usable = np.ones(len(scene.t), dtype=bool)
+    measurements, _ = sailed()
+    usable = np.ones(len(measurements.t), dtype=bool)
     usable[500:520] = False
-    seen = windows(replace(scene, usable=usable), 8.0, 2.0)
+    seen = windows(replace(measurements, usable=usable), 8.0, 2.0)
     half = 4.0
     middle = seen.middle_s
-    assert ((middle + half <= scene.t[500] + 0.05) | (middle - half >= scene.t[519] - 0.05)).all()
+    assert ((middle + half <= measurements.t[500] + 0.05) | (middle - half >= measurements.t[519] - 0.05)).all()
     assert len(seen.runs) == 2
     assert sum(end - first for first, end in seen.runs) == len(seen.starts)
 
 
 def test_slow_errors_of_the_velocity_are_taken_from_the_position_and_fast_motion_is_kept() -> None:
-    scene, _ = sailed()
-    slow = 0.05 * np.sin(2.0 * np.pi * scene.t / 40.0)[:, None] * np.ones(3)
-    wrong = scene.nu + slow
-    better = complementary_filter(wrong, wrong, scene.eta, RATE_HZ)
+    measurements, _ = sailed()
+    slow = 0.05 * np.sin(2.0 * np.pi * measurements.t / 40.0)[:, None] * np.ones(3)
+    wrong = measurements.nu + slow
+    better = complementary_filter(wrong, wrong, measurements.eta, RATE_HZ)
     inner = slice(100, -100)
-    assert np.abs(better - scene.nu)[inner].max() < 0.15 * np.abs(slow).max()
-    assert np.abs(complementary_filter(scene.nu, scene.nu, scene.eta, RATE_HZ) - scene.nu)[inner].max() < 1e-3
+    assert np.abs(better - measurements.nu)[inner].max() < 0.15 * np.abs(slow).max()
+    assert (
+        np.abs(complementary_filter(measurements.nu, measurements.nu, measurements.eta, RATE_HZ) - measurements.nu)[
+            inner
+        ].max()
+        < 1e-3
+    )

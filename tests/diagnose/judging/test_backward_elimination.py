@@ -30,7 +30,7 @@ def problem(tmp_path_factory: pytest.TempPathFactory) -> EstimationProblem:
 
 
 def candidates(problem: EstimationProblem) -> list[Candidate]:
-    return [one for one in list_candidates(problem.plain.scene)[0] if one.effect.unsteady is None]
+    return [one for one in list_candidates(problem.plain.measurements)[0] if one.effect.unsteady is None]
 
 
 def of(problem: EstimationProblem, *keys: tuple[str, str | None]) -> list[Candidate]:

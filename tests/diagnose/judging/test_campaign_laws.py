@@ -140,7 +140,7 @@ def test_noise_and_hulls_that_are_off_have_no_law_in_common() -> None:
     logs = {}
     for seed in range(LOGS):
         cut = windows(sailed(seed), 8.0, 2.0)
-        plain, spread = prior_force_model(cut.scene, FERRY)
+        plain, spread = prior_force_model(cut.measurements, FERRY)
         # The same hull in all logs, as it is of one vessel.
         off = np.random.default_rng(5).choice([0.92, 1.08], len(plain.hull))
         problem = estimation_problem(cut, replace(plain, hull=plain.hull * off), spread)

@@ -31,8 +31,8 @@ FERRY = load_profile("milliampere")
 ROWS = 50
 
 
-def push(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-    return replace(picture, external=picture.external + np.array([p[0], 0.0, 0.0]))
+def push(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+    return replace(force_model, external=force_model.external + np.array([p[0], 0.0, 0.0]))
 
 
 PUSH = Candidate(
@@ -46,14 +46,14 @@ NOTHING = Fit((), (), np.empty((0, 0)), hull_of(FERRY), 0.0)
 def linear(strength: float, hull: Floats | None = None) -> EstimationProblem:
     """A trial whose prediction errors are the push, every newton of it worth `strength` in units of the noise."""
     zero = np.zeros((ROWS, 3))
-    scene = Measurements(
+    measurements = Measurements(
         FERRY, np.arange(ROWS) * 0.2, zero, zero, zero, np.zeros((ROWS, 2, 3)), zero, np.ones(ROWS, dtype=bool)
     )
-    plain = ForceModel(scene, hull_of(FERRY), scene.parts, scene.angles, zero)
+    plain = ForceModel(measurements, hull_of(FERRY), measurements.parts, measurements.angles, zero)
     by_hull = np.zeros((ROWS, len(COEFFICIENTS))) if hull is None else hull
     return cast(
         EstimationProblem,
-        SimpleNamespace(plain=plain, by_hull=by_hull, white=lambda picture: strength * picture.external[:, 0]),
+        SimpleNamespace(plain=plain, by_hull=by_hull, white=lambda force_model: strength * force_model.external[:, 0]),
     )
 
 
@@ -88,7 +88,7 @@ def test_what_the_hull_can_imitate_is_not_seen() -> None:
 
 
 def test_what_was_found_and_what_is_only_noise_have_no_chance_to_tell() -> None:
-    still = replace(PUSH, effect=replace(PUSH.effect, apply=lambda picture, p, instance: picture))
+    still = replace(PUSH, effect=replace(PUSH.effect, apply=lambda force_model, p, instance: force_model))
     assert detection_powers(linear(0.2), NOTHING, [still]) == ()
     found = Fit((PUSH,), (np.array([5.0]),), np.eye(1), hull_of(FERRY), 0.0)
     assert detection_powers(linear(0.2), found, [PUSH]) == ()

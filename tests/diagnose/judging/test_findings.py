@@ -44,7 +44,7 @@ def with_lows(stands: Elimination, forces: list[float], runs: list[float], score
 
 
 def judged_by_rules(problem: EstimationProblem, stands: Elimination) -> tuple[Finding, tuple[str, ...]]:
-    (finding,), notes = apply_rules(force_claims(problem, stands, problem.windows.scene), LogFigures())
+    (finding,), notes = apply_rules(force_claims(problem, stands, problem.windows.measurements), LogFigures())
     return finding, notes
 
 
@@ -69,7 +69,7 @@ def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[E
 def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
     problem, stands = windy
     (blown,) = stands.fit.candidates
-    brief = replace(blown, effect=replace(blown.effect, once=lambda scene, p: True))
+    brief = replace(blown, effect=replace(blown.effect, once=lambda measurements, p: True))
     finding, (note,) = judged_by_rules(problem, replace(stands, fit=replace(stands.fit, candidates=(brief,))))
     assert finding.probability == JUDGING.hint_probability
     assert "the vessel was in that place once" in note
@@ -144,7 +144,7 @@ def test_only_an_axis_that_is_claimed_shows_a_finding(
     shows: bool,
 ) -> None:
     problem, stands = windy
-    (claim,) = force_claims(problem, with_lows(stands, forces, runs), problem.windows.scene)
+    (claim,) = force_claims(problem, with_lows(stands, forces, runs), problem.windows.measurements)
     finding = replace(claim.finding, axes=dict(zip(AXES, shares, strict=True)))
     judged, _ = improves_no_claimed_axis(finding, Context(claim.figures))
     assert judged is not None
@@ -153,7 +153,9 @@ def test_only_an_axis_that_is_claimed_shows_a_finding(
 
 def test_a_strong_likelihood_needs_no_more(windy: tuple[EstimationProblem, Elimination]) -> None:
     problem, stands = windy
-    (claim,) = force_claims(problem, with_lows(stands, [-0.1] * 3, [-0.1] * 4, score=45.0), problem.windows.scene)
+    (claim,) = force_claims(
+        problem, with_lows(stands, [-0.1] * 3, [-0.1] * 4, score=45.0), problem.windows.measurements
+    )
     assert improves_no_claimed_axis(claim.finding, Context(claim.figures)) == (claim.finding, "")
 
 

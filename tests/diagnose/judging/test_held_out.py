@@ -18,9 +18,10 @@ from ferryid.diagnose.judging.held_out import HEADING, held_out, held_out_eviden
 from ferryid.effects import effects
 from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.vessel import load_profile
-from ferryid.vessel.hull import forward
 from ferryid.vessel.wind import wind_force
+from tests.vessel.hull_matrices import forward
 
 FERRY = load_profile("milliampere")
 WIND = np.array([-2.0, 1.5])
@@ -60,12 +61,12 @@ def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005) -> Measuremen
     return Measurements(FERRY, t, eta, nu, path[:, 3:], parts, np.zeros((len(t), 2)), np.ones(len(t), dtype=bool))
 
 
-def trial_on(scene: Measurements) -> EstimationProblem:
-    cut = windows(scene, 8.0, 2.0)
-    seen = cut.scene
+def trial_on(measurements: Measurements) -> EstimationProblem:
+    cut = windows(measurements, 8.0, 2.0)
+    seen = cut.measurements
     still = wind_force(FERRY.wind, np.zeros((len(seen.t), 2)), seen.psi, seen.nu) if FERRY.wind else np.zeros(3)
     plain = ForceModel(seen, hull_of(FERRY), seen.parts, seen.angles, still)
-    return estimation_problem(cut, plain, INFERENCE.hull_spread * np.abs(plain.hull))
+    return estimation_problem(cut, plain, EFFECTS.hull_spread * np.abs(plain.hull))
 
 
 def candidate(name: str, instance: str | None = None) -> Candidate:
@@ -89,8 +90,11 @@ def test_what_is_left_over_is_model_minus_measured(windy: EstimationProblem) -> 
     """A wind that the model does not know pushes the vessel; what is left over is that push with its sign turned round."""
     seen, plain = windy.windows, windy.plain
     assert FERRY.wind is not None
-    scene = seen.scene
-    push = wind_force(FERRY.wind, np.broadcast_to(WIND, (len(scene.t), 2)), scene.psi, scene.nu) - plain.external
+    measurements = seen.measurements
+    push = (
+        wind_force(FERRY.wind, np.broadcast_to(WIND, (len(measurements.t), 2)), measurements.psi, measurements.nu)
+        - plain.external
+    )
     left = force_errors(seen, plain, plain)
     for axis in range(3):
         slope = np.polyfit(seen.mean(push)[:, axis], left[:, axis], 1)[0]
@@ -197,8 +201,8 @@ def test_a_constant_push_is_matched_by_its_placebo(calm: EstimationProblem) -> N
     # The held-out errors shrink, but the same force late shrinks them as much: it tells nothing of when it acts.
     base = candidate("wind").effect
 
-    def apply(picture: ForceModel, p: np.ndarray, instance: str | None) -> ForceModel:
-        return replace(picture, external=picture.external + np.array([p[0], p[1], 0.0]))
+    def apply(force_model: ForceModel, p: np.ndarray, instance: str | None) -> ForceModel:
+        return replace(force_model, external=force_model.external + np.array([p[0], p[1], 0.0]))
 
     pushed = replace(calm, plain=replace(calm.plain, external=calm.plain.external + np.array([40.0, -40.0, 0.0])))
     push = Candidate(
@@ -220,10 +224,10 @@ def test_only_what_depends_on_the_heading_has_a_mirrored_placebo(windy: Estimati
 
 
 @pytest.mark.slow
-def test_free_runs_of_the_true_picture_stay_with_the_vessel(windy: EstimationProblem) -> None:
+def test_free_runs_of_the_true_force_model_stay_with_the_vessel(windy: EstimationProblem) -> None:
     folds = folds_of(windy.windows)
     assert folds is not None
-    seen = windy.windows.scene
+    seen = windy.windows.measurements
     assert FERRY.wind is not None
     blown = wind_force(FERRY.wind, np.broadcast_to(WIND, (len(seen.t), 2)), seen.psi, seen.nu)
     true = replace(windy, plain=replace(windy.plain, external=blown))

@@ -15,7 +15,7 @@ FERRY = load_profile("milliampere")
 N = 100
 
 
-def scene() -> Measurements:
+def measurements() -> Measurements:
     """A hundred seconds at rest."""
     zero = np.zeros((N, 3))
     usable = np.ones(N, dtype=bool)
@@ -37,7 +37,7 @@ def found(**parameters: Estimate) -> Finding:
 def test_a_load_is_compared_while_it_was_aboard() -> None:
     mass = Estimate(290.0, 280.0, 300.0, "kg")
     (one,) = compare_hidden_signals(
-        {"payload": load(20, 60)}, scene(), [found(mass=mass, x=Estimate(0.4, 0.3, 0.5, "m"))]
+        {"payload": load(20, 60)}, measurements(), [found(mass=mass, x=Estimate(0.4, 0.3, 0.5, "m"))]
     )
     assert one.measured == {"mass": 300.0, "x": 0.5, "onset": 20.0, "offset": 59.0}
     assert set(one.found) == {"mass", "x"}
@@ -46,7 +46,7 @@ def test_a_load_is_compared_while_it_was_aboard() -> None:
 
 
 def test_a_load_that_stays_has_no_ends_and_one_that_was_not_found_is_told() -> None:
-    (one,) = compare_hidden_signals({"payload": load(0, N)}, scene(), [])
+    (one,) = compare_hidden_signals({"payload": load(0, N)}, measurements(), [])
     assert set(one.measured) == {"mass", "x"}
     assert one.says.endswith("nothing of it was found.")
 
@@ -54,11 +54,11 @@ def test_a_load_that_stays_has_no_ends_and_one_that_was_not_found_is_told() -> N
 def test_a_wind_is_compared_on_average_of_what_was_measured() -> None:
     blown = np.full((N, 2), [2.0, -1.0])
     blown[:50] = np.nan
-    (one,) = compare_hidden_signals({"wind": blown}, scene(), [])
+    (one,) = compare_hidden_signals({"wind": blown}, measurements(), [])
     assert one.measured == {"north": pytest.approx(2.0), "east": pytest.approx(-1.0)}
     assert "on average: north 2 m/s, east -1 m/s" in one.says
 
 
 def test_an_empty_deck_is_no_load() -> None:
-    (one,) = compare_hidden_signals({"payload": load(0, 0)}, scene(), [])
+    (one,) = compare_hidden_signals({"payload": load(0, 0)}, measurements(), [])
     assert one.measured == {"mass": 0.0, "x": 0.0}

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.change_points import MOST_BREAKS, _breaks, active_intervals
+from ferryid.diagnose.inference.change_points import LEVELS, _breaks, active_intervals
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, estimation_problem, fit
-from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.error_profiles import in_words, profile_of
 from ferryid.diagnose.judging.locate import locate, whitened
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import Parameter, effects
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
+from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 from ferryid.vessel import load_profile
 
@@ -41,21 +41,27 @@ def trial_on(push: Floats | None = None) -> EstimationProblem:
     )
     bare = ForceModel(seen, hull_of(FERRY), seen.parts, seen.angles, np.zeros((len(t), 3)))
     accelerated = np.column_stack([np.cos(t / 23.0) / 23.0, 0.7 / 53.0 * np.cos(t / 53.0), np.zeros_like(t)])
-    # Inverse dynamics with the picture's own equations: its force is what is left of the motion it gives without any.
+    # Inverse dynamics with the force model's own equations: its force is what is left of the motion it gives without any.
     needed = (accelerated - acceleration(bare)) @ FERRY.hull.M.T
     gone = np.zeros((len(t), 3)) if push is None else push
     parts = np.stack([needed - gone, np.zeros_like(needed)], axis=1)
-    scene = replace(seen, parts=parts)
-    cut = windows(scene, 8.0, 2.0)
-    plain = ForceModel(cut.scene, hull_of(FERRY), cut.scene.parts, cut.scene.angles, np.zeros((len(cut.scene.t), 3)))
-    return estimation_problem(cut, plain, INFERENCE.hull_spread * np.abs(plain.hull))
+    measurements = replace(seen, parts=parts)
+    cut = windows(measurements, 8.0, 2.0)
+    plain = ForceModel(
+        cut.measurements,
+        hull_of(FERRY),
+        cut.measurements.parts,
+        cut.measurements.angles,
+        np.zeros((len(cut.measurements.t), 3)),
+    )
+    return estimation_problem(cut, plain, EFFECTS.hull_spread * np.abs(plain.hull))
 
 
 def pushed(shape: Floats) -> Candidate:
     """An effect that is any push: `shape` times its only parameter."""
 
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        return replace(picture, external=picture.external + p[0] * shape)
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        return replace(force_model, external=force_model.external + p[0] * shape)
 
     effect = replace(effects()["wind"], id="push", apply=apply)
     return Candidate(effect, None, (Parameter("size", "", 1.0, -10.0, 10.0),))
@@ -157,7 +163,7 @@ def test_white_noise_has_no_change_and_a_step_has_one() -> None:
     false = 0
     for seed in range(200):
         noise = np.random.default_rng(seed).standard_normal(300)
-        false += len(_breaks(np.abs(noise), 0, 300, MOST_BREAKS)) > 0
+        false += len(_breaks(np.abs(noise), 0, 300, LEVELS)) > 0
         false += active_intervals(times, noise**2, 4.0, (0.0, 300.0), steady=True) != ((0.0, 300.0),)
     assert false <= 8
     step = np.random.default_rng(1).standard_normal(300) ** 2 * np.where(times < 120.0, 0.05, 4.0)

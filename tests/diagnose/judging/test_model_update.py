@@ -68,9 +68,9 @@ def sailed(folder: Path, name: str, path: str, seed: int, more: str) -> str:
 
 
 def trial_on(log: str, model: Model | None = None) -> tuple[EstimationProblem, Survey]:
-    scene, survey = read_measurements(log, FERRY, None)
-    seen = windows(scene, *window_lengths(FERRY))
-    plain, spread = prior_force_model(seen.scene, FERRY, model, survey.recording.sha256)
+    measurements, survey = read_measurements(log, FERRY, None)
+    seen = windows(measurements, *window_lengths(FERRY))
+    plain, spread = prior_force_model(seen.measurements, FERRY, model, survey.recording.sha256)
     return estimation_problem(seen, plain, spread), survey
 
 
@@ -224,26 +224,27 @@ def test_a_fault_that_passed_in_one_log_is_not_in_the_next(folder: Path) -> None
     assert made is not None
     assert not made.accepted, "nothing of it holds for the vessel"
     here, there = (
-        prior_force_model(problem.plain.scene, FERRY, made, sha)[0] for sha in (found.training["sha256"], "other")
+        prior_force_model(problem.plain.measurements, FERRY, made, sha)[0]
+        for sha in (found.training["sha256"], "other")
     )
-    t = problem.plain.scene.t
+    t = problem.plain.measurements.t
     weak = np.any(here.parts != there.parts, axis=(1, 2))
     assert weak.any()
     assert ((t[weak] >= 300.0) & (t[weak] < 500.0)).all()
 
 
-def test_the_model_moves_as_the_picture_that_was_fitted(model: Model, fouled: str) -> None:
+def test_the_model_moves_as_the_force_model_that_was_fitted(model: Model, fouled: str) -> None:
     problem, survey = trial_on(fouled)
     candidates = [
         Candidate(effects()[name], None, effects()[name].parameters_of(FERRY)) for name in ("fouling", "wind")
     ]
-    picture = replace(problem.plain, hull=np.array([one.value for one in model.hull.values()]))
+    force_model = replace(problem.plain, hull=np.array([one.value for one in model.hull.values()]))
     for candidate, stored in zip(candidates, (*model.vessel_effects, *model.conditions[0].effects), strict=True):
-        picture = candidate.act(picture, np.array(list(stored.values.values())))
-    again, _ = prior_force_model(problem.plain.scene, FERRY, model, survey.recording.sha256)
-    np.testing.assert_allclose(acceleration(again), acceleration(picture), rtol=1e-9, atol=1e-12)
-    elsewhere, _ = prior_force_model(problem.plain.scene, FERRY, model, "of another log")
-    assert np.abs(acceleration(elsewhere) - acceleration(picture)).max() > 1e-3
+        force_model = candidate.act(force_model, np.array(list(stored.values.values())))
+    again, _ = prior_force_model(problem.plain.measurements, FERRY, model, survey.recording.sha256)
+    np.testing.assert_allclose(acceleration(again), acceleration(force_model), rtol=1e-9, atol=1e-12)
+    elsewhere, _ = prior_force_model(problem.plain.measurements, FERRY, model, "of another log")
+    assert np.abs(acceleration(elsewhere) - acceleration(force_model)).max() > 1e-3
 
 
 def test_a_diagnosis_of_a_diagnosed_model_changes_what_it_adds_alone(model: Model, folder: Path) -> None:
@@ -362,13 +363,15 @@ def test_stored_gusts_load_the_vessel_as_many_winds_drawn_at_random_do(fouled: s
     assert kept.model is not None
     stored = load_file(Path(kept.model))
     (known,) = stored.conditions
-    scene = trial_on(fouled)[0].plain.scene
-    rows = np.flatnonzero(scene.usable)[:: int(np.count_nonzero(scene.usable) / 12)]
+    measurements = trial_on(fouled)[0].plain.measurements
+    rows = np.flatnonzero(measurements.usable)[:: int(np.count_nonzero(measurements.usable) / 12)]
 
     def load(of: Model, sha256: str = known.sha256) -> np.ndarray:
         """Return the external force beyond that in still air."""
         still = replace(of, conditions=())
-        return np.subtract(*(prior_force_model(scene, FERRY, one, sha256)[0].external[rows] for one in (of, still)))
+        return np.subtract(
+            *(prior_force_model(measurements, FERRY, one, sha256)[0].external[rows] for one in (of, still))
+        )
 
     assert {one.effect for one in known.effects} == {"wind", "gusts"}
     wind = next(one for one in known.effects if one.effect == "wind")
@@ -376,10 +379,10 @@ def test_stored_gusts_load_the_vessel_as_many_winds_drawn_at_random_do(fouled: s
     draws = air + GUST_STD * np.random.default_rng(13).normal(size=(20_000, 2))
     average, steady = np.empty((2, len(rows), 3))
     for k, row in enumerate(rows.tolist()):
-        psi, nu = np.full(len(draws), scene.psi[row]), np.tile(scene.nu[row], (len(draws), 1))
+        psi, nu = np.full(len(draws), measurements.psi[row]), np.tile(measurements.nu[row], (len(draws), 1))
         average[k] = wind_force(FERRY.wind, draws, psi, nu).mean(axis=0)
         steady[k] = wind_force(FERRY.wind, air[None], psi[:1], nu[:1])[0]
-    still = scene.air_load[rows]
+    still = measurements.air_load[rows]
     factors = np.array([wind.values[name] for name in ("C_X", "C_Y", "C_N")])
     scale = np.sqrt(np.mean(average**2, axis=0))
     assert (np.abs(load(stored) - factors * (average - still)) < 0.02 * scale).all()
@@ -445,6 +448,6 @@ def test_sides_of_a_shallow_place_that_a_log_does_not_tell_have_no_interval(fold
     log = sailed(folder, "shallow", TWELVE, 6, "[environment.shallow]\nnorth_m = [7.5, 60.0]\ndamping_factor = 2.0\n")
     found, problem = taught(log, "shallow_water")
     (stored,) = found.conditions
-    untold = effects()["shallow_water"].untold(problem.plain.scene, np.array(list(stored.values.values())))
+    untold = effects()["shallow_water"].untold(problem.plain.measurements, np.array(list(stored.values.values())))
     assert untold
     assert {name for name, one in stored.parameters.items() if not np.isfinite(one.low)} == untold

@@ -27,10 +27,10 @@ def still(*, noise_mps: float = NOISE_MPS, damping: float = DAMPING, mass: float
     parts = np.zeros((len(T), len(FERRY.actuators), 3))
     parts[:, 0, 1] = THRUST_N * np.sqrt(2.0) * np.sin(2.0 * np.pi * T / 200.0)
     eta = np.zeros((len(T), 3)) if placed else np.full((len(T), 3), [np.nan, np.nan, 0.0])
-    scene = Measurements(FERRY, T, eta, nu, nu, parts, parts[:, :, 0], np.ones(len(T), dtype=bool))
+    measurements = Measurements(FERRY, T, eta, nu, nu, parts, parts[:, :, 0], np.ones(len(T), dtype=bool))
     hull = dict.fromkeys(COEFFICIENTS, 0.0) | {"m11": mass, "m22": mass, "m33": mass, "Y_v": -damping}
-    seen = windows(scene, 8.0, 2.0)
-    plain = ForceModel(seen.scene, np.array(list(hull.values())), parts, parts[:, :, 0], np.zeros((len(T), 3)))
+    seen = windows(measurements, 8.0, 2.0)
+    plain = ForceModel(seen.measurements, np.array(list(hull.values())), parts, parts[:, :, 0], np.zeros((len(T), 3)))
     return SimpleNamespace(windows=seen, plain=plain)
 
 

@@ -49,8 +49,8 @@ def sailed(seed: int) -> Measurements:
     c, s = np.cos(psi), np.sin(psi)
     eta = np.column_stack([np.cumsum(c * u - s * v) * STEP_S, np.cumsum(s * u + c * v) * STEP_S, psi])
     still = np.zeros((len(T), 2, 3))
-    scene = Measurements(FERRY, T, eta, nu, nu, still, np.zeros((len(T), 2)), np.ones(len(T), dtype=bool))
-    bare = ForceModel(scene, hull_of(FERRY), scene.parts, scene.angles, np.zeros((len(T), 3)))
+    measurements = Measurements(FERRY, T, eta, nu, nu, still, np.zeros((len(T), 2)), np.ones(len(T), dtype=bool))
+    bare = ForceModel(measurements, hull_of(FERRY), measurements.parts, measurements.angles, np.zeros((len(T), 3)))
     needed = (np.gradient(nu, STEP_S, axis=0) - acceleration(bare)) @ FERRY.hull.M.T
     # Two thrusters at bow and stern that share surge and sway, and turn the vessel between them.
     (x1, y1), (x2, y2) = (actuator.position_m for actuator in FERRY.actuators)
@@ -62,15 +62,15 @@ def sailed(seed: int) -> Measurements:
     angles = np.arctan2(parts[:, :, 1], parts[:, :, 0])
     noisy = nu + rng.standard_normal(nu.shape) * [0.01, 0.01, 0.002]
     measured = eta + rng.standard_normal(eta.shape) * [0.02, 0.02, 0.002]
-    return replace(scene, parts=parts, angles=angles, eta=measured, nu_raw=noisy)
+    return replace(measurements, parts=parts, angles=angles, eta=measured, nu_raw=noisy)
 
 
 def trial_with(force: Floats, seed: int = 0) -> EstimationProblem:
-    """Return a trial whose picture lacks a force [N, N, N·m] that acted, shape (n, 3)."""
+    """Return a trial whose force model lacks a force [N, N, N·m] that acted, shape (n, 3)."""
     cut = windows(sailed(seed), 8.0, 2.0)
-    plain, spread = prior_force_model(cut.scene, FERRY)
-    every = round(len(T) / len(cut.scene.t))
-    thin = force[: len(cut.scene.t) * every].reshape(-1, every, 3).mean(axis=1)
+    plain, spread = prior_force_model(cut.measurements, FERRY)
+    every = round(len(T) / len(cut.measurements.t))
+    thin = force[: len(cut.measurements.t) * every].reshape(-1, every, 3).mean(axis=1)
     return estimation_problem(cut, replace(plain, external=plain.external - thin), spread)
 
 
@@ -115,7 +115,7 @@ def test_a_law_comes_back(force: Floats, on: str, name: str, size: float) -> Non
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_and_a_hull_that_is_off_have_no_law(seed: int) -> None:
     cut = windows(sailed(seed), 8.0, 2.0)
-    plain, spread = prior_force_model(cut.scene, FERRY)
+    plain, spread = prior_force_model(cut.measurements, FERRY)
     off = np.random.default_rng(seed).choice([0.92, 1.08], len(plain.hull))
     problem = estimation_problem(cut, replace(plain, hull=plain.hull * off), spread)
     made = find_unexplained(problem, fit(problem, ()), sailed(seed))
@@ -184,21 +184,21 @@ def test_an_effect_that_a_law_makes_idle_is_an_impostor_and_a_true_one_is_not() 
     assert find_displaced(problem, fit(problem, [breeze], kept.values)) == ()
 
 
-def test_terms_are_forces_of_the_picture() -> None:
+def test_terms_are_forces_of_the_force_model() -> None:
     problem = trial_with(pushes())
-    picture = problem.plain
-    scene = picture.scene
-    by_name = {(term.on, term.name): term for term in terms_of(scene)}
-    assert len(by_name) == len(terms_of(scene))
-    u, _, r = scene.nu.T
-    np.testing.assert_allclose(by_name["sway", "ur"].force(picture), np.column_stack([0 * u, u * r, 0 * u]))
+    force_model = problem.plain
+    measurements = force_model.measurements
+    by_name = {(term.on, term.name): term for term in terms_of(measurements)}
+    assert len(by_name) == len(terms_of(measurements))
+    u, _, r = measurements.nu.T
+    np.testing.assert_allclose(by_name["sway", "ur"].force(force_model), np.column_stack([0 * u, u * r, 0 * u]))
     assert by_name["sway", "ur"].coefficient_unit == "N/(m·rad/s²)"
-    north = by_name["north", "1"].force(picture)
-    np.testing.assert_allclose(north[:, 0], np.cos(scene.psi))
-    np.testing.assert_allclose(north[:, 1], -np.sin(scene.psi))
+    north = by_name["north", "1"].force(force_model)
+    np.testing.assert_allclose(north[:, 0], np.cos(measurements.psi))
+    np.testing.assert_allclose(north[:, 1], -np.sin(measurements.psi))
     # A share of a thruster's force has its lever.
     own = by_name["force of thruster1", "1"]
-    np.testing.assert_allclose(own.force(picture), picture.parts[:, 0])
+    np.testing.assert_allclose(own.force(force_model), force_model.parts[:, 0])
     assert own.coefficient_unit == "-"
-    across = by_name["force across thruster1", "1"].force(picture)
-    np.testing.assert_allclose(np.sum(across[:, :2] * picture.parts[:, 0, :2], axis=1), 0.0, atol=1e-9)
+    across = by_name["force across thruster1", "1"].force(force_model)
+    np.testing.assert_allclose(np.sum(across[:, :2] * force_model.parts[:, 0, :2], axis=1), 0.0, atol=1e-9)

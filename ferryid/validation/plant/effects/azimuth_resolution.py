@@ -38,7 +38,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
         plant.encoders.append(rounded)
 
 
-def oracle(scene: Measurements) -> SensorEstimate:
+def oracle(measurements: Measurements) -> SensorEstimate:
     """Return the step of the coarsest angle; the gain is that of its readings' being on a grid over being anywhere."""
     from math import log
 
@@ -46,11 +46,11 @@ def oracle(scene: Measurements) -> SensorEstimate:
     from ferryid.diagnose.checks.thresholds import CHECKS
     from ferryid.validation.oracle_sensors import SensorEstimate
 
-    steps = [step_of(angle) for angle in scene.angles.T]
+    steps = [step_of(angle) for angle in measurements.angles.T]
     step = max(steps, default=0.0)
     if step == 0.0:
         return SensorEstimate(0.0, 1)
-    readings = np.degrees(np.unique(np.round(scene.angles[:, steps.index(step)], 9)))
+    readings = np.degrees(np.unique(np.round(measurements.angles[:, steps.index(step)], 9)))
     off = off_grid(readings, step)
     count, near = len(readings), int(np.count_nonzero(off < 0.5 * CHANCE * step))
     share = min(max(near / count, CHANCE), 1.0 - LEAST_OFF)

@@ -69,7 +69,7 @@ class PlantEffect:
     realised
         ``realised(trial, conditions)`` measures parameters in a trial that no setting gives; empty where it does not act.
     oracle
-        ``oracle(scene)`` estimates an error of a sensor from kinematics alone: a
+        ``oracle(measurements)`` estimates an error of a sensor from kinematics alone: a
         `ferryid.validation.oracle_sensors.SensorEstimate`. Forces are estimated with the effect of `ferryid.effects`.
     time_limited
         True where it may begin and end during the log.

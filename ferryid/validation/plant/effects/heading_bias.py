@@ -38,7 +38,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
     plant.reports.append(report)
 
 
-def oracle(scene: Measurements) -> SensorEstimate:
+def oracle(measurements: Measurements) -> SensorEstimate:
     """Return the estimate of a heading bias from kinematics."""
     from dataclasses import replace
     from math import degrees
@@ -47,7 +47,7 @@ def oracle(scene: Measurements) -> SensorEstimate:
     from ferryid.diagnose.checks.thresholds import CHECKS
     from ferryid.validation.oracle_sensors import SensorEstimate, kinematic_gain
 
-    found = kinematics(scene, (ANGLE,))
+    found = kinematics(measurements, (ANGLE,))
     if found is None:
         return SensorEstimate(0.0, 1)
     bias = np.array([0.0, 0.0, float(found.solution.values[ANGLE])])

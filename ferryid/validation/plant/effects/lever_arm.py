@@ -39,7 +39,7 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
     plant.reports.append(report)
 
 
-def oracle(scene: Measurements) -> SensorEstimate:
+def oracle(measurements: Measurements) -> SensorEstimate:
     """Return the estimate of a lever arm from kinematics."""
     from dataclasses import replace
 
@@ -48,7 +48,7 @@ def oracle(scene: Measurements) -> SensorEstimate:
     from ferryid.validation.oracle_sensors import SensorEstimate, kinematic_gain
     from ferryid.vessel.frames import to_world
 
-    found = kinematics(scene, (X, Y))
+    found = kinematics(measurements, (X, Y))
     if found is None:
         return SensorEstimate(0.0, 2)
     x, y = found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
@@ -59,7 +59,7 @@ def oracle(scene: Measurements) -> SensorEstimate:
         return replace(seen, eta=seen.eta - arm)
 
     # Either is determined by turns of its own, so that their errors are hardly correlated.
-    idle = max(abs(x.value), abs(y.value)) < least_m(scene)
+    idle = max(abs(x.value), abs(y.value)) < least_m(measurements)
     return SensorEstimate(kinematic_gain(found, X) + kinematic_gain(found, Y), 2, {"x": x, "y": y}, correct, idle)
 
 

@@ -34,13 +34,13 @@ def act(plant: Plant, conditions: Conditions, rng: np.random.Generator) -> None:
     plant.reports.append(report)
 
 
-def oracle(scene: Measurements) -> SensorEstimate:
+def oracle(measurements: Measurements) -> SensorEstimate:
     """Return the estimate of the scale of the yaw rate from the reported heading."""
     from ferryid.diagnose.checks.thresholds import CHECKS
     from ferryid.diagnose.checks.yaw_rate_scale import compared, corrected
     from ferryid.validation.oracle_sensors import SensorEstimate, gain_of_score
 
-    rates = compared(scene)
+    rates = compared(measurements)
     if rates is None:
         return SensorEstimate(0.0, 1)
     score = rates.off / max(float(rates.solution.errors[0]), 1e-300)

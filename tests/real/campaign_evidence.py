@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
-from ferryid.diagnose.inference.campaign_hull import Member, fit_campaign_hull, residual_gaps
-from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.campaign_hull import CampaignHull, Member, fit_campaign_hull, induced
+from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.folds import DRAWS, folds_of, subset
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.effects.force_model import ForceModel
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.errors import FerryIdError
 from ferryid.types import Floats
 
@@ -54,7 +54,7 @@ def held_out_gains(
     Parameters
     ----------
     variants
-        The same logs with other effects or pictures, by name.
+        The same logs with other effects or force models, by name.
     none
         The logs without effects.
     spread, induced_size
@@ -97,6 +97,22 @@ def held_out_gains(
     return gains
 
 
+def residual_gaps(member: Member, hull: CampaignHull, place: int) -> Floats:
+    """Return the gaps that are left in some windows of a log, shape (J, c), with its hull and effects fitted elsewhere.
+
+    Parameters
+    ----------
+    member
+        With the windows to judge.
+    hull, place
+        The fit, and the log's place in it.
+    """
+    h = len(COEFFICIENTS)
+    mean = hull.before + hull.spread * hull.step
+    force_model = induced(replace(member.plain, hull=mean[:h]), mean[h:])
+    return member.windows.gap(apply_candidates(force_model, member.candidates, hull.values[place]))
+
+
 def _white_squares(gaps: Floats, noise: AutoregressiveNoise, block: NDArray[np.int64]) -> Floats:
     """Return the whitened square of every window; those that only start a block's autoregression count nothing."""
     squares = np.zeros(len(gaps))
@@ -112,18 +128,18 @@ def _white_squares(gaps: Floats, noise: AutoregressiveNoise, block: NDArray[np.i
 def turn_heading(candidate: Candidate, psi: Floats) -> Candidate:
     """Return an effect that pushes as if the vessel had had another heading, shape (n,)."""
 
-    def apply(picture: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-        scene = picture.scene
-        other = replace(scene, eta=np.column_stack([scene.eta[:, :2], psi]))
-        pushed = candidate.effect.apply(replace(picture, scene=other), p, instance)
-        return replace(picture, external=pushed.external)
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        measurements = force_model.measurements
+        other = replace(measurements, eta=np.column_stack([measurements.eta[:, :2], psi]))
+        pushed = candidate.effect.apply(replace(force_model, measurements=other), p, instance)
+        return replace(force_model, external=pushed.external)
 
     return replace(candidate, effect=replace(candidate.effect, apply=apply))
 
 
 def placebos(members: Sequence[Member]) -> dict[str, tuple[Member, ...]]:
     """Return the members with effects that cannot be true: on the mirrored heading, and on that of another log."""
-    every = [member.windows.scene.psi for member in members]
+    every = [member.windows.measurements.psi for member in members]
     others = [np.resize(every[(i + 1) % len(every)], len(psi)) for i, psi in enumerate(every)]
     return {
         MIRRORED: tuple(_moved(member, -psi) for member, psi in zip(members, every, strict=True)),

@@ -1,0 +1,121 @@
+"""Thresholds of the effects: how far off hull and formulas may be, and what is too little to be an effect."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ferryid.thresholds import threshold
+
+
+@dataclass(frozen=True)
+class EffectThresholds:
+    """Effects."""
+
+    hull_spread: float = threshold(
+        0.12,
+        "of the coefficient",
+        "standard deviation of the prior of the hull's coefficients",
+        "convention: how well a hull model is known",
+    )
+    selected_spread: float = threshold(
+        1.0,
+        "of the coefficient",
+        "the same of a hull coefficient that is selected as wrong",
+        "convention: as large as the coefficient; narrower favours small changes",
+    )
+    coefficient_change: float = threshold(
+        0.25,
+        "of the coefficient",
+        "distance from the model's coefficient that the interval of a hull coefficient must keep to be reported",
+        "convention: about two standard deviations of `hull_spread`",
+    )
+    formula_error: float = threshold(
+        0.1,
+        "of what the effect changes",
+        "standard deviation of the error of an effect's formula",
+        "tuned on simulated logs of a plant with other formulas; `ferryid prove` measures the coverage",
+    )
+    load_error: float = threshold(
+        0.05,
+        "of what the effect changes",
+        "the same of a wind's load and of a mooring's pull",
+        "convention: half of `formula_error`; the wind's load has factors of its own beside it",
+    )
+    definition_error: float = threshold(
+        0.02,
+        "of what the effect changes",
+        "the same where the formula is the parameter's definition: a share of a thruster's force, an angle, a delay",
+        "tuned on simulated logs of a plant with other formulas; `ferryid prove` measures the coverage",
+    )
+    least_current: float = threshold(
+        0.01,
+        "m/s",
+        "smaller currents are void, intervals no narrower",
+        "convention: a hundredth of a vessel's speed of 1 m/s",
+    )
+    least_heading: float = threshold(
+        0.5,
+        "deg",
+        "smaller heading biases are void, intervals no narrower",
+        "convention: compasses are no better",
+    )
+    least_shallow: float = threshold(
+        0.1,
+        "of the damping",
+        "smaller growths over shallow ground are void, intervals no narrower",
+        "convention: below `hull_spread`",
+    )
+    least_inflow: float = threshold(
+        0.03,
+        "s/m",
+        "smaller inflow losses are void, intervals no narrower",
+        "convention: 3 % of the thrust at 1 m/s; thrust curves are no better",
+    )
+    least_wake: float = threshold(
+        0.05,
+        "of the thrust",
+        "smaller losses in a wake are void, intervals no narrower",
+        "convention: 5 %, in a full wake only",
+    )
+    least_lag: float = threshold(
+        0.03,
+        "s",
+        "shorter lags of the thrusters are void, intervals no narrower",
+        "convention: a third of a period at 10 Hz",
+    )
+    least_delay: float = threshold(
+        0.03,
+        "s",
+        "shorter delays of the navigation are void, intervals no narrower",
+        "convention: a third of a period at 10 Hz",
+    )
+    passing_gain: float = threshold(
+        0.1,
+        "of the thrust",
+        "smaller changes of a thruster's force that both begin and end within the log are hints",
+        "convention: as much as `formula_error`, hull and formulas are off in a part of the manoeuvres",
+    )
+    slowest_waves: float = threshold(
+        0.25,
+        "of the usual frequency",
+        "lowest frequency of waves",
+        "convention: deep-water waves of a quarter of the frequency are sixteen times as long, and slower is no sea",
+    )
+    least_place: float = threshold(
+        0.05, "of the log", "least share of a log that lies in a place of shallow water", "convention: a twentieth"
+    )
+    most_place: float = threshold(
+        0.8,
+        "of the log",
+        "most of a log that lies in it with every side one cell of the grid further out",
+        "convention: what is nearly everywhere is the hull's damping, or its fouling; 0.7 before",
+    )
+    beyond_side: float = threshold(
+        0.02,
+        "of the log",
+        "share of a log that lies beyond a side, below which that side's position is not reported",
+        "convention: two per cent",
+    )
+
+
+EFFECTS = EffectThresholds()
