@@ -82,7 +82,7 @@ NO_DECISION = {
         diagnose.inference.change_points LEVELS
         diagnose.inference.estimation STEPS ANEW ENOUGH MOVED DAMPINGS NUDGE TRUST
         diagnose.inference.kalman SETTLED
-        diagnose.inference.noise_model STARTS SMALL
+        diagnose.inference.noise_model STARTS SMALL FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING LONGEST_STEP SUFFICIENT_GAIN
         diagnose.inference.onset_estimation NEARBY_S FINEST_S GLANCE
         diagnose.inference.profile_likelihood FIRST GROWTH STEEP CLOSER PARTS
         diagnose.inference.search FAR
@@ -114,6 +114,7 @@ NO_DECISION = {
         identify.split EVERY
         identify.sweeps.structure_sweep DRAWS
         models.forces.estimator CHUNK_ROWS
+        effects.wind KEPT
         models.forces.residual _RUNS
         models.prediction.free_run MAX_STARTS
         compare.comparison_statements TOLD_QUANTITIES
