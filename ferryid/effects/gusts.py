@@ -13,7 +13,7 @@ from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 from ferryid.vessel.wind import wind_force
 
-STEP = 0.1
+DIFFERENCE_MPS = 0.1
 """Change of the wind by which its load is differentiated [m/s]."""
 
 
@@ -37,13 +37,13 @@ def unsteady(force_model: ForceModel) -> Processes:
         ends = [
             wind_force(
                 areas,
-                np.broadcast_to(force_model.air + side * STEP * towards, (len(measurements.t), 2)),
+                np.broadcast_to(force_model.air + side * DIFFERENCE_MPS * towards, (len(measurements.t), 2)),
                 measurements.psi,
                 measurements.nu,
             )
             for side in (1.0, -1.0)
         ]
-        loads.append(factors * (ends[0] - ends[1]) / (2.0 * STEP))
+        loads.append(factors * (ends[0] - ends[1]) / (2.0 * DIFFERENCE_MPS))
     return lambda p: tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
 
 
