@@ -106,7 +106,7 @@ def _entry(
     elif alike:
         says = f"{first} and {second} are alike {place}: their {error} differs by less than {COMPARE.alike:.1%}"
     elif not known:
-        says = f"too little data to tell {first} from {second} {place}: {error} {ratio:.3g} of the other's"
+        says = f"too little data to distinguish {first} from {second} {place}: {error} {ratio:.3g} of the other's"
     elif clear:
         says = f"{first} is better than {second} {place} (p {format_probability(corrected)}): "
         says += f"its {error} is {ratio:.3g} of the other's{span}"
@@ -120,7 +120,7 @@ def _entry(
             f"{error} of the first {ratio:.3g} of the other's{span}"
         )
     if not evidence:
-        says += f"; no evidence, as {first} has learnt from {'this log' if judged.on else 'some of these logs'}"
+        says += f"; no evidence, as {first} was fitted to {'this log' if judged.on else 'some of these logs'}"
     return {
         "on": judged.on,
         "kind": kind,

@@ -68,5 +68,5 @@ EFFECT = Effect(
     instances=instances,
     vessel=True,
     regressor=regressor,
-    form=EFFECTS.definition_error,
+    formula_error=EFFECTS.definition_error,
 )

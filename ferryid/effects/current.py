@@ -58,6 +58,6 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     regressor=regressor,
-    bends_hull=True,
-    idle=EFFECTS.least_current,
+    changes_hull=True,
+    negligible=EFFECTS.least_current,
 )

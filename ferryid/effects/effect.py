@@ -50,7 +50,7 @@ class Choice:
     """Parameters that were chosen in view of a log, and the logarithm of how many alternatives they were chosen from."""
 
     parameters: tuple[Parameter, ...]
-    doubt: float
+    log_alternatives: float
 
 
 @dataclass(frozen=True)
@@ -99,13 +99,14 @@ class Effect:
         Why the measurements cannot show it, as a sentence; empty where it can.
     onset
         True where it may begin or end during the log.
-    kick
-        ``kick(force_model, p)`` returns the momentum that an effect gives the vessel if it begins in a row [N·s, N·s, N·m·s],
-        shape (n, 3). What ends leaves the vessel as fast as it is.
+    impulse
+        ``impulse(force_model, p)`` returns the momentum that an effect gives the vessel if it begins in a row
+        [N·s, N·s, N·m·s], shape (n, 3). What ends leaves the velocity as it is.
     says
         One sentence on a finding, from its values by name and its instance.
-    once
-        ``once(measurements, p)`` is True where it acted for so short a time that whatever came just then would look the same.
+    single_visit
+        ``single_visit(measurements, p)`` is True where the vessel was in the place in which it acts only once, so that
+        whatever acted at that time would look the same.
     in_part
         True where that sentence can be said of some of the values alone, those that a log tells.
     scenario
@@ -116,25 +117,25 @@ class Effect:
     vessel
         True for a property of hull or actuators, which carries over to other logs; False for a condition of one log.
     choose
-        ``choose(force_model, believed, residual)`` returns the parameters for a log whose forces are otherwise those of the
+        ``choose(force_model, prior_hull, residual)`` returns the parameters for a log whose forces are otherwise those of the
         force model, where there are alternatives to choose from (places, coefficients): a quick scan, in place of
-        ``parameters_of``. The force model's hull is the fitted one, `believed` the prior's coefficients, shape (26,).
-    least
+        ``parameters_of``. The force model's hull is the fitted one, `prior_hull` the prior's coefficients, shape (26,).
+    minimum_change
         How far the interval of a parameter has to stay from its neutral value for the parameter to be worth a report.
-    untold
-        ``untold(measurements, p)`` returns the names of parameters that a log does not determine, whatever their values.
-    idle
+    unreported
+        ``unreported(measurements, p)`` returns the names of parameters that a log does not determine, whatever their values.
+    negligible
         An effect whose parameters are all nearer to neutral than this is void: hull or instruments may be as much off anyway.
         Those count that have the unit of the first; a place has no size.
-    form
+    formula_error
         How far off its formula, and what the model has beside it, are believed to be: a standard deviation, as a share of how
         far a parameter is from neutral. A log tells of noise and coefficients only.
-    passing
+    passing_size
         What both begins and ends within a log and is nearer to neutral than this is a hint: hull and formulas are as much off
         in a part of the manoeuvres.
-    bends_hull
+    changes_hull
         True where the effect changes how the hull's coefficients act: masses, damping, the flow.
-    ridge
+    profiled
         Parameter that others trade with, along which the posterior of an effect that acts all along is followed; empty where
         its curvature tells all.
     of_sensor
@@ -158,18 +159,18 @@ class Effect:
     instances: Callable[[Profile], tuple[str | None, ...]] = lambda profile: (None,)
     cannot: Callable[[Measurements], str] = lambda measurements: ""
     onset: bool = False
-    kick: Callable[[ForceModel, Floats], Floats] | None = None
+    impulse: Callable[[ForceModel, Floats], Floats] | None = None
     vessel: bool = False
     choose: Callable[[ForceModel, Floats, Residual], Choice] | None = None
-    least: float = 0.0
-    untold: Callable[[Measurements, Floats], frozenset[str]] = lambda measurements, p: frozenset()
-    once: Callable[[Measurements, Floats], bool] = lambda measurements, p: False
+    minimum_change: float = 0.0
+    unreported: Callable[[Measurements, Floats], frozenset[str]] = lambda measurements, p: frozenset()
+    single_visit: Callable[[Measurements, Floats], bool] = lambda measurements, p: False
     in_part: bool = False
-    idle: float = 0.0
-    form: float = EFFECTS.formula_error
-    passing: float = 0.0
-    bends_hull: bool = False
-    ridge: str = ""
+    negligible: float = 0.0
+    formula_error: float = EFFECTS.formula_error
+    passing_size: float = 0.0
+    changes_hull: bool = False
+    profiled: str = ""
     of_sensor: bool = False
     unsteady: Callable[[ForceModel], Processes] | None = None
     about: str = ""
@@ -177,7 +178,7 @@ class Effect:
     simulated: Simulated | None = None
 
     @property
-    def turn(self) -> int:
+    def order(self) -> int:
         """When it acts among others: what corrects the measurements first, then what the others build on."""
         return 0 if self.of_sensor else 1 if self.unsteady is not None else 2
 
@@ -188,5 +189,5 @@ class Effect:
         after = self.apply(force_model, p, instance)
         if onset_s <= 0.0 and not isfinite(offset_s):
             return after
-        kick = None if self.kick is None or onset_s <= 0.0 else self.kick(force_model, p)
-        return between(force_model, after, onset_s, offset_s, kick)
+        impulse = None if self.impulse is None or onset_s <= 0.0 else self.impulse(force_model, p)
+        return between(force_model, after, onset_s, offset_s, impulse)

@@ -289,16 +289,16 @@ def wind_load(measurements: Measurements, areas: WindAreas, air: Floats) -> Floa
 
 
 def between(
-    before: ForceModel, after: ForceModel, onset_s: float, offset_s: float = inf, kick: Floats | None = None
+    before: ForceModel, after: ForceModel, onset_s: float, offset_s: float = inf, impulse: Floats | None = None
 ) -> ForceModel:
     """Return the second force model from an onset until an offset [s], else the first, with the second's hull.
 
-    `kick` is a momentum by row, as of `ferryid.effects.effect.Effect`; that of the first row of the onset acts there.
+    `impulse` is a momentum by row, as of `ferryid.effects.effect.Effect`; that of the first row of the onset acts there.
     """
     rows = (before.measurements.t >= onset_s) & (before.measurements.t < offset_s)
-    if kick is not None and rows.any() and not rows[0]:
+    if impulse is not None and rows.any() and not rows[0]:
         external, first = after.external.copy(), int(np.argmax(rows))
-        external[first] += kick[first] / before.measurements.step_s
+        external[first] += impulse[first] / before.measurements.step_s
         after = replace(after, external=external)
 
     def mixed(old: Floats, new: Floats) -> Floats:

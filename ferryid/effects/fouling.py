@@ -68,6 +68,6 @@ EFFECT = Effect(
     vessel=True,
     regressor=regressor,
     # Within the prior of the hull it is the hull's own.
-    idle=EFFECTS.hull_spread,
-    bends_hull=True,
+    negligible=EFFECTS.hull_spread,
+    changes_hull=True,
 )

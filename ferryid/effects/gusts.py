@@ -12,7 +12,7 @@ from ferryid.effects.force_model import ForceModel, Measurements, wind_load
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
-STEP = 0.1
+DIFFERENCE_MPS = 0.1
 """Change of the wind by which its load is differentiated [m/s]."""
 
 
@@ -33,8 +33,10 @@ def unsteady(force_model: ForceModel) -> Processes:
         return lambda p: ()
     loads, factors = [], 1.0 if force_model.air_factors is None else force_model.air_factors
     for towards in np.eye(2):
-        ends = [wind_load(measurements, areas, force_model.air + side * STEP * towards) for side in (1.0, -1.0)]
-        loads.append(factors * (ends[0] - ends[1]) / (2.0 * STEP))
+        ends = [
+            wind_load(measurements, areas, force_model.air + side * DIFFERENCE_MPS * towards) for side in (1.0, -1.0)
+        ]
+        loads.append(factors * (ends[0] - ends[1]) / (2.0 * DIFFERENCE_MPS))
     return lambda p: tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
 
 

@@ -62,7 +62,7 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     of_sensor=True,
-    idle=EFFECTS.least_heading,
+    negligible=EFFECTS.least_heading,
     regressor=regressor,
-    form=EFFECTS.definition_error,
+    formula_error=EFFECTS.definition_error,
 )

@@ -33,10 +33,10 @@ SURGE_ALONE = frozenset({"X_|u|u"})
 
 def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     """Return a factor for each coefficient that the profile's hull has."""
-    return tuple(_factor(name, EFFECTS.selected_spread) for name in _named(profile))
+    return tuple(_factor(name, EFFECTS.selected_spread) for name in _nonzero_names(profile))
 
 
-def _named(profile: Profile) -> list[str]:
+def _nonzero_names(profile: Profile) -> list[str]:
     return [name for name, value in zip(COEFFICIENTS, hull_of(profile).tolist(), strict=True) if value != 0.0]
 
 
@@ -44,24 +44,26 @@ def _factor(name: str, size: float) -> Parameter:
     return Parameter(name, "-", size, 0.05, 10.0, neutral=1.0)
 
 
-def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Choice:
+def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> Choice:
     """Return factors of which only those of the coefficients that are worth it can move."""
-    names = _named(force_model.measurements.profile)
+    names = _nonzero_names(force_model.measurements.profile)
     able = [name for name in names if name not in ARMS]
     places = [COEFFICIENTS.index(name) for name in able]
-    J, e = hull_jacobian(force_model, believed, residual, places)
-    chosen, doubt = _best_subset(J.T @ J, -J.T @ e, able)
+    J, e = hull_jacobian(force_model, prior_hull, residual, places)
+    chosen, log_alternatives = _best_subset(J.T @ J, -J.T @ e, able)
     if 2 * len(chosen) > len(able):
         # A model that is wrong all over is wrong there, too.
         chosen |= frozenset(ARMS)
-    return Choice(tuple(_factor(name, EFFECTS.selected_spread if name in chosen else HELD) for name in names), doubt)
+    return Choice(
+        tuple(_factor(name, EFFECTS.selected_spread if name in chosen else HELD) for name in names), log_alternatives
+    )
 
 
 def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str], float]:
     """Return the coefficients whose evidence is best, going from few to many and from many to few, and what choosing cost."""
     n = len(names)
 
-    def doubt(chosen: frozenset[str]) -> float:
+    def log_alternatives(chosen: frozenset[str]) -> float:
         k = len(chosen)
         return log(n) + lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1)
 
@@ -71,18 +73,18 @@ def _best_subset(G: Floats, b: Floats, names: list[str]) -> tuple[frozenset[str]
         spread = np.array([EFFECTS.selected_spread if name in chosen else EFFECTS.hull_spread for name in names])
         A = np.eye(n) + G * np.outer(spread, spread)
         c = spread * b
-        return 0.5 * float(c @ np.linalg.solve(A, c)) - 0.5 * float(np.linalg.slogdet(A)[1]) - doubt(chosen)
+        return 0.5 * float(c @ np.linalg.solve(A, c)) - 0.5 * float(np.linalg.slogdet(A)[1]) - log_alternatives(chosen)
 
-    everything = frozenset(names)
-    best, most = everything, score(everything)
-    for chosen in (frozenset[str](), everything):
+    all_names = frozenset(names)
+    best, best_score = all_names, score(all_names)
+    for chosen in (frozenset[str](), all_names):
         grows = not chosen
         while len(chosen) < n if grows else len(chosen) > 1:
-            near = [chosen | {name} for name in everything - chosen] if grows else [chosen - {name} for name in chosen]
+            near = [chosen | {name} for name in all_names - chosen] if grows else [chosen - {name} for name in chosen]
             chosen = max(near, key=lambda one: (score(one), sorted(one)))
-            if score(chosen) > most:
-                best, most = chosen, score(chosen)
-    return best, doubt(best)
+            if score(chosen) > best_score:
+                best, best_score = chosen, score(chosen)
+    return best, log_alternatives(best)
 
 
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
@@ -99,14 +101,16 @@ def cannot(measurements: Measurements) -> str:
 
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence; the values are those of the coefficients that are certainly off."""
-    off = {name: value for name, value in values.items() if abs(value - 1.0) > EFFECTS.coefficient_change}
-    masses = [name for name in off if name in MASS]
+    changed = {name: value for name, value in values.items() if abs(value - 1.0) > EFFECTS.coefficient_change}
+    masses = [name for name in changed if name in MASS]
     what = " and ".join(
-        word for word, some in (("masses", masses), ("damping", [name for name in off if name not in MASS])) if some
+        word for word, some in (("masses", masses), ("damping", [name for name in changed if name not in MASS])) if some
     )
-    told = ", ".join(f"{name} is {value:.2f} times the model's" for name, value in off.items())
+    listing = ", ".join(f"{name} is {value:.2f} times the model's" for name, value in changed.items())
     return (
-        f"The hull model's {what or 'coefficients'} are wrong: {told}." if told else "The hull model is somewhat wrong."
+        f"The hull model's {what or 'coefficients'} are wrong: {listing}."
+        if listing
+        else "The hull model is somewhat wrong."
     )
 
 
@@ -125,6 +129,6 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     choose=choose,
-    least=EFFECTS.coefficient_change,
-    bends_hull=True,
+    minimum_change=EFFECTS.coefficient_change,
+    changes_hull=True,
 )

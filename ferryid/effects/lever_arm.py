@@ -66,6 +66,6 @@ EFFECT = Effect(
     vessel=True,
     of_sensor=True,
     regressor=regressor,
-    bends_hull=True,
-    form=EFFECTS.definition_error,
+    changes_hull=True,
+    formula_error=EFFECTS.definition_error,
 )

@@ -11,11 +11,11 @@ from ferryid.effects.force_model import ForceModel
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import Floats
 
-TINY = 0.01
+DIFFERENCE_STEP = 0.01
 
 
 def hull_jacobian(
-    force_model: ForceModel, believed: Floats, residual: Residual, places: list[int]
+    force_model: ForceModel, prior_hull: Floats, residual: Residual, places: list[int]
 ) -> tuple[Floats, Floats]:
     """Return a log's residual as linear in the hull: its derivatives by shares of coefficients, and its value as believed.
 
@@ -25,9 +25,9 @@ def hull_jacobian(
     columns, away = [], []
     for k in places:
         hull = force_model.hull.copy()
-        hull[k] += TINY * believed[k]
-        columns.append((residual(replace(force_model, hull=hull)) - e) / TINY)
-        away.append(force_model.hull[k] / believed[k] - 1.0 if believed[k] != 0.0 else 0.0)
+        hull[k] += DIFFERENCE_STEP * prior_hull[k]
+        columns.append((residual(replace(force_model, hull=hull)) - e) / DIFFERENCE_STEP)
+        away.append(force_model.hull[k] / prior_hull[k] - 1.0 if prior_hull[k] != 0.0 else 0.0)
     J = np.column_stack(columns)
     return J, e - J @ np.array(away)
 

@@ -90,6 +90,6 @@ EFFECT = Effect(
     cannot=cannot,
     onset=True,
     regressor=regressor,
-    form=EFFECTS.load_error,
+    formula_error=EFFECTS.load_error,
     simulated=Simulated(load),
 )

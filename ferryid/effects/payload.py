@@ -55,12 +55,12 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     )
 
 
-def untold(measurements: Measurements, p: Floats) -> frozenset[str]:
+def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:
     """Return what is fitted so that the rest comes out right, and is of no interest itself."""
     return frozenset({DEEPER})
 
 
-def kick(force_model: ForceModel, p: Floats) -> Floats:
+def impulse(force_model: ForceModel, p: Floats) -> Floats:
     """Return the momentum that a load takes which lay still over ground before it came aboard, shape (n, 3)."""
     m, x = float(p[0]), float(p[1])
     u, v, r = force_model.measurements.nu.T
@@ -102,9 +102,9 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     onset=True,
-    kick=kick,
-    untold=untold,
+    impulse=impulse,
+    unreported=unreported,
     regressor=regressor,
-    bends_hull=True,
-    ridge="mass",
+    changes_hull=True,
+    profiled="mass",
 )

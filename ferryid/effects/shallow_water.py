@@ -69,7 +69,7 @@ def _damped(force_model: ForceModel, factor: Floats) -> ForceModel:
     return replace(force_model, damping_factor=factor if before is None else before * factor)
 
 
-def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Choice:
+def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> Choice:
     """Return the place whose damping explains most of what is left, with its neighbours on the grid as the usual error."""
     measurements = force_model.measurements
     place = measurements.eta[:, :2]
@@ -106,7 +106,7 @@ def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Cho
         return Choice(parameters_of(measurements.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
     columns = (sums[north, east] - sums[south, east] - sums[north, west] + sums[south, west]).T
-    J, linear = hull_jacobian(force_model, believed, residual, np.flatnonzero(believed).tolist())
+    J, linear = hull_jacobian(force_model, prior_hull, residual, np.flatnonzero(prior_hull).tolist())
     gains = log_evidence_gains(J, linear, columns, FACTOR.size)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
@@ -122,7 +122,7 @@ def cannot(measurements: Measurements) -> str:
     return "" if np.isfinite(measurements.eta[measurements.usable, :2]).all() else "the log has no position"
 
 
-def untold(measurements: Measurements, p: Floats) -> frozenset[str]:
+def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:
     """Return the sides beyond which the vessel hardly went, as the place may reach any farther there, and the added mass."""
     x, y = measurements.eta[measurements.usable, 0], measurements.eta[measurements.usable, 1]
     south, north, west, east = p[1:5].tolist()
@@ -131,7 +131,7 @@ def untold(measurements: Measurements, p: Floats) -> frozenset[str]:
     return frozenset({HEAVIER.name, *far})
 
 
-def once(measurements: Measurements, p: Floats) -> bool:
+def single_visit(measurements: Measurements, p: Floats) -> bool:
     """Tell whether the vessel was in the place a single time, or hardly: then it is a time as well as a place."""
     there = inside(measurements, p[1:5])[measurements.usable] > 0.5
     entered = int(there[0]) + int(np.count_nonzero(there[1:] & ~there[:-1]))
@@ -141,9 +141,9 @@ def once(measurements: Measurements, p: Floats) -> bool:
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence; sides that the log does not tell are left out."""
     where = [
-        told
+        text
         for low, high, axis in (("south", "north", "north"), ("west", "east", "east"))
-        if (told := _between(values.get(low), values.get(high), axis))
+        if (text := _between(values.get(low), values.get(high), axis))
     ]
     place = f" {' and '.join(where)}," if where else " in some of these waters,"
     return f"Damping is {values['factor']:.2f} times as large{place} as over shallow ground."
@@ -172,9 +172,9 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     choose=choose,
-    untold=untold,
-    once=once,
+    unreported=unreported,
+    single_visit=single_visit,
     in_part=True,
-    idle=EFFECTS.least_shallow,
-    bends_hull=True,
+    negligible=EFFECTS.least_shallow,
+    changes_hull=True,
 )

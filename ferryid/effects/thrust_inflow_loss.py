@@ -64,5 +64,5 @@ EFFECT = Effect(
     scenario,
     vessel=True,
     regressor=regressor,
-    idle=EFFECTS.least_inflow,
+    negligible=EFFECTS.least_inflow,
 )

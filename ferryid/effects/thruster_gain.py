@@ -59,6 +59,6 @@ EFFECT = Effect(
     onset=True,
     vessel=True,
     regressor=regressor,
-    form=EFFECTS.definition_error,
-    passing=EFFECTS.passing_gain,
+    formula_error=EFFECTS.definition_error,
+    passing_size=EFFECTS.passing_gain,
 )

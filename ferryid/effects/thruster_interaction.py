@@ -89,5 +89,5 @@ EFFECT = Effect(
     cannot=cannot,
     vessel=True,
     regressor=regressor,
-    idle=EFFECTS.least_wake,
+    negligible=EFFECTS.least_wake,
 )

@@ -75,6 +75,6 @@ EFFECT = Effect(
     says,
     scenario,
     vessel=True,
-    idle=EFFECTS.least_lag,
+    negligible=EFFECTS.least_lag,
     regressor=regressor,
 )

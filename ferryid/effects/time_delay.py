@@ -60,7 +60,7 @@ EFFECT = Effect(
     apply,
     says,
     scenario,
-    idle=EFFECTS.least_delay,
-    form=EFFECTS.definition_error,
+    negligible=EFFECTS.least_delay,
+    formula_error=EFFECTS.definition_error,
     regressor=regressor,
 )

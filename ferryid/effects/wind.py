@@ -40,7 +40,7 @@ def parameters_of(profile: Profile) -> tuple[Parameter, ...]:
     )
 
 
-def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Choice:
+def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> Choice:
     """Return the parameters with the wind to begin with."""
     parameters = parameters_of(force_model.measurements.profile)
     angles = np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS
@@ -49,7 +49,7 @@ def choose(force_model: ForceModel, believed: Floats, residual: Residual) -> Cho
         for speed in SPEEDS_MPS
         for angle in (angles if speed > 0.0 else angles[:1])
     ]
-    J, e = hull_jacobian(force_model, believed, residual, np.flatnonzero(believed).tolist())
+    J, e = hull_jacobian(force_model, prior_hull, residual, np.flatnonzero(prior_hull).tolist())
     calm = residual(force_model)
     left = np.column_stack([e + residual(apply(force_model, wind, None)) - calm for wind in winds])
     sizes = np.array([one.size for one in parameters[:2]])
@@ -70,7 +70,7 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
     return replace(force_model, external=force_model.external + more, air=air, air_factors=factors)
 
 
-def untold(measurements: Measurements, p: Floats) -> frozenset[str]:
+def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:
     """Return what is fitted so that the rest comes out right, and is of no interest itself."""
     return frozenset(COEFFICIENTS)
 
@@ -137,7 +137,7 @@ EFFECT = Effect(
     scenario,
     cannot=cannot,
     choose=choose,
-    untold=untold,
+    unreported=unreported,
     regressor=regressor,
-    form=EFFECTS.load_error,
+    formula_error=EFFECTS.load_error,
 )

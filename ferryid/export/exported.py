@@ -167,4 +167,4 @@ def exported(model: Model, sha256: str, name: str = "") -> Exported:
 
 def _on(stored: StoredEffect) -> str:
     effect = effects()[stored.effect]
-    return SENSORS if effect.of_sensor else HULL if effect.bends_hull else THRUSTERS
+    return SENSORS if effect.of_sensor else HULL if effect.changes_hull else THRUSTERS

@@ -170,7 +170,7 @@ def _read(path: Path, key: Mapping[str, Any]) -> StoredSums:
     columns, told = read_table(path)
     place = folder_of(Path(), told["name"], told["sha256"], key["profile_sha256"]).name
     if told["schema"] != SCHEMA or told["key"] != key or path.parent.name != place:
-        raise FerryIdError(f"{path}: not what was asked for. Fix: delete it, it is made anew")
+        raise FerryIdError(f"{path}: not what was asked for. Fix: delete it, it will be computed again")
     K, m = told["columns"]
     width = K + m + 1
     counts = np.array(told["n"], dtype=np.int64)
@@ -182,7 +182,7 @@ def _read(path: Path, key: Mapping[str, Any]) -> StoredSums:
     shifts, force, base = (np.array(told[name], dtype=np.float64) for name in ("shift", "force", "base"))
     whole = np.array_equal(products[..., -1, -1], counts) and np.isfinite(packed).all()
     if not whole or shifts.shape != (len(counts), K + m) or not force.shape == base.shape == (counts.shape[1], 3, 3):
-        raise FerryIdError(f"{path}: damaged. Fix: delete it, it is made anew")
+        raise FerryIdError(f"{path}: damaged. Fix: delete it, it will be computed again")
     pieces = [BlockSums(n, K, m, shift, one) for n, shift, one in zip(counts, shifts, products, strict=True)]
     windows = len(key["windows_s"])
     return StoredSums(

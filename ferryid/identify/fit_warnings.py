@@ -32,7 +32,7 @@ def fit_warnings(
     """Return what a reader must know before trusting the verdict."""
     warnings = []
     if parts.kind == "every-kth":
-        warnings.append("Validation rows share smoothing windows with training rows: the error is told too small.")
+        warnings.append("Validation rows share smoothing windows with training rows: the error is underestimated.")
     warnings += general_warnings(settings, known, scores, len(prepared))
     weighed = [motion.payload is not None for motion in motions]
     without = len(weighed) - sum(weighed)

@@ -14,8 +14,8 @@ import numpy as np
 
 from ferryid.diagnose import Estimate
 from ferryid.diagnose.inference import (
-    BANDS,
-    STRENGTHS,
+    START_FREQUENCIES,
+    START_STRENGTHS,
     Candidate,
     DisturbanceState,
     EstimationProblem,
@@ -223,8 +223,8 @@ def _places(suspect: Candidate) -> list[Floats]:
     band = np.array([one.unit == "Hz" for one in suspect.parameters])
     return [
         usual * np.where(strength, a, np.where(band, b, 1.0))
-        for a in STRENGTHS
-        for b in (BANDS if band.any() else (1.0,))
+        for a in START_STRENGTHS
+        for b in (START_FREQUENCIES if band.any() else (1.0,))
     ]
 
 
@@ -232,8 +232,8 @@ def _estimate(trial: EstimationProblem, full: _Model, suspect: Candidate) -> For
     """Return what one effect of a hypothesis gains, added last."""
     others = [one for one in full.fit.candidates if one.key != suspect.key]
     shaking = [state.candidate for state in full.states if state.candidate.key != suspect.key]
-    untold = suspect.effect.untold(trial.plain.measurements, suspect.start)
-    free = sum(one.size > HELD and one.name not in untold for one in suspect.parameters)
+    unreported = suspect.effect.unreported(trial.plain.measurements, suspect.start)
+    free = sum(one.size > HELD and one.name not in unreported for one in suspect.parameters)
     # Without the wind that they are one of, gusts push as they did about it.
     blown = any(one.effect.about == suspect.effect.id for one in shaking)
     rest = _modelled(trial, others, shaking, fitted_force_model(full.trial.plain, full.fit) if blown else None, full)
@@ -267,13 +267,13 @@ def _log_likelihood(trial: EstimationProblem, made: Fit) -> float:
 def _estimates(model: _Model, index: int) -> dict[str, Estimate]:
     """Return the parameters of a steady effect with intervals as a diagnosis tells them, those that the log tells."""
     suspect, values = model.fit.candidates[index], model.fit.values[index]
-    followed = intervals(model.trial, model.fit, index) if suspect.effect.ridge and not suspect.times else {}
-    untold = suspect.effect.untold(model.trial.plain.measurements, values)
+    followed = intervals(model.trial, model.fit, index) if suspect.effect.profiled and not suspect.times else {}
+    unreported = suspect.effect.unreported(model.trial.plain.measurements, values)
     found = {}
     for one, value, error in zip(
         suspect.parameters, values.tolist(), model.fit.reported_errors(index).tolist(), strict=True
     ):
-        if one.size <= HELD or one.name in untold:
+        if one.size <= HELD or one.name in unreported:
             continue
         low, high = max(value - REACH * error, one.low), min(value + REACH * error, one.high)
         if one.name in followed:

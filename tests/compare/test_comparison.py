@@ -147,7 +147,7 @@ def test_a_training_log_is_no_evidence(folder: Path, compared: Comparison) -> No
         if (row["what"], row["second"]) == ("sway", "ferry@2")
     }
     assert rows[None, "ferry@1"]["better"] == "ferry@1"
-    assert rows[None, "ferry@1"]["says"].endswith("no evidence, as ferry@1 has learnt from some of these logs")
+    assert rows[None, "ferry@1"]["says"].endswith("no evidence, as ferry@1 was fitted to some of these logs")
     assert not rows[None, "ferry@1"]["evidence"]
     # What is better without having learnt is so all the more.
     assert rows[None, BASE]["evidence"]
@@ -161,7 +161,7 @@ def test_a_short_log_has_no_intervals_and_says_so(field: CandidateSet, tmp_path:
     assert entry["blocks"] == 3
     assert "3 blocks of 30 s are too few for an interval" in entry["warnings"][-1]
     assert all(row["better"] is None for row in result["better"])
-    assert all(row["says"].startswith("too little data to tell") for row in result["better"])
+    assert all(row["says"].startswith("too little data to distinguish") for row in result["better"])
     assert all(np.isnan(one["p"]) for pair in entry["pairs"] for one in pair["mse"].values())
 
 

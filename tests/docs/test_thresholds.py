@@ -31,7 +31,7 @@ NO_DECISION = {
         signals.smooth _AXIS_OF
         diagnose.checks.kinematics SCALE ANGLE X Y LATE NORTH EAST NEUTRAL
         diagnose.checks.yaw_rate_scale NEUTRAL SIZE
-        diagnose.inference.kalman OWN DIFFUSE
+        diagnose.inference.kalman CHANNEL_STATES DIFFUSE
         effects.effect HELD
         effects.equations_of_motion MASSES DAMPED
         effects.force_model _NO_FLOW _NO_LOAD _NO_FACTOR
@@ -67,7 +67,7 @@ NO_DECISION = {
         diagnose.checks.kinematics DERIVATIVE_S
         diagnose.inference.autoregression ORDER
         diagnose.inference.weak_form STEPS_A_WINDOW FORCES_HZ
-        diagnose.inference.spectra FINE BURST_HZ BURST_S BURST_PERIODS BANDS_HZ
+        diagnose.inference.spectra WINDOW_RATIO BURST_HZ BURST_S BURST_PERIODS BANDS_HZ
         identify.settings TEST_WINDOW_S
         models.forces.residual HORIZON_S
         models.prediction.free_run HORIZONS_S STEP_S
@@ -78,18 +78,20 @@ NO_DECISION = {
         diagnose.checks.azimuth_resolution TURNS
         diagnose.checks.contradiction SHIFTS_S MOST_ACTUATORS
         diagnose.checks.kinematics SIZE TINY STEPS
-        diagnose.inference.campaign_hull ROUNDS STEPS TRUST TINY START
+        diagnose.inference.campaign_hull ROUNDS STEPS LONGEST_STEP DIFFERENCE_STEP START_SIZE
         diagnose.inference.change_points LEVELS
-        diagnose.inference.estimation STEPS ANEW ENOUGH MOVED DAMPINGS NUDGE TRUST
-        diagnose.inference.kalman SETTLED
-        diagnose.inference.noise_model STARTS SMALL FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING LONGEST_STEP SUFFICIENT_GAIN
-        diagnose.inference.onset_estimation NEARBY_S FINEST_S GLANCE
-        diagnose.inference.profile_likelihood FIRST GROWTH STEEP CLOSER PARTS
-        diagnose.inference.search FAR
-        diagnose.inference.stochastic_disturbance STRENGTHS BANDS
+        diagnose.inference.estimation MAX_ITERATIONS HULL_SLOPE_ITERATIONS CONVERGED_GAIN HULL_DIFFERENCE DAMPINGS
+        diagnose.inference.estimation PARAMETER_DIFFERENCE LONGEST_STEP
+        diagnose.inference.kalman CONVERGED
+        diagnose.inference.noise_model START_SHARES DIFFERENCE_STEP FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING
+        diagnose.inference.noise_model LONGEST_STEP SUFFICIENT_GAIN
+        diagnose.inference.onset_estimation FIRST_TIME_STEP_S LAST_TIME_STEP_S COMPARING_ITERATIONS
+        diagnose.inference.profile_likelihood FIRST_STEP STEP_GROWTH LARGEST_FALL MOST_REFINEMENTS QUANTILES
+        diagnose.inference.search COARSE_ITERATIONS
+        diagnose.inference.stochastic_disturbance START_STRENGTHS START_FREQUENCIES
         diagnose.judging.findings TIME_STEP TIME_FIT TIME_FINE_S
-        effects.gusts STEP
-        effects.linear_evidence TINY
+        effects.gusts DIFFERENCE_MPS
+        effects.linear_evidence DIFFERENCE_STEP
         effects.shallow_water CELLS
         effects.wind SPEEDS_MPS BEARINGS
         identify.settings WINDOWS_S
@@ -102,7 +104,7 @@ NO_DECISION = {
         signals.quality _MEDIAN_OF
         signals.render _FIELDS_SHOWN
         diagnose.inference.folds DRAWS
-        diagnose.inference.onset_estimation MOST_NUMBERS
+        diagnose.inference.onset_estimation MOST_VALUES
         diagnose.inference.simulation_baseline SHOWN_ROWS
         diagnose.judging.error_profiles SECTORS SPEEDS PLACES TIMES
         diagnose.judging.findings SHOWN_RIVALS

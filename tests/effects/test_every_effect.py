@@ -111,7 +111,7 @@ def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
     result = search(estimation_problem(seen, replace(plain, hull=0.4 * plain.hull), 0.4 * spread), lambda stage: None)
     assert [one.effect.id for one in result.fit.candidates] == ["hull_parameters"]
     value, error = result.fit.values[0], result.fit.errors(0)
-    certain = np.abs(value - 1.0) - 2.0 * error > result.fit.candidates[0].effect.least
+    certain = np.abs(value - 1.0) - 2.0 * error > result.fit.candidates[0].effect.minimum_change
     assert np.count_nonzero(certain) >= 5
     assert (np.abs(value - 2.5) < 4.0 * error)[certain].all()
 

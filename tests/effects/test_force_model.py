@@ -179,11 +179,11 @@ def test_lift_is_that_of_the_vessel_layer() -> None:
 def test_a_load_that_lay_still_takes_its_share_of_the_momentum() -> None:
     before = force_model(flow=False, load=False, damped=False)
     payload, p, row = effects()["payload"], np.array([300.0, 0.8]), 17
-    assert payload.kick is not None
+    assert payload.impulse is not None
     onset_s = float(before.measurements.t[row])
     after = payload.apply(before, p, None)
-    kicked = between(before, after, onset_s, kick=payload.kick(before, p))
-    change = (acceleration(kicked) - acceleration(between(before, after, onset_s))) * before.measurements.step_s
+    with_impulse = between(before, after, onset_s, impulse=payload.impulse(before, p))
+    change = (acceleration(with_impulse) - acceleration(between(before, after, onset_s))) * before.measurements.step_s
     nu = before.measurements.nu[row]
     own = FERRY.hull.M
     load = np.array([[300.0, 0.0, 0.0], [0.0, 300.0, 240.0], [0.0, 240.0, 192.0]])

@@ -42,4 +42,4 @@ def test_a_hull_of_unknown_draught_has_mass_and_place_only() -> None:
     names = [one.name for one in PAYLOAD.parameters_of(known.profile)]
     assert names[:2] == ["mass", "x"]
     # Of what is fitted for their sake, nothing is told.
-    assert PAYLOAD.untold(known, np.array([610.0, 0.0, 1.0])) == frozenset(names[2:])
+    assert PAYLOAD.unreported(known, np.array([610.0, 0.0, 1.0])) == frozenset(names[2:])

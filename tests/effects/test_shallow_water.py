@@ -44,7 +44,7 @@ PLACES = [
 @pytest.mark.parametrize(("sides", "wanted"), PLACES)
 def test_sides_beyond_which_nobody_went_are_untold(sides: dict[str, float], wanted: set[str]) -> None:
     force_model = sailed()
-    assert EFFECT.untold(force_model.measurements, values(**sides)) == wanted | {HEAVIER.name}
+    assert EFFECT.unreported(force_model.measurements, values(**sides)) == wanted | {HEAVIER.name}
     here = acceleration(EFFECT.apply(force_model, values(**sides), None))
     for name in SIDES:
         # Whatever the log could tell of a side would be told by a change of the forces there.
@@ -60,11 +60,11 @@ def test_a_share_of_two_per_cent_of_what_was_measured_makes_a_side_told() -> Non
         # Half-way between two rows, so many of them beyond.
         side = float(0.5 * (east[-beyond - 1] + east[-beyond]))
         p = values(south=30.0, north=60.0, west=10.0, east=side)
-        assert EFFECT.untold(measurements, p) == wanted | {HEAVIER.name}
+        assert EFFECT.unreported(measurements, p) == wanted | {HEAVIER.name}
     # Where nothing was measured nobody is known to have been.
     blind = replace(measurements, usable=measurements.eta[:, 0] < 60.0)
-    assert EFFECT.untold(blind, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {"north", HEAVIER.name}
-    assert EFFECT.untold(measurements, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {HEAVIER.name}
+    assert EFFECT.unreported(blind, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {"north", HEAVIER.name}
+    assert EFFECT.unreported(measurements, values(south=30.0, north=60.0, west=10.0, east=30.0)) == {HEAVIER.name}
 
 
 def test_a_place_that_was_visited_once_is_a_time_as_well() -> None:
@@ -79,7 +79,7 @@ def test_a_place_that_was_visited_once_is_a_time_as_well() -> None:
     ):
         inside = np.any([(t >= first) & (t < last) for first, last in times], axis=0)
         eta = np.where(inside[:, None], there, there + np.array([0.0, 50.0, 0.0]))
-        assert EFFECT.once(replace(force_model.measurements, eta=eta), p) == wanted, times
+        assert EFFECT.single_visit(replace(force_model.measurements, eta=eta), p) == wanted, times
 
 
 @pytest.mark.parametrize(

@@ -35,5 +35,5 @@ def test_a_search_begins_on_the_side_that_the_wind_blows_to(towards_deg: float, 
     assert np.hypot(north, east) == pytest.approx(min(SPEEDS_MPS, key=lambda one: abs(one - speed)))
     assert abs(np.angle(np.exp(1j * (np.arctan2(east, north) - towards)))) < np.radians(16.0)
     # What is to be told is the wind alone, and choosing where to begin costs nothing.
-    assert chosen.doubt == 0.0
+    assert chosen.log_alternatives == 0.0
     assert [replace(one, start=None) for one in chosen.parameters] == list(BREEZE.parameters)

@@ -228,7 +228,7 @@ def test_places_that_will_not_do(tmp_path: Path) -> None:
     export(tmp_path / "again.mcap", overwrite=True)
     assert not list(tmp_path.glob(".*.part"))
     other = replace(MODEL, profile_text=load_profile("gunnerus").text)
-    with pytest.raises(FerryIdError, match="says nothing about milliampere"):
+    with pytest.raises(FerryIdError, match="does not apply to milliampere"):
         export(tmp_path / "view.mcap", model=other, profile=FERRY)
     with pytest.raises(FerryIdError, match="Fix: give --model or --vessel"):
         export(tmp_path / "view.mcap", model=None)

@@ -202,11 +202,11 @@ def test_a_fault_that_passed_is_a_condition_of_its_log(tmp_path: Path) -> None:
 def test_what_a_log_did_not_tell_is_not_said_of_the_model_either(tmp_path: Path) -> None:
     sides = {"south": -900.0, "north": 4.0, "west": -900.0, "east": 900.0}
     known = stored("shallow_water", factor=1.6, **sides)
-    untold = {
+    unreported = {
         name: replace(one, low=nan, high=nan) if name in ("south", "west", "east") else one
         for name, one in known.parameters.items()
     }
-    shallow = replace(known, parameters=untold)
+    shallow = replace(known, parameters=unreported)
     path = save(replace(diagnosed(), conditions=(Conditions("trial", HERE, (shallow,)),)), tmp_path).path
     again = load_file(path).conditions[0].effects[0]
     assert again.values == known.values, "it acts with what was fitted"

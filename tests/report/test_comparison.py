@@ -93,7 +93,7 @@ def test_many_models_are_held_against_the_best() -> None:
 
 def test_what_has_seen_the_log_is_no_evidence() -> None:
     rows = result(("one", "two"), 0.001, frozenset({"one"}))
-    assert rows["better"][0]["says"].endswith("; no evidence, as one has learnt from this log")
+    assert rows["better"][0]["says"].endswith("; no evidence, as one was fitted to this log")
     assert "where it was trained, which is no evidence" in comparison_words.headline(rows)
     assert result(("one", "two"), 0.001, frozenset({"two"}))["better"][0]["evidence"]
 
@@ -112,7 +112,7 @@ def test_too_few_blocks_are_too_little_data() -> None:
     rows = comparison_statements(judged)
     # Without a horizon that has intervals, free runs have no sentence.
     assert [row["what"] for row in rows] == ["surge", "sway", "yaw"]
-    assert all(row["says"].startswith("too little data to tell") for row in rows)
+    assert all(row["says"].startswith("too little data to distinguish") for row in rows)
 
 
 def test_chances_are_short() -> None:
@@ -143,4 +143,4 @@ def test_a_ratio_over_a_reference_is_turned_round_with_its_interval() -> None:
 def test_nor_is_it_where_it_may_be_better() -> None:
     (row, *_) = result(("one", "two"), 0.03, frozenset({"one"}))["better"]
     assert row["perhaps"] == "one"
-    assert row["says"].endswith("; no evidence, as one has learnt from this log")
+    assert row["says"].endswith("; no evidence, as one was fitted to this log")

@@ -48,9 +48,9 @@ def examine(measurements: Measurements) -> tuple[tuple[SensorFinding, ...], Meas
     wrong, says = mirrored(measurements.eta, measurements.nu_raw, measurements.usable, 1.0 / measurements.step_s)
     if wrong:
         raise FerryIdError(
-            f"{measurements.profile.path}: signals contradict each other, so nothing can be learnt from them. {says} "
+            f"{measurements.profile.path}: signals contradict each other, so no model can be identified from them. {says} "
             f"Fix: correct the frame of [signals.{wrong}] in the profile {measurements.profile.name}, or of what it is "
-            "held against"
+            "compared with"
         )
     findings = []
     for check in checks():
@@ -62,9 +62,9 @@ def examine(measurements: Measurements) -> tuple[tuple[SensorFinding, ...], Meas
         measurements = refilter_velocity(measurements)
     if says := opposed(measurements):
         raise FerryIdError(
-            f"{measurements.profile.path}: force and motion contradict each other, so nothing can be learnt from them. {says} "
-            f"Fix: correct the sign of the speeds or angles in the profile {measurements.profile.name}, or the clocks of "
-            "the log"
+            f"{measurements.profile.path}: force and motion contradict each other, so no model can be identified from them. "
+            f"{says} Fix: correct the sign of the speeds or angles in the profile {measurements.profile.name}, or the "
+            "clocks of the log"
         )
     return tuple(findings), measurements
 

@@ -121,7 +121,7 @@ def find(measurements: Measurements) -> SensorFinding | None:
         {"step": estimate(step)},
         f"The azimuth angles are read in steps of {step:g} deg: at any moment the force points {100.0 * error:.0f} % of itself "
         "to one side or the other.",
-        lambda seen: corrected(seen, steps),
+        lambda measured: corrected(measured, steps),
         {"time_s": measurements.t, "angle_deg": np.degrees(measurements.angles[:, k])},
     )
 

@@ -25,14 +25,16 @@ def find(measurements: Measurements) -> SensorFinding | None:
     late = found.solution.estimate(LATE, "s")
     word = "later" if late.value > 0.0 else "earlier"
 
-    def correct(seen: Measurements) -> Measurements:
-        when = seen.t + abs(late.value)
-        inside = np.interp(when, seen.t, seen.usable.astype(np.float64), left=0.0, right=0.0) >= 1.0
-        usable = seen.usable & inside
+    def correct(measured: Measurements) -> Measurements:
+        when = measured.t + abs(late.value)
+        inside = np.interp(when, measured.t, measured.usable.astype(np.float64), left=0.0, right=0.0) >= 1.0
+        usable = measured.usable & inside
         if late.value > 0.0:
-            return replace(seen, eta=np.column_stack([_at(when, seen, seen.eta[:, :2]), seen.psi]), usable=usable)
-        moved = (_earlier(when, seen, nu) for nu in (seen.nu_raw, seen.nu))
-        return replace(seen, nu_raw=next(moved), nu=next(moved), usable=usable)
+            return replace(
+                measured, eta=np.column_stack([_at(when, measured, measured.eta[:, :2]), measured.psi]), usable=usable
+            )
+        moved = (_earlier(when, measured, nu) for nu in (measured.nu_raw, measured.nu))
+        return replace(measured, nu_raw=next(moved), nu=next(moved), usable=usable)
 
     return SensorFinding(
         "clock_offset",
@@ -43,15 +45,15 @@ def find(measurements: Measurements) -> SensorFinding | None:
     )
 
 
-def _at(when: Floats, seen: Measurements, values: Floats) -> Floats:
-    known = seen.usable
-    return np.column_stack([np.interp(when, seen.t[known], column[known]) for column in values.T])
+def _at(when: Floats, measured: Measurements, values: Floats) -> Floats:
+    known = measured.usable
+    return np.column_stack([np.interp(when, measured.t[known], column[known]) for column in values.T])
 
 
-def _earlier(when: Floats, seen: Measurements, nu: Floats) -> Floats:
+def _earlier(when: Floats, measured: Measurements, nu: Floats) -> Floats:
     """Return velocities, yaw rate excepted, of a later row; what is late is the velocity over ground."""
-    over_ground = _at(when, seen, np.column_stack(to_world(nu[:, 0], nu[:, 1], seen.psi)))
-    return np.column_stack([*to_body(over_ground[:, 0], over_ground[:, 1], seen.psi), nu[:, 2]])
+    over_ground = _at(when, measured, np.column_stack(to_world(nu[:, 0], nu[:, 1], measured.psi)))
+    return np.column_stack([*to_body(over_ground[:, 0], over_ground[:, 1], measured.psi), nu[:, 2]])
 
 
 CHECK = Check("clock_offset", "Clocks of position and velocity", find, place=30)

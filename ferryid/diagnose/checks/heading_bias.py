@@ -26,8 +26,8 @@ def find(measurements: Measurements) -> SensorFinding | None:
     side = "clockwise" if angle.value > 0.0 else "anticlockwise"
     bias = float(found.solution.values[ANGLE])
 
-    def correct(seen: Measurements) -> Measurements:
-        return replace(seen, eta=seen.eta - np.array([0.0, 0.0, bias]))
+    def correct(measured: Measurements) -> Measurements:
+        return replace(measured, eta=measured.eta - np.array([0.0, 0.0, bias]))
 
     return SensorFinding(
         "heading_bias",

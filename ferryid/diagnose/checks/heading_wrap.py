@@ -24,8 +24,8 @@ def find(measurements: Measurements) -> SensorFinding | None:
     if count == 0.0:
         return None
 
-    def correct(seen: Measurements) -> Measurements:
-        return replace(seen, eta=np.column_stack([seen.eta[:, :2], psi]))
+    def correct(measured: Measurements) -> Measurements:
+        return replace(measured, eta=np.column_stack([measured.eta[:, :2], psi]))
 
     return SensorFinding(
         "heading_wrap",

@@ -33,11 +33,11 @@ def find(measurements: Measurements) -> SensorFinding | None:
     names = [name for name, column in zip(NAMES, held.T, strict=True) if column.any()]
     percent = 100.0 * share
 
-    def correct(seen: Measurements) -> Measurements:
+    def correct(measured: Measurements) -> Measurements:
         # What was held is bridged: the jump at its end is no motion, and means reach over it.
-        both = ((seen.eta, held[:, :3]), (seen.nu_raw, held[:, 3:]))
-        eta, nu_raw = (interpolate_gaps(np.where(gone, np.nan, now), seen.usable) for now, gone in both)
-        return replace(seen, eta=eta, nu_raw=nu_raw, usable=seen.usable & ~rows)
+        both = ((measured.eta, held[:, :3]), (measured.nu_raw, held[:, 3:]))
+        eta, nu_raw = (interpolate_gaps(np.where(gone, np.nan, now), measured.usable) for now, gone in both)
+        return replace(measured, eta=eta, nu_raw=nu_raw, usable=measured.usable & ~rows)
 
     return SensorFinding(
         "held_samples",

@@ -133,21 +133,21 @@ class _Same:
         return id(self.measurements)
 
 
-def kinematics(measurements: Measurements, told: tuple[int, ...] = ()) -> Kinematics | None:
+def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kinematics | None:
     """Compare positions and velocities; None where the measurements have too little of them.
 
     Parameters
     ----------
     measurements
         From a log.
-    told
+    forced
         Parameters that are let in from the start, because it is known that they are off.
     """
-    return _compared(_Same(measurements), told)
+    return _compared(_Same(measurements), forced)
 
 
 @lru_cache(maxsize=1)
-def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
+def _compared(same: _Same, forced: tuple[int, ...]) -> Kinematics | None:
     measurements = same.measurements
     problem, both = spans(measurements, np.hstack([measurements.eta, measurements.nu_raw[:, :2]]))
     if len(problem.starts) < 8:
@@ -159,7 +159,7 @@ def _compared(same: _Same, told: tuple[int, ...]) -> Kinematics | None:
     pulled = _slope(eta[:, :2], m) / problem.step_s
     data = _Data(problem, eta, velocity, pulled)
     p, active = _start(data)
-    active[list(told)] = True
+    active[list(forced)] = True
     searched = _search(data, p, active)
     if searched is None:
         return None

@@ -34,10 +34,10 @@ def find(measurements: Measurements) -> SensorFinding | None:
     x, y = found.solution.estimate(X, "m"), found.solution.estimate(Y, "m")
     at = np.array([x.value, y.value])
 
-    def correct(seen: Measurements) -> Measurements:
-        one = np.ones(len(seen.t))
-        arm = np.column_stack([*to_world(at[0] * one, at[1] * one, seen.psi), 0.0 * one])
-        return replace(seen, eta=seen.eta - arm)
+    def correct(measured: Measurements) -> Measurements:
+        one = np.ones(len(measured.t))
+        arm = np.column_stack([*to_world(at[0] * one, at[1] * one, measured.psi), 0.0 * one])
+        return replace(measured, eta=measured.eta - arm)
 
     ends = ("ahead" if at[0] >= 0.0 else "astern", "to starboard" if at[1] >= 0.0 else "to port")
     return SensorFinding(

@@ -42,8 +42,8 @@ def find(measurements: Measurements) -> SensorFinding | None:
     seconds = float(rows.sum()) * measurements.step_s
     share = 100.0 * hardest / largest
 
-    def correct(seen: Measurements) -> Measurements:
-        return replace(seen, usable=seen.usable & ~rows)
+    def correct(measured: Measurements) -> Measurements:
+        return replace(measured, usable=measured.usable & ~rows)
 
     return SensorFinding(
         "unrecorded_force",

@@ -31,8 +31,8 @@ def find(measurements: Measurements) -> SensorFinding | None:
     right = unit[0][0] if unit else factor.value
     scale = np.array([right, right, 1.0])
 
-    def correct(seen: Measurements) -> Measurements:
-        return replace(seen, nu_raw=seen.nu_raw / scale, nu=seen.nu / scale)
+    def correct(measured: Measurements) -> Measurements:
+        return replace(measured, nu_raw=measured.nu_raw / scale, nu=measured.nu / scale)
 
     return SensorFinding(
         "velocity_scale",

@@ -97,7 +97,7 @@ def find(measurements: Measurements) -> SensorFinding | None:
         "yaw_rate_scale",
         {"factor": factor},
         f"The yaw rate measured is{sign} {abs(factor.value):.3f} times that of the heading.",
-        lambda seen: corrected(seen, factor.value),
+        lambda measured: corrected(measured, factor.value),
         {"time_s": rates.middle_s, "heading_rate_radps": rates.heading, "yaw_rate_radps": rates.gyro},
     )
 

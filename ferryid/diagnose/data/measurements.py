@@ -207,8 +207,9 @@ def _measurements(track: Track, measured: Measured, profile: Profile, window_s: 
     usable = measured.usable & np.isfinite(measured.eta[:, 2])
     if not usable.any():
         raise FerryIdError(
-            f"{track.log}: a diagnosis needs the heading, to tell the world's forces from the vessel's, found none while "
-            "velocities and actuators were measured. Fix: map [signals.heading] in the profile, or use a log that has it"
+            f"{track.log}: a diagnosis needs the heading, to distinguish forces of the environment from the vessel's, "
+            "found none while velocities and actuators were measured. Fix: map [signals.heading] in the profile, or use a "
+            "log that has it"
         )
     eta = measured.eta
     placed: Flags = np.asarray(np.isfinite(eta[:, :2]).all(axis=1))

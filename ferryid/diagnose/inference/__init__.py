@@ -13,14 +13,14 @@ from ferryid.diagnose.inference.noise_model import NoiseModel, fit_noise_with, l
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.profile_likelihood import intervals
 from ferryid.diagnose.inference.search import is_negligible
-from ferryid.diagnose.inference.stochastic_disturbance import BANDS, STRENGTHS, DisturbanceState
+from ferryid.diagnose.inference.stochastic_disturbance import START_FREQUENCIES, START_STRENGTHS, DisturbanceState
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, windows
 
 __all__ = [
-    "BANDS",
     "INFERENCE",
-    "STRENGTHS",
+    "START_FREQUENCIES",
+    "START_STRENGTHS",
     "Candidate",
     "DisturbanceState",
     "EstimationProblem",

@@ -44,9 +44,9 @@ class HullBaseline:
 
     def expect(self, log: AveragedLog) -> Expectation:
         """Return the forces of the hull, in still air and water where none was measured."""
-        seen = log.windows
+        windows = log.windows
         sha256 = log.screened.measured.survey.recording.sha256
-        return Expectation(*prior_force_model(seen.measurements, self.profile, self.model, sha256), _library(log))
+        return Expectation(*prior_force_model(windows.measurements, self.profile, self.model, sha256), _library(log))
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,13 @@ class SimulationBaseline:
 
     def expect(self, log: AveragedLog) -> Expectation:
         """Return the simulation's forces, with its own conditions as neutral values of the candidates."""
-        measurements, seen = log.screened.measurements, log.windows
+        measurements, windows = log.screened.measurements, log.windows
         path_errors = compare_paths(self.simulated.measurements, measurements)
         shift_s = path_errors.shift_s if isinstance(path_errors, PathComparison) else 0.0
         comparison = simulation_as_json(self.simulated, path_errors)
         return Expectation(
-            *simulated_force_model(self.simulated, seen.measurements, shift_s),
-            tuple(differing_candidates(self.simulated, seen.measurements, shift_s)),
+            *simulated_force_model(self.simulated, windows.measurements, shift_s),
+            tuple(differing_candidates(self.simulated, windows.measurements, shift_s)),
             (comparison["says"], *difference_notes(self.simulated, measurements)),
             comparison,
         )

@@ -73,12 +73,12 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
     spreads: list[Floats] = []
     place: dict[str, int] = {}
     for log in logs:
-        seen = log.windows
-        if len(seen.starts) < INFERENCE.campaign_windows or log.path in place:
+        windows = log.windows
+        if len(windows.starts) < INFERENCE.campaign_windows or log.path in place:
             continue
-        plain, spread = prior_force_model(seen.measurements, profile)
+        plain, spread = prior_force_model(windows.measurements, profile)
         place[log.path] = len(members)
-        members.append(Member(seen, plain, own_candidates(seen, profile)))
+        members.append(Member(windows, plain, own_candidates(windows, profile)))
         spreads.append(spread)
     if len(members) < 2:
         raise FerryIdError(
@@ -91,7 +91,7 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
     return Campaign(tuple(members), fit_campaign_hull(members, np.max(spreads, axis=0), induced_size), place)
 
 
-def own_candidates(seen: Windows, profile: Profile) -> tuple[Candidate, ...]:
+def own_candidates(windows: Windows, profile: Profile) -> tuple[Candidate, ...]:
     """Return what a log is given of its own while the hull is fitted to all."""
     effect = effects()[OWN]
-    return () if effect.cannot(seen.measurements) else (Candidate(effect, None, effect.parameters_of(profile)),)
+    return () if effect.cannot(windows.measurements) else (Candidate(effect, None, effect.parameters_of(profile)),)

@@ -34,9 +34,9 @@ from ferryid.types import Floats
 INDUCED = ("X_vr", "X_vv")
 ROUNDS, STEPS = 3, 5
 """Rounds, each with the noise that the one before left, and Gauss-Newton steps in a round."""
-TRUST = 2.0
-TINY = 0.02
-START = 0.4
+LONGEST_STEP = 2.0
+DIFFERENCE_STEP = 0.02
+START_SIZE = 0.4
 """Where a search begins besides at the neutral values, in sizes: a load that grows with speed squared has no slope at rest."""
 
 
@@ -188,8 +188,8 @@ def fit_campaign_hull(members: Sequence[Member], spread: Floats, induced_size: F
     bare = replace(joint, members=empty)
     noise = joint.noise(bare, z, own)
     for _ in range(ROUNDS):
-        z, own_none = bare.solve(z, own, noise)
-        noise = joint.noise(bare, z, own_none)
+        z, no_own = bare.solve(z, own, noise)
+        noise = joint.noise(bare, z, no_own)
     if any(member.candidates for member in members):
         own = [joint.start(i, z, noise) for i in range(len(members))]
         for _ in range(ROUNDS):
@@ -233,7 +233,7 @@ class _Joint:
         """Return where to begin with a log's own effects: what explains most beside a hull that may move."""
         q = sum(len(candidate.parameters) for candidate in self.members[i].candidates)
         around = product((-1.0, 0.0, 1.0), repeat=q) if q <= 3 else [*np.eye(q).tolist(), *(-np.eye(q)).tolist()]
-        tried = [START * np.array(one) for one in around]
+        tried = [START_SIZE * np.array(one) for one in around]
         J = self.by_hull(i, z, tried[0], noise)
         factor = cho_factor(J.T @ J + np.eye(len(z)))
         cost = []
@@ -252,8 +252,8 @@ class _Joint:
         J = np.zeros((len(w), len(z)))
         for k in np.flatnonzero(self.spread > 0.0):
             moved = z.copy()
-            moved[k] += TINY
-            J[:, k] = (self.white(i, moved, own, noise) - w) / TINY
+            moved[k] += DIFFERENCE_STEP
+            J[:, k] = (self.white(i, moved, own, noise) - w) / DIFFERENCE_STEP
         return J
 
     def by_own(self, i: int, z: Floats, own: Floats, noise: AutoregressiveNoise) -> tuple[Floats, Floats]:
@@ -262,8 +262,8 @@ class _Joint:
         J = np.empty((len(w), len(own)))
         for k in range(len(own)):
             moved = own.copy()
-            moved[k] += TINY
-            J[:, k] = (self.white(i, z, moved, noise) - w) / TINY
+            moved[k] += DIFFERENCE_STEP
+            J[:, k] = (self.white(i, z, moved, noise) - w) / DIFFERENCE_STEP
         return w, J
 
     def solve(self, z: Floats, own: Sequence[Floats], noise: AutoregressiveNoise) -> tuple[Floats, list[Floats]]:
@@ -278,7 +278,7 @@ class _Joint:
             step = -np.linalg.solve(A, z + np.sum([part.gradient for part in parts], axis=0))
             moves = [part.own_step(step) for part in parts]
             longest = max(float(np.abs(one).max(initial=0.0)) for one in (step, *moves))
-            full = min(1.0, TRUST / max(longest, 1e-12))
+            full = min(1.0, LONGEST_STEP / max(longest, 1e-12))
             for share in (full, 0.5 * full, 0.25 * full, 0.1 * full):
                 new = [one + share * move for one, move in zip(now, moves, strict=True)]
                 new_cost = self._cost(z + share * step, new, noise)

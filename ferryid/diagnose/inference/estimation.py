@@ -25,23 +25,23 @@ from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import titled
 from ferryid.types import Floats
 
-STEPS = 24
-ANEW = 4
-"""Steps after which the derivatives by the hull's coefficients are taken anew."""
-ENOUGH = 1e-2
-"""Gain in cost of a step that is worth another."""
-MOVED = 0.1
-"""Move of a coefficient of the hull by which a slope is found, in its spread."""
+MAX_ITERATIONS = 24
+HULL_SLOPE_ITERATIONS = 4
+"""Iterations after which the derivatives by the hull's coefficients are computed again."""
+CONVERGED_GAIN = 1e-2
+"""Gain in cost of an iteration below which the fit has converged."""
+HULL_DIFFERENCE = 0.1
+"""Finite difference of a coefficient of the hull, in its spread."""
 DAMPINGS = (0.0, 0.3, 3.0, 30.0, 300.0)
-NUDGE = 1e-2
-"""Move of an effect's parameter, in its size, by which a slope is found."""
-TRUST = 4.0
+PARAMETER_DIFFERENCE = 1e-2
+"""Finite difference of an effect's parameter, in its size."""
+LONGEST_STEP = 4.0
 """Longest Gauss-Newton step, in sizes of a parameter."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect in one instance; `doubt` as in `ferryid.effects.effect.Choice`.
+    """An effect in one instance; `log_alternatives` as in `ferryid.effects.effect.Choice`.
 
     It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end).
     """
@@ -51,7 +51,7 @@ class Candidate:
     parameters: tuple[Parameter, ...]
     onset_s: float = 0.0
     offset_s: float = inf
-    doubt: float = 0.0
+    log_alternatives: float = 0.0
 
     @property
     def times(self) -> tuple[str, ...]:
@@ -118,15 +118,18 @@ class Fit:
         return np.sqrt(np.diag(self.spread)[first : first + len(self.values[index])])
 
     def reported_errors(self, index: int) -> Floats:
-        """Return the standard deviations that are told: `INFERENCE.posterior_factor`, and what no log tells.
+        """Return the standard deviations to report: with `INFERENCE.posterior_factor`, and what no log determines.
 
-        That is its formula (``form``), and what hull or instruments may be off anyway (``idle``, about a 95 % interval). A
+        That is the error of its formula (``formula_error``), and what hull or instruments may be off anyway (``negligible``,
+        about a 95 % interval). A
         place has no size.
         """
         candidate, values = self.candidates[index], self.values[index]
         sized = np.array([one.unit == candidate.parameters[0].unit for one in candidate.parameters])
         away = values - np.array([one.neutral for one in candidate.parameters])
-        beyond = np.where(sized, np.hypot(candidate.effect.form * away, 0.5 * candidate.effect.idle), 0.0)
+        beyond = np.where(
+            sized, np.hypot(candidate.effect.formula_error * away, 0.5 * candidate.effect.negligible), 0.0
+        )
         return np.hypot(INFERENCE.posterior_factor * self.errors(index), beyond)
 
 
@@ -182,8 +185,10 @@ class EstimationProblem:
         free = np.flatnonzero(self.hull_spread)
         every = np.zeros((self.steps.measured[:, self.steps.channels].size, len(self.hull_spread)))
         if free.size:
-            moves = MOVED * self.hull_spread[free]
-            every[:, free] = self.whitening_filter.white(self.steps.hull_changes(force_model, free, moves) / MOVED)
+            moves = HULL_DIFFERENCE * self.hull_spread[free]
+            every[:, free] = self.whitening_filter.white(
+                self.steps.hull_changes(force_model, free, moves) / HULL_DIFFERENCE
+            )
         return every
 
     def white(self, force_model: ForceModel) -> Floats:
@@ -223,7 +228,7 @@ def fit(
     candidates: Sequence[Candidate],
     start: Sequence[Floats] | None = None,
     *,
-    steps: int = STEPS,
+    steps: int = MAX_ITERATIONS,
     begin: StartingPoint | None = None,
 ) -> Fit:
     """Fit a hypothesis by Gauss-Newton steps on the posterior.
@@ -252,7 +257,7 @@ def fit(
     cuts = np.cumsum([len(candidate.parameters) for candidate in candidates])[:-1].tolist()
     q, h = len(every), len(problem.hull_spread)
     # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
-    bends = any(candidate.effect.bends_hull for candidate in candidates)
+    bends = any(candidate.effect.changes_hull for candidate in candidates)
 
     def force_model_of(z: Floats) -> ForceModel:
         force_model = replace(problem.plain, hull=problem.plain.hull + problem.hull_spread * z[:h])
@@ -279,12 +284,12 @@ def fit(
     by_hull, fresh = (problem.by_hull if begin is None else begin.by_hull)[:, moving], False
     of_hull = by_hull.T @ by_hull
     for count in range(max(steps, 1)):
-        if count > 0 and (bends or count % ANEW == 0):
+        if count > 0 and (bends or count % HULL_SLOPE_ITERATIONS == 0):
             by_hull, fresh = problem.hull_slopes(force_model_of(z))[:, moving], True
             of_hull = by_hull.T @ by_hull
         by_effects = np.empty((len(w), 0))
         if free.size:
-            d = np.where(z[h + free] + NUDGE <= high[free], NUDGE, -NUDGE)
+            d = np.where(z[h + free] + PARAMETER_DIFFERENCE <= high[free], PARAMETER_DIFFERENCE, -PARAMETER_DIFFERENCE)
             moved = np.repeat(z[None], len(free), axis=0)
             moved[np.arange(len(free)), h + free] += d
             gaps = np.stack([problem.steps.gap(force_model_of(one)) for one in moved], axis=2)
@@ -301,7 +306,7 @@ def fit(
         for damping in DAMPINGS:
             # Levenberg's and Marquardt's way, where the whole step leads astray.
             step = newton_step(A + damping * np.diag(np.diag(A)), slope, least, most)
-            step *= min(1.0, TRUST / max(float(np.abs(step).max()), 1e-12))
+            step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
             new = z + step
             new[h:] = np.clip(new[h:], low, high)
             w_new = white(new)
@@ -310,15 +315,15 @@ def fit(
                 gained = cost - new_cost
                 z, w, cost = new, w_new, new_cost
                 break
-        if gained < ENOUGH:
-            if fresh or steps <= ANEW:
+        if gained < CONVERGED_GAIN:
+            if fresh or steps <= HULL_SLOPE_ITERATIONS:
                 break
             by_hull, fresh = problem.hull_slopes(force_model_of(z))[:, moving], True
             of_hull = by_hull.T @ by_hull
     covariance = np.asarray(np.linalg.inv(A)[h:, h:] * np.outer(size, size), dtype=np.float64)
     evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(A)[1]) - problem.whitening_filter.log_scale
     evidence -= sum(
-        candidate.doubt + len(candidate.times) * log(len(problem.windows.starts)) for candidate in candidates
+        candidate.log_alternatives + len(candidate.times) * log(len(problem.windows.starts)) for candidate in candidates
     )
     values = tuple(np.split(neutral + size * z[h:], cuts)) if every else ()
     hull = problem.plain.hull + problem.hull_spread * z[:h]
@@ -331,7 +336,11 @@ def effect_slopes(problem: EstimationProblem, kept: Fit) -> Floats:
     columns = []
     for i, candidate in enumerate(kept.candidates):
         for k, one in enumerate(candidate.parameters):
-            d = NUDGE if kept.values[i][k] + NUDGE * one.size <= one.high else -NUDGE
+            d = (
+                PARAMETER_DIFFERENCE
+                if kept.values[i][k] + PARAMETER_DIFFERENCE * one.size <= one.high
+                else -PARAMETER_DIFFERENCE
+            )
             moved = kept.values[i].copy()
             moved[k] += d * one.size
             changed = (*kept.values[:i], moved, *kept.values[i + 1 :])
@@ -349,9 +358,9 @@ def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candid
     """Return a candidate with the parameters that its effect chooses beside a fit; the same one where there is no choice."""
     if candidate.effect.choose is None:
         return candidate
-    believed = fitted_force_model(problem.plain, replace(beside, hull=problem.plain.hull)).hull
-    made = candidate.effect.choose(fitted_force_model(problem.plain, beside), believed, problem.white)
-    return replace(candidate, parameters=made.parameters, doubt=made.doubt)
+    prior_hull = fitted_force_model(problem.plain, replace(beside, hull=problem.plain.hull)).hull
+    made = candidate.effect.choose(fitted_force_model(problem.plain, beside), prior_hull, problem.white)
+    return replace(candidate, parameters=made.parameters, log_alternatives=made.log_alternatives)
 
 
 def fitted_force_model(plain: ForceModel, made: Fit) -> ForceModel:
@@ -361,7 +370,7 @@ def fitted_force_model(plain: ForceModel, made: Fit) -> ForceModel:
 
 def apply_candidates(force_model: ForceModel, candidates: Sequence[Candidate], values: Sequence[Floats]) -> ForceModel:
     """Return the force model with some candidates in it, each in its turn."""
-    for candidate, p in sorted(zip(candidates, values, strict=True), key=lambda one: one[0].effect.turn):
+    for candidate, p in sorted(zip(candidates, values, strict=True), key=lambda one: one[0].effect.order):
         force_model = candidate.act(force_model, p)
     return force_model
 

@@ -12,9 +12,9 @@ import numpy as np
 from ferryid.compiled import compiled
 from ferryid.types import Floats
 
-OWN = 5
+CHANNEL_STATES = 5
 """States of a channel: position, velocity, measurement error, its rate, disturbance."""
-SETTLED = 1e-9
+CONVERGED = 1e-9
 """Change of gains, as a share of the largest, below which they stay as they are."""
 DIFFUSE = 2
 """Steps after which position and velocity are known."""
@@ -44,11 +44,11 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, st
     c, s, q = columns.shape[1], columns.shape[2], x.shape[1]
     h, half = step_s, 0.5 * step_s * step_s
     for j in range(c):
-        i = OWN * j
+        i = CHANNEL_STATES * j
         for b in range(s):
             part = columns[k, j, b]
             for m in range(q):
-                scratch[b, m] = part * x[OWN * c + b, m]
+                scratch[b, m] = part * x[CHANNEL_STATES * c + b, m]
                 x[i, m] += half * scratch[b, m]
         for m in range(q):
             speed, wrong, rate, push = x[i + 1, m], x[i + 2, m], x[i + 3, m], x[i + 4, m]
@@ -65,10 +65,10 @@ def advance(x: Floats, keep: Floats, blocks: Floats, columns: Floats, k: int, st
             scratch[i, m] = 0.0
         for b in range(s):
             for m in range(q):
-                scratch[i, m] += blocks[i, b] * x[OWN * c + b, m]
+                scratch[i, m] += blocks[i, b] * x[CHANNEL_STATES * c + b, m]
     for i in range(s):
         for m in range(q):
-            x[OWN * c + i, m] = scratch[i, m]
+            x[CHANNEL_STATES * c + i, m] = scratch[i, m]
 
 
 @compiled
@@ -116,14 +116,14 @@ def gains(
         Standard deviation of every prediction, shape (n, c).
     """
     n, c, s = columns.shape
-    S = OWN * c + s
+    S = CHANNEL_STATES * c + s
     h = step_s
     known = 0 if integrals == 2 else 1
     keep = kept(noise, h)
     P, Q, turned = np.zeros((S, S)), np.zeros((S, S)), np.empty((S, S))
     scratch, sight = np.empty((s, S)), np.empty(S)
     for j in range(c):
-        i = OWN * j
+        i = CHANNEL_STATES * j
         vague = (1e3 * scale[j]) ** 2
         P[i + known, i + known] = vague
         if integrals == 2:
@@ -138,11 +138,14 @@ def gains(
         Q[i + 4, i + 4] = (1.0 - f * f) * pushed
     for i in range(s):
         for m in range(s):
-            P[OWN * c + i, OWN * c + m], Q[OWN * c + i, OWN * c + m] = drive[1, i, m], drive[0, i, m]
+            P[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m], Q[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m] = (
+                drive[1, i, m],
+                drive[0, i, m],
+            )
     K, spread = np.zeros((n, c, S)), np.empty((n, c))
     for k in range(n):
         for j in range(c):
-            at, wrong_ = OWN * j + known, OWN * j + 2
+            at, wrong_ = CHANNEL_STATES * j + known, CHANNEL_STATES * j + 2
             for i in range(S):
                 sight[i] = P[at, i] + P[wrong_, i]
             variance = sight[at] + sight[wrong_] + noise[j, 0] * noise[j, 0]
@@ -169,7 +172,7 @@ def gains(
                 for i in range(S):
                     change = max(change, abs(K[k, j, i] - K[k - 1, j, i]))
                     largest = max(largest, abs(K[k, j, i]))
-            if change < SETTLED * largest:
+            if change < CONVERGED * largest:
                 for rest in range(k + 1, n):
                     for j in range(c):
                         spread[rest, j] = spread[k, j]
@@ -208,14 +211,14 @@ def errors(
     """
     n, c, q = series.shape
     s = blocks.shape[0]
-    S = OWN * c + s
+    S = CHANNEL_STATES * c + s
     known = 0 if integrals == 2 else 1
     keep = kept(noise, step_s)
     x, error, scratch = np.zeros((S, q)), np.empty(q), np.empty((s, q))
     out = np.empty((n, c, q))
     for k in range(n):
         for j in range(c):
-            at, wrong = OWN * j + known, OWN * j + 2
+            at, wrong = CHANNEL_STATES * j + known, CHANNEL_STATES * j + 2
             for m in range(q):
                 error[m] = series[k, j, m] - x[at, m] - x[wrong, m]
                 out[k, j, m] = error[m] / spread[k, j]

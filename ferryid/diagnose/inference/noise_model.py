@@ -26,10 +26,10 @@ from ferryid.types import Floats
 
 GROUPS = (0, 0, 1)
 """Channels that share a noise: north and east (or surge and sway), and the turn."""
-STARTS = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5))
+START_SHARES = ((0.05, 1.0, 0.03), (0.05, 3.0, 0.1), (0.5, 6.0, 0.1), (0.02, 2.0, 0.5))
 """Where the search for a channel's noise begins: white error, as a share of all; time constant of the coloured, in steps; and
 disturbance, as a share of the acceleration left over."""
-SMALL = 1e-4
+DIFFERENCE_STEP = 1e-4
 """Move of a parameter's logarithm by which a slope is found."""
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-2, 1e-5, 1e5
 """Damping of the steps of the search for the likeliest noise, as a share of the information."""
@@ -116,15 +116,15 @@ class WhiteningFilter:
         return every
 
 
-def make_whitening_filter(noise: NoiseModel, steps: Windows, pushes: Floats | None = None) -> WhiteningFilter:
+def make_whitening_filter(noise: NoiseModel, steps: Windows, responses: Floats | None = None) -> WhiteningFilter:
     """Return a filter with its gains for some steps. Channels that share no disturbance are filtered by themselves.
 
-    `pushes` are those of `disturbance_columns`, for whoever knows them already.
+    `responses` are those of `disturbance_columns`, where they are known already.
     """
     h, integrals = stride_s(steps), integrals_of(steps)
     scale = _scales(steps)
     if noise.processes and noise.force_model is not None:
-        columns = disturbance_columns(noise, steps) if pushes is None else pushes
+        columns = disturbance_columns(noise, steps) if responses is None else responses
         blocks, drive = _blocks(noise.processes, h)
         by_run = tuple(
             gains(scale, noise.channels, integrals, blocks, drive, np.ascontiguousarray(columns[a:b]), h)
@@ -154,15 +154,15 @@ def disturbance_columns(noise: NoiseModel, steps: Windows) -> Floats:
     return np.concatenate(columns, axis=2)
 
 
-def fit_noise(steps: Windows, gaps: Floats, near: NoiseModel | None = None) -> NoiseModel:
+def fit_noise(steps: Windows, gaps: Floats, initial: NoiseModel | None = None) -> NoiseModel:
     """Return the noise that gaps have if each channel has its own, by maximum likelihood.
 
     Parameters
     ----------
     steps, gaps
         The trial's, and what a hypothesis leaves.
-    near
-        A filter to begin with; else the search begins at several places.
+    initial
+        Noise to start from; else the search starts at several places.
     """
     h, integrals = stride_s(steps), integrals_of(steps)
     scale = _scales(steps)
@@ -178,15 +178,15 @@ def fit_noise(steps: Windows, gaps: Floats, near: NoiseModel | None = None) -> N
             scales = np.broadcast_to(log_scales[:, :, None], whitened.shape)
             return whitened.reshape(len(z), -1), scales.reshape(len(z), -1)
 
-        rough = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
+        rms = float(np.sqrt(np.mean(gaps[:, own] ** 2)))
         # The second difference of a position has six times the variance of its errors, the first of a velocity's twice.
-        error = rough * h**integrals / (2.4 if integrals == 2 else 1.4)
+        error = rms * h**integrals / (2.4 if integrals == 2 else 1.4)
         # The likelihood has several tops: the same roughness may be of short errors, of long ones or of pushes.
         begin = [
-            np.log([white * error, error, error_s * h, pushed * rough, 10.0 * h])
-            for white, error_s, pushed in STARTS[: 1 if near else None]
+            np.log([white * error, error, error_s * h, pushed * rms, 10.0 * h])
+            for white, error_s, pushed in START_SHARES[: 1 if initial else None]
         ]
-        begin += [np.log(near.channels[own[0]])] if near else []
+        begin += [np.log(initial.channels[own[0]])] if initial else []
 
         def searched(start: Floats, predictions: Predicting = predictions) -> tuple[float, Floats]:
             return _most_likely(predictions, start, _bounds(start, h))
@@ -199,11 +199,11 @@ def fit_noise(steps: Windows, gaps: Floats, near: NoiseModel | None = None) -> N
 def fit_noise_with(
     steps: Windows,
     gaps: Floats,
-    alone: NoiseModel,
-    made: Callable[[Floats], tuple[Process, ...]],
+    channel_noise: NoiseModel,
+    processes_of: Callable[[Floats], tuple[Process, ...]],
     start: Floats,
     force_model: ForceModel,
-    worth: float = -np.inf,
+    minimum: float = -np.inf,
 ) -> tuple[NoiseModel, Floats, Floats, float]:
     """Return the noise that gaps have if disturbances push beside each channel's own noise.
 
@@ -211,16 +211,16 @@ def fit_noise_with(
     ----------
     steps, gaps
         The trial's, and what a hypothesis leaves.
-    alone
+    channel_noise
         The noise to begin with; its processes stay as they are.
-    made
+    processes_of
         The further processes, from positive parameters.
     start
         These to begin with, shape (k,).
     force_model
         In which all push.
-    worth
-        Logarithm of the likelihood that has to come into sight before the search goes on to its end.
+    minimum
+        Logarithm of the likelihood that must come within reach, or the search over all parameters is left out.
 
     Returns
     -------
@@ -237,44 +237,49 @@ def fit_noise_with(
     first = [GROUPS.index(group) for group in sorted(set(GROUPS))]
 
     def noise(z: Floats) -> NoiseModel:
-        own, rest = np.exp(z[: 5 * len(first)].reshape(-1, 5)), np.exp(z[5 * len(first) :])
-        return NoiseModel(own[list(GROUPS)], (*alone.processes, *made(rest)), force_model)
+        own, parameters = np.exp(z[: 5 * len(first)].reshape(-1, 5)), np.exp(z[5 * len(first) :])
+        return NoiseModel(own[list(GROUPS)], (*channel_noise.processes, *processes_of(parameters)), force_model)
 
     # How a disturbance pushes does not depend on its parameters.
-    pushes = disturbance_columns(NoiseModel(alone.channels, (*alone.processes, *made(start)), force_model), steps)
+    responses = disturbance_columns(
+        NoiseModel(channel_noise.channels, (*channel_noise.processes, *processes_of(start)), force_model), steps
+    )
 
     def cost(z: Floats) -> float:
-        return -likelihood(noise(z), steps, gaps, pushes)
+        return -likelihood(noise(z), steps, gaps, responses)
 
     def predicted(z: Floats) -> Predictions:
-        ready = make_whitening_filter(noise(z), steps, pushes)
+        ready = make_whitening_filter(noise(z), steps, responses)
         return ready.white(gaps), ready.log_scales.reshape(-1)
 
     def predictions(every: Floats) -> Predictions:
         whitened, log_scales = zip(*over(predicted, every), strict=True)
         return np.array(whitened), np.array(log_scales)
 
-    channels = np.log(alone.channels[first])
+    channels = np.log(channel_noise.channels[first])
     begin = np.concatenate([channels.ravel(), np.log(start)])
     bounds = [pair for row in channels for pair in _bounds(row, h)]
     bounds += [(float(one) - 5.0, float(one) + 4.0) for one in np.log(start)]
     # What gives way to a disturbance first is the size of each channel's own coloured error and push.
-    some = [5 * group + size for group in range(len(first)) for size in (1, 3)]
-    some += range(len(begin) - len(start), len(begin))
+    first_searched = [5 * group + size for group in range(len(first)) for size in (1, 3)]
+    first_searched += range(len(begin) - len(start), len(begin))
 
-    def predictions_of_some(every: Floats) -> Predictions:
+    def predictions_of_first(every: Floats) -> Predictions:
         full = np.repeat(begin[None], len(every), axis=0)
-        full[:, some] = every
+        full[:, first_searched] = every
         return predictions(full)
 
     z = begin.copy()
-    best, z[some] = _most_likely(
-        predictions_of_some, begin[some], [bounds[k] for k in some], most=INFERENCE.screening_iterations
+    best, z[first_searched] = _most_likely(
+        predictions_of_first,
+        begin[first_searched],
+        [bounds[k] for k in first_searched],
+        most=INFERENCE.screening_iterations,
     )
-    if -best > worth - INFERENCE.screening_gain:
+    if -best > minimum - INFERENCE.screening_gain:
         best, z = _most_likely(predictions, z, bounds)
     # What is not worth it need not be known.
-    width = _widths(cost, z, len(start), best) if -best > worth else np.full(len(start), np.inf)
+    width = _widths(cost, z, len(start), best) if -best > minimum else np.full(len(start), np.inf)
     return noise(z), np.exp(z[len(z) - len(start) :]), width, -best
 
 
@@ -315,9 +320,9 @@ def _widths(cost: Callable[[Floats], float], z: Floats, k: int, best: float) -> 
     return width
 
 
-def likelihood(noise: NoiseModel, steps: Windows, gaps: Floats, pushes: Floats | None = None) -> float:
-    """Return the logarithm of the likelihood of gaps, but for a constant; `pushes` as in `make_whitening_filter`."""
-    ready = make_whitening_filter(noise, steps, pushes)
+def likelihood(noise: NoiseModel, steps: Windows, gaps: Floats, responses: Floats | None = None) -> float:
+    """Return the logarithm of the likelihood of gaps, but for a constant; `responses` as in `make_whitening_filter`."""
+    ready = make_whitening_filter(noise, steps, responses)
     return -0.5 * float(np.sum(ready.white(gaps) ** 2)) - ready.log_scale
 
 
@@ -360,7 +365,7 @@ def _most_likely(
     (whitened,), (log_scales,) = predictions(z[None])
     cost = 0.5 * float(whitened @ whitened) + float(log_scales.sum())
     for _ in range(most):
-        moves = np.where(z + SMALL <= high, SMALL, -SMALL)
+        moves = np.where(z + DIFFERENCE_STEP <= high, DIFFERENCE_STEP, -DIFFERENCE_STEP)
         near_whitened, near_scales = predictions(z + np.diag(moves))
         by_whitened = (near_whitened - whitened) / moves[:, None]
         by_scale = (near_scales - log_scales) / moves[:, None]

@@ -9,7 +9,7 @@ from math import inf, log
 import numpy as np
 
 from ferryid.diagnose.inference.estimation import (
-    NUDGE,
+    PARAMETER_DIFFERENCE,
     Candidate,
     EstimationProblem,
     Fit,
@@ -26,11 +26,11 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.force_model import ForceModel, as_measured
 from ferryid.types import Floats, Ints
 
-MOST_NUMBERS = 1e7
+MOST_VALUES = 1e7
 """Numbers that a scan holds at once; parts are longer in long logs."""
-NEARBY_S, FINEST_S = 8.0, 0.2
+FIRST_TIME_STEP_S, LAST_TIME_STEP_S = 8.0, 0.2
 """Steps [s] with which a time is searched for nearby, from the first down to the last."""
-GLANCE = 3
+COMPARING_ITERATIONS = 3
 """Steps of a fit by which spans are compared."""
 
 
@@ -64,18 +64,18 @@ def linearise(problem: EstimationProblem, made: Fit, begin: StartingPoint) -> Li
     return Linearisation(force_model, problem.white(force_model), slopes, np.asarray(inverse, dtype=np.float64))
 
 
-def promising_spans(problem: EstimationProblem, ground: Linearisation, candidate: Candidate) -> list[Candidate]:
+def promising_spans(problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate) -> list[Candidate]:
     """Return a candidate in the few spans, other than the whole log, in which it promises most beside a fit.
 
-    Short ones are among them that can name nothing (see `brief`): left out, what came and went within seconds would be taken
-    for something that lasts.
+    Short ones are among them that are never reported (see `is_brief`): without these, what came and went within seconds would
+    be taken for something that lasts.
 
     The log is cut into parts; what a candidate adds in a part is linear in its parameters there, and what it adds in a span is
     the sum of the parts'. So one set of cross-products holds the evidence of every span, hull and other effects refitted.
     """
     edges = _edges(problem, candidate)
     parts = len(edges) - 1
-    G, g = _cross_products(problem, ground, candidate, edges)
+    G, g = _cross_products(problem, linearisation, candidate, edges)
     a, b = np.triu_indices(parts + 1, 1)
     part = (a > 0) | (b < parts)
     a, b = a[part], b[part]
@@ -99,7 +99,7 @@ def part_s(problem: EstimationProblem, candidate: Candidate) -> float:
     return float(np.median(np.diff(_edges(problem, candidate))))
 
 
-def brief(problem: EstimationProblem, candidate: Candidate) -> bool:
+def is_brief(problem: EstimationProblem, candidate: Candidate) -> bool:
     """Tell whether a candidate acts for so short a time that it cannot be judged: it stands in for whatever came just then."""
     return bool(candidate.times) and lasts_s(problem, candidate) < INFERENCE.span_blocks * block_s(problem.windows)
 
@@ -115,30 +115,30 @@ def lasts_s(problem: EstimationProblem, candidate: Candidate) -> float:
 def _edges(problem: EstimationProblem, candidate: Candidate) -> Floats:
     """Return where the log is cut [s], into parts of as many steps each: in a gap nothing begins or ends."""
     times = problem.steps.middle_s
-    most = MOST_NUMBERS / (len(times) * problem.steps.channels.sum() * len(candidate.parameters))
+    most = MOST_VALUES / (len(times) * problem.steps.channels.sum() * len(candidate.parameters))
     parts = max(INFERENCE.span_parts, int(min(len(times) * stride_s(problem.steps) / INFERENCE.span_s, most)))
     return np.interp(np.linspace(0.0, len(times) - 1.0, parts + 1), np.arange(len(times)), times)
 
 
 def _cross_products(
-    problem: EstimationProblem, ground: Linearisation, candidate: Candidate, edges: Floats
+    problem: EstimationProblem, linearisation: Linearisation, candidate: Candidate, edges: Floats
 ) -> tuple[Floats, Floats]:
     """Return cross-products of what a candidate adds in every part, shape (parts, p, parts, p), and of it with what is left."""
     steps, start = problem.steps, candidate.start
     part = np.clip(np.searchsorted(edges, steps.middle_s, side="right") - 1, 0, len(edges) - 2)
     own = part[:, None, None] == np.arange(len(edges) - 1)
-    there = as_measured(candidate.effect.apply(ground.force_model, start, candidate.instance))
+    there = as_measured(candidate.effect.apply(linearisation.force_model, start, candidate.instance))
     columns = []
     for k, one in enumerate(candidate.parameters):
         moved = start.copy()
-        moved[k] += NUDGE * one.size
-        change = as_measured(candidate.effect.apply(ground.force_model, moved, candidate.instance)) - there
-        columns.append(steps.mean(steps.along(change))[:, :, None] / NUDGE * own)
+        moved[k] += PARAMETER_DIFFERENCE * one.size
+        change = as_measured(candidate.effect.apply(linearisation.force_model, moved, candidate.instance)) - there
+        columns.append(steps.mean(steps.along(change))[:, :, None] / PARAMETER_DIFFERENCE * own)
     p = len(columns)
     C = problem.whitening_filter.white(np.stack(columns, axis=3).reshape(len(steps.starts), -1, (len(edges) - 1) * p))
-    shared = ground.slopes.T @ C
-    G = C.T @ C - shared.T @ ground.inverse @ shared
-    return G.reshape(len(edges) - 1, p, len(edges) - 1, p), (C.T @ ground.left).reshape(-1, p)
+    shared = linearisation.slopes.T @ C
+    G = C.T @ C - shared.T @ linearisation.inverse @ shared
+    return G.reshape(len(edges) - 1, p, len(edges) - 1, p), (C.T @ linearisation.left).reshape(-1, p)
 
 
 def _gains(G: Floats, g: Floats, a: Ints, b: Ints, candidate: Candidate) -> Floats:
@@ -159,7 +159,12 @@ def _gains(G: Floats, g: Floats, a: Ints, b: Ints, candidate: Candidate) -> Floa
 
 
 def refine_span(
-    problem: EstimationProblem, made: Fit, index: int, begin: StartingPoint, step_s: float, finest_s: float = FINEST_S
+    problem: EstimationProblem,
+    made: Fit,
+    index: int,
+    begin: StartingPoint,
+    step_s: float,
+    finest_s: float = LAST_TIME_STEP_S,
 ) -> Fit:
     """Return a fit with the ends of one candidate's span where they are likeliest nearby.
 
@@ -187,7 +192,11 @@ def refine_span(
                 if lasts_s(problem, moved) < INFERENCE.span_s or not times[0] < time < times[-1]:
                     continue
                 tried = fit(
-                    problem, replace_candidate(best.candidates, index, moved), best.values, steps=GLANCE, begin=begin
+                    problem,
+                    replace_candidate(best.candidates, index, moved),
+                    best.values,
+                    steps=COMPARING_ITERATIONS,
+                    begin=begin,
                 )
                 best = max(best, tried, key=lambda one: one.evidence)
         step *= 0.5 if best.candidates[index] == before else 1.0
@@ -200,14 +209,20 @@ def refit_spans(problem: EstimationProblem, made: Fit) -> Fit:
         if not candidate.times:
             continue
         bare, begin = without(problem, made, i), starting_point(problem, made)
-        ground = linearise(problem, bare, starting_point(problem, bare))
-        spans = [candidate, *promising_spans(problem, ground, candidate)]
+        linearisation = linearise(problem, bare, starting_point(problem, bare))
+        spans = [candidate, *promising_spans(problem, linearisation, candidate)]
         tried = [
-            fit(problem, replace_candidate(made.candidates, i, one), made.values, steps=GLANCE, begin=begin)
+            fit(
+                problem,
+                replace_candidate(made.candidates, i, one),
+                made.values,
+                steps=COMPARING_ITERATIONS,
+                begin=begin,
+            )
             for one in spans
         ]
         best = max(tried, key=lambda one: one.evidence)
-        step = max(NEARBY_S, 0.5 * part_s(problem, candidate))
+        step = max(FIRST_TIME_STEP_S, 0.5 * part_s(problem, candidate))
         sharp = refine_span(problem, best, i, begin, step)
         made = fit(problem, sharp.candidates, sharp.values, begin=begin)
     return made

@@ -122,7 +122,7 @@ def _modelled(measurements: Measurements, profile: Profile, model: Model, sha256
     known = ModelForces(model)
     if known.force.profile.name != profile.name:
         raise FerryIdError(
-            f"{model.label}: a model of {known.force.profile.name} says nothing about {profile.name}. "
+            f"{model.label}: a model of {known.force.profile.name} does not apply to {profile.name}. "
             "Fix: give a model and logs of one vessel"
         )
     plain = replace(known.plain(measurements), ambient=lambda now: known.plain(now).external)

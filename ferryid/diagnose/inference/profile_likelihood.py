@@ -18,11 +18,11 @@ from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.effect import HELD
 from ferryid.types import Floats
 
-FIRST, GROWTH = 0.5, 1.6
+FIRST_STEP, STEP_GROWTH = 0.5, 1.6
 """First step, in standard deviations at the top, and by how much each is longer than the one before."""
-STEEP, CLOSER = 3.0, 8
+LARGEST_FALL, MOST_REFINEMENTS = 3.0, 8
 """Fall of the logarithm of the evidence between two neighbours that calls for one between them, and how often at most."""
-PARTS = 41
+QUANTILES = 41
 """Parts of equal probability into which what is left free is cut."""
 
 
@@ -36,16 +36,16 @@ def intervals(problem: EstimationProblem, kept: Fit, index: int) -> dict[str, tu
     kept
         What was found.
     index
-        Of a candidate whose effect has a ``ridge``.
+        Of a candidate whose effect has a profiled parameter.
     """
     candidate = kept.candidates[index]
     names = [one.name for one in candidate.parameters]
-    place = names.index(candidate.effect.ridge)
+    place = names.index(candidate.effect.profiled)
     own = candidate.parameters[place]
     top = float(kept.values[index][place])
-    first = max(FIRST * float(kept.errors(index)[place]), 0.01 * own.size)
+    first = max(FIRST_STEP * float(kept.errors(index)[place]), 0.01 * own.size)
 
-    def held(value: float, beside: Fit) -> tuple[float, Fit]:
+    def conditional_fit(value: float, beside: Fit) -> tuple[float, Fit]:
         still = replace(own, size=HELD, neutral=value, start=value)
         parameters = tuple(still if k == place else one for k, one in enumerate(candidate.parameters))
         start = list(beside.values)
@@ -54,39 +54,39 @@ def intervals(problem: EstimationProblem, kept: Fit, index: int) -> dict[str, tu
         made = fit(problem, candidates, start, begin=starting_point(problem, beside))
         return made.evidence - 0.5 * ((value - own.neutral) / own.size) ** 2, made
 
-    found = {top: held(top, kept)}
+    found = {top: conditional_fit(top, kept)}
     for side in (-1.0, 1.0):
         value, step, last = top, first, found[top][1]
         # Until nothing lies beyond, or nothing that is likely; the likeliest may lie at the end of what is possible itself.
         while (further := min(max(value + side * step, own.low), own.high)) != value:
             value = further
-            found[value] = held(value, last)
+            found[value] = conditional_fit(value, last)
             if (
                 found[value][0]
                 < max(evidence for evidence, _ in found.values())
                 - INFERENCE.profile_drop * INFERENCE.posterior_factor**2
             ):
                 break
-            step, last = GROWTH * step, found[value][1]
-    for _ in range(CLOSER):
-        steep = [
+            step, last = STEP_GROWTH * step, found[value][1]
+    for _ in range(MOST_REFINEMENTS):
+        falls = [
             (abs(found[a][0] - found[b][0]), a, b)
             for a, b in pairwise(sorted(found))
             if max(found[a][0], found[b][0])
             > max(evidence for evidence, _ in found.values()) - INFERENCE.profile_drop * INFERENCE.posterior_factor**2
         ]
-        fall, a, b = max(steep)
-        if fall < STEEP:
+        fall, a, b = max(falls)
+        if fall < LARGEST_FALL:
             break
         higher = max(found[a], found[b], key=lambda one: one[0])[1]
-        found[0.5 * (a + b)] = held(0.5 * (a + b), higher)
+        found[0.5 * (a + b)] = conditional_fit(0.5 * (a + b), higher)
     from scipy.interpolate import PchipInterpolator  # takes half a second to import: only where it is needed
 
     values = np.array(sorted(found))
     log_weights = np.array([found[value][0] for value in values.tolist()]) / INFERENCE.posterior_factor**2
     fine = np.linspace(values[0], values[-1], 50 * len(values))
     weights = np.exp(PchipInterpolator(values, log_weights)(fine) - log_weights.max())
-    cut = ndtri((np.arange(PARTS) + 0.5) / PARTS)
+    cut = ndtri((np.arange(QUANTILES) + 0.5) / QUANTILES)
     ends = {}
     for k, name in enumerate(names):
         if k == place:
@@ -95,7 +95,7 @@ def intervals(problem: EstimationProblem, kept: Fit, index: int) -> dict[str, tu
         middle = np.array([found[value][1].values[index][k] for value in values.tolist()])
         spread = np.array([found[value][1].reported_errors(index)[k] for value in values.tolist()])
         spots = np.interp(fine, values, middle)[:, None] + np.interp(fine, values, spread)[:, None] * cut
-        ends[name] = _interval(spots.ravel(), np.repeat(weights, PARTS))
+        ends[name] = _interval(spots.ravel(), np.repeat(weights, QUANTILES))
     return ends
 
 

@@ -21,8 +21,8 @@ from ferryid.diagnose.inference.estimation import (
     without,
 )
 from ferryid.diagnose.inference.onset_estimation import (
-    GLANCE,
-    NEARBY_S,
+    COMPARING_ITERATIONS,
+    FIRST_TIME_STEP_S,
     Linearisation,
     linearise,
     part_s,
@@ -37,8 +37,8 @@ from ferryid.effects import effects
 from ferryid.effects.force_model import Measurements
 from ferryid.types import Floats
 
-FAR = 8
-"""Steps of a fit by which candidates are sorted from afar, `GLANCE` from nearby; the best are then fitted to the end."""
+COARSE_ITERATIONS = 8
+"""Iterations of a fit that ranks candidates from the prior, `COMPARING_ITERATIONS` from near by; the best then converge."""
 
 
 @dataclass(frozen=True)
@@ -116,42 +116,42 @@ def search(
     if known is not None:
         candidates = list(known)
     steady = [candidate for candidate in candidates if candidate.effect.unsteady is None]
-    shaken = [candidate for candidate in candidates if candidate.effect.unsteady is not None]
-    calm = problem.plain
+    disturbances = [candidate for candidate in candidates if candidate.effect.unsteady is not None]
+    undisturbed = problem.plain
     chosen, rounds = fit(problem, ()), list[Round]()
     states: tuple[DisturbanceState, ...] = ()
-    stood: frozenset[tuple[str, str | None]] | None = None
-    calm_beside: frozenset[tuple[str, str | None]] | None = None
+    keys_with_states: frozenset[tuple[str, str | None]] | None = None
+    keys_without_states: frozenset[tuple[str, str | None]] | None = None
     while True:
         taken = {candidate.key for candidate in chosen.candidates}
         left = [candidate for candidate in steady if candidate.key not in taken]
         progress(f"weighing {len(left)} hypotheses beside {len(taken) or 'none'} found")
-        found = _weighed(problem, chosen, left)
+        found = _ranked_candidates(problem, chosen, left)
         rounds.append(_round(found))
         good = [one for one in found if one.gain > INFERENCE.prior_odds and not is_negligible(problem, one.fit)]
         best = good[0] if good and len(taken) < INFERENCE.most_effects else None
         if best is None:
             chosen = prune(problem, chosen)
-        beside, gain = _beside(problem, chosen, found, shaken)
+        beside, gain = _fit_beside_disturbances(problem, chosen, found, disturbances)
         clear = best is not None and best.gain > INFERENCE.clear_gain
-        if shaken and not states and not clear and beside.keys != calm_beside:
+        if disturbances and not states and not clear and beside.keys != keys_without_states:
             progress("looking for gusts and waves")
             # What explains more is taken first.
             least = max(INFERENCE.disturbance_gain, (0.0 if best is None else best.gain) - gain)
-            rough, found_states = fit_disturbances(problem, beside, shaken, calm, least)
+            rough, found_states = fit_disturbances(problem, beside, disturbances, undisturbed, least)
             # What would stand in for them falls, and what they hid may show.
             kept = prune(rough, fit(rough, beside.candidates, beside.values)) if found_states else chosen
-            if found_states and _has_what_they_shake(kept, found_states):
-                stood = beside.keys
+            if found_states and _has_related_effects(kept, found_states):
+                keys_with_states = beside.keys
                 problem, chosen, states = rough, kept, found_states
                 continue
-            calm_beside = beside.keys if least <= INFERENCE.disturbance_gain else calm_beside
+            keys_without_states = beside.keys if least <= INFERENCE.disturbance_gain else keys_without_states
         if best is None:
             break
         problem = problem.with_noise_of(best.fit)
         chosen = refit_spans(problem, fit(problem, best.fit.candidates, best.fit.values))
-    if states and chosen.keys != stood:
-        problem, states = fit_disturbances(problem, chosen, shaken, calm, near=states)
+    if states and chosen.keys != keys_with_states:
+        problem, states = fit_disturbances(problem, chosen, disturbances, undisturbed, initial=states)
         chosen = prune(problem, fit(problem, chosen.candidates, chosen.values))
     if states:
         chosen = refit_spans(problem, chosen)
@@ -164,43 +164,45 @@ def refit_with_own_noise(problem: EstimationProblem, made: Fit) -> Fit:
     return fit(fair, made.candidates, made.values, begin=starting_point(fair, made))
 
 
-def _has_what_they_shake(made: Fit, states: Sequence[DisturbanceState]) -> bool:
+def _has_related_effects(made: Fit, states: Sequence[DisturbanceState]) -> bool:
     there = {"", *(candidate.effect.id for candidate in made.candidates)}
     return all(state.candidate.effect.about in there for state in states)
 
 
-def _beside(
-    problem: EstimationProblem, chosen: Fit, found: Sequence[ScoredCandidate], shaken: Sequence[Candidate]
+def _fit_beside_disturbances(
+    problem: EstimationProblem, chosen: Fit, found: Sequence[ScoredCandidate], disturbances: Sequence[Candidate]
 ) -> tuple[Fit, float]:
     """Return the fit beside which disturbances are looked for, and its evidence over what is chosen.
 
     What one of them comes and goes about, a wind's gusts, hides it and is hidden by it: the two are judged together.
     """
-    about = {candidate.effect.about for candidate in shaken}
+    about = {candidate.effect.about for candidate in disturbances}
     for one in found:
         if one.candidate.effect.id in about:
             return fit(problem, one.fit.candidates, one.fit.values), one.gain
     return chosen, 0.0
 
 
-def _weighed(problem: EstimationProblem, chosen: Fit, candidates: Sequence[Candidate]) -> list[ScoredCandidate]:
+def _ranked_candidates(
+    problem: EstimationProblem, chosen: Fit, candidates: Sequence[Candidate]
+) -> list[ScoredCandidate]:
     """Return what each candidate adds to those chosen already, the best first."""
     current = fit(problem, chosen.candidates, chosen.values)
     begin = starting_point(problem, current)
-    ground = linearise(problem, current, begin)
-    found = over(partial(_best, problem, current, begin, ground), candidates)
+    linearisation = linearise(problem, current, begin)
+    found = over(partial(_best_fit, problem, current, begin, linearisation), candidates)
     found.sort(key=lambda one: -one.gain)
-    fair = over(partial(_fairly, problem), found[: INFERENCE.compared_candidates])
+    fair = over(partial(_with_own_noise, problem), found[: INFERENCE.compared_candidates])
     return sorted([*fair, *found[INFERENCE.compared_candidates :]], key=lambda one: -one.gain)
 
 
-def _fairly(problem: EstimationProblem, one: ScoredCandidate) -> ScoredCandidate:
+def _with_own_noise(problem: EstimationProblem, one: ScoredCandidate) -> ScoredCandidate:
     made = refit_with_own_noise(problem, fit(problem, one.fit.candidates, one.fit.values))
     return replace(one, fit=made, gain=max(one.gain, one.gain + made.evidence - one.fit.evidence))
 
 
-def _best(
-    problem: EstimationProblem, current: Fit, begin: StartingPoint, ground: Linearisation, candidate: Candidate
+def _best_fit(
+    problem: EstimationProblem, current: Fit, begin: StartingPoint, linearisation: Linearisation, candidate: Candidate
 ) -> ScoredCandidate:
     """Return a candidate's best fit beside the current ones, over all spans where it can begin or end."""
 
@@ -208,28 +210,32 @@ def _best(
         gain = made.evidence - current.evidence
         return ScoredCandidate(made.candidates[-1], made, gain)
 
-    def tried(one: Candidate, values: Floats | None = None) -> ScoredCandidate:
+    def scored_fit(one: Candidate, values: Floats | None = None) -> ScoredCandidate:
         start = (*current.values, one.start if values is None else values)
         # Where the hull has strained to stand in for an effect that multiplies it, the way to both leads from the profile's.
-        afar = one.effect.bends_hull and not one.times
+        from_prior = one.effect.changes_hull and not one.times
         made = fit(
-            problem, (*current.candidates, one), start, steps=FAR if afar else GLANCE, begin=None if afar else begin
+            problem,
+            (*current.candidates, one),
+            start,
+            steps=COARSE_ITERATIONS if from_prior else COMPARING_ITERATIONS,
+            begin=None if from_prior else begin,
         )
         return scored(made)
 
     candidate = choose_parameters(problem, current, candidate)
-    whole = tried(candidate)
+    whole = scored_fit(candidate)
     if not candidate.effect.onset:
         return whole
-    # The kick of an onset shows within seconds of it only; what is changed from then on leads there.
-    smooth = replace(candidate, effect=replace(candidate.effect, kick=None))
-    spans = [tried(one) for one in promising_spans(problem, ground, smooth)]
+    # The impulse of an onset shows within seconds of it only; what is changed from then on leads there.
+    smooth = replace(candidate, effect=replace(candidate.effect, impulse=None))
+    spans = [scored_fit(one) for one in promising_spans(problem, linearisation, smooth)]
     index, step = len(current.candidates), 0.5 * part_s(problem, candidate)
 
     def refined(one: ScoredCandidate) -> ScoredCandidate:
-        coarse = refine_span(problem, one.fit, index, begin, step, NEARBY_S)
-        kicked = tried(replace(coarse.candidates[-1], effect=candidate.effect), coarse.values[-1])
-        return scored(refine_span(problem, kicked.fit, index, begin, min(step, NEARBY_S)))
+        coarse = refine_span(problem, one.fit, index, begin, step, FIRST_TIME_STEP_S)
+        with_impulse = scored_fit(replace(coarse.candidates[-1], effect=candidate.effect), coarse.values[-1])
+        return scored(refine_span(problem, with_impulse.fit, index, begin, min(step, FIRST_TIME_STEP_S)))
 
     # Seconds matter: which of them is best shows when each has its own.
     good = [one for one in spans if one.gain > max(whole.gain, 0.5 * INFERENCE.prior_odds)]
@@ -246,22 +252,24 @@ def _round(found: Sequence[ScoredCandidate]) -> Round:
 
 def is_negligible(problem: EstimationProblem, made: Fit, index: int = -1) -> bool:
     """Tell whether an effect of a fit, the last one if not another, moves the vessel too little to matter to anybody."""
-    candidate, seen = made.candidates[index], problem.windows
+    candidate, windows = made.candidates[index], problem.windows
     named = zip(made.values[index].tolist(), candidate.parameters, strict=True)
-    untold = candidate.effect.untold(problem.plain.measurements, made.values[index])
+    unreported = candidate.effect.unreported(problem.plain.measurements, made.values[index])
     away = [
         abs(value - one.neutral)
         for value, one in named
-        if one.unit == candidate.parameters[0].unit and one.name not in untold
+        if one.unit == candidate.parameters[0].unit and one.name not in unreported
     ]
-    if max(away) < candidate.effect.idle:
+    if max(away) < candidate.effect.negligible:
         return True
     others = [k for k in range(len(made.candidates)) if k != index % len(made.candidates)]
     before = replace(
         made, candidates=tuple(made.candidates[k] for k in others), values=tuple(made.values[k] for k in others)
     )
-    moved = seen.gap(fitted_force_model(problem.plain, made)) - seen.gap(fitted_force_model(problem.plain, before))
-    size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
+    moved = windows.gap(fitted_force_model(problem.plain, made)) - windows.gap(
+        fitted_force_model(problem.plain, before)
+    )
+    size = np.sqrt(np.mean(windows.measured[:, windows.channels] ** 2, axis=0))
     return bool((np.sqrt(np.mean(moved**2, axis=0)) < INFERENCE.void_share * size).all())
 
 

@@ -99,20 +99,28 @@ def learn_simulation(
     measurements, survey = read_measurements(path, profile, out, verify=verify, progress=progress)
     sensors, measurements = examine(measurements)
     name = survey.motion.log
-    seen = windows(measurements, *window_lengths(profile))
-    if len(seen.starts) < INFERENCE.fewest_windows:
+    simulated_windows = windows(measurements, *window_lengths(profile))
+    if len(simulated_windows.starts) < INFERENCE.fewest_windows:
         raise FerryIdError(
             f"{name}: --against needs a simulation long enough to learn its model from, found "
-            f"{counted(len(seen.starts), 'stretch')} of "
+            f"{counted(len(simulated_windows.starts), 'stretch')} of "
             f"{window_lengths(profile)[0]:.0f} s without a gap where {INFERENCE.fewest_windows} are needed. "
             "Fix: simulate and record the whole trial"
         )
-    plain, spread = prior_force_model(seen.measurements, profile)
+    plain, spread = prior_force_model(simulated_windows.measurements, profile)
     wide = INFERENCE.simulator_hull_factor * spread if profile.hull.has_model else spread
     progress(f"learning what {name} simulates")
-    result = search(estimation_problem(seen, plain, wide), progress)
+    result = search(estimation_problem(simulated_windows, plain, wide), progress)
     made = result.fit
-    left = float(np.mean((seen.gap(fitted_force_model(plain, made)) / _size(seen.measured[:, seen.channels])) ** 2))
+    left = float(
+        np.mean(
+            (
+                simulated_windows.gap(fitted_force_model(plain, made))
+                / _size(simulated_windows.measured[:, simulated_windows.channels])
+            )
+            ** 2
+        )
+    )
     if left > INFERENCE.foreign_share:
         raise FerryIdError(
             f"{name}: --against needs a simulation of {profile.name}, found a motion of which its hull and the actuators' "
@@ -222,8 +230,8 @@ def differing_candidates(simulated: Simulation, measurements: Measurements, shif
 
 def difference_notes(simulated: Simulation, measurements: Measurements) -> list[str]:
     """Return the errors of the simulation's sensors, and conditions that differ by what was measured, in sentences."""
-    told = [f"The simulation's log: {one.says}" for one in simulated.sensors]
-    return told + [
+    notes = [f"The simulation's log: {one.says}" for one in simulated.sensors]
+    return notes + [
         f"The {one.candidate.effect.id} differs by what was measured, and is no finding: "
         f"{_described(one, simulated.measurements)} in the simulation; the recording's own is part of its force model."
         for one in simulated.conditions
@@ -232,11 +240,11 @@ def difference_notes(simulated: Simulation, measurements: Measurements) -> list[
 
 
 def _described(one: Condition, measurements: Measurements) -> str:
-    untold = one.candidate.effect.untold(measurements, one.values)
+    unreported = one.candidate.effect.unreported(measurements, one.values)
     return ", ".join(
-        f"{parameter.name} {_told(value, parameter.unit)}"
+        f"{parameter.name} {_with_unit(value, parameter.unit)}"
         for parameter, value in zip(one.candidate.parameters, one.values.tolist(), strict=True)
-        if parameter.name not in untold
+        if parameter.name not in unreported
     )
 
 
@@ -257,26 +265,26 @@ def _relative(candidate: Candidate, carried: Sequence[Condition], index: int, ba
     def says(values: Values, instance: str | None) -> str:
         name = candidate.effect.title + (f" ({instance})" if instance else "")
         parts = [
-            f"{one.name.replace('_', ' ')} {_told(neutral[one.name], one.unit)} in the simulation, "
-            f"{_told(values[one.name], one.unit)} in the recording"
+            f"{one.name.replace('_', ' ')} {_with_unit(neutral[one.name], one.unit)} in the simulation, "
+            f"{_with_unit(values[one.name], one.unit)} in the recording"
             for one in candidate.parameters
             if one.name in values
         ]
         return f"{name} differs: {'; '.join(parts)}."
 
-    def kick(force_model: ForceModel, p: Floats) -> Floats:
+    def impulse(force_model: ForceModel, p: Floats) -> Floats:
         # What the simulation has aboard already gives none.
-        assert candidate.effect.kick is not None
-        return candidate.effect.kick(force_model, p) - candidate.effect.kick(force_model, own.values)
+        assert candidate.effect.impulse is not None
+        return candidate.effect.impulse(force_model, p) - candidate.effect.impulse(force_model, own.values)
 
     # Where the simulation has it for a while, no other span of it can be told, and its own has its own kick.
-    kicks = candidate.effect.kick is not None and not own.candidate.times
-    effect = replace(candidate.effect, apply=apply, says=says, kick=kick if kicks else None)
+    has_impulse = candidate.effect.impulse is not None and not own.candidate.times
+    effect = replace(candidate.effect, apply=apply, says=says, impulse=impulse if has_impulse else None)
     parameters = tuple(replace(one, neutral=neutral[one.name]) for one in candidate.parameters)
     return Candidate(effect, candidate.instance, parameters)
 
 
-def _told(value: float, unit: str) -> str:
+def _with_unit(value: float, unit: str) -> str:
     return f"{value:.2f}" + ("" if unit == "-" else f" {unit}")
 
 
@@ -318,7 +326,7 @@ def simulation_as_json(simulated: Simulation, compared: PathComparison | str) ->
                 for parameter, value, error in zip(
                     one.candidate.parameters, one.values.tolist(), one.errors.tolist(), strict=True
                 )
-                if parameter.name not in one.candidate.effect.untold(simulated.measurements, one.values)
+                if parameter.name not in one.candidate.effect.unreported(simulated.measurements, one.values)
             },
         }
         for one in simulated.conditions

@@ -16,7 +16,7 @@ from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.types import Floats
 
-FINE = 8
+WINDOW_RATIO = 8
 """The spectrum's windows are this much shorter than those of the fit, as they must not hide what is fast."""
 BURST_HZ = (0.03, 0.1, 0.2, 0.4, 0.8)
 """Bands that are searched for bursts."""
@@ -86,7 +86,7 @@ def bands_of(
 def fine_windows(problem: EstimationProblem, measurements: Measurements) -> Windows:
     """Return windows of the measurements that are short enough to show what is fast."""
     step_s = problem.windows.measurements.step_s
-    return windows(measurements, max(len(problem.windows.weight) * step_s / FINE, 8.0 * step_s), step_s)
+    return windows(measurements, max(len(problem.windows.weight) * step_s / WINDOW_RATIO, 8.0 * step_s), step_s)
 
 
 def bursts_of(problem: EstimationProblem, force_model: ForceModel, measurements: Measurements) -> Burst | None:
@@ -102,8 +102,8 @@ def bursts_of(problem: EstimationProblem, force_model: ForceModel, measurements:
         block_s = max(BURST_S, BURST_PERIODS / high)
         if high < 0.5 / short.measurements.step_s:
             found.append(_uneven(short, errors, low, high, block_s))
-    told = [one for one in found if one is not None]
-    return max(told, key=lambda one: one.deviations, default=None)
+    uneven = [one for one in found if one is not None]
+    return max(uneven, key=lambda one: one.deviations, default=None)
 
 
 def _uneven(short: Windows, errors: Floats, low_hz: float, high_hz: float, block_s: float) -> Burst | None:

@@ -18,7 +18,7 @@ from ferryid.effects.effect import Process
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats
 
-STRENGTHS, BANDS = (0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
+START_STRENGTHS, START_FREQUENCIES = (0.3, 1.0), (0.5, 0.7, 1.0, 1.4, 2.0)
 """Where the search begins, as shares of the usual ones; from hardly anything nothing leads on."""
 
 
@@ -40,7 +40,9 @@ class DisturbanceState:
     @property
     def estimates(self) -> dict[str, Estimate]:
         """Parameters with their 95 % intervals, which are even in the logarithm."""
-        away = np.exp(1.96 * np.minimum(np.hypot(self.widths, self.candidate.effect.form), INFERENCE.widest_log))
+        away = np.exp(
+            1.96 * np.minimum(np.hypot(self.widths, self.candidate.effect.formula_error), INFERENCE.widest_log)
+        )
         low, high = self.values / away, self.values * away
         return {
             one.name: Estimate(value, max(a, one.low), min(b, one.high), one.unit)
@@ -54,10 +56,10 @@ def fit_disturbances(
     problem: EstimationProblem,
     made: Fit,
     candidates: Sequence[Candidate],
-    calm: ForceModel,
-    least: float = INFERENCE.disturbance_gain,
+    undisturbed: ForceModel,
+    minimum_gain: float = INFERENCE.disturbance_gain,
     *,
-    near: Sequence[DisturbanceState] = (),
+    initial: Sequence[DisturbanceState] = (),
 ) -> tuple[EstimationProblem, tuple[DisturbanceState, ...]]:
     """Return the trial with the disturbances in its filter that what a fit leaves speaks for, and these.
 
@@ -71,54 +73,54 @@ def fit_disturbances(
         What has been found.
     candidates
         Disturbances that the measurements can show.
-    calm
+    undisturbed
         The plain force model without any of them.
-    least
+    minimum_gain
         Evidence that the first of them must show: what else explains as much is looked at before it.
-    near
+    initial
         What they were beside another fit: where the search begins.
     """
     force_model = fitted_force_model(problem.plain, made)
     steps = problem.excerpt
     gaps = steps.gap(force_model)
     noise = fit_noise(steps, gaps, problem.filter)
-    before = {state.candidate.key: [state.values] for state in near}
+    before = {state.candidate.key: [state.values] for state in initial}
     best = likelihood(noise, steps, gaps)
     states: list[DisturbanceState] = []
     left = list(candidates)
     while left:
-        worth = INFERENCE.disturbance_gain if states else least
+        required_gain = INFERENCE.disturbance_gain if states else minimum_gain
         tried = []
         for candidate in left:
             assert candidate.effect.unsteady is not None
             processes = candidate.effect.unsteady(force_model)
-            if not processes(_sizes(candidate)):
+            if not processes(_usual_values(candidate)):
                 continue
             places = before.get(candidate.key, _starts(candidate))
-            begin = max(places, key=lambda one: _glance(steps, gaps, noise, processes(one), force_model))
-            price = 0.5 * len(begin) * log(len(steps.starts))
-            told, values, widths, after = fit_noise_with(
-                steps, gaps, noise, processes, begin, force_model, best + price + worth
+            start = max(places, key=lambda one: _log_likelihood(steps, gaps, noise, processes(one), force_model))
+            penalty = 0.5 * len(start) * log(len(steps.starts))
+            fitted_noise, values, widths, after = fit_noise_with(
+                steps, gaps, noise, processes, start, force_model, best + penalty + required_gain
             )
-            gain = after - best - price
-            if _seen(candidate, values, widths, stride_s(steps)):
-                tried.append((gain, told, DisturbanceState(candidate, values, widths, gain), after))
+            gain = after - best - penalty
+            if _is_identified(candidate, values, widths, stride_s(steps)):
+                tried.append((gain, fitted_noise, DisturbanceState(candidate, values, widths, gain), after))
         if not tried:
             break
-        gain, told, state, after = max(tried, key=lambda one: one[0])
-        if gain < worth:
+        gain, fitted_noise, state, after = max(tried, key=lambda one: one[0])
+        if gain < required_gain:
             break
-        noise, best = told, after
+        noise, best = fitted_noise, after
         states.append(state)
         left.remove(state.candidate)
-    plain = calm
+    plain = undisturbed
     for state in states:
         # On average, too, they may do something.
         plain = state.candidate.act(plain, state.values)
     return replace(problem.with_noise_of(made), filter=noise, plain=plain), tuple(states)
 
 
-def _seen(candidate: Candidate, values: Floats, widths: Floats, step_s: float) -> bool:
+def _is_identified(candidate: Candidate, values: Floats, widths: Floats, step_s: float) -> bool:
     """Tell whether a disturbance is known: how fast it is, how strong on one axis at least, and its moment if it has one.
 
     A position's error in a narrow band looks like a force along it, but turns nothing; what is faster than the filter's steps
@@ -141,7 +143,7 @@ def _strengths(candidate: Candidate) -> NDArray[np.bool_]:
     return np.array([parameter.name.endswith("std") for parameter in candidate.parameters])
 
 
-def _glance(
+def _log_likelihood(
     steps: Windows, gaps: Floats, noise: NoiseModel, processes: tuple[Process, ...], force_model: ForceModel
 ) -> float:
     return likelihood(NoiseModel(noise.channels, (*noise.processes, *processes), force_model), steps, gaps)
@@ -149,12 +151,12 @@ def _glance(
 
 def _starts(candidate: Candidate) -> list[Floats]:
     """Return parameters to begin with: strengths, and frequencies where there is one, about the usual ones."""
-    usual = _sizes(candidate)
+    usual = _usual_values(candidate)
     strength = _strengths(candidate)
     band = np.array([parameter.unit == "Hz" for parameter in candidate.parameters])
-    bands = BANDS if band.any() else (1.0,)
-    return [usual * np.where(strength, a, np.where(band, b, 1.0)) for a in STRENGTHS for b in bands]
+    bands = START_FREQUENCIES if band.any() else (1.0,)
+    return [usual * np.where(strength, a, np.where(band, b, 1.0)) for a in START_STRENGTHS for b in bands]
 
 
-def _sizes(candidate: Candidate) -> Floats:
+def _usual_values(candidate: Candidate) -> Floats:
     return np.array([parameter.size for parameter in candidate.parameters])

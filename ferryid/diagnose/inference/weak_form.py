@@ -127,18 +127,18 @@ def windows(measurements: Measurements, length_s: float, stride_s: float) -> Win
     return Windows(thin, rows, tuple(runs), _weights(m, thin.step_s)[0], measured, channels)
 
 
-def steps_of(seen: Windows) -> Windows:
+def steps_of(long: Windows) -> Windows:
     """Return short windows without overlap in what they measure, over the rows that windows cover: the steps of a filter.
 
     With a triangle as its weight, ``∫ w p''`` is the second difference of a position; with a box, ``∫ w nu'`` is the first of
     a velocity. A step is a `STEPS_A_WINDOW`-th of a window.
     """
-    measurements = seen.measurements
+    measurements = long.measurements
     covered = np.zeros(len(measurements.t), dtype=np.bool_)
-    for start in seen.starts:
-        covered[start : start + len(seen.weight)] = True
-    m = max(1, round(len(seen.weight) / STEPS_A_WINDOW))
-    placed = bool(seen.channels[0])
+    for start in long.starts:
+        covered[start : start + len(long.weight)] = True
+    m = max(1, round(len(long.weight) / STEPS_A_WINDOW))
+    placed = bool(long.channels[0])
     span = 2 * m if placed else m
     starts: list[int] = []
     runs: list[tuple[int, int]] = []
@@ -158,7 +158,7 @@ def steps_of(seen: Windows) -> Windows:
     differences = np.where(np.isfinite(differences), differences, 0.0) / h ** (2 if placed else 1)
     measured = np.hstack([differences, differences])
     return Windows(
-        measurements, at, tuple(runs), weight / (weight.sum() * measurements.step_s), measured, seen.channels
+        measurements, at, tuple(runs), weight / (weight.sum() * measurements.step_s), measured, long.channels
     )
 
 

@@ -50,11 +50,11 @@ def check_axis_consistency(problem: EstimationProblem, kept: Fit, index: int) ->
     index
         Which effect.
     """
-    seen, runs = problem.windows, problem.windows.runs
+    windows, runs = problem.windows, problem.windows.runs
     neutral = np.array([one.neutral for one in kept.candidates[index].parameters])
     idle = replace(kept, values=(*kept.values[:index], neutral, *kept.values[index + 1 :]))
-    here = seen.gap(fitted_force_model(problem.plain, kept))
-    does = here - seen.gap(fitted_force_model(problem.plain, idle))
+    here = windows.gap(fitted_force_model(problem.plain, kept))
+    does = here - windows.gap(fitted_force_model(problem.plain, idle))
     c = does.shape[1]
     known, centre = nuisance_columns(problem, kept, but=index)
     columns = problem.noise.white(does[:, :, None] * np.eye(c), runs)

@@ -17,7 +17,7 @@ from ferryid.effects.wording import listed
 PLACEBO = (
     "a placebo (the same force at other times, or on mirrored headings) does as well on stretches kept from the fit"
 )
-TORN = "on an axis where it would have to act, most of it is missing"
+INCONSISTENT = "on an axis where it would have to act, most of it is missing"
 LAW = "an empirical law of the motion explains more in that place, and leaves nothing to explain"
 
 
@@ -33,14 +33,14 @@ class Elimination:
         Held-out evidence; None where nothing is left, or the log is too short to hold anything out.
     standings
         Of every candidate among its rivals.
-    told
+    dropped
         What was dropped, and why.
     """
 
     fit: Fit
     proof: HeldOutEvidence | None
     standings: tuple[RivalComparison, ...]
-    told: tuple[str, ...]
+    dropped: tuple[str, ...]
 
 
 def eliminate_backward(
@@ -108,7 +108,7 @@ def _fallen(problem: EstimationProblem, kept: Fit, proof: HeldOutEvidence | None
         return idle[0], ""
     inconsistent = [i for i in range(len(kept.candidates)) if check_axis_consistency(problem, kept, i).inconsistent]
     if inconsistent:
-        return inconsistent[0], TORN
+        return inconsistent[0], INCONSISTENT
     # Physics without a name here may look a little like an effect.
     imitated = find_displaced(problem, kept)
     return (imitated[0], LAW) if imitated else (None, "")

@@ -122,7 +122,7 @@ class VesselLaw:
 class CampaignLaws:
     """What the logs of a vessel, of which one is at `place`, say of its laws."""
 
-    said: tuple[LogInformation, ...]
+    information: tuple[LogInformation, ...]
     place: int
     law: VesselLaw | None
 
@@ -136,15 +136,15 @@ class CampaignLaws:
         if self.law is None or not self.law.able[self.place]:
             return None
         made = _with(problem, kept, self.law.terms, self.law.elsewhere[self.place])
-        seen = problem.with_noise_of(made)
-        before = held_out(seen, folds, kept.candidates, kept.values)
-        after = held_out(seen, folds, made.candidates, made.values)
-        better = compare_held_out(seen, folds, before, after)
-        return Law(self.law.terms, made, seen, better, self.law.total, 0.0, self.law.values, self.law.errors)
+        refitted = problem.with_noise_of(made)
+        before = held_out(refitted, folds, kept.candidates, kept.values)
+        after = held_out(refitted, folds, made.candidates, made.values)
+        better = compare_held_out(refitted, folds, before, after)
+        return Law(self.law.terms, made, refitted, better, self.law.total, 0.0, self.law.values, self.law.errors)
 
     def of_others(self, law: Law) -> tuple[int, int, int]:
         """Return how many other logs there are, how many can show a law of this log, and in how many of these it holds."""
-        others = [one for k, one in enumerate(self.said) if k != self.place]
+        others = [one for k, one in enumerate(self.information) if k != self.place]
         if self.law is not None:
             others = [one.beside(self.law.terms, self.law.values) for one in others]
         gains = [
@@ -164,9 +164,9 @@ def find_campaign_laws(logs: Mapping[str, tuple[EstimationProblem, Fit]]) -> dic
         Of one vessel, by path: each with what was found of it, hull and effects, and the noise that these leave.
     """
     best: VesselLaw | None = None
-    said = tuple(log_information(problem, kept) for problem, kept in logs.values())
+    information = tuple(log_information(problem, kept) for problem, kept in logs.values())
     while best is None or len(best.terms) < JUDGING.law_terms:
-        law = select_campaign_law(said, best)
+        law = select_campaign_law(information, best)
         if law is None:
             break
         for _ in range(JUDGING.law_refits):
@@ -174,8 +174,8 @@ def find_campaign_laws(logs: Mapping[str, tuple[EstimationProblem, Fit]]) -> dic
             law = _fitted(again, law.terms)
         if not law.holds:
             break
-        best, said = law, again
-    return {path: CampaignLaws(said, place, best) for place, path in enumerate(logs)}
+        best, information = law, again
+    return {path: CampaignLaws(information, place, best) for place, path in enumerate(logs)}
 
 
 def log_information(problem: EstimationProblem, kept: Fit, law: VesselLaw | None = None) -> LogInformation:
@@ -189,28 +189,32 @@ def log_information(problem: EstimationProblem, kept: Fit, law: VesselLaw | None
         problem = problem.with_noise_of(kept)
     terms = terms_of(problem.plain.measurements)
     lines = linearise_terms(problem, kept, terms)
-    pushes, seen = lines.terms * lines.sizes, problem.windows
-    left, known, columns = (problem.noise.white(one, seen.runs) for one in (lines.gaps, lines.known, pushes))
-    measured = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
+    pushes, windows = lines.terms * lines.sizes, problem.windows
+    left, known, columns = (problem.noise.white(one, windows.runs) for one in (lines.gaps, lines.known, pushes))
+    measured = np.sqrt(np.mean(windows.measured[:, windows.channels] ** 2, axis=0))
     moves = np.max(np.sqrt(np.mean(pushes**2, axis=0)) / np.maximum(measured, 1e-12)[:, None], axis=0)
     # Hull and effects are believed to lie about their usual values, the terms may have any.
     p = len(lines.centre)
     A = np.vstack([known, np.eye(p)])
     B = np.column_stack([np.concatenate([left, lines.centre]), np.vstack([columns, np.zeros((p, len(terms)))])])
     rest = B - A @ np.linalg.lstsq(A, B, rcond=None)[0]
-    said = LogInformation(terms, rest[:, 1:].T @ rest[:, 1:], -rest[:, 1:].T @ rest[:, 0], moves)
-    return said if law is None else said.beside(law.terms, -law.values)
+    information = LogInformation(terms, rest[:, 1:].T @ rest[:, 1:], -rest[:, 1:].T @ rest[:, 0], moves)
+    return information if law is None else information.beside(law.terms, -law.values)
 
 
-def select_campaign_law(said: Sequence[LogInformation], known: VesselLaw | None = None) -> VesselLaw | None:
+def select_campaign_law(information: Sequence[LogInformation], known: VesselLaw | None = None) -> VesselLaw | None:
     """Return the law with the one more term that gains most in the logs that it is not fitted to; None where none holds."""
-    if len(said) < 2:
+    if len(information) < 2:
         return None
     chosen = () if known is None else known.terms
     taken = {term.key for term in chosen}
-    tried = [_fitted(said, (*chosen, term)) for term in said[0].terms if term.of_vessel and term.key not in taken]
+    tried = [
+        _fitted(information, (*chosen, term))
+        for term in information[0].terms
+        if term.of_vessel and term.key not in taken
+    ]
     best = max((one for one in tried if one.holds), key=lambda one: one.total, default=None)
-    least = JUDGING.law_gain + (_fitted(said, chosen).total if chosen else 0.0)
+    least = JUDGING.law_gain + (_fitted(information, chosen).total if chosen else 0.0)
     return best if best is not None and best.total >= least else None
 
 
@@ -224,18 +228,20 @@ def _with(problem: EstimationProblem, kept: Fit, terms: Sequence[Term], values: 
     return fit(problem, [*kept.candidates, replace(law, parameters=held)], [*kept.values, values])
 
 
-def _fitted(said: Sequence[LogInformation], terms: tuple[Term, ...]) -> VesselLaw:
+def _fitted(information: Sequence[LogInformation], terms: tuple[Term, ...]) -> VesselLaw:
     """Return a law with the coefficients that all logs speak for."""
-    parts = [one.of(terms) for one in said]
+    parts = [one.of(terms) for one in information]
     normal, slope = (np.stack(one) for one in zip(*parts, strict=True))
     A, b = normal.sum(axis=0), slope.sum(axis=0)
     inverse = np.linalg.pinv(A, hermitian=True)
     values = inverse @ b
     elsewhere = np.stack([np.linalg.pinv(A - N, hermitian=True) @ (b - g) for N, g in zip(normal, slope, strict=True)])
-    gains, expected = np.array([one.gains(terms, without) for one, without in zip(said, elsewhere, strict=True)]).T
+    gains, expected = np.array(
+        [one.gains(terms, without) for one, without in zip(information, elsewhere, strict=True)]
+    ).T
     # What each log would gain by coefficients of its own, over the common ones, is chi-squared if only noise parts them.
     own = np.array([0.5 * g @ np.linalg.pinv(N, hermitian=True) @ g for N, g in zip(normal, slope, strict=True)])
-    apart = 2.0 * float(own.sum() - 0.5 * b @ values) / (len(terms) * (len(said) - 1))
+    apart = 2.0 * float(own.sum() - 0.5 * b @ values) / (len(terms) * (len(information) - 1))
     errors = INFERENCE.posterior_factor * np.sqrt(np.diag(inverse) * max(1.0, apart))
-    most = np.array([max(one.move(term) for one in said) for term in terms])
+    most = np.array([max(one.move(term) for one in information) for term in terms])
     return VesselLaw(terms, values, errors, elsewhere, gains, expected, np.abs(values) * most)

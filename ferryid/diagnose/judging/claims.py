@@ -43,7 +43,7 @@ class Figures:
         Share of the held-out squared force error that it removes while it acts, by axis; empty where nothing was held out.
     lasts_s, block_s
         For how many seconds of data it acts, infinite for what acts throughout, and the length of a held-out block [s].
-    once
+    single_visit
         True where the vessel was only once in the place in which it acts.
     passes
         Of what begins and ends within the log, its size over the one that hull and formulas may be off by.
@@ -60,7 +60,7 @@ class Figures:
     removed: Mapping[str, float] = field(default_factory=dict)
     lasts_s: float = inf
     block_s: float = 0.0
-    once: bool = False
+    single_visit: bool = False
     passes: float = inf
     power_in_velocities: float = inf
     other_logs: OtherLogs | None = None

@@ -98,11 +98,11 @@ def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosi
     before, after = _scores(problem, log.base, kept, stands.proof)
     ratio = {axis: Estimate(unit="-", **one) for axis, one in after.get("ratio", {}).items()}
     left = {axis: share for axis, share in _left_shares(problem, after["mse"]).items() if axis not in still}
-    remainder = Remainder(is_testable(chances, still), bool(stands.told), ratio, left)
+    remainder = Remainder(is_testable(chances, still), bool(stands.dropped), ratio, left)
     notes = (
         *survey_notes(screened),
         *estimated.expectation.notes,
-        *stands.told,
+        *stands.dropped,
         *rule_notes,
         *log_notes(figures),
         *untested_notes(selected.search.untested),
@@ -173,9 +173,9 @@ def _left_shares(problem: EstimationProblem, mse: Mapping[str, float]) -> dict[s
 
     That is the thrust's or the inertia's, whichever is larger: a vessel that holds its place in a wind hardly accelerates.
     """
-    seen = problem.windows
-    inertia = seen.measured[:, 3:] @ mass_of(problem.plain.hull).T
-    thrust = seen.mean(seen.measurements.parts.sum(axis=1))
+    windows = problem.windows
+    inertia = windows.measured[:, 3:] @ mass_of(problem.plain.hull).T
+    thrust = windows.mean(windows.measurements.parts.sum(axis=1))
     moves = np.maximum(np.mean(inertia**2, axis=0), np.mean(thrust**2, axis=0))
     return {axis: mse[axis] / float(size) for axis, size in zip(AXES, moves, strict=True) if size > 0.0}
 
@@ -207,13 +207,13 @@ def _free_run(runs: FreeRuns, errors: Floats) -> dict[str, Any]:
 
 
 def _leftover(problem: EstimationProblem, base: Fit, kept: Fit) -> dict[str, Any]:
-    seen = problem.windows
-    psi = seen.mean(seen.measurements.psi[:, None])[:, 0]
-    speed = seen.mean(np.hypot(seen.measurements.nu[:, 0], seen.measurements.nu[:, 1])[:, None])[:, 0]
+    windows = problem.windows
+    psi = windows.mean(windows.measurements.psi[:, None])[:, 0]
+    speed = windows.mean(np.hypot(windows.measurements.nu[:, 0], windows.measurements.nu[:, 1])[:, None])[:, 0]
     return {
-        "t": seen.middle_s,
-        "before": force_errors(seen, fitted_force_model(problem.plain, base), problem.plain),
-        "after": force_errors(seen, fitted_force_model(problem.plain, kept), problem.plain),
+        "t": windows.middle_s,
+        "before": force_errors(windows, fitted_force_model(problem.plain, base), problem.plain),
+        "after": force_errors(windows, fitted_force_model(problem.plain, kept), problem.plain),
         "heading": np.degrees(np.mod(psi, 2.0 * np.pi)),
         "speed": speed,
     }

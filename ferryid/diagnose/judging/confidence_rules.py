@@ -116,8 +116,8 @@ def law_of_one_log(finding: Finding, context: Context, _threshold: float) -> Out
         return finding, ""
     holding = others.holding
     shown = f", and {holding or 'none'} {'does' if holding < 2 else 'do'}" if others.able else ""
-    told = f"Of {counted(others.count, 'other log')} {others.able or 'none'} could show it at this size"
-    return lowered(replace(finding, says=f"{finding.says} {told}{shown}.")), ""
+    sentence = f"Of {counted(others.count, 'other log')} {others.able or 'none'} could show it at this size"
+    return lowered(replace(finding, says=f"{finding.says} {sentence}{shown}.")), ""
 
 
 @rule(JUDGING.power_in_velocities, "of the power")
@@ -168,7 +168,7 @@ def _brief(own: Figures, blocks: float) -> bool:
 @rule()
 def place_visited_once(finding: Finding, context: Context, _threshold: float) -> Outcome:
     """Lower what acts in a place that was visited once, as the effect defines it: something else may have come just then."""
-    if not context.own.once:
+    if not context.own.single_visit:
         return finding, ""
     return _because(
         finding, "the vessel was in that place once, or hardly at all, so that something else may have come then"

@@ -13,7 +13,7 @@ from math import erf, sqrt
 import numpy as np
 
 from ferryid.diagnose.inference.estimation import (
-    NUDGE,
+    PARAMETER_DIFFERENCE,
     Candidate,
     EstimationProblem,
     Fit,
@@ -87,7 +87,8 @@ def detection_powers(problem: EstimationProblem, kept: Fit, library: Sequence[Ca
                 # Of what comes and goes by chance a force model holds no force: it is found in the noise, and not here.
                 break
             columns = [
-                (problem.white(candidate.act(force_model, usual + NUDGE * step)) - there) / NUDGE
+                (problem.white(candidate.act(force_model, usual + PARAMETER_DIFFERENCE * step)) - there)
+                / PARAMETER_DIFFERENCE
                 for step in np.diag(size)
             ]
             information = np.column_stack(columns).T @ apart(np.column_stack(columns))
@@ -127,10 +128,10 @@ def is_testable(every: Sequence[DetectionPower], axes: Sequence[str]) -> bool:
 
 def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> list[str]:
     """Return what the log could not show, and what to record next, in sentences; each effect and manoeuvre once."""
-    told = []
+    sentences = []
     if axes:
         what = " and ".join(axes)
-        told.append(
+        sentences.append(
             f"The vessel was hardly moved in {what}: the log tells nothing of its hull there. "
             f"To excite {'it' if len(axes) == 1 else 'them'}, record {'; '.join(EXCITES[axis] for axis in axes)}."
         )
@@ -144,8 +145,10 @@ def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> li
             f"for {listed([titled(title, ', '.join(of)) for title, of in names.items()])}, record {manoeuvre}"
             for manoeuvre, names in by_manoeuvre.items()
         ]
-        told.append(f"This log would not have shown everything at its usual size. To make sure: {'; '.join(parts)}.")
-    return told
+        sentences.append(
+            f"This log would not have shown everything at its usual size. To make sure: {'; '.join(parts)}."
+        )
+    return sentences
 
 
 def untested_notes(untested: Mapping[str, str]) -> list[str]:

@@ -61,16 +61,16 @@ def _columns(short: Windows, frequency: Floats, power: Floats, pushes: Sequence[
     turns = np.exp(-2j * np.pi * np.outer(frequency, step_s * np.arange(len(short.weight))))
     passed = np.abs(turns @ short.weight * step_s) ** 2
     # A mean is no part of what comes and goes, and what the windows stop tells nothing.
-    seen = (frequency > 0.0) & (passed > JUDGING.passed_power)
+    transmitted = (frequency > 0.0) & (passed > JUDGING.passed_power)
     pushed = sum(
         (np.mean(one.force[:, axis] ** 2) * density(one, frequency) for one in pushes), np.zeros_like(frequency)
     )
     kind, unit = ("moment", "(N·m)²/Hz") if axis == 2 else ("force", "N²/Hz")
     return {
         "evidence": {
-            "frequency": frequency[seen],
-            "before": (power[:, axis] / frequency[1])[seen],
-            "explained": (passed * pushed)[seen],
+            "frequency": frequency[transmitted],
+            "before": (power[:, axis] / frequency[1])[transmitted],
+            "explained": (passed * pushed)[transmitted],
         },
         "labels": {
             "residual": f"{AXES[axis]} {kind} left over [{unit}]",

@@ -103,8 +103,8 @@ def manoeuvre(effect: str, rivals: Collection[str]) -> str | None:
     if not rivals:
         return None
     known = dict(PAIRS)
-    told: list[str] = []
+    manoeuvres: list[str] = []
     for rival in rivals:
         pair = frozenset({effect, rival})
-        told += [known[pair]] if pair in known else [SHOWS.get(one, OTHERWISE) for one in (effect, rival)]
-    return "; ".join(dict.fromkeys(told))
+        manoeuvres += [known[pair]] if pair in known else [SHOWS.get(one, OTHERWISE) for one in (effect, rival)]
+    return "; ".join(dict.fromkeys(manoeuvres))

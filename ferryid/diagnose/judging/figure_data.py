@@ -62,7 +62,7 @@ def figure_regressor(
 
 def _in_windows(problem: EstimationProblem, label: str, values: Floats) -> Floats:
     """Return a quantity in every window: its mean, as forces are shown, but of an angle the one in the middle."""
-    seen = problem.windows
+    windows = problem.windows
     if label.endswith("[deg]"):
-        return np.asarray(values[seen.starts + len(seen.weight) // 2])
-    return seen.mean(values[:, None])[:, 0]
+        return np.asarray(values[windows.starts + len(windows.weight) // 2])
+    return windows.mean(values[:, None])[:, 0]

@@ -81,7 +81,7 @@ def _force_claim(
     place = locate(problem, bare, kept, measurements)
     estimates = _estimates(problem, candidate, kept, i)
     by_name = dict(zip((p.name for p in candidate.parameters), values.tolist(), strict=True))
-    told = {name: value for name, value in by_name.items() if name in estimates}
+    reported = {name: value for name, value in by_name.items() if name in estimates}
     proof = None if stands.proof is None else stands.proof.proofs[i]
     finding = Finding(
         effect=candidate.effect.id,
@@ -98,33 +98,33 @@ def _force_claim(
         rivals=rivals,
         unresolved_with=unresolved,
         separating_manoeuvre=manoeuvre(candidate.effect.id, unresolved),
-        says=candidate.effect.says(told, candidate.instance) if told else "",
+        says=candidate.effect.says(reported, candidate.instance) if reported else "",
         **figure_columns(
             problem, place, figure_regressor(candidate, fitted_force_model(problem.plain, bare), values, place)
         ),
     )
-    return Claim(finding, _figures(problem, candidate, values, told, proof, removed))
+    return Claim(finding, _figures(problem, candidate, values, reported, proof, removed))
 
 
 def _figures(
     problem: EstimationProblem,
     candidate: Candidate,
     values: Floats,
-    told: Mapping[str, float],
+    reported: Mapping[str, float],
     proof: Proof | None,
     removed: Mapping[str, float],
 ) -> Figures:
     first = candidate.parameters[0]
     passes = inf
-    if len(candidate.times) == 2 and candidate.effect.passing > 0.0:
-        passes = abs(told.get(first.name, first.neutral) - first.neutral) / candidate.effect.passing
+    if len(candidate.times) == 2 and candidate.effect.passing_size > 0.0:
+        passes = abs(reported.get(first.name, first.neutral) - first.neutral) / candidate.effect.passing_size
     shown = {} if proof is None else _lower_ends(proof)
     return Figures(
         kind="force",
         removed=removed,
         lasts_s=lasts_s(problem, candidate) if candidate.times else inf,
         block_s=block_s(problem.windows),
-        once=candidate.effect.once(problem.plain.measurements, values),
+        single_visit=candidate.effect.single_visit(problem.plain.measurements, values),
         passes=passes,
         **shown,
     )
@@ -154,14 +154,14 @@ def removed_shares(problem: EstimationProblem, stands: Elimination) -> dict[tupl
 def _estimates(problem: EstimationProblem, candidate: Candidate, kept: Fit, index: int) -> dict[str, Estimate]:
     error = kept.reported_errors(index)
     estimates = {}
-    untold = candidate.effect.untold(problem.plain.measurements, kept.values[index])
-    followed = intervals(problem, kept, index) if candidate.effect.ridge and not candidate.times else {}
+    unreported = candidate.effect.unreported(problem.plain.measurements, kept.values[index])
+    followed = intervals(problem, kept, index) if candidate.effect.profiled and not candidate.times else {}
     for parameter, value, spread in zip(candidate.parameters, kept.values[index].tolist(), error.tolist(), strict=True):
         low, high = max(value - 1.96 * spread, parameter.low), min(value + 1.96 * spread, parameter.high)
         if parameter.name in followed:
             low, high = min(followed[parameter.name][0], value), max(followed[parameter.name][1], value)
-        least = candidate.effect.least
-        if parameter.name in untold:
+        least = candidate.effect.minimum_change
+        if parameter.name in unreported:
             continue
         if least > 0.0 and low < parameter.neutral + least and high > parameter.neutral - least:
             continue

@@ -147,12 +147,14 @@ def _judged(horizons: Floats, errors: Floats, block: Ints) -> FreeRuns:
     flat = [np.where(known, one, 0.0).reshape(len(block), -1) for one in errors]
     count = known.reshape(len(block), -1).astype(np.float64)
     total = np.maximum(count.sum(axis=0), 1.0)
-    seen = count.sum(axis=0) > 0
-    before, after = (np.where(seen, np.sqrt((one**2).sum(axis=0) / total), np.nan).reshape(shape) for one in flat)
+    counted_runs = count.sum(axis=0) > 0
+    before, after = (
+        np.where(counted_runs, np.sqrt((one**2).sum(axis=0) / total), np.nan).reshape(shape) for one in flat
+    )
     picks = draws(block)
     sums = [picks @ by_block(one**2, block) for one in flat]
     ratio = np.sqrt(sums[1] / np.where(sums[0] > 0.0, sums[0], np.nan))
     low, high = np.full(ratio.shape[1], np.nan), np.full(ratio.shape[1], np.nan)
-    low[seen], high[seen] = np.nanquantile(1.0 - ratio[:, seen], [0.025, 0.975], axis=0)
+    low[counted_runs], high[counted_runs] = np.nanquantile(1.0 - ratio[:, counted_runs], [0.025, 0.975], axis=0)
     removed = 1.0 - after / before
     return FreeRuns(horizons, before, after, removed, low.reshape(shape), high.reshape(shape), len(block))

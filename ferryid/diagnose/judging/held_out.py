@@ -223,9 +223,9 @@ def placebos(problem: EstimationProblem, candidate: Candidate, values: Floats) -
     on the heading at all. Each has the parameters of the candidate, to be fitted like it; but what is fitted beside an effect
     and never reported, by how much its formula is off, stays as it was found: a placebo is the same force, elsewhere.
     """
-    untold = candidate.effect.untold(problem.plain.measurements, values)
+    unreported = candidate.effect.unreported(problem.plain.measurements, values)
     parameters = tuple(
-        replace(one, size=HELD, neutral=value, start=value) if one.name in untold else one
+        replace(one, size=HELD, neutral=value, start=value) if one.name in unreported else one
         for one, value in zip(candidate.parameters, values.tolist(), strict=True)
     )
     candidate = replace(candidate, parameters=parameters)

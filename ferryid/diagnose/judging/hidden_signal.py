@@ -49,10 +49,9 @@ def _beside(signal: str, values: Floats, measurements: Measurements, findings: S
     if finding is not None:
         found = {name: one for name, one in finding.parameters.items() if name in measured}
     shown = ", ".join(_says(name, value, units) for name, value in measured.items())
-    told = ", ".join(_says(name, one.value, units) for name, one in found.items())
-    says = (
-        f"The {signal} was hidden. Measured {when}: {shown}; {f'found: {told}' if told else 'nothing of it was found'}."
-    )
+    found_values = ", ".join(_says(name, one.value, units) for name, one in found.items())
+    result = f"found: {found_values}" if found_values else "nothing of it was found"
+    says = f"The {signal} was hidden. Measured {when}: {shown}; {result}."
     return Withheld(signal, found, measured, says)
 
 

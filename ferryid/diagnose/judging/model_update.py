@@ -154,14 +154,16 @@ def _properties(logs: Sequence[Posterior], profile: Profile) -> tuple[tuple[Stor
 
 def _contradictions(found: Sequence[StoredEffect], profile: Profile) -> list[str]:
     """Return the parameters whose intervals lie apart between two logs, with their values."""
-    told = []
+    sentences = []
     for parameter in effects()[found[0].effect].parameters_of(profile):
         several = [stored.parameters[parameter.name] for stored in found]
         values = [each.value for each in several]
         gap = max(each.low for each in several) - min(each.high for each in several)
         if gap > 0.0 and max(values) - min(values) > JUDGING.contradiction_share * parameter.size:
-            told.append(f"{parameter.name} ({' against '.join(f'{value:.3g}' for value in values)} {parameter.unit})")
-    return told
+            sentences.append(
+                f"{parameter.name} ({' against '.join(f'{value:.3g}' for value in values)} {parameter.unit})"
+            )
+    return sentences
 
 
 def _together(found: Sequence[StoredEffect]) -> StoredEffect:

@@ -72,23 +72,23 @@ def posterior_of(
     survey
         Of the log.
     """
-    told = {(one.effect, one.instance): one for one in findings}
-    believed = [i for i, one in enumerate(kept.candidates) if one.key in told and told[one.key].sure]
-    if not believed:
+    reported = {(one.effect, one.instance): one for one in findings}
+    accepted = [i for i, one in enumerate(kept.candidates) if one.key in reported and reported[one.key].sure]
+    if not accepted:
         return None
     notes = [
         f"{one.effect.title} is too doubtful to enter a model."
         for i, one in enumerate(kept.candidates)
-        if i not in believed and one.key in told
+        if i not in accepted and one.key in reported
     ]
-    if len(believed) < len(kept.candidates):
-        kept = fit(problem, [kept.candidates[i] for i in believed], [kept.values[i] for i in believed])
+    if len(accepted) < len(kept.candidates):
+        kept = fit(problem, [kept.candidates[i] for i in accepted], [kept.values[i] for i in accepted])
     motion, recording = survey.motion, survey.recording
     before, spread, hull, covariance = _hull(problem, kept)
     stored = []
     for i, candidate in enumerate(kept.candidates):
         if candidate.effect.id != IN_THE_HULL:
-            finding = told[candidate.key]
+            finding = reported[candidate.key]
             source = Source(
                 motion.log,
                 recording.sha256,
@@ -101,16 +101,16 @@ def posterior_of(
             )
             # A fault that passed within the log is no property that others have.
             lasts = candidate.effect.vessel and source.offset_s is None
-            untold = candidate.effect.untold(problem.plain.measurements, kept.values[i])
+            unreported = candidate.effect.unreported(problem.plain.measurements, kept.values[i])
             errors = [
-                nan if one.name in untold else error
+                nan if one.name in unreported else error
                 for one, error in zip(candidate.parameters, kept.reported_errors(i).tolist(), strict=True)
             ]
             stored.append((lasts, _stored(candidate, kept.values[i], errors, finding.parameters, source)))
     for state in states:
         candidate = state.candidate
-        if candidate.key in told and told[candidate.key].sure:
-            source = Source(motion.log, recording.sha256, told[candidate.key].probability)
+        if candidate.key in reported and reported[candidate.key].sure:
+            source = Source(motion.log, recording.sha256, reported[candidate.key].probability)
             found = {
                 name: Quantity(one.value, one.low, one.high, one.unit)
                 if name in state.known
@@ -139,15 +139,15 @@ def posterior_of(
 
 
 def _stored(
-    candidate: Candidate, values: Floats, errors: Sequence[float], told: Mapping[str, Estimate], source: Source
+    candidate: Candidate, values: Floats, errors: Sequence[float], reported: Mapping[str, Estimate], source: Source
 ) -> StoredEffect:
     """Return an effect with its intervals: those that were told, or of these errors, unknown (NaN) where they are."""
     parameters = {}
     for one, value, error in zip(candidate.parameters, values.tolist(), errors, strict=True):
         # With the limit second, what is unknown stays so.
         low, high = max(value - 1.96 * error, one.low), min(value + 1.96 * error, one.high)
-        if one.name in told:
-            low, high = min(told[one.name].low, value), max(told[one.name].high, value)
+        if one.name in reported:
+            low, high = min(reported[one.name].low, value), max(reported[one.name].high, value)
         parameters[one.name] = Quantity(value, low, high, one.unit)
     return StoredEffect(candidate.effect.id, candidate.instance, parameters, (source,))
 

@@ -15,8 +15,8 @@ from ferryid.diagnose.inference.estimation import (
     starting_point,
     without,
 )
-from ferryid.diagnose.inference.onset_estimation import brief
-from ferryid.diagnose.inference.search import FAR
+from ferryid.diagnose.inference.onset_estimation import is_brief
+from ferryid.diagnose.inference.search import COARSE_ITERATIONS
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
@@ -65,7 +65,7 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
     candidate = kept.candidates[index]
     bare = without(problem, kept, index)
     none = exp(min(bare.evidence - kept.evidence + INFERENCE.prior_odds, 50.0))
-    if brief(problem, candidate):
+    if is_brief(problem, candidate):
         return RivalComparison((), 1.0 / (1.0 + none))
     begin = starting_point(problem, bare)
     taken = {one.key for one in kept.candidates}
@@ -77,7 +77,11 @@ def compare_rivals(problem: EstimationProblem, kept: Fit, index: int, library: S
         stand_in = choose_parameters(problem, bare, refit_spans)
         start = [*bare.values, stand_in.start]
         made = fit(
-            problem, [*bare.candidates, stand_in], start, steps=FAR, begin=None if stand_in.effect.bends_hull else begin
+            problem,
+            [*bare.candidates, stand_in],
+            start,
+            steps=COARSE_ITERATIONS,
+            begin=None if stand_in.effect.changes_hull else begin,
         )
         return RivalFit(stand_in, made, made.evidence - kept.evidence)
 

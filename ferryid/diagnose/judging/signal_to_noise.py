@@ -27,18 +27,18 @@ def velocity_noise_shares(problem: EstimationProblem) -> dict[str, float]:
 
     The noise is that between two velocities: the one in use, and the slope of positions. It is shared between them evenly.
     """
-    seen, plain = problem.windows, problem.plain
-    measurements = seen.measurements
+    windows, plain = problem.windows, problem.plain
+    measurements = windows.measurements
     rows = odd_rows(JUDGING.noise_mean_s, 1.0 / measurements.step_s)
-    if not seen.channels[0] or len(measurements.t) < rows:
+    if not windows.channels[0] or len(measurements.t) < rows:
         return {}
     # Motion that is faster than the mean is left out of both.
     own = steady_mean(measurements.nu, rows)
     other = steady_mean(np.nan_to_num(velocity_from_pose(measurements.eta, 1.0 / measurements.step_s)), rows)
     here, there = (acceleration(replace(plain, measurements=replace(measurements, nu=nu))) for nu in (own, other))
     idle = acceleration(replace(plain, parts=np.zeros_like(plain.parts)))
-    noise = np.std(seen.mean(here - there), axis=0) / sqrt(2.0)
-    thrust = np.std(seen.mean(here - idle), axis=0)
-    moved = np.maximum(thrust, np.std(seen.mean(here), axis=0))
+    noise = np.std(windows.mean(here - there), axis=0) / sqrt(2.0)
+    thrust = np.std(windows.mean(here - idle), axis=0)
+    moved = np.maximum(thrust, np.std(windows.mean(here), axis=0))
     # Where nothing pushes, noise is not taken for what a push does.
     return {axis: float(noise[j] / moved[j]) for j, axis in enumerate(AXES) if thrust[j] > 0.0}

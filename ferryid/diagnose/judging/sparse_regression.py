@@ -101,40 +101,40 @@ def select_law(problem: EstimationProblem, kept: Fit, folds: Folds, unlike: Floa
     if unlike is not None:
         terms = _unlike(problem, kept, terms, unlike)
     chosen: list[Term] = []
-    made, seen = kept, problem
+    made, refitted = kept, problem
     gains: list[tuple[float, float]] = []
     while len(chosen) < JUDGING.law_terms:
-        lines = linearise_terms(seen, made, terms)
-        best, real, chance = _best(seen, seen.noise, lines, folds)
+        lines = linearise_terms(refitted, made, terms)
+        best, real, chance = _best(refitted, refitted.noise, lines, folds)
         if real < JUDGING.law_gain or real <= chance:
-            best, real, chance = _best(seen, _noise_of_the_rest(seen, lines), lines, folds, plain=True)
+            best, real, chance = _best(refitted, _noise_of_the_rest(refitted, lines), lines, folds, plain=True)
             if real < JUDGING.unwhitened_law_gain or real <= chance:
                 break
         gains.append((real, chance))
         chosen.append(terms.pop(best))
-        made = _fitted(seen, kept, chosen)
-        seen = seen.with_noise_of(made)
+        made = _fitted(refitted, kept, chosen)
+        refitted = refitted.with_noise_of(made)
     if not chosen:
         return None
-    made = _fitted(seen, kept, chosen)
+    made = _fitted(refitted, kept, chosen)
     errors = made.errors(len(kept.candidates))
     sure = [abs(value) > JUDGING.law_errors * error for value, error in zip(made.values[-1], errors, strict=True)]
     if not any(sure):
         return None
     if not all(sure):
         chosen = [term for term, one in zip(chosen, sure, strict=True) if one]
-        made = _fitted(seen, kept, chosen)
-    if _void(seen, made):
+        made = _fitted(refitted, kept, chosen)
+    if _void(refitted, made):
         return None
-    before = held_out(seen, folds, kept.candidates, kept.values)
-    after = held_out(seen, folds, made.candidates, made.values)
-    better = compare_held_out(seen, folds, before, after)
+    before = held_out(refitted, folds, kept.candidates, kept.values)
+    after = held_out(refitted, folds, made.candidates, made.values)
+    better = compare_held_out(refitted, folds, before, after)
     if better.score_low <= 0.0:
         return None
     return Law(
         tuple(chosen),
         made,
-        seen,
+        refitted,
         better,
         *gains[0],
         made.values[-1],
@@ -190,10 +190,12 @@ def _fitted(problem: EstimationProblem, kept: Fit, terms: Sequence[Term]) -> Fit
 
 def _void(problem: EstimationProblem, made: Fit) -> bool:
     """Tell whether the law moves the vessel too little to matter to anybody."""
-    seen = problem.windows
+    windows = problem.windows
     without = replace(made, candidates=made.candidates[:-1], values=made.values[:-1])
-    moved = seen.gap(fitted_force_model(problem.plain, made)) - seen.gap(fitted_force_model(problem.plain, without))
-    size = np.sqrt(np.mean(seen.measured[:, seen.channels] ** 2, axis=0))
+    moved = windows.gap(fitted_force_model(problem.plain, made)) - windows.gap(
+        fitted_force_model(problem.plain, without)
+    )
+    size = np.sqrt(np.mean(windows.measured[:, windows.channels] ** 2, axis=0))
     return bool((np.sqrt(np.mean(moved**2, axis=0)) < INFERENCE.void_share * size).all())
 
 
@@ -228,13 +230,13 @@ def _best(
 
 def linearise_terms(problem: EstimationProblem, made: Fit, terms: Sequence[Term]) -> LinearTerms:
     """Return a fit's gaps and what they change by with hull, effects and the coefficients of terms."""
-    seen = problem.windows
+    windows = problem.windows
     force_model = fitted_force_model(problem.plain, made)
-    base = seen.gap(force_model)
+    base = windows.gap(force_model)
     known, centre = nuisance_columns(problem, made)
     pushes = np.stack(
         [
-            seen.gap(replace(force_model, external=force_model.external + term.force(force_model))) - base
+            windows.gap(replace(force_model, external=force_model.external + term.force(force_model))) - base
             for term in terms
         ],
         axis=-1,
@@ -245,13 +247,13 @@ def linearise_terms(problem: EstimationProblem, made: Fit, terms: Sequence[Term]
 
 def nuisance_columns(problem: EstimationProblem, made: Fit, *, but: int = -1) -> tuple[Floats, Floats]:
     """Return a fit's `LinearTerms.known` and `LinearTerms.centre`, without the parameters of the candidate number `but`."""
-    seen = problem.windows
-    base = seen.gap(fitted_force_model(problem.plain, made))
+    windows = problem.windows
+    base = windows.gap(fitted_force_model(problem.plain, made))
     known, centre = [], []
     for k, spread in enumerate(problem.hull_spread):
         hull = made.hull.copy()
         hull[k] += 0.1 * spread
-        known.append((seen.gap(fitted_force_model(problem.plain, replace(made, hull=hull))) - base) / 0.1)
+        known.append((windows.gap(fitted_force_model(problem.plain, replace(made, hull=hull))) - base) / 0.1)
         centre.append((made.hull[k] - problem.plain.hull[k]) / spread if spread > 0.0 else 0.0)
     for i, candidate in enumerate(made.candidates):
         for j, parameter in enumerate(candidate.parameters if i != but else ()):
@@ -259,7 +261,7 @@ def nuisance_columns(problem: EstimationProblem, made: Fit, *, but: int = -1) ->
             values = [one.copy() for one in made.values]
             values[i][j] += step * parameter.size
             known.append(
-                (seen.gap(fitted_force_model(problem.plain, replace(made, values=tuple(values)))) - base) / step
+                (windows.gap(fitted_force_model(problem.plain, replace(made, values=tuple(values)))) - base) / step
             )
             centre.append((float(made.values[i][j]) - parameter.neutral) / parameter.size)
     return np.stack(known, axis=-1), np.array(centre)

@@ -17,7 +17,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
 from ferryid.diagnose.inference.folds import Folds, folds_of
-from ferryid.diagnose.inference.onset_estimation import brief
+from ferryid.diagnose.inference.onset_estimation import is_brief
 from ferryid.diagnose.inference.spectra import BURST_HZ, Band, Burst, bursts_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_laws import CampaignLaws
@@ -71,26 +71,26 @@ def find_unexplained(
     """
     claims = []
     folds = folds_of(problem.windows)
-    after, seen = kept, problem
+    after, refitted = kept, problem
     if folds is not None and laws is not None and (common := laws.common(problem, kept, folds)) is not None:
         shared = _lawful(common, after, measurements, f"that holds in all {counted(laws.able, 'log')} that can show it")
         claims.append(Claim(shared, Figures("law")))
-        after, seen = common.fit, common.problem
-    if folds is not None and (law := select_law(seen, after, folds)) is not None:
+        after, refitted = common.fit, common.problem
+    if folds is not None and (law := select_law(refitted, after, folds)) is not None:
         own = _lawful(law, after, measurements, "that was seen in this log only")
         claims.append(Claim(own, Figures("law", other_logs=None if laws is None else OtherLogs(*laws.of_others(law)))))
-        after, seen = law.fit, law.problem
-    left = locate(seen, after, after, measurements)
+        after, refitted = law.fit, law.problem
+    left = locate(refitted, after, after, measurements)
     # An effect that comes and goes by chance stays in these errors: it is a state of the filter, no part of the force model.
     known = bool(problem.filter.processes)
     uneven = bool(left.profiles) and left.profiles[0].statistic >= JUDGING.regime_errors
-    burst = bursts_of(seen, fitted_force_model(seen.plain, after), measurements)
+    burst = bursts_of(refitted, fitted_force_model(refitted.plain, after), measurements)
     if burst is not None and burst.deviations >= JUDGING.burst_deviations:
         uneven = True
         if not known:
             claims.append(Claim(_in_bursts(burst), Figures("bursts")))
     elif uneven and not known:
-        claims.append(Claim(_unsteady(seen, left), Figures("unsteady")))
+        claims.append(Claim(_unsteady(refitted, left), Figures("unsteady")))
     return Unexplained(tuple(claims), left, uneven)
 
 
@@ -104,7 +104,7 @@ def find_displaced(problem: EstimationProblem, kept: Fit) -> tuple[int, ...]:
     folds = folds_of(problem.windows)
     if folds is None:
         return ()
-    every = (i for i, one in enumerate(kept.candidates) if not brief(problem, one))
+    every = (i for i, one in enumerate(kept.candidates) if not is_brief(problem, one))
     return tuple(i for i in every if _displaced(problem, kept, i, folds))
 
 
@@ -118,15 +118,17 @@ def _displaced(problem: EstimationProblem, kept: Fit, index: int, folds: Folds) 
     law = select_law(problem.with_noise_of(without), without, folds, unlike=moved)
     if law is None:
         return False
-    told, coefficients = law.fit.candidates[-1], law.fit.values[-1]
+    law_candidate, coefficients = law.fit.candidates[-1], law.fit.values[-1]
     candidate, values = kept.candidates[index], kept.values[index]
-    both = fit(problem, [*rest, told, candidate], [*start, coefficients, candidate.start])
+    both = fit(problem, [*rest, law_candidate, candidate], [*start, coefficients, candidate.start])
     fair = problem.with_noise_of(both)
     with_neither = fit(fair, rest, start).evidence
-    with_law = fit(fair, [*rest, told], [*start, coefficients]).evidence
+    with_law = fit(fair, [*rest, law_candidate], [*start, coefficients]).evidence
     with_effect = fit(fair, [*rest, candidate], [*start, values]).evidence
-    with_both = fit(fair, [*rest, told, candidate], both.values).evidence
-    better = with_law - with_effect > max(INFERENCE.prior_odds, candidate.effect.form * (with_law - with_neither))
+    with_both = fit(fair, [*rest, law_candidate, candidate], both.values).evidence
+    better = with_law - with_effect > max(
+        INFERENCE.prior_odds, candidate.effect.formula_error * (with_law - with_neither)
+    )
     return better and with_both - with_law < INFERENCE.prior_odds
 
 
@@ -137,14 +139,14 @@ def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str) -> Find
     place = locate(problem, before, law.fit, measurements)
     force_model = fitted_force_model(problem.plain, before)
     terms = [
-        _told(term, force_model, problem, float(value), float(error))
+        _law_term(term, force_model, problem, float(value), float(error))
         for term, value, error in zip(law.terms, law.values, law.errors, strict=True)
     ]
     first = law.terms[0]
     size = "" if first.name == "1" else f"{first.name} [{first.unit}]" if first.unit else first.name
     regressor = (size, first.value(force_model)) if size else None
     parts = [one.says for one in terms]
-    told = "; ".join(parts)
+    listing = "; ".join(parts)
     return Finding(
         effect=UNKNOWN,
         instance=None,
@@ -159,14 +161,14 @@ def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str) -> Find
         rivals=(),
         unresolved_with=(),
         separating_manoeuvre=None,
-        says=f"A force acts that has no name here, but a law {whose}: {told}.",
+        says=f"A force acts that has no name here, but a law {whose}: {listing}.",
         band_hz=_band(place.bands, place.shares, [band.before - band.after for band in place.bands]),
         law=tuple(terms),
         **figure_columns(problem, place, regressor),
     )
 
 
-def _told(term: Term, force_model: ForceModel, problem: EstimationProblem, value: float, error: float) -> LawTerm:
+def _law_term(term: Term, force_model: ForceModel, problem: EstimationProblem, value: float, error: float) -> LawTerm:
     """Return a term as people read it: its force where its quantity is as large as it usually gets."""
     quantity = term.value(force_model)[problem.windows.measurements.usable]
     at = 1.0 if term.name == "1" else float(f"{np.quantile(np.abs(quantity), JUDGING.usual_quantile):.1g}")

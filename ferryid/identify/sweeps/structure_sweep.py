@@ -323,8 +323,8 @@ def _notes(by: Mapping[str, StructureComparison], settings: FitSettings) -> list
                 "these logs."
             )
         notes.append(
-            "Intervals and p by whole logs hold the scatter within these logs, not that between one day and the next: what is "
-            "told apart there may be these days' own."
+            "Intervals and p by whole logs hold the scatter within these logs, not that between one day and the next: "
+            "a difference may be these days' own."
         )
     for key, one in by.items():
         least = min(float(np.nanmean(over_base(structure, one))) for structure in one.structures)

@@ -122,7 +122,7 @@ class ModelForces:
 
     def _effects(self, sha256: str) -> tuple[StoredEffect, ...]:
         every = (*self.model.conditions_of(sha256), *self.model.vessel_effects)
-        return tuple(sorted(every, key=lambda stored: effects()[stored.effect].turn))
+        return tuple(sorted(every, key=lambda stored: effects()[stored.effect].order))
 
     def altered_hull(self) -> Floats:
         """Return the hull's coefficients as the properties of the vessel alter them, shape (26,)."""

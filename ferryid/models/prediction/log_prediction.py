@@ -104,7 +104,7 @@ def signal_map(model: Model, profile: Profile | None) -> Profile:
     own = parse_profile(model.profile_text, model.name)
     if profile is not None and profile.name != own.name:
         raise FerryIdError(
-            f"{model.name}@{model.version}: a model of {own.name} says nothing about {profile.name}. "
+            f"{model.name}@{model.version}: a model of {own.name} does not apply to {profile.name}. "
             "Fix: give a model and logs of one vessel"
         )
     return profile or own
@@ -121,8 +121,8 @@ def predict_with_effects(
     motion, track = prepared.motion, prepared.track
     if track is None or not np.isfinite(motion.eta[motion.valid, 2]).any():
         raise FerryIdError(
-            f"{motion.log}: {model.label} holds effects that need the heading, to tell the world's forces from the vessel's, "
-            "found none in the log. Fix: map [signals.heading] in the profile, or use a log that has it"
+            f"{motion.log}: {model.label} holds effects that need the heading, to distinguish forces of the environment "
+            "from the vessel's, found none in the log. Fix: map [signals.heading] in the profile, or use a log that has it"
         )
     known, sha256 = ModelForces(model), prepared.recording.sha256
     measurements = measurements_of_motion(track, motion, profile)

@@ -153,7 +153,7 @@ def test_a_model_that_couples_surge_inertia_is_refused(short: Measurements) -> N
 
 def test_a_model_of_another_vessel_is_refused(short: Measurements) -> None:
     other = model_of("decoupled", np.zeros, load_profile("revolt").text)
-    with pytest.raises(FerryIdError, match="says nothing about"):
+    with pytest.raises(FerryIdError, match="does not apply to"):
         prior_force_model(short, FERRY, other)
 
 

@@ -12,7 +12,14 @@ import pytest
 
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit, starting_point
 from ferryid.diagnose.inference.folds import block_s
-from ferryid.diagnose.inference.onset_estimation import brief, lasts_s, linearise, part_s, promising_spans, refine_span
+from ferryid.diagnose.inference.onset_estimation import (
+    is_brief,
+    lasts_s,
+    linearise,
+    part_s,
+    promising_spans,
+    refine_span,
+)
 from ferryid.diagnose.inference.search import list_candidates, search
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.rivals import compare_rivals
@@ -65,9 +72,9 @@ def test_what_lasts_less_than_two_blocks_is_brief() -> None:
     case = problem(0.0)
     two_s = 2.0 * block_s(case.windows)
     assert two_s == pytest.approx(80.0)
-    assert brief(case, replace(PUSH, onset_s=100.0, offset_s=97.0 + two_s))
-    assert not brief(case, replace(PUSH, onset_s=100.0, offset_s=103.0 + two_s))
-    assert not brief(case, PUSH)
+    assert is_brief(case, replace(PUSH, onset_s=100.0, offset_s=97.0 + two_s))
+    assert not is_brief(case, replace(PUSH, onset_s=100.0, offset_s=103.0 + two_s))
+    assert not is_brief(case, PUSH)
     # It has no rivals: no name could be judged there.
     made = fit(case, [replace(PUSH, onset_s=100.0, offset_s=130.0)])
     assert compare_rivals(case, made, 0, [PUSH]).rivals == ()

@@ -25,7 +25,7 @@ def both(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel
 
 
 FACTORS = Candidate(
-    Effect("both", "Both", lambda profile: (), both, lambda v, i: "", lambda v, i: {}, ridge="a"),
+    Effect("both", "Both", lambda profile: (), both, lambda v, i: "", lambda v, i: {}, profiled="a"),
     None,
     (Parameter("a", "-", 1.0, 0.0, 20.0, neutral=1.0), Parameter("b", "N", 50.0, -1e4, 1e4, start=20.0)),
 )

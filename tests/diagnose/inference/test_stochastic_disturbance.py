@@ -12,7 +12,7 @@ from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import Search, list_candidates, search
-from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, _seen
+from ferryid.diagnose.inference.stochastic_disturbance import DisturbanceState, _is_identified
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.confidence_rules import absent_in_velocities
 from ferryid.diagnose.judging.disturbance_findings import _power_in_velocities, density, disturbance_claims
@@ -130,5 +130,5 @@ def test_waves_slower_than_any_sea_are_none() -> None:
     ferry = load_profile("milliampere")
     waves = Candidate(effects()["waves"], None, effects()["waves"].parameters_of(ferry))
     values, widths = np.array([0.45, 60.0, 100.0, 6.0]), np.full(4, 0.1)
-    assert _seen(waves, values, widths, 0.4)
-    assert not _seen(waves, np.array([0.044, *values[1:]]), widths, 0.4)
+    assert _is_identified(waves, values, widths, 0.4)
+    assert not _is_identified(waves, np.array([0.044, *values[1:]]), widths, 0.4)

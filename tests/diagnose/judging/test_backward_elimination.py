@@ -73,9 +73,9 @@ def test_a_likelier_rival_takes_the_place_of_what_was_selected_first(problem: Es
 
 def test_what_helps_no_held_out_stretch_falls_and_is_told(problem: EstimationProblem) -> None:
     right = fit(problem, of(problem, LOSS, FIRST))
-    idle = of(problem, ("wind", None))
+    negligible = of(problem, ("wind", None))
     breeze = Fit(
-        (*right.candidates, *idle),
+        (*right.candidates, *negligible),
         (*right.values, np.array([0.2, 0.1, 1.0, 1.0, 1.0])),
         np.eye(7),
         right.hull,
@@ -83,8 +83,8 @@ def test_what_helps_no_held_out_stretch_falls_and_is_told(problem: EstimationPro
     )
     told = eliminate_backward(problem.with_noise_of(right), breeze, [], lambda stage: None)
     assert {one.key for one in told.fit.candidates} == {LOSS, FIRST}
-    (sentence,) = told.told
-    assert sentence == f"{idle[0].effect.title} was suspected, but dropped: {PLACEBO}."
+    (sentence,) = told.dropped
+    assert sentence == f"{negligible[0].effect.title} was suspected, but dropped: {PLACEBO}."
 
 
 def test_what_fell_for_one_reason_is_one_sentence() -> None:
@@ -97,7 +97,7 @@ def test_what_fell_for_one_reason_is_one_sentence() -> None:
 def test_what_is_too_small_to_matter_falls_without_a_word(problem: EstimationProblem) -> None:
     """A loss of 0.25 that is judged by somebody to whom one of less than 1 does not matter."""
     loss, first = of(problem, LOSS, FIRST)
-    careless = replace(loss, effect=replace(loss.effect, idle=1.0))
+    careless = replace(loss, effect=replace(loss.effect, negligible=1.0))
     for one, falls in ((loss, (None, "")), (careless, (0, ""))):
         both = fit(problem, [one, first])
         assert _fallen(problem.with_noise_of(both), both, None) == falls

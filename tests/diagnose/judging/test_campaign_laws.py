@@ -109,9 +109,9 @@ def test_others_are_counted_by_what_they_can_show() -> None:
     assert (finding.law[0].on, finding.law[0].quantity) == ("yaw", "uv")
     assert finding.probability == JUDGING.hint_probability
     assert finding.says.endswith("Of 2 other logs 2 could show it at this size, and none does.")
-    other = told["1"].said[1]
+    other = told["1"].information[1]
     deaf = replace(other, normal=1e-9 * other.normal, slope=1e-9 * other.slope)
-    unheard = find_unexplained(problem, kept, sailed(0), CampaignLaws((told["0"].said[0], deaf), 0, None))
+    unheard = find_unexplained(problem, kept, sailed(0), CampaignLaws((told["0"].information[0], deaf), 0, None))
     (finding, *_), _ = apply_rules(unheard.claims, LogFigures(joint=True))
     assert finding.says.endswith("Of 1 other log none could show it at this size.")
 

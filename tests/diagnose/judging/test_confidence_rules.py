@@ -136,7 +136,7 @@ def test_what_acts_for_less_than_two_blocks_is_a_hint() -> None:
 
 def test_what_acts_in_a_place_that_was_visited_once_is_a_hint() -> None:
     assert stands(place_visited_once, found("mooring"), on("force"))
-    assert not stands(place_visited_once, found("mooring"), on("force", once=True))
+    assert not stands(place_visited_once, found("mooring"), on("force", single_visit=True))
 
 
 def test_what_comes_and_goes_by_little_is_a_hint() -> None:
@@ -290,7 +290,7 @@ def test_a_rule_sees_the_findings_as_those_before_it_left_them() -> None:
 def test_no_rule_raises_a_probability_and_dropped_findings_are_gone() -> None:
     for probability in (0.0, 0.3, JUDGING.hint_probability, 0.7, 1.0):
         claims = [
-            Claim(found("wind", probability), Figures("force", once=True)),
+            Claim(found("wind", probability), Figures("force", single_visit=True)),
             Claim(replace(found("hull_parameters", probability), parameters={}), Figures("force")),
         ]
         (only,), _ = apply_rules(claims, LogFigures(hull_known=False, velocity_noise={"yaw": 1.0}))

@@ -69,7 +69,7 @@ def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[E
 def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
     problem, stands = windy
     (blown,) = stands.fit.candidates
-    brief = replace(blown, effect=replace(blown.effect, once=lambda measurements, p: True))
+    brief = replace(blown, effect=replace(blown.effect, single_visit=lambda measurements, p: True))
     finding, (note,) = judged_by_rules(problem, replace(stands, fit=replace(stands.fit, candidates=(brief,))))
     assert finding.probability == JUDGING.hint_probability
     assert "the vessel was in that place once" in note
@@ -98,7 +98,7 @@ def test_what_comes_and_goes_by_little_is_a_hint(
     problem, stands = windy
     (blown,) = stands.fit.candidates
     candidate = replace(
-        blown, effect=replace(blown.effect, passing=passing, onset=True), onset_s=onset_s, offset_s=offset_s
+        blown, effect=replace(blown.effect, passing_size=passing, onset=True), onset_s=onset_s, offset_s=offset_s
     )
     made = replace(stands.fit, candidates=(candidate,), values=(np.array([2.5, 0.0, 1.0, 1.0, 1.0]),))
     finding, notes = judged_by_rules(problem, replace(stands, fit=made))

@@ -448,6 +448,8 @@ def test_sides_of_a_shallow_place_that_a_log_does_not_tell_have_no_interval(fold
     log = sailed(folder, "shallow", TWELVE, 6, "[environment.shallow]\nnorth_m = [7.5, 60.0]\ndamping_factor = 2.0\n")
     found, problem = taught(log, "shallow_water")
     (stored,) = found.conditions
-    untold = effects()["shallow_water"].untold(problem.plain.measurements, np.array(list(stored.values.values())))
-    assert untold
-    assert {name for name, one in stored.parameters.items() if not np.isfinite(one.low)} == untold
+    unreported = effects()["shallow_water"].unreported(
+        problem.plain.measurements, np.array(list(stored.values.values()))
+    )
+    assert unreported
+    assert {name for name, one in stored.parameters.items() if not np.isfinite(one.low)} == unreported

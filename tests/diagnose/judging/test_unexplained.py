@@ -170,7 +170,7 @@ def test_an_effect_that_a_law_makes_idle_is_an_impostor_and_a_true_one_is_not() 
     kept = fit(problem, [candidate])
     assert find_displaced(problem, kept) == (0,)
     # Where the law explains more by no more than the effect's formula may be off, it displaces nothing.
-    vague = replace(candidate, effect=replace(gain, form=1.0))
+    vague = replace(candidate, effect=replace(gain, formula_error=1.0))
     assert find_displaced(problem, replace(kept, candidates=(vague,))) == ()
     wind = effects()["wind"]
     breeze = Candidate(wind, None, wind.parameters_of(FERRY))
