@@ -323,7 +323,7 @@ def batch(
         _paths(logs), Path(out), vessel=vessel, recipe=recipe, processes=processes, dask=dask, memory_limit=memory_limit,
         again=again, progress=progress, tell=tell,
     )  # fmt: skip
-    return _outcome(result, render_batch(result))
+    return _outcome(result.to_json(), render_batch(result))
 
 
 def export(

@@ -22,6 +22,7 @@ ORDER = (
     "lazy",
     "types",
     "thresholds",
+    "json_record",
     "ingest",
     "vessel",
     "signals",

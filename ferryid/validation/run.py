@@ -20,11 +20,11 @@ from ferryid import __version__
 from ferryid.batch.spread import Spread, spread
 from ferryid.errors import FerryIdError
 from ferryid.files import alone, dump_json, finite, write_text
+from ferryid.json_record import Record
 from ferryid.validation.case import Case
 from ferryid.validation.checkpoint import discard, run_stage
 from ferryid.validation.commitment import SEAL_FILE, commitment, publish_answers, publish_commitment, read_seal
 from ferryid.validation.interfaces import Pipeline, Trial
-from ferryid.validation.json_record import Record
 from ferryid.validation.records import CaseResult, Diagnosis, Failure
 from ferryid.validation.run_folder import RESULT_FILE, RunFolder, open_run_folder, remove_temporary
 from ferryid.validation.source_hash import source_hash

@@ -10,9 +10,9 @@ from typing import Any
 
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import replacing
+from ferryid.json_record import Record
 from ferryid.validation.case import Case
 from ferryid.validation.interfaces import Generate, Trial
-from ferryid.validation.json_record import Record
 from ferryid.validation.records import Failure
 from ferryid.validation.worker_client import worker_of
 

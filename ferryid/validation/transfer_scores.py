@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import binom
 
 from ferryid.diagnose import AXES
-from ferryid.validation.json_record import Record
+from ferryid.json_record import Record
 from ferryid.validation.name_scores import Share, names, wrong_names
 from ferryid.validation.records import DIAGNOSED, UNKNOWN, CaseResult, TransferScore
 
