@@ -18,7 +18,7 @@ from ferryid.models import Model, blank_model
 from ferryid.report.batch_rows import BaseAndModel, DiagnosisSummary, EvaluationSummary, FindingSummary, FitSummary
 from ferryid.report.diagnosis_report import diagnose_and_report
 from ferryid.report.fit_report import fit_and_report
-from ferryid.types import RunContext, no_progress
+from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
 LONGEST_NAME = 80
@@ -56,6 +56,11 @@ class Job:
     tables: Path
     recorded: Path
 
+    @property
+    def context(self) -> RunContext:
+        """Results go to the folder, ingested tables to those that all logs share."""
+        return RunContext(self.folder, tables_out=self.tables)
+
     def below(self, path: str | Path) -> str:
         """Return a path relative to the folder."""
         return Path(os.path.relpath(path, self.folder)).as_posix()
@@ -67,9 +72,7 @@ class Job:
 
 
 def _fitted(job: Job) -> FitSummary:
-    made = fit_and_report(
-        [job.log], job.profile, job.recipe.fit, RunContext(job.folder), name=job.model_name(), tables=job.tables
-    )
+    made = fit_and_report([job.log], job.profile, job.recipe.fit, job.context, name=job.model_name())
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
     if job.recorded.exists():
         settings = job.recipe.fit.on(job.profile)
@@ -89,7 +92,7 @@ def _fitted(job: Job) -> FitSummary:
 
 def _evaluated(job: Job) -> EvaluationSummary:
     model = job.model or blank_model(job.profile, job.profile.name)
-    told = evaluate(model, [job.log], RunContext(job.tables), profile=job.profile)
+    told = evaluate(model, [job.log], job.context, profile=job.profile)
     write_text(job.folder / "evaluation.json", dump_json(told))
     entry = finite(told["logs"][0])
     return EvaluationSummary(
@@ -108,12 +111,10 @@ def _diagnosed(job: Job) -> DiagnosisSummary:
     made = diagnose_and_report(
         [job.log],
         job.profile,
-        job.folder,
         DiagnosisSettings(model=job.model, withhold=job.recipe.withhold),
-        tables=job.tables,
+        job.context,
         name=job.model_name("-diagnosed"),
         command=[*words, *(["--model", job.recipe.model] if job.recipe.model else [])],
-        progress=no_progress,
     )
     told = made.json
     kept = ("effect", "instance", "probability", "parameters", "says")

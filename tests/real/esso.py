@@ -127,7 +127,7 @@ def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]
 
 def hidden_wind(path: str, member: Member) -> Floats:
     """Return the wind that a run measured, on the rows of its windows' scene, shape (n, 2)."""
-    scene, _ = read_measurements(path, ESSO, None)
+    scene, _ = read_measurements(path, ESSO)
     corrected = windows(replace(examine(replace(scene, wind=None))[1], wind=scene.wind), *window_lengths(ESSO)).scene
     assert corrected.wind is not None
     assert np.allclose(corrected.t, member.windows.scene.t)

@@ -7,10 +7,9 @@ the difference. An effect that the simulation has already has the simulation's v
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import inf, isfinite
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,7 @@ from ferryid.effects import effects
 from ferryid.effects.effect import Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.errors import FerryIdError
-from ferryid.types import Floats
+from ferryid.types import IN_MEMORY, Floats, RunContext
 from ferryid.vessel.profile import Profile
 
 SHOWN_ROWS = 400
@@ -76,9 +75,7 @@ class Simulation:
     sensors: tuple[SensorFinding, ...]
 
 
-def learn_simulation(
-    path: str, profile: Profile, out: Path | None, *, verify: bool = False, progress: Callable[[str], None]
-) -> Simulation:
+def learn_simulation(path: str, profile: Profile, run: RunContext = IN_MEMORY) -> Simulation:
     """Return the picture that a simulated log shows.
 
     Parameters
@@ -87,15 +84,15 @@ def learn_simulation(
         The log, recorded with the same signals as the vessel's own.
     profile
         The vessel that it simulates.
-    out, verify, progress
-        As in `ferryid.diagnose.pipeline.diagnose`.
+    run
+        Folder of the ingested tables, progress, and whether to check every checksum.
 
     Raises
     ------
     FerryIdError
         For a log that cannot be used, is too short, or moves like no vessel of this profile.
     """
-    scene, survey = read_measurements(path, profile, out, verify=verify, progress=progress)
+    scene, survey = read_measurements(path, profile, run)
     sensors, scene = examine(scene)
     name = survey.motion.log
     seen = windows(scene, *window_lengths(profile))
@@ -108,8 +105,8 @@ def learn_simulation(
         )
     plain, spread = prior_force_model(seen.scene, profile)
     wide = INFERENCE.simulator_hull_factor * spread if profile.hull.has_model else spread
-    progress(f"learning what {name} simulates")
-    result = search(estimation_problem(seen, plain, wide), progress)
+    run.progress(f"learning what {name} simulates")
+    result = search(estimation_problem(seen, plain, wide), run.progress)
     made = result.fit
     left = float(np.mean((seen.gap(fitted_force_model(plain, made)) / _size(seen.measured[:, seen.channels])) ** 2))
     if left > INFERENCE.foreign_share:

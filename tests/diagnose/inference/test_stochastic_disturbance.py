@@ -39,7 +39,7 @@ IMITATORS = ("wind", "gusts", "waves", "time_delay", "thruster_lag")
 def found_in(environment: str, seed: int, folder: Path) -> Search:
     log = folder / "trial.mcap"
     write_log(simulate(parse_scenario(BASE + environment, "unsteady"), seed), log)
-    scene, _ = read_measurements(str(log), FERRY, None)
+    scene, _ = read_measurements(str(log), FERRY)
     seen = windows(scene, *window_lengths(FERRY))
     plain, spread = prior_force_model(seen.scene, FERRY)
     candidates, _ = list_candidates(seen.scene)
