@@ -39,9 +39,9 @@ def command(
     from ferryid import api
     from ferryid.diagnose import DiagnosisSettings
 
-    settings = DiagnosisSettings(None, against, together, tuple(withhold or ()), verify)
+    settings = DiagnosisSettings(None, against, together, tuple(withhold or ()))
     words = ("ferryid", *sys.argv[1:])
     outcome = api.diagnose(
-        logs, vessel, out, model=model, settings=settings, name=name, command=words, progress=progress
+        logs, vessel, out, model=model, settings=settings, name=name, command=words, verify=verify, progress=progress
     )
     emit(outcome, json)

@@ -200,6 +200,7 @@ def compare(
     vessel: str | Path | Profile | None = None,
     window_s: float = 1.0,
     command: Sequence[str] = (),
+    verify: bool = False,
     progress: Progress = _quiet,
 ) -> Report:
     """Compare models on the same rows of logs, and by their coefficients; without logs by their coefficients alone.
@@ -267,6 +268,7 @@ def diagnose(
     settings: DiagnosisSettings | None = None,
     name: str = "",
     command: Sequence[str] = (),
+    verify: bool = False,
     progress: Progress = _quiet,
 ) -> Report:
     """Say which physics a model left out of recordings, what shows it, and store the model that has it.
@@ -288,6 +290,8 @@ def diagnose(
         Name of the model with the findings.
     command
         The words that the page says it was asked for with.
+    verify
+        Check every checksum of the logs.
     """
     from ferryid.diagnose import DiagnosisSettings
     from ferryid.report.diagnosis_report import diagnose_and_report, patient
@@ -295,9 +299,8 @@ def diagnose(
     out = Path(out)
     profile, examined = patient(vessel, model, out)
     settings = replace(settings or DiagnosisSettings(), model=examined)
-    outcome = diagnose_and_report(
-        _paths(logs), profile, out, settings, tables=out, name=name, command=command, progress=progress
-    )
+    run = _context(out, progress, verify)
+    outcome = diagnose_and_report(_paths(logs), profile, settings, run, name=name, command=command)
     progress("")
     return outcome
 
@@ -323,7 +326,7 @@ def batch(
         _paths(logs), Path(out), vessel=vessel, recipe=recipe, processes=processes, dask=dask, memory_limit=memory_limit,
         again=again, progress=progress, tell=tell,
     )  # fmt: skip
-    return _outcome(result, render_batch(result))
+    return _outcome(result.to_json(), render_batch(result))
 
 
 def export(

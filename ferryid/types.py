@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,16 +31,31 @@ class RunContext:
     Attributes
     ----------
     out
-        Output folder, whose ``logs`` keep the ingested tables.
+        Output folder.
     progress
         Called with the name of each stage.
     verify
         Check every checksum of the logs.
+    tables_out
+        Output folder whose ``logs`` keep the ingested tables, where that is another than `out`.
+    keep_tables
+        False reads the logs without keeping ingested tables.
     """
 
     out: Path
     progress: Callable[[str], None] = no_progress
     verify: bool = False
+    tables_out: Path | None = None
+    keep_tables: bool = True
+
+    @property
+    def tables(self) -> Path | None:
+        """Output folder whose ``logs`` keep the ingested tables; None keeps none."""
+        return (self.tables_out or self.out) if self.keep_tables else None
+
+
+IN_MEMORY = RunContext(Path(os.devnull), keep_tables=False)
+"""Context of a stage that keeps and writes nothing, and shows no progress."""
 
 
 def by_axis(values: Sequence[float] | Floats) -> dict[str, float]:

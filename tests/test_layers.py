@@ -23,6 +23,7 @@ ORDER = (
     "lazy",
     "types",
     "thresholds",
+    "json_record",
     "ingest",
     "vessel",
     "signals",

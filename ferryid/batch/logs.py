@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
+from ferryid.batch.log_result import LogFile
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.ingest import existing_parts
@@ -52,9 +52,9 @@ class Entry:
         return [part.resolve() for part in parts or [whole]]
 
     @property
-    def files(self) -> list[list[Any]]:
-        """Path, size and time of change of each file, by which an unchanged log is known; empty for one that is not there."""
-        found: list[list[Any]] = []
+    def files(self) -> tuple[LogFile, ...]:
+        """Its files; none for a log that is not there."""
+        found = []
         for path in self.paths:
             for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
                 try:
@@ -62,8 +62,8 @@ class Entry:
                 except OSError:  # whoever reads the log says what is wrong with it
                     continue
                 if not file.is_dir():
-                    found.append([str(file), state.st_size, state.st_mtime_ns])
-        return found
+                    found.append(LogFile(str(file), state.st_size, state.st_mtime_ns))
+        return tuple(found)
 
 
 def entries_of(asked: Sequence[str], vessel: str | None, tell: Callable[[str], None]) -> list[Entry]:

@@ -19,21 +19,23 @@ from typing import Any
 
 from ferryid import __version__
 from ferryid.batch import memory
-from ferryid.batch.kept import Kept, Row, key_of
+from ferryid.batch.kept import Kept, key_of
+from ferryid.batch.log_result import LogResult
 from ferryid.batch.logs import Entry, entries_of
 from ferryid.batch.recipe import Recipe, load_recipe
 from ferryid.batch.remaining import Remaining, told_time
 from ferryid.batch.spread import spread
-from ferryid.batch.summary import lines_of, table_of, write_table
+from ferryid.batch.summary import summary_row, table_of, write_table
 from ferryid.batch.task import DONE, STATUSES, Task, lost, work
 from ferryid.batch.trend import trends_of
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError, one_line
-from ferryid.files import alone, dump_json, finite, remove_abandoned, write_text
+from ferryid.files import alone, dump_json, remove_abandoned, write_text
 from ferryid.ingest import open_log
 from ferryid.ingest.hashing import content_hash
 from ferryid.models import Model, model_to_json
 from ferryid.report.batch_page import render
+from ferryid.report.batch_rows import BatchResult, MemoryUse
 from ferryid.report.diagnosis_report import patient
 from ferryid.signals.recording import log_name
 from ferryid.vessel.profile import Profile
@@ -57,7 +59,7 @@ def batch(
     again: bool = False,
     progress: Callable[[str], None],
     tell: Callable[[str], None],
-) -> dict[str, Any]:
+) -> BatchResult:
     """Fit, evaluate and diagnose every log of an archive that is not done yet, and sum up all of it.
 
     Parameters
@@ -81,11 +83,6 @@ def batch(
     tell
         Called with single lines that are to be kept: what is done already, and each log that went wrong.
 
-    Returns
-    -------
-    dict
-        Schema ``ferryid.batch/1``.
-
     Raises
     ------
     FerryIdError
@@ -102,26 +99,25 @@ def batch(
         remove_abandoned(out / "logs")
         kept = Kept(folder / "results")
         tasks = [_task(entry, patients[entry.vessel], chosen, limit, again, out.resolve()) for entry in entries]
-        rows: dict[int, tuple[Path, Row]] = {}
+        rows: dict[int, tuple[Path, LogResult]] = {}
         for number, (entry, task) in enumerate(zip(entries, tasks, strict=True)):
             table = patients[entry.vessel][0].table
             found = kept.of(task.folder, task.files, task.stamp, partial(_content, task.log, table))
-            if found is not None and replace(task, files=found[1]["files"]).stands(found[1]):
+            if found is not None and replace(task, files=found[1].files).stands(found[1]):
                 rows[number] = found
         left = [number for number in range(len(tasks)) if number not in rows]
         already = len(rows)
-        _tell_done(tell, [row["status"] for _, row in rows.values()], [tasks[number] for number in left], kept)
+        _tell_done(tell, [row.status for _, row in rows.values()], [tasks[number] for number in left], kept)
         if left:
             _carry_out([tasks[number] for number in left], left, rows, len(tasks), processes, dask, progress, tell)
         progress("writing the summary")
-        result = _summed_up(entries, [rows[number] for number in range(len(entries))], patients, chosen, limit, out)
-        result["counts"]["done_before"] = already
-        result["seconds"] = time.monotonic() - begun
-        write_table(folder / "summary.parquet", table_of(result["rows"]))
+        results = [rows[number] for number in range(len(entries))]
+        result = _summed_up(entries, results, already, patients, chosen, limit, out, begun)
+        write_table(folder / "summary.parquet", table_of(result.rows))
         write_text(folder / "index.html", render(result))
-        write_text(folder / "batch.json", dump_json(result))
+        write_text(folder / "batch.json", dump_json(result.to_json()))
     progress("")
-    return dict(finite(result))
+    return result
 
 
 def _patients(entries: Sequence[Entry], recipe: Recipe, out: Path) -> dict[str | None, tuple[Profile, Model | None]]:
@@ -194,7 +190,7 @@ def _tell_done(tell: Callable[[str], None], statuses: Sequence[str], left: Seque
 def _carry_out(
     tasks: Sequence[Task],
     numbers: Sequence[int],
-    rows: dict[int, tuple[Path, Row]],
+    rows: dict[int, tuple[Path, LogResult]],
     count: int,
     processes: int,
     dask: str | None,
@@ -202,7 +198,7 @@ def _carry_out(
     tell: Callable[[str], None],
 ) -> None:
     """Do what is left, and put its rows to the others."""
-    remaining = Remaining([sum(file[1] for file in task.files) for task in tasks])
+    remaining = Remaining([sum(file.size_bytes for file in task.files) for task in tasks])
     start, at_work = time.monotonic(), list[int]()
     left = ""
 
@@ -224,64 +220,63 @@ def _carry_out(
                 at_work.remove(number)
             rows[numbers[number]] = tasks[number].folder, row
             left = f", {told_time(remaining.seconds(number, time.monotonic() - start))} left"
-            if row["status"] != DONE:
-                tell(one_line(f"{row['status']}: {tasks[number].log}: {row['reason']}"))
+            if row.status != DONE:
+                tell(one_line(f"{row.status}: {tasks[number].log}: {row.reason}"))
             show()
 
 
 def _summed_up(
     entries: Sequence[Entry],
-    found: Sequence[tuple[Path, Row]],
+    found: Sequence[tuple[Path, LogResult]],
+    done_before: int,
     patients: Mapping[str | None, tuple[Profile, Model | None]],
     recipe: Recipe,
     limit: int,
     out: Path,
-) -> dict[str, Any]:
+    begun: float,
+) -> BatchResult:
     root = out / "batch"
     vessels = [patients[entry.vessel][0].name for entry in entries]
-    rows = [
-        lines_of(entry, name, row, folder.name)
+    rows = tuple(
+        summary_row(entry, name, row, folder.name)
         for entry, name, (folder, row) in zip(entries, vessels, found, strict=True)
-    ]
-    counts = Counter(row["status"] for row in rows)
-    return {
-        "schema": SCHEMA,
-        "ferryid_version": __version__,
-        "counts": {"logs": len(rows), **{status: counts[status] for status in STATUSES}},
-        "recipe": {**recipe.plain(), "model": recipe.model},
-        "memory": {
-            "limit_bytes": limit,
-            "bounded": memory.can_be_bounded(),
-            "peak_bytes": max((row["peak_bytes"] for row in rows), default=0),
-        },
-        "folder": str(root),
-        "summary": str(root / "summary.parquet"),
-        "page": str(root / "index.html"),
-        "rows": rows,
-        "trends": trends_of(rows, {profile.name: profile for profile, _ in patients.values()}),
-    }
+    )
+    counts = Counter(row.status for row in rows)
+    return BatchResult(
+        schema=SCHEMA,
+        ferryid_version=__version__,
+        counts={"logs": len(rows), **{status: counts[status] for status in STATUSES}, "done_before": done_before},
+        recipe={**recipe.plain(), "model": recipe.model},
+        memory=MemoryUse(limit, memory.can_be_bounded(), max((row.peak_bytes for row in rows), default=0)),
+        folder=str(root),
+        summary=str(root / "summary.parquet"),
+        page=str(root / "index.html"),
+        rows=rows,
+        trends=trends_of(rows, {profile.name: profile for profile, _ in patients.values()}),
+        seconds=time.monotonic() - begun,
+    )
 
 
-def render_batch(result: Mapping[str, Any]) -> str:
+def render_batch(result: BatchResult) -> str:
     """Return a short account of a batch as text."""
-    counts = result["counts"]
+    counts = result.counts
     bad = [f"{counts[status]} {status}" for status in STATUSES if status != DONE and counts[status]]
     lines = [f"{counted(counts['logs'], 'log')}: {counts[DONE]} done{''.join(f', {one}' for one in bad)}"]
-    verdicts = Counter(row["diagnose"]["verdict"] for row in result["rows"] if row["diagnose"])
+    verdicts = Counter(row.diagnose.verdict for row in result.rows if row.diagnose)
     if verdicts:
         lines.append("  " + ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(verdicts.items())))
-    fits = [row["fit"] for row in result["rows"] if row["fit"]]
+    fits = [row.fit for row in result.rows if row.fit]
     if fits:
-        lines.append(f"  {sum(fit['accepted'] for fit in fits)} of {len(fits)} fits accepted")
-    judged = [row["evaluate"] for row in result["rows"] if row["evaluate"]]
-    ratios = [one["normalised_mse"] for one in judged if one["normalised_mse"] is not None]
+        lines.append(f"  {sum(fit.accepted for fit in fits)} of {len(fits)} fits accepted")
+    judged = [row.evaluate for row in result.rows if row.evaluate]
+    ratios = [one.normalised_mse for one in judged if one.normalised_mse is not None]
     if ratios:
         told = f"{median(ratios):.3f} of its base model's, median of {counted(len(ratios), 'log')}"
-        lines.append(f"  force MSE of {judged[0]['of']}: {told}")
-    lines += [f"  {trend['says']}" for trend in result["trends"] if trend["says"]]
-    peak = result["memory"]["peak_bytes"]
-    bound = f"at most {memory.told_bytes(result['memory']['limit_bytes'])} allowed"
-    held = bound if result["memory"]["bounded"] else "no bound: this system keeps none"
+        lines.append(f"  force MSE of {judged[0].evaluated}: {told}")
+    lines += [f"  {trend.sentence}" for trend in result.trends if trend.sentence]
+    peak = result.memory.peak_bytes
+    bound = f"at most {memory.told_bytes(result.memory.limit_bytes)} allowed"
+    held = bound if result.memory.bounded else "no bound: this system keeps none"
     lines.append(f"memory  {memory.told_bytes(peak)} for the largest log ({held} to a process)")
-    lines += [f"table   {result['summary']}", f"page    {result['page']}"]
+    lines += [f"table   {result.summary}", f"page    {result.page}"]
     return "\n".join(lines)

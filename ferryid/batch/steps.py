@@ -7,17 +7,18 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from ferryid.batch.log_result import StepSummary
 from ferryid.batch.recipe import Recipe
 from ferryid.compare import evaluate
 from ferryid.diagnose import DiagnosisSettings
-from ferryid.files import dump_json, write_text
+from ferryid.files import dump_json, finite, write_text
 from ferryid.identify import load_block_sums
 from ferryid.models import Model, blank_model
+from ferryid.report.batch_rows import BaseAndModel, DiagnosisSummary, EvaluationSummary, FindingSummary, FitSummary
 from ferryid.report.diagnosis_report import diagnose_and_report
 from ferryid.report.fit_report import fit_and_report
-from ferryid.types import RunContext, no_progress
+from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
 LONGEST_NAME = 80
@@ -55,6 +56,11 @@ class Job:
     tables: Path
     recorded: Path
 
+    @property
+    def context(self) -> RunContext:
+        """Results go to the folder, ingested tables to those that all logs share."""
+        return RunContext(self.folder, tables_out=self.tables)
+
     def below(self, path: str | Path) -> str:
         """Return a path relative to the folder."""
         return Path(os.path.relpath(path, self.folder)).as_posix()
@@ -65,70 +71,66 @@ class Job:
         return whole[: LONGEST_NAME - len(end)] + end
 
 
-def _fitted(job: Job) -> dict[str, Any]:
-    made = fit_and_report(
-        [job.log], job.profile, job.recipe.fit, RunContext(job.folder), name=job.model_name(), tables=job.tables
-    )
+def _fitted(job: Job) -> FitSummary:
+    made = fit_and_report([job.log], job.profile, job.recipe.fit, job.context, name=job.model_name())
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
     if job.recorded.exists():
         settings = job.recipe.fit.on(job.profile)
         load_block_sums(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
-    told, scores = made.json, made.json["scores"]
-    return {
-        "model": job.below(told["model"]["path"]),
-        "report": job.below(made.report),
-        "accepted": made.accepted,
-        "headline": told["headline"],
-        "warnings": list(told["warnings"]),
-        "normalised_mse": scores["normalised_mse"],
-        "per_axis": scores["per_axis"],
-        "mse": scores["mse"],
-    }
+    told, scores = made.json, finite(made.json["scores"])
+    return FitSummary(
+        model=job.below(told["model"]["path"]),
+        report=job.below(made.report),
+        accepted=made.accepted,
+        headline=told["headline"],
+        warnings=tuple(told["warnings"]),
+        normalised_mse=scores["normalised_mse"],
+        per_axis=scores["per_axis"],
+        mse=BaseAndModel.from_json(scores["mse"]),
+    )
 
 
-def _evaluated(job: Job) -> dict[str, Any]:
+def _evaluated(job: Job) -> EvaluationSummary:
     model = job.model or blank_model(job.profile, job.profile.name)
-    told = evaluate(model, [job.log], RunContext(job.tables), profile=job.profile)
+    told = evaluate(model, [job.log], job.context, profile=job.profile)
     write_text(job.folder / "evaluation.json", dump_json(told))
-    entry = told["logs"][0]
-    return {
-        "of": job.model.label if job.model else f"the hull of {job.profile.name}",
-        "result": "evaluation.json",
-        "normalised_mse": entry["normalised_mse"] if job.model else None,
-        "per_axis": entry["per_axis"] if job.model else {},
-        "mse": entry["mse"]["model"],
-        "warnings": entry["warnings"],
-    }
+    entry = finite(told["logs"][0])
+    return EvaluationSummary(
+        evaluated=job.model.label if job.model else f"the hull of {job.profile.name}",
+        file="evaluation.json",
+        normalised_mse=entry["normalised_mse"] if job.model else None,
+        per_axis=entry["per_axis"] if job.model else {},
+        mse=entry["mse"]["model"],
+        warnings=tuple(entry["warnings"]),
+    )
 
 
-def _diagnosed(job: Job) -> dict[str, Any]:
+def _diagnosed(job: Job) -> DiagnosisSummary:
     words = ["ferryid", "diagnose", job.log, *(["--vessel", job.vessel] if job.vessel else [])]
     words += [word for signal in job.recipe.withhold for word in ("--withhold", signal)]
     made = diagnose_and_report(
         [job.log],
         job.profile,
-        job.folder,
         DiagnosisSettings(model=job.model, withhold=job.recipe.withhold),
-        tables=job.tables,
+        job.context,
         name=job.model_name("-diagnosed"),
         command=[*words, *(["--model", job.recipe.model] if job.recipe.model else [])],
-        progress=no_progress,
     )
     told = made.json
-    return {
-        "report": job.below(made.report),
-        "model": None if told["model"] is None else job.below(told["model"]),
-        "verdict": told["verdict"],
-        "findings": [
-            {name: one[name] for name in ("effect", "instance", "probability", "parameters", "says")}
-            for one in told["findings"]
-        ],
-        "before": told["before"]["mse"],
-        "after": told["after"]["mse"],
-    }
+    kept = ("effect", "instance", "probability", "parameters", "says")
+    return DiagnosisSummary(
+        report=job.below(made.report),
+        model=None if told["model"] is None else job.below(told["model"]),
+        verdict=told["verdict"],
+        findings=tuple(
+            FindingSummary.from_json(finite({name: one[name] for name in kept})) for one in told["findings"]
+        ),
+        before=finite(told["before"]["mse"]),
+        after=finite(told["after"]["mse"]),
+    )
 
 
-CARRY_OUT: Mapping[str, Callable[[Job], dict[str, Any]]] = {
+CARRY_OUT: Mapping[str, Callable[[Job], StepSummary]] = {
     "fit": _fitted,
     "evaluate": _evaluated,
     "diagnose": _diagnosed,

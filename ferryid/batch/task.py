@@ -9,17 +9,19 @@ import time
 import traceback
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ferryid.batch import memory
-from ferryid.batch.kept import Row, clear, read_row, write_row
+from ferryid.batch.kept import clear, read_row, write_row
+from ferryid.batch.log_result import LogFile, LogResult
 from ferryid.batch.recipe import Recipe
 from ferryid.errors import FerryIdError, UnwritableError, one_line
-from ferryid.files import alone, finite, unwritable, write_text
+from ferryid.files import alone, unwritable, write_text
 
 if TYPE_CHECKING:
+    from ferryid.signals.data_quality import LostData
     from ferryid.signals.stream import Recording
     from ferryid.vessel.profile import Profile
 
@@ -42,7 +44,7 @@ class Task:
     log, name
         Absolute path, and name.
     files
-        As `ferryid.batch.logs.Entry.files` has them.
+        The log's.
     folder, tables
         For its results, and the output folder whose ``logs`` keep ingested tables; absolute.
     vessel
@@ -63,7 +65,7 @@ class Task:
 
     log: str
     name: str
-    files: list[list[Any]]
+    files: tuple[LogFile, ...]
     folder: Path
     tables: Path
     vessel: str
@@ -75,32 +77,31 @@ class Task:
     memory_bytes: int
     again: bool = False
 
-    def row(self, status: str, reason: str = "") -> Row:
+    def row(self, status: str, reason: str = "") -> LogResult:
         """Return a row without results."""
-        return {
-            "name": self.name,
-            "files": self.files,
-            "stamp": dict(self.stamp),
-            "status": status,
-            "reason": reason,
-            "sha256": None,
-            "start_ns": None,
-            "duration_s": None,
-            "lost": None,
-            "memory_bytes": self.memory_bytes,
-            "peak_bytes": 0,
-            "seconds": {},
-        }
+        return LogResult(
+            name=self.name,
+            files=self.files,
+            stamp=dict(self.stamp),
+            status=status,
+            reason=reason,
+            sha256=None,
+            start_ns=None,
+            duration_s=None,
+            memory_bytes=self.memory_bytes,
+            peak_bytes=0,
+            seconds={},
+        )
 
-    def stands(self, row: Row | None) -> bool:
+    def stands(self, row: LogResult | None) -> bool:
         """Return whether a row tells of this log as it is now, and nothing of it is to be tried again."""
-        if row is None or row["stamp"] != dict(self.stamp) or row["files"] != self.files:
+        if row is None or row.stamp != dict(self.stamp) or row.files != self.files:
             return False
-        more = row["status"] in (MEMORY, LOST) and self.memory_bytes > row["memory_bytes"]
-        return row["status"] == DONE or not (self.again or more)
+        more = row.status in (MEMORY, LOST) and self.memory_bytes > row.memory_bytes
+        return row.status == DONE or not (self.again or more)
 
 
-def work(task: Task) -> Row:
+def work(task: Task) -> LogResult:
     """Carry out a task, and return its row when all of it is on disk.
 
     Raises
@@ -120,7 +121,7 @@ def work(task: Task) -> Row:
         return row
 
 
-def lost(task: Task) -> Row:
+def lost(task: Task) -> LogResult:
     """Return the row of a log whose processes died."""
     reason = (
         "its process died, time and again: most likely of too little memory. "
@@ -133,25 +134,27 @@ def lost(task: Task) -> Row:
     return row
 
 
-def _row(task: Task) -> Row:
+def _row(task: Task) -> LogResult:
     memory.forget_peak()
     row = task.row(DONE)
     try:
         with warnings.catch_warnings(), memory.bounded(task.memory_bytes):
             # What NumPy cannot compute becomes NaN, and is told where it matters.
             warnings.simplefilter("ignore", RuntimeWarning)
-            _carry_out(task, row)
+            for so_far in _carry_out(task, row):
+                row = so_far
     except UnwritableError:
         raise
     except Exception as error:  # noqa: BLE001 - whatever one log shows is told in its row, and the others go on
-        row["status"], row["reason"] = _told(task, error)
-        if row["status"] == FAILED:
+        status, reason = _told(task, error)
+        row = replace(row, status=status, reason=reason)
+        if status == FAILED:
             write_text(task.folder / TRACEBACK, "".join(traceback.format_exception(error)))
-    row["peak_bytes"] = memory.peak_bytes()
-    return dict(finite(row))
+    return replace(row, peak_bytes=memory.peak_bytes())
 
 
-def _carry_out(task: Task, row: Row) -> None:
+def _carry_out(task: Task, row: LogResult) -> Iterator[LogResult]:
+    """Yield the row of a task each time that something is added to it, so that an error loses nothing."""
     from ferryid.batch.steps import CARRY_OUT, Job
     from ferryid.models import model_from_json
     from ferryid.signals.cache import folder_of
@@ -162,21 +165,23 @@ def _carry_out(task: Task, row: Row) -> None:
     model = None if task.model_text is None else model_from_json(json.loads(task.model_text), "the model of the recipe")
     begun = time.perf_counter()
     recording = record(task.log, profile, task.tables)
-    row |= {
-        "sha256": recording.sha256,
-        "start_ns": recording.start_ns,
-        "duration_s": (recording.end_ns - recording.start_ns) * 1e-9,
-        "lost": _lost(recording, profile),
-    }
-    row["seconds"]["read"] = time.perf_counter() - begun
+    row = replace(
+        row,
+        sha256=recording.sha256,
+        start_ns=recording.start_ns,
+        duration_s=(recording.end_ns - recording.start_ns) * 1e-9,
+        lost=_lost(recording, profile),
+    )
+    row = row.after("read", time.perf_counter() - begun)
+    yield row
     recorded = folder_of(task.tables, recording.name, recording.sha256, profile.sha256)
     del recording
     job = Job(task.log, task.name, task.vessel, profile, model, task.recipe, task.folder, task.tables, recorded)
     refused = {}
     for step in task.recipe.steps:
-        begun = time.perf_counter()
+        begun, found = time.perf_counter(), None
         try:
-            row[step] = CARRY_OUT[step](job)
+            found = CARRY_OUT[step](job)
         except UnwritableError:
             raise
         except FerryIdError as error:
@@ -185,25 +190,27 @@ def _carry_out(task: Task, row: Row) -> None:
                 raise
             # A log too short for a fit may well be evaluated.
             refused[step] = reason
-        row["seconds"][step] = time.perf_counter() - begun
+        row = row.after(step, time.perf_counter() - begun, found)
+        yield row
     if refused:
-        row["status"] = REFUSED if len(refused) == len(task.recipe.steps) else PARTLY
-        row["reason"] = "; ".join(f"{step}: {reason}" for step, reason in refused.items())
-        if len(set(refused.values())) == 1 and row["status"] == REFUSED:
-            row["reason"] = next(iter(refused.values()))
+        status = REFUSED if len(refused) == len(task.recipe.steps) else PARTLY
+        reason = "; ".join(f"{step}: {reason}" for step, reason in refused.items())
+        if len(set(refused.values())) == 1 and status == REFUSED:
+            reason = next(iter(refused.values()))
+        yield replace(row, status=status, reason=reason)
 
 
-def _lost(recording: Recording, profile: Profile) -> dict[str, Any]:
+def _lost(recording: Recording, profile: Profile) -> LostData:
     """Return what of a log could not be read, and which rows no step uses; of one that is refused only the first."""
-    from ferryid.signals.data_quality import lost_plain
+    from ferryid.signals.data_quality import LostData
     from ferryid.signals.prepare import track_of
 
     try:
         measured = track_of(recording, profile).measured
     except FerryIdError:
-        return lost_plain(recording.losses, (), 0)
+        return LostData.of(recording.losses, (), 0)
     rows = sum(one.rows for one in measured.left_out)
-    return lost_plain(recording.losses, measured.left_out, rows + int(measured.usable.sum()))
+    return LostData.of(recording.losses, measured.left_out, rows + int(measured.usable.sum()))
 
 
 def _told(task: Task, error: Exception) -> tuple[str, str]:

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import Any
+from math import nan
 
 import numpy as np
 
-from ferryid.batch.summary import found_in, parameters_of
+from ferryid.batch.summary import parameters_of
 from ferryid.counts import counted, verb
 from ferryid.diagnose import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
+from ferryid.report.batch_rows import FindingSummary, Key, SummaryRow, Trend, TrendLog, TrendPoint
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -31,7 +32,7 @@ WITH_THE_REST = {"gusts": ("time_constant",), "waves": ("time_constant", "peak_f
 """Parameters without a meaning where the effect is absent, beside those of effects that say so themselves."""
 
 
-def trends_of(rows: Sequence[Mapping[str, Any]], profiles: Mapping[str, Profile]) -> list[dict[str, Any]]:
+def trends_of(rows: Sequence[SummaryRow], profiles: Mapping[str, Profile]) -> tuple[Trend, ...]:
     """Return every parameter of every effect that was found, over the logs of its vessel.
 
     Hints count as well: what is doubtful in each of many logs, and yet moves with their dates, is so less.
@@ -39,72 +40,73 @@ def trends_of(rows: Sequence[Mapping[str, Any]], profiles: Mapping[str, Profile]
     Parameters
     ----------
     rows
-        As `ferryid.batch.summary.lines_of` gives them.
+        Of all logs.
     profiles
         By the names of the vessels.
 
     Returns
     -------
-    list
-        One entry a vessel and parameter: ``points``, what was found, by date where all logs have one, else in the order of the
-        logs; ``absent``, logs whose diagnosis did not find it; ``kind``, ``change`` and ``says``, the trend if there is one.
+    tuple
+        One entry a vessel and parameter: by date where all logs of the vessel have one, else in the order of the logs.
     """
     found = []
     for vessel, profile in profiles.items():
-        own = [row for row in rows if row["vessel"] == vessel and row["diagnose"]]
-        dated = bool(own) and all(row["date"] for row in own)
+        own = [row for row in rows if row.vessel == vessel and row.diagnose]
+        dated = bool(own) and all(row.date for row in own)
         if dated:
-            own.sort(key=lambda row: datetime.fromisoformat(row["date"]))
+            own.sort(key=lambda row: datetime.fromisoformat(row.date or ""))
         for key, name in parameters_of(own).values():
-            several = [found_in(row, key) for row in own]
+            several = [row.finding(key) for row in own]
             if name not in NO_TREND:
                 found.append(_trend(vessel, profile, own, several, key, name, dated))
-    return found
+    return tuple(found)
 
 
 def _trend(
     vessel: str,
     profile: Profile,
-    rows: Sequence[Mapping[str, Any]],
-    several: Sequence[Any],
-    key: tuple[str, str | None],
+    rows: Sequence[SummaryRow],
+    several: Sequence[FindingSummary | None],
+    key: Key,
     name: str,
     dated: bool,
-) -> dict[str, Any]:
+) -> Trend:
     effect = effects().get(key[0])
     title = titled(effect.title if effect else key[0].replace("_", " ").capitalize(), key[1])
     neutral = _neutral(profile, key[0], name)
     points, absent, seen = [], [], []
     for place, (row, one) in enumerate(zip(rows, several, strict=True)):
-        where = {"log": row["name"], "date": row["date"], "place": place}
-        if one is not None and name in one["parameters"]:
-            points.append({**where, **one["parameters"][name], "probability": one["probability"]})
-            seen.append((place, one["parameters"][name]["value"]))
-        elif one is None and row["diagnose"]["verdict"] != "not_testable":
-            absent.append(where)
+        if one is not None and name in one.parameters:
+            found = one.parameters[name]
+            points.append(
+                TrendPoint(row.name, row.date, place, found.value, found.low, found.high, found.unit, one.probability)
+            )
+            seen.append((place, found.value))
+        elif one is None and row.diagnose is not None and row.diagnose.verdict != "not_testable":
+            absent.append(TrendLog(row.name, row.date, place))
             if neutral is not None:
                 seen.append((place, neutral))
     places = [place for place, _ in seen]
-    kind, change = trend([value for _, value in seen])
-    unit = points[0]["unit"]
-    hints = sum(point["probability"] <= JUDGING.hint_probability for point in points)
+    kind, change = trend([nan if value is None else value for _, value in seen])
+    unit = points[0].unit
+    hints = sum(point.probability <= JUDGING.hint_probability for point in points)
     doubt = f" ({hints} of {counted(len(points), 'finding')} {verb(hints, 'is')} hints)" if hints else ""
     what = f"{vessel}: {title}, {name.replace('_', ' ')}"
-    return {
-        "vessel": vessel,
-        "effect": key[0],
-        "instance": key[1],
-        "parameter": name,
-        "title": title,
-        "unit": unit,
-        "neutral": neutral,
-        "dated": dated,
-        "points": points,
-        "absent": absent,
-        "kind": kind,
-        "change": change,
-        "says": f"{_says(what, unit, kind, change, [rows[k] for k in places])}{doubt}" if kind else "",
-    }
+    return Trend(
+        vessel=vessel,
+        effect=key[0],
+        instance=key[1],
+        parameter=name,
+        title=title,
+        unit=unit,
+        neutral=neutral,
+        dated=dated,
+        points=tuple(points),
+        absent=tuple(absent),
+        kind=kind,
+        change=change,
+        sentence=f"{_sentence(what, unit, kind, change, [rows[k] for k in places])}{doubt}" if kind else "",
+    )
 
 
 def _neutral(profile: Profile, effect: str, name: str) -> float | None:
@@ -169,7 +171,7 @@ def _ranks(y: Floats) -> Floats:
     return np.asarray((ends - 0.5 * (counts - 1))[place])
 
 
-def _says(what: str, unit: str, kind: str, change: Mapping[str, float], rows: Sequence[Mapping[str, Any]]) -> str:
+def _sentence(what: str, unit: str, kind: str, change: Mapping[str, float], rows: Sequence[SummaryRow]) -> str:
     unit = "" if unit == "-" else f" {unit}"
     before, after = (f"{change[end]:.3g}{unit}" for end in ("before", "after"))
     if kind == "steps":
@@ -178,5 +180,5 @@ def _says(what: str, unit: str, kind: str, change: Mapping[str, float], rows: Se
     return f"{what} {kind} from {before} to {after} (first and last third), {_when(rows[0])} to {_when(rows[-1])}"
 
 
-def _when(row: Mapping[str, Any]) -> str:
-    return str(row["date"])[:10] if row["date"] else str(row["name"])
+def _when(row: SummaryRow) -> str:
+    return row.date[:10] if row.date else row.name

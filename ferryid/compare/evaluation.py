@@ -58,7 +58,7 @@ def evaluate(
         prepared = prepare(
             path,
             profile,
-            run.out,
+            run.tables,
             window_s=window,
             smoother=smoother,
             rate_hz=model.settings.get("rate_hz"),

@@ -9,10 +9,8 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
-from ferryid.types import AXES
 
 __all__ = [
-    "AXES",
     "JUDGING",
     "SCHEMA",
     "UNKNOWN",

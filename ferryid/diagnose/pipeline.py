@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from ferryid.diagnose.checks.screening import screen_sensors
 from ferryid.diagnose.data.measurements import measure_log
@@ -19,12 +18,13 @@ from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
 from ferryid.models.store import check_name
+from ferryid.types import RunContext
 from ferryid.vessel.profile import Profile
 
 
 @dataclass(frozen=True)
 class DiagnosisSettings:
-    """What logs are compared with, and how they are read.
+    """What logs are compared with, and which signals are hidden.
 
     Attributes
     ----------
@@ -36,15 +36,12 @@ class DiagnosisSettings:
         Fit one hull to all logs first, and diagnose each with what the others say of it.
     withhold
         Signals to hide from the diagnosis.
-    verify
-        Check every checksum.
     """
 
     model: Model | None = None
     against: str | None = None
     together: bool = False
     withhold: tuple[str, ...] = ()
-    verify: bool = False
 
     def check(self) -> None:
         """Refuse two things to compare with at once."""
@@ -63,11 +60,9 @@ class DiagnosisSettings:
 def diagnose_campaign(
     logs: Sequence[str],
     profile: Profile,
-    tables: Path | None,
     baseline: Baseline | None,
     settings: DiagnosisSettings,
-    *,
-    progress: Callable[[str], None],
+    run: RunContext,
 ) -> tuple[Diagnosis, ...]:
     """Diagnose the logs of a campaign; one log is a campaign of one.
 
@@ -77,86 +72,76 @@ def diagnose_campaign(
         Paths; parts of one recording joined by ``+``.
     profile
         The vessel.
-    tables
-        Output folder, whose ``logs`` keep the ingested tables; None keeps none.
     baseline
         What the logs are compared with; None for one hull that is fitted to all of them.
     settings
-        Which signals are hidden, and whether checksums are checked.
-    progress
-        Called with the name of each stage.
+        Which signals are hidden.
+    run
+        Folder of the ingested tables, progress, and whether to check every checksum of the logs.
 
     Raises
     ------
     FerryIdError
         For logs that cannot be used, and for fewer than two where a hull is to be fitted to all.
     """
-    hidden, verify = settings.withhold, settings.verify
-    measured = [measure_log(log, profile, tables, withhold=hidden, verify=verify, progress=progress) for log in logs]
-    screened = [screen_sensors(log, progress) for log in measured]
+    measured = [measure_log(log, profile, run, withhold=settings.withhold) for log in logs]
+    screened = [screen_sensors(log, run.progress) for log in measured]
     averaged = [average(log) for log in screened]
     if baseline is None:
-        baseline = CampaignBaseline(profile, fit_campaign(averaged, profile, progress))
+        baseline = CampaignBaseline(profile, fit_campaign(averaged, profile, run.progress))
     estimated = [estimate(log, baseline) for log in averaged if log.long_enough]
-    selected = [select(log, progress) for log in estimated]
-    judged = judge(selected, progress)
+    selected = [select(log, run.progress) for log in estimated]
+    judged = judge(selected, run.progress)
     return conclude(averaged, judged, baseline)
 
 
 def diagnose(
     logs: Sequence[str],
     profile: Profile,
-    tables: Path | None,
-    settings: DiagnosisSettings | None = None,
-    *,
-    progress: Callable[[str], None],
+    settings: DiagnosisSettings,
+    run: RunContext,
 ) -> tuple[Diagnosis, ...]:
     """Diagnose logs of one vessel, each as a campaign of its own, or all together.
 
     Parameters
     ----------
-    logs, profile, tables, progress
+    logs, profile, run
         As of `diagnose_campaign`.
     settings
-        What the logs are compared with; the profile's hull where None.
+        What the logs are compared with, and which signals are hidden.
 
     Raises
     ------
     FerryIdError
         For input that cannot be used.
     """
-    chosen = settings or DiagnosisSettings()
-    chosen.check()
-    baseline: Baseline | None = None if chosen.together else HullBaseline(profile, chosen.model)
-    if chosen.against is not None:
-        baseline = SimulationBaseline(
-            learn_simulation(chosen.against, profile, tables, verify=chosen.verify, progress=progress)
-        )
+    settings.check()
+    baseline: Baseline | None = None if settings.together else HullBaseline(profile, settings.model)
+    if settings.against is not None:
+        baseline = SimulationBaseline(learn_simulation(settings.against, profile, run))
     return tuple(
         diagnosis
-        for campaign in ([logs] if chosen.together else [[log] for log in logs])
-        for diagnosis in diagnose_campaign(campaign, profile, tables, baseline, chosen, progress=progress)
+        for campaign in ([logs] if settings.together else [[log] for log in logs])
+        for diagnosis in diagnose_campaign(campaign, profile, baseline, settings, run)
     )
 
 
 def diagnose_and_store(
     logs: Sequence[str],
     profile: Profile,
-    out: Path,
-    settings: DiagnosisSettings | None = None,
+    settings: DiagnosisSettings,
+    run: RunContext,
     *,
-    tables: Path | None,
     name: str = "",
-    progress: Callable[[str], None],
 ) -> tuple[Diagnosis, ...]:
     """Diagnose logs and store the model that the findings lead to.
 
     Parameters
     ----------
-    logs, profile, settings, tables, progress
+    logs, profile, settings
         As of `diagnose`.
-    out
-        Output folder, whose ``models`` keep the model.
+    run
+        Output folder, whose ``models`` keep the model; else as of `diagnose`.
     name
         Name of the model; that of the examined model, else the vessel's, where empty.
 
@@ -165,8 +150,7 @@ def diagnose_and_store(
     FerryIdError
         For input that cannot be used, a name that a model cannot have, and a folder that cannot be written.
     """
-    chosen = settings or DiagnosisSettings()
     if name:
         check_name(name)
-    found = diagnose(logs, profile, tables, chosen, progress=progress)
-    return store_updated_model(found, profile, chosen.model, out, name=name)
+    found = diagnose(logs, profile, settings, run)
+    return store_updated_model(found, profile, settings.model, run.out, name=name)

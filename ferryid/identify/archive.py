@@ -259,7 +259,7 @@ def fit_archive(
     if settings.split == "every-kth":
         raise FerryIdError("--split every-kth: an archive keeps blocks, no rows. Fix: give blocks or logs")
     windows_s = settings.windows_s or (settings.window_s,)
-    where = archived_folders(run.out, profile, names)
+    where = archived_folders(run.tables or run.out, profile, names)
     sums = _Sums(len(windows_s), len(where), by_logs=settings.split == "logs")
     functions = _add_logs(where, profile, settings, windows_s, sums.add, run.progress)
     check_components(settings.components, functions)
@@ -290,7 +290,7 @@ def archive_folds(
     folds: int,
 ) -> tuple[Basis, Flags, dict[str, Folds], list[dict[str, Any]]]:
     """Return what a sweep needs of an archive: basis, axes without force, folds by stretches and whole logs, and the logs."""
-    where = archived_folders(run.out, profile, names)
+    where = archived_folders(run.tables or run.out, profile, names)
     by = {"blocks": FoldSums(len(windows_s), folds)}
     if len(where) > 1:
         by["logs"] = FoldSums(len(windows_s), len(where), whole=True)

@@ -22,6 +22,6 @@ def read_logs(paths: Sequence[str], profile: Profile, settings: FitSettings, run
     opened = []
     for path in paths:
         run.progress(f"reading {Path(path).name}")
-        opened.append(open_track(path, profile, run.out, rate_hz=settings.rate_hz, verify=run.verify))
+        opened.append(open_track(path, profile, run.tables, rate_hz=settings.rate_hz, verify=run.verify))
     refuse_twice(opened)
     return opened

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -13,41 +13,48 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MaxNLocator
 
 from ferryid.diagnose import JUDGING
+from ferryid.report.batch_rows import ByAxis, SummaryRow, Trend, TrendPoint
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, UNITS, canvas, svg_text
 from ferryid.types import AXES
 
 PANEL = 1.35
 """Height of a panel [inches]."""
 ABSENT = "#9a9a9a"
+ERRORS: tuple[tuple[str, str, str, Callable[[SummaryRow], ByAxis]], ...] = (
+    ("base model", "o", BASE, lambda row: row.fit.mse.base if row.fit else {}),
+    ("fit to the log", "o", NEW, lambda row: row.fit.mse.model if row.fit else {}),
+    ("evaluated, whole log", "x", MEASURED, lambda row: row.evaluate.mse if row.evaluate else {}),
+)
+"""Label, marker and colour of what is drawn of a row, and its mean square errors."""
 
 
-def findings(trends: Sequence[Mapping[str, Any]]) -> str:
+def findings(trends: Sequence[Trend]) -> str:
     """Return the parameters of one effect, a panel each: values with 95 % intervals over the dates of their logs.
 
     Parameters
     ----------
     trends
-        As `ferryid.batch.trend.trends_of` gives them, of one vessel and effect.
+        Of one vessel and effect.
     """
     with mpl.rc_context(STYLE):
         figure, every = canvas(len(trends), 1.0 + PANEL * len(trends))
-        dated = bool(trends[0]["dated"])
+        dated = trends[0].dated
         for ax, one in zip(every, trends, strict=True):
-            sure = [point for point in one["points"] if point["probability"] > JUDGING.hint_probability]
-            hints = [point for point in one["points"] if point["probability"] <= JUDGING.hint_probability]
+            sure = [point for point in one.points if point.probability > JUDGING.hint_probability]
+            hints = [point for point in one.points if point.probability <= JUDGING.hint_probability]
             _points(ax, sure, dated, "found", NEW)
             _points(ax, hints, dated, "a hint", "white")
-            if one["neutral"] is not None:
-                x = [_x(where, dated) for where in one["absent"]]
-                ax.plot(x, [one["neutral"]] * len(x), "|", color=ABSENT, markersize=7, label="not found")
-            unit = "" if one["unit"] == "-" else f" [{one['unit']}]"
-            ax.set_ylabel(f"{one['parameter'].replace('_', ' ')}{unit}")
+            if one.neutral is not None:
+                x = [_x(where.date, where.place, dated) for where in one.absent]
+                ax.plot(x, [one.neutral] * len(x), "|", color=ABSENT, markersize=7, label="not found")
+            unit = "" if one.unit == "-" else f" [{one.unit}]"
+            ax.set_ylabel(f"{one.parameter.replace('_', ' ')}{unit}")
         _horizontal(every, dated)
         _legend(figure, every)
         return svg_text(figure)
 
 
-def errors(rows: Sequence[Mapping[str, Any]], dated: bool) -> str:
+def errors(rows: Sequence[SummaryRow], dated: bool) -> str:
     """Return the root-mean-square force errors on each axis over the dates of their logs.
 
     Parameters
@@ -60,15 +67,9 @@ def errors(rows: Sequence[Mapping[str, Any]], dated: bool) -> str:
     with mpl.rc_context(STYLE):
         figure, every = canvas(len(AXES), 1.0 + PANEL * len(AXES))
         for ax, axis, unit in zip(every, AXES, UNITS, strict=True):
-            for label, mark, colour, path in (
-                ("base model", "o", BASE, ("fit", "mse", "base")),
-                ("fit to the log", "o", NEW, ("fit", "mse", "model")),
-                ("evaluated, whole log", "x", MEASURED, ("evaluate", "mse")),
-            ):
-                found = [
-                    (_x({**row, "place": place}, dated), _error(row, path, axis)) for place, row in enumerate(rows)
-                ]
-                known = [(x, y) for x, y in found if y is not None]
+            for label, mark, colour, mse in ERRORS:
+                found = [(_x(row.date, place, dated), mse(row).get(axis)) for place, row in enumerate(rows)]
+                known = [(x, y**0.5) for x, y in found if y is not None]
                 if known:
                     ax.plot(
                         [x for x, _ in known],
@@ -88,22 +89,15 @@ def errors(rows: Sequence[Mapping[str, Any]], dated: bool) -> str:
         return svg_text(figure)
 
 
-def _error(row: Mapping[str, Any], path: Sequence[str], axis: str) -> float | None:
-    value: Any = row
-    for name in (*path, axis):
-        value = None if value is None else value.get(name)
-    return None if value is None else float(value) ** 0.5
-
-
-def _points(ax: Axes, points: Sequence[Mapping[str, Any]], dated: bool, label: str, face: str) -> None:
+def _points(ax: Axes, points: Sequence[TrendPoint], dated: bool, label: str, face: str) -> None:
     if not points:
         return
     value, low, high = (
-        np.array([np.nan if point[name] is None else point[name] for point in points], dtype=np.float64)
-        for name in ("value", "low", "high")
+        np.array([np.nan if one is None else one for one in each], dtype=np.float64)
+        for each in zip(*((point.value, point.low, point.high) for point in points), strict=True)
     )
     ax.errorbar(
-        [_x(point, dated) for point in points],
+        [_x(point.date, point.place, dated) for point in points],
         value,
         yerr=np.maximum(np.vstack([value - low, high - value]), 0.0),
         fmt="o",
@@ -115,8 +109,8 @@ def _points(ax: Axes, points: Sequence[Mapping[str, Any]], dated: bool, label: s
     )
 
 
-def _x(where: Mapping[str, Any], dated: bool) -> Any:
-    return datetime.fromisoformat(where["date"]) if dated else where["place"] + 1
+def _x(date: str | None, place: int, dated: bool) -> Any:
+    return datetime.fromisoformat(date) if dated and date else place + 1
 
 
 def _horizontal(every: Sequence[Axes], dated: bool) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import groupby
 from os.path import commonpath
@@ -14,8 +15,10 @@ from urllib.parse import quote
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING
 from ferryid.report import batch_figures
+from ferryid.report.batch_rows import BatchResult, EvaluationSummary, FindingSummary, SummaryRow, Trend
 from ferryid.report.diagnosis_words import title
 from ferryid.report.html import template
+from ferryid.signals.data_quality import LostData
 from ferryid.types import AXES
 
 WORDS = {
@@ -30,41 +33,99 @@ FEWEST_DRAWN = 2
 """Logs with a finding below which it is not drawn over dates."""
 
 
-def render(result: Mapping[str, Any]) -> str:
-    """Return the page as HTML.
+@dataclass(frozen=True)
+class Lost:
+    """What of a log was lost and what is left out, both short, all sentences, and seconds of both to sort by."""
 
-    Parameters
-    ----------
-    result
-        Schema ``ferryid.batch/1``.
-    """
-    rows = [_row(row) for row in result["rows"]]
-    # What could not be read may lie anywhere, and keeps the path that was given.
-    root = _common([row["log"] for row in rows if not row["bare"]])
-    for row in rows:
-        row["path"] = row["log"].removeprefix(root)
-    counts, memory = result["counts"], result["memory"]
+    messages: str = ""
+    left_out: str = ""
+    sentences: tuple[str, ...] = ()
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class NamedFinding:
+    """The name of a finding, and what is said of it."""
+
+    name: str
+    sentences: str
+
+
+@dataclass(frozen=True)
+class MeanError:
+    """Root-mean-square errors of an evaluation by axis, and its squared error over the base model's where that is another."""
+
+    rms: tuple[float | None, ...]
+    ratio: float | None
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """A row of the table of logs, as the template shows it; ``bare`` without results."""
+
+    log: str
+    name: str
+    status: str
+    reason: str
+    vessel: str
+    note: str
+    date: str
+    time: str
+    minutes: float | None
+    verdict: str
+    found: tuple[NamedFinding, ...]
+    perhaps: tuple[NamedFinding, ...]
+    effects: tuple[str, ...]
+    fit: str
+    fit_mse: float | None
+    warnings: tuple[str, ...]
+    lost: Lost
+    evaluated: MeanError | None
+    links: tuple[tuple[str, str], ...]
+    bare: bool
+    seconds: float
+    peak_bytes: int
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure with its title and caption."""
+
+    title: str
+    svg: str
+    caption: str
+
+
+def render(result: BatchResult) -> str:
+    """Return the page as HTML."""
+    rows = [_row(row) for row in result.rows]
+    counts = result.counts
     return template("batch.html").render(
         rows=rows,
-        root=root,
-        made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, ferryid {result['ferryid_version']}",
+        # What could not be read may lie anywhere, and keeps the path that was given.
+        root=_common([row.log for row in rows if not row.bare]),
+        made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, ferryid {result.ferryid_version}",
         headline=_headline(counts),
         counts=[(WORDS[name], counts[name]) for name in WORDS if counts[name] and counts["logs"] != counts[name]],
-        verdicts=sorted(Counter(row["verdict"] for row in rows if row["verdict"]).items()),
-        accepted=Counter(row["fit"] for row in rows if row["fit"]),
-        trends=[trend["says"] for trend in result["trends"] if trend["says"]],
-        figures=[*_findings(result["trends"]), *_errors(result["rows"])],
-        choices={name: sorted({row[name] for row in rows if row[name]}) for name in ("vessel", "status", "verdict")},
-        effects=sorted({effect for row in rows for effect in row["effects"]}),
-        dated=any(row["date"] for row in rows),
-        vessels=sorted({row["vessel"] for row in rows}),
-        noted=any(row["note"] for row in rows),
-        steps=[step for step in ("fit", "evaluate", "diagnose") if step in result["recipe"]["steps"]],
+        verdicts=sorted(Counter(row.verdict for row in rows if row.verdict).items()),
+        accepted=Counter(row.fit for row in rows if row.fit),
+        trends=[trend.sentence for trend in result.trends if trend.sentence],
+        figures=[*_findings(result.trends), *_errors(result.rows)],
+        choices={
+            "vessel": sorted({row.vessel for row in rows if row.vessel}),
+            "status": sorted({row.status for row in rows if row.status}),
+            "verdict": sorted({row.verdict for row in rows if row.verdict}),
+        },
+        effects=sorted({effect for row in rows for effect in row.effects}),
+        dated=any(row.date for row in rows),
+        vessels=sorted({row.vessel for row in rows}),
+        noted=any(row.note for row in rows),
+        steps=[step for step in ("fit", "evaluate", "diagnose") if step in result.recipe["steps"]],
         model=_examined(result),
-        columns=_columns(result["recipe"]),
-        memory=memory,
+        columns=_columns(result.recipe),
+        memory=result.memory,
         gigabyte=1 << 30,
-        took=sum(row["seconds"] for row in rows),
+        took=sum(row.seconds for row in rows),
     )
 
 
@@ -74,10 +135,11 @@ def _columns(recipe: Mapping[str, Any]) -> int:
     return 2 * ("diagnose" in steps) + 2 * ("fit" in steps) + (1 + bool(recipe["model"])) * ("evaluate" in steps)
 
 
-def _examined(result: Mapping[str, Any]) -> str:
+def _examined(result: BatchResult) -> str:
     """Return the name of the model that logs were evaluated against, empty for the hull of the profile."""
-    names = [row["evaluate"]["of"] for row in result["rows"] if row["evaluate"]]
-    return "" if not result["recipe"]["model"] else next(iter(names), result["recipe"]["model"])
+    names = [row.evaluate.evaluated for row in result.rows if row.evaluate]
+    model = str(result.recipe["model"])
+    return next(iter(names), model) if model else ""
 
 
 def _common(logs: Sequence[str]) -> str:
@@ -96,120 +158,114 @@ def _headline(counts: Mapping[str, int]) -> str:
     return f"{logs}, all done" if counts["logs"] == counts["done"] else f"{logs}, {counts['done']} done"
 
 
-def _row(row: Mapping[str, Any]) -> dict[str, Any]:
-    fit, evaluation, diagnosis = row["fit"], row["evaluate"], row["diagnose"]
-    findings = diagnosis["findings"] if diagnosis else []
-    sure = [one for one in findings if one["probability"] > JUDGING.hint_probability]
+def _row(row: SummaryRow) -> TableRow:
+    fit, evaluation, diagnosis = row.fit, row.evaluate, row.diagnose
+    sure = [one for one in row.findings if one.probability > JUDGING.hint_probability]
     links = [
-        (name, quote(f"{row['folder']}/{made[key]}"))
-        for name, made, key in (
-            ("fit", fit, "report"),
-            ("diagnosis", diagnosis, "report"),
-            ("evaluation", evaluation, "result"),
-        )
-        if made
+        *([("fit", fit.report)] if fit else []),
+        *([("diagnosis", diagnosis.report)] if diagnosis else []),
+        *([("evaluation", evaluation.file)] if evaluation else []),
+        *([("traceback", "traceback.txt")] if row.status == "failed" else []),
     ]
-    if row["status"] == "failed":
-        links.append(("traceback", quote(f"{row['folder']}/traceback.txt")))
-    return {
-        **{name: row[name] for name in ("log", "name", "status", "reason", "vessel", "note")},
-        "date": (row["date"] or "")[:10],
-        "time": _time(row),
-        "minutes": None if row["duration_s"] is None else row["duration_s"] / 60.0,
-        "verdict": (diagnosis["verdict"] if diagnosis else "").replace("_", " "),
-        "found": _named(sure),
-        "perhaps": _named([one for one in findings if one not in sure]),
-        "effects": list(dict.fromkeys(title(one["effect"]) for one in findings)),
-        "fit": "" if fit is None else "accepted" if fit["accepted"] else "not accepted",
-        "fit_mse": None if fit is None else fit["normalised_mse"],
-        "warnings": list(dict.fromkeys(said for made in (fit, evaluation) if made for said in made["warnings"])),
-        "lost": _lost(row.get("lost")),
-        "evaluated": None if evaluation is None else _mean_error(evaluation),
-        "links": links,
-        "bare": not (fit or evaluation or diagnosis),
-        "seconds": sum(row["seconds"].values()),
-        "peak": row["peak_bytes"],
-    }
+    return TableRow(
+        log=row.log,
+        name=row.name,
+        status=row.status,
+        reason=row.reason,
+        vessel=row.vessel,
+        note=row.note,
+        date=(row.date or "")[:10],
+        time=_time(row),
+        minutes=None if row.duration_s is None else row.duration_s / 60.0,
+        verdict=(diagnosis.verdict if diagnosis else "").replace("_", " "),
+        found=_named(sure),
+        perhaps=_named([one for one in row.findings if one not in sure]),
+        effects=tuple(dict.fromkeys(title(one.effect) for one in row.findings)),
+        fit="" if fit is None else "accepted" if fit.accepted else "not accepted",
+        fit_mse=None if fit is None else fit.normalised_mse,
+        warnings=tuple(dict.fromkeys(said for made in (fit, evaluation) if made for said in made.warnings)),
+        lost=_lost(row.lost),
+        evaluated=None if evaluation is None else _mean_error(evaluation),
+        links=tuple((name, quote(f"{row.folder}/{file}")) for name, file in links),
+        bare=not (fit or evaluation or diagnosis),
+        seconds=row.work_s,
+        peak_bytes=row.peak_bytes,
+    )
 
 
-def _lost(lost: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return what a log lost, what of it is left out, both short, all sentences, and seconds of both to sort by."""
+def _lost(lost: LostData | None) -> Lost:
     if lost is None:
-        return {"messages": "", "left_out": "", "says": [], "seconds": None}
-    parts = [counted(lost["messages"], "message")] if lost["messages"] else ["unknown"] if lost["unknown"] else []
-    parts += [f"{lost['seconds']:.1f} s"] if lost["seconds"] else []
-    return {
-        "messages": ", ".join(parts) + (" or more" if lost["unknown"] and lost["messages"] else ""),
-        "left_out": f"{lost['seconds_left_out']:.1f} s left out" if lost["rows_left_out"] else "",
-        "says": lost["says"],
-        "seconds": lost["seconds"] + lost["seconds_left_out"],
-    }
+        return Lost()
+    parts = [counted(lost.messages, "message")] if lost.messages else ["unknown"] if lost.unknown else []
+    parts += [f"{lost.seconds:.1f} s"] if lost.seconds else []
+    return Lost(
+        messages=", ".join(parts) + (" or more" if lost.unknown and lost.messages else ""),
+        left_out=f"{lost.seconds_left_out:.1f} s left out" if lost.rows_left_out else "",
+        sentences=lost.sentences,
+        seconds=lost.seconds + lost.seconds_left_out,
+    )
 
 
-def _time(row: Mapping[str, Any]) -> str:
+def _time(row: SummaryRow) -> str:
     """Return when a log begins; of a manifest that gives the day, no more than the day."""
-    time = (row["date"] or "")[:16].replace("T", " ")
-    return time.removesuffix(" 00:00") if row["date_from"] == "manifest" else time
+    time = (row.date or "")[:16].replace("T", " ")
+    return time.removesuffix(" 00:00") if row.date_from == "manifest" else time
 
 
-def _named(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
+def _named(findings: Sequence[FindingSummary]) -> tuple[NamedFinding, ...]:
     """Return names, each once, and what is said of them."""
-    told: dict[str, list[str]] = {}
+    sentences: dict[str, list[str]] = {}
     for one in findings:
-        name = title(one["effect"], one["instance"])
-        told.setdefault(name[:1].lower() + name[1:], []).append(one["says"])
-    return [{"name": name, "says": " ".join(says)} for name, says in told.items()]
+        name = title(one.effect, one.instance)
+        sentences.setdefault(name[:1].lower() + name[1:], []).append(one.sentence)
+    return tuple(NamedFinding(name, " ".join(several)) for name, several in sentences.items())
 
 
-def _mean_error(evaluation: Mapping[str, Any]) -> dict[str, Any]:
-    """Return root-mean-square errors of an evaluation, and its squared error over the base model's where that is another."""
-    mse = evaluation["mse"]
-    return {
-        "rms": [None if mse[axis] is None else mse[axis] ** 0.5 for axis in AXES],
-        "ratio": evaluation["normalised_mse"],
-    }
+def _mean_error(evaluation: EvaluationSummary) -> MeanError:
+    mse = [evaluation.mse[axis] for axis in AXES]
+    return MeanError(tuple(None if one is None else one**0.5 for one in mse), evaluation.normalised_mse)
 
 
-def _findings(trends: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
+def _findings(trends: Sequence[Trend]) -> list[Figure]:
     shown = []
-    for (vessel, head), group in groupby(trends, lambda one: (one["vessel"], one["title"])):
-        every = [one for one in group if len(one["points"]) >= FEWEST_DRAWN]
+    for (vessel, head), group in groupby(trends, lambda one: (one.vessel, one.title)):
+        every = [one for one in group if len(one.points) >= FEWEST_DRAWN]
         if not every:
             continue
-        logs = {point["log"] for one in every for point in one["points"]}
-        order = "" if every[0]["dated"] else " Not all logs have a date, so that they stand in their order."
+        logs = {point.log for one in every for point in one.points}
+        order = "" if every[0].dated else " Not all logs have a date, so that they stand in their order."
         shown.append(
-            {
-                "title": f"{head}, {vessel}",
-                "svg": batch_figures.findings(every),
-                "caption": f"{head} in {counted(len(logs), 'log')}, with their 95 % intervals. Hollow: a "
-                "hint, less likely than not. "
+            Figure(
+                f"{head}, {vessel}",
+                batch_figures.findings(every),
+                f"{head} in {counted(len(logs), 'log')}, with their 95 % intervals. Hollow: a hint, less likely than not. "
                 f"Grey: logs whose diagnosis did not find it.{order}",
-            }
+            )
         )
     return shown
 
 
-def _errors(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
+def _errors(rows: Sequence[SummaryRow]) -> list[Figure]:
     shown = []
-    for vessel in dict.fromkeys(row["vessel"] for row in rows):
-        own = [row for row in rows if row["vessel"] == vessel and (row["fit"] or row["evaluate"])]
-        dated = all(row["date"] for row in own)
+    for vessel in dict.fromkeys(row.vessel for row in rows):
+        own = [row for row in rows if row.vessel == vessel and (row.fit or row.evaluate)]
+        dated = all(row.date for row in own)
         if len(own) < FEWEST_DRAWN:
             continue
-        own.sort(key=lambda row: datetime.fromisoformat(row["date"]) if dated else 0)
-        of = next((row["evaluate"]["of"] for row in own if row["evaluate"]), "")
+        if dated:
+            own.sort(key=lambda row: datetime.fromisoformat(row.date or ""))
+        of = next((row.evaluate.evaluated for row in own if row.evaluate), "")
         evaluated = f" Crosses: {of}, on the whole log." if of else ""
         fitted = (
             "Circles: the base model, and the model fitted to the log itself, on the log's validation rows."
-            if any(row["fit"] for row in own)
+            if any(row.fit for row in own)
             else ""
         )
         shown.append(
-            {
-                "title": f"Force errors, {vessel}",
-                "svg": batch_figures.errors(own, dated),
-                "caption": f"Root-mean-square force error of {counted(len(own), 'log')}. {fitted}{evaluated}",
-            }
+            Figure(
+                f"Force errors, {vessel}",
+                batch_figures.errors(own, dated),
+                f"Root-mean-square force error of {counted(len(own), 'log')}. {fitted}{evaluated}",
+            )
         )
     return shown

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ferryid.diagnose import AXES, Diagnosis, Finding, Profiled
+from ferryid.diagnose import Diagnosis, Finding, Profiled
 from ferryid.report.figures import (
     BASE,
     MEASURED,
@@ -29,7 +29,7 @@ from ferryid.report.figures import (
 from ferryid.report.left_out import shade_left_out
 from ferryid.report.structure import envelope
 from ferryid.signals.track import LeftOut
-from ferryid.types import Floats
+from ferryid.types import AXES, Floats
 
 PROFILES = 4
 """Profiles that are drawn, the most telling ones; all are in the JSON."""

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.diagnose import AXES, Diagnosis, Finding, campaign_verdict
+from ferryid.diagnose import Diagnosis, Finding, campaign_verdict
 from ferryid.models.prediction import FreeRun
 from ferryid.report import diagnosis_figures, diagnosis_words, figures
 from ferryid.report.html import template
 from ferryid.report.left_out import left_out_table
 from ferryid.signals.track import LeftOut
-from ferryid.types import Floats
+from ferryid.types import AXES, Floats
 
 MAX_LOGS = 6
 """Logs whose evidence is drawn; the page stays readable."""

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from ferryid import __version__
-from ferryid.diagnose import AXES, SCHEMA, Diagnosis, DiagnosisSettings, campaign_verdict, diagnose_and_store, to_json
+from ferryid.diagnose import SCHEMA, Diagnosis, DiagnosisSettings, campaign_verdict, diagnose_and_store, to_json
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
 from ferryid.models import Model
 from ferryid.models.store import load
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.outcome import Report
+from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile, parse_profile
 from ferryid.vessel.profile import Profile
 
@@ -57,19 +58,17 @@ def _profile(vessel: str | Path | Profile) -> Profile:
 def diagnose_and_report(
     logs: Sequence[str],
     profile: Profile,
-    out: Path,
-    settings: DiagnosisSettings | None = None,
+    settings: DiagnosisSettings,
+    run: RunContext,
     *,
-    tables: Path | None,
     name: str = "",
     command: Sequence[str] = (),
-    progress: Callable[[str], None],
 ) -> Report:
     """Diagnose logs, store the model that the findings lead to, and write the report.
 
     Parameters
     ----------
-    logs, profile, out, settings, tables, name, progress
+    logs, profile, settings, run, name
         As of `ferryid.diagnose.pipeline.diagnose_and_store`.
     command
         The words that the diagnosis was asked for with.
@@ -79,9 +78,9 @@ def diagnose_and_report(
     FerryIdError
         For input that cannot be used, and a folder that cannot be written.
     """
-    diagnoses = diagnose_and_store(logs, profile, out, settings, tables=tables, name=name, progress=progress)
-    progress("writing the report")
-    return report(diagnoses, out, command)
+    diagnoses = diagnose_and_store(logs, profile, settings, run, name=name)
+    run.progress("writing the report")
+    return report(diagnoses, run.out, command)
 
 
 def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = ()) -> Report:

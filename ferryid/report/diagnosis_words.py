@@ -8,10 +8,11 @@ from pathlib import PurePath
 from typing import Any
 
 from ferryid.counts import counted
-from ferryid.diagnose import AXES, JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, error_ratio, worse_axes
+from ferryid.diagnose import JUDGING, UNKNOWN, Diagnosis, Estimate, Finding, error_ratio, worse_axes
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.effects.wording import listed, timed, titled
+from ferryid.types import AXES
 
 EVERYWHERE = "all along"
 INCREDIBLE = 3.0

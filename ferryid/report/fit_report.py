@@ -38,7 +38,6 @@ def fit_and_report(
     run: RunContext,
     *,
     name: str = "",
-    tables: Path | None = None,
 ) -> FitReport:
     """Fit a model to logs, store it in the output folder, and write its report.
 
@@ -54,15 +53,13 @@ def fit_and_report(
         Output folder, in which ``logs``, ``models`` and ``reports`` are made; progress; whether to check every checksum.
     name
         Name of the model; the profile's where empty.
-    tables
-        Output folder whose ``logs`` keep the ingested tables, where that is another.
 
     Raises
     ------
     FerryIdError
         For unusable input or an output folder that cannot be written; nothing half-written is left.
     """
-    return _reported(fit_logs(logs, profile, settings, replace(run, out=tables or run.out), name=name), run)
+    return _reported(fit_logs(logs, profile, settings, run, name=name), run)
 
 
 def fit_archive_and_report(

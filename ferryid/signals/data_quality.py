@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ferryid.counts import counted, verb
 from ferryid.ingest.log import Loss
+from ferryid.json_record import Number, Record, json_key
 from ferryid.signals.parquet import unit_of
 from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording, Stream
@@ -113,30 +114,40 @@ def plain_left_out(one: LeftOut) -> dict[str, Any]:
     return {**asdict(one), "intervals": [{**asdict(span), "signals": [*span.signals]} for span in one.intervals]}
 
 
-def lost_plain(losses: Sequence[Loss], left_out: Sequence[LeftOut], total: int) -> dict[str, Any]:
-    """Return for JSON what was lost of a log, and what of the rest is not used.
+@dataclass(frozen=True)
+class LostData(Record):
+    """What was lost of a log, and what of the rest is not used.
 
-    Parameters
+    Attributes
     ----------
-    losses
-        What could not be read.
-    left_out, total
-        Rows that are not used, and how many there are.
-
-    Returns
-    -------
-    dict
-        ``messages`` and ``seconds`` that are known to be lost, ``unknown``: whether more may be, ``rows_left_out`` and
-        ``seconds_left_out``, and ``says``: all of it as sentences.
+    messages, seconds
+        Messages and time [s] that are known to be lost.
+    unknown
+        Whether more may be.
+    rows_left_out, seconds_left_out
+        Rows that are not used, and their length [s].
+    sentences
+        All of it.
     """
-    return {
-        "messages": sum(loss.messages or 0 for loss in losses),
-        "seconds": sum(loss.seconds or 0.0 for loss in losses),
-        "unknown": any(loss.messages is None for loss in losses),
-        "rows_left_out": _rows(left_out),
-        "seconds_left_out": float(sum(one.seconds for one in left_out)),
-        "says": [*(f"Lost: {loss_sentence(loss)}" for loss in losses), *rows_left_out(left_out, total)],
-    }
+
+    messages: int
+    seconds: Number
+    unknown: bool
+    rows_left_out: int
+    seconds_left_out: Number
+    sentences: tuple[str, ...] = field(metadata=json_key("says"))
+
+    @classmethod
+    def of(cls, losses: Sequence[Loss], left_out: Sequence[LeftOut], total: int) -> LostData:
+        """Return what was lost, from what could not be read, the rows that are not used, and how many rows there are."""
+        return cls(
+            messages=sum(loss.messages or 0 for loss in losses),
+            seconds=sum(loss.seconds or 0.0 for loss in losses),
+            unknown=any(loss.messages is None for loss in losses),
+            rows_left_out=_rows(left_out),
+            seconds_left_out=float(sum(one.seconds for one in left_out)),
+            sentences=(*(f"Lost: {loss_sentence(loss)}" for loss in losses), *rows_left_out(left_out, total)),
+        )
 
 
 def _unread(losses: Sequence[Loss]) -> tuple[str, ...]:

@@ -89,7 +89,9 @@ def _overlap(recording: Recording, track: Track) -> list[str]:
     ]
 
 
-def open_track(path: str, profile: Profile, out: Path, *, rate_hz: float | None = None, verify: bool = False) -> Opened:
+def open_track(
+    path: str, profile: Profile, out: Path | None, *, rate_hz: float | None = None, verify: bool = False
+) -> Opened:
     """Ingest and align one log, and reconstruct its forces; arguments and errors are those of `prepare`."""
     return track_of(record(path, profile, out, verify=verify), profile, rate_hz)
 
@@ -112,7 +114,7 @@ def track_of(
 def prepare(
     path: str,
     profile: Profile,
-    out: Path,
+    out: Path | None,
     *,
     window_s: float,
     smoother: str = "square",
@@ -129,7 +131,7 @@ def prepare(
     profile
         Vessel and signal map.
     out
-        Output folder, whose ``logs`` keep the ingested tables.
+        Output folder, whose ``logs`` keep the ingested tables; None keeps none.
     window_s, smoother, rate_hz
         See `ferryid.signals.smooth` and `ferryid.signals.align`.
     verify

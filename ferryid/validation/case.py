@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ferryid.validation.json_record import Record
+from ferryid.json_record import Record
 
 FORMATS = ("mcap", "ros1", "ros2")
 """Log formats, which take turns."""

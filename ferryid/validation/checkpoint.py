@@ -5,14 +5,28 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ferryid.batch.remaining import told_time
 from ferryid.batch.spread import Spread
 from ferryid.files import finite, unwritable, write_text
+from ferryid.json_record import Record
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Line(Record):
+    """A line of a checkpoint file: the name of a case, and its result as plain data."""
+
+    name: str
+    result: Any
+
+    def text(self) -> str:
+        """Return the line as it is written."""
+        return json.dumps(self.to_json(), allow_nan=False) + "\n"
 
 
 def completed(path: Path) -> dict[str, Any]:
@@ -27,9 +41,9 @@ def completed(path: Path) -> dict[str, Any]:
     results = {}
     for text in whole.splitlines():
         try:
-            line = json.loads(text)
-            results[line["name"]] = line["result"]
-        except (ValueError, TypeError, KeyError):  # what a crash of the machine left of it: to be done again
+            line = Line.from_json(json.loads(text))
+            results[line.name] = line.result
+        except ValueError:  # what a crash of the machine left of it: to be done again
             continue
     return results
 
@@ -38,8 +52,8 @@ def discard(path: Path, names: Iterable[str]) -> None:
     """Have some cases of a stage done again."""
     gone, lines = set(names), completed(path)
     if gone & set(lines):
-        kept = [{"name": name, "result": result} for name, result in lines.items() if name not in gone]
-        write_text(path, "".join(json.dumps(line) + "\n" for line in kept))
+        kept = [Line(name, result) for name, result in lines.items() if name not in gone]
+        write_text(path, "".join(line.text() for line in kept))
 
 
 def run_stage(
@@ -82,7 +96,7 @@ def run_stage(
             for count, (number, result) in enumerate(workers.over(function, [work[name] for name in left]), 1):
                 done[left[number]] = written = finite(result)
                 try:
-                    file.write(json.dumps({"name": left[number], "result": written}, allow_nan=False) + "\n")
+                    file.write(Line(left[number], written).text())
                     file.flush()
                 except OSError as error:
                     raise unwritable(path, error) from error

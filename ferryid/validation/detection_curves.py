@@ -31,8 +31,8 @@ from scipy.special import expit
 from scipy.stats import chi2, norm
 
 from ferryid.errors import FerryIdError
+from ferryid.json_record import Record
 from ferryid.types import Flags, Floats
-from ferryid.validation.json_record import Record
 
 RELIABLE = 0.95
 """Share that is named reliably: 19 in 20."""

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from ferryid.diagnose import Estimate
+from ferryid.json_record import Record
 from ferryid.validation.case import Truth, parameter_vectors
-from ferryid.validation.json_record import Record
 from ferryid.validation.name_scores import Share, named_findings
 from ferryid.validation.plant.effects import plant_effects
 from ferryid.validation.records import CaseResult, Finding

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from ferryid.json_record import Record
 from ferryid.validation.case import Case
-from ferryid.validation.json_record import Record
 from ferryid.validation.records import CaseResult, Diagnosis
 
 

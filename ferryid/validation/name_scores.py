@@ -10,7 +10,7 @@ from scipy.stats import beta
 
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
-from ferryid.validation.json_record import Record
+from ferryid.json_record import Record
 from ferryid.validation.records import UNKNOWN, CaseResult, Finding, Key
 
 NONE, OTHER, REFUSED = "none", "wrong place", "refused"

@@ -58,9 +58,7 @@ def oracle(log: str, profile: Profile, truths: Sequence[Truth]) -> OracleResult:
     """
     start = time.perf_counter()
     _check(profile, truths)
-    return replace(
-        _estimates(_Log(read_measurements(log, profile, None)[0]), truths), seconds=time.perf_counter() - start
-    )
+    return replace(_estimates(_Log(read_measurements(log, profile)[0]), truths), seconds=time.perf_counter() - start)
 
 
 def oracle_of_each(log: str, profile: Profile, truths: Sequence[Truth]) -> OracleResult:
@@ -70,7 +68,7 @@ def oracle_of_each(log: str, profile: Profile, truths: Sequence[Truth]) -> Oracl
     """
     start = time.perf_counter()
     _check(profile, truths)
-    shared = _Log(read_measurements(log, profile, None)[0])
+    shared = _Log(read_measurements(log, profile)[0])
     recovered = tuple(_estimates(shared, [one]).recovered[0] for one in truths)
     return OracleResult(0.0, recovered, time.perf_counter() - start)
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose import AXES
 from ferryid.report.html import template
 from ferryid.report.validation_figures import Answers, Detected, confusion_matrix, detection_curves, parameter_errors
+from ferryid.types import AXES
 from ferryid.validation.case_sampling import KINDS, cells
 from ferryid.validation.detection_curves import Curve
 from ferryid.validation.estimate_errors import WITHIN, EstimateErrors

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ferryid.diagnose import JUDGING, Estimate
+from ferryid.json_record import Record
 from ferryid.validation.case import Case, Truth
-from ferryid.validation.json_record import Record
 
 UNKNOWN = "unknown"
 """Effect id of a finding that has no name."""

@@ -14,24 +14,25 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import Any
+from typing import Any, TypeVar
 
 from ferryid import __version__
 from ferryid.batch.spread import Spread, spread
 from ferryid.errors import FerryIdError
 from ferryid.files import alone, dump_json, finite, write_text
+from ferryid.json_record import Record
 from ferryid.validation.case import Case
 from ferryid.validation.checkpoint import discard, run_stage
 from ferryid.validation.commitment import SEAL_FILE, commitment, publish_answers, publish_commitment, read_seal
 from ferryid.validation.interfaces import Pipeline, Trial
-from ferryid.validation.json_record import Record
 from ferryid.validation.records import CaseResult, Diagnosis, Failure
 from ferryid.validation.run_folder import RESULT_FILE, RunFolder, open_run_folder, remove_temporary
 from ferryid.validation.source_hash import source_hash
-from ferryid.validation.stages import LogJob, diagnose_case, evaluate_case, write_case
+from ferryid.validation.stages import CaseFiles, LogJob, diagnose_case, evaluate_case, write_case
 
 SCHEMA = "ferryid.prove/1"
 SEED_BITS = 48
+Result = TypeVar("Result", bound=Record)
 GUARD = "process"
 """What keeps the answers from a diagnosis: no answer is on disk, and its process is given log and profile alone."""
 
@@ -93,9 +94,8 @@ def run_validation(
         announce(f"commitment to {len(cases)} answers: {committed}")
 
         jobs = _written_logs(stage, folder, cases, pipeline)
-        diagnoses = _parsed(
-            folder.lines("diagnosed"), stage("diagnosing", folder.lines("diagnosed"), jobs, diagnose_case)
-        )
+        lines = folder.lines("diagnosed")
+        diagnoses = _parsed(Diagnosis, lines, stage("diagnosing", lines, jobs, diagnose_case))
         publish_answers(path, answers, folder.salt)
 
         trials = {case.name: _trial(path, case, jobs[case.name], diagnoses[case.name]) for case in cases}
@@ -188,18 +188,15 @@ def _written_logs(stage: Any, folder: RunFolder, cases: Sequence[Case], pipeline
     discard(lines, [case.name for case in cases if not (logs / case.name).is_dir()])
     work = {case.name: case for case in cases}
     written = stage("writing logs", lines, work, partial(write_case, pipeline.generate, logs))
-    try:
-        return {
-            name: LogJob(folder.path, folder.sources, name, str(one["log"]), str(one["profile"]))
-            for name, one in written.items()
-        }
-    except (TypeError, KeyError) as error:
-        raise _damaged(lines) from error
+    return {
+        name: LogJob(folder.path, folder.sources, name, files.log, files.profile)
+        for name, files in _parsed(CaseFiles, lines, written).items()
+    }
 
 
-def _parsed(lines: Path, found: Mapping[str, Any]) -> dict[str, Diagnosis]:
+def _parsed(kind: type[Result], lines: Path, found: Mapping[str, Any]) -> dict[str, Result]:
     try:
-        return {name: Diagnosis.from_json(one) for name, one in found.items()}
+        return {name: kind.from_json(one) for name, one in found.items()}
     except ValueError as error:
         raise _damaged(lines) from error
 

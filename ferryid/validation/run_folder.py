@@ -13,6 +13,7 @@ from typing import Any
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, remove_abandoned, write_text
+from ferryid.json_record import Record
 from ferryid.validation.commitment import ANSWERS_FILE, SEAL_FILE, commitment
 from ferryid.validation.source_hash import source_hash
 
@@ -25,6 +26,15 @@ FILES = (
 """All that a run writes into its folder, and all that is removed where it begins from the start."""
 FORMER_FILE = "answers.sealed"
 """Encrypted answers of earlier versions of ferryid."""
+
+
+@dataclass(frozen=True)
+class RunRecord(Record):
+    """Content of ``run.json``: salt, hash of seed and settings, and hash of the sources."""
+
+    salt: str
+    request: str
+    sources: str
 
 
 @dataclass(frozen=True)
@@ -73,10 +83,10 @@ def open_run_folder(path: Path, seed: int, settings: Mapping[str, Any], announce
     sources, found = source_hash(), _read_run(path)
     if found is None:
         return _new(path, seed, settings, sources)
-    if found["sources"] != sources:
+    if found.sources != sources:
         announce("the sources of ferryid have changed since this folder's run began: it begins from the start")
         _clear(path)
-    elif not hmac.compare_digest(_request(seed, settings, found["salt"]), found["request"]):
+    elif not hmac.compare_digest(_request(seed, settings, found.salt), found.request):
         if not (path / RESULT_FILE).exists():
             raise FerryIdError(
                 f"{path}: holds an unfinished run of another seed, --runs or --only. "
@@ -87,7 +97,7 @@ def open_run_folder(path: Path, seed: int, settings: Mapping[str, Any], announce
     else:
         announce("completed cases of this folder's run are kept")
         remove_temporary(path)
-        return RunFolder(path, found["salt"], sources)
+        return RunFolder(path, found.salt, sources)
     return _new(path, seed, settings, sources)
 
 
@@ -100,8 +110,8 @@ def remove_temporary(path: Path) -> None:
 
 def _new(path: Path, seed: int, settings: Mapping[str, Any], sources: str) -> RunFolder:
     salt = secrets.token_hex(SALT_BYTES)
-    run = {"salt": salt, "request": _request(seed, settings, salt), "sources": sources}
-    write_text(path / RUN_FILE, dump_json(run))
+    run = RunRecord(salt, _request(seed, settings, salt), sources)
+    write_text(path / RUN_FILE, dump_json(run.to_json()))
     return RunFolder(path, salt, sources)
 
 
@@ -110,7 +120,7 @@ def _request(seed: int, settings: Mapping[str, Any], salt: str) -> str:
     return commitment({"seed": seed, **settings}, salt)
 
 
-def _read_run(path: Path) -> dict[str, str] | None:
+def _read_run(path: Path) -> RunRecord | None:
     """Return what ``run.json`` holds; None in a folder without any file of a run."""
     if (path / FORMER_FILE).exists():
         raise FerryIdError(
@@ -118,10 +128,8 @@ def _read_run(path: Path) -> dict[str, str] | None:
             "Fix: remove or move the folder, or choose another --out"
         )
     try:
-        found = dict(json.loads((path / RUN_FILE).read_text("utf-8")))
-        if set(found) == {"salt", "request", "sources"} and all(isinstance(one, str) for one in found.values()):
-            return found
-    except (OSError, ValueError, TypeError):
+        return RunRecord.from_json(json.loads((path / RUN_FILE).read_text("utf-8")))
+    except (OSError, ValueError):
         pass
     present = [name for name in FILES if (path / name).exists()]
     if present:

@@ -9,9 +9,9 @@ from math import nan
 
 import numpy as np
 
+from ferryid.json_record import Record
 from ferryid.validation.detection_curves import Curve, Ratio, curve, ratio
 from ferryid.validation.estimate_errors import EstimateErrors, estimate_errors
-from ferryid.validation.json_record import Record
 from ferryid.validation.name_scores import (
     Cell,
     Confusion,

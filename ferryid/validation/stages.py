@@ -10,9 +10,9 @@ from typing import Any
 
 from ferryid.errors import FerryIdError, UnwritableError
 from ferryid.files import replacing
+from ferryid.json_record import Record
 from ferryid.validation.case import Case
 from ferryid.validation.interfaces import Generate, Trial
-from ferryid.validation.json_record import Record
 from ferryid.validation.records import Failure
 from ferryid.validation.worker_client import worker_of
 
@@ -48,15 +48,23 @@ class LogJob:
         return self.run / "models" / self.name
 
 
-def write_case(generate: Generate, logs: Path, case: Case) -> dict[str, str]:
-    """Write the log of a case into a folder of its own, whole or not at all; return the names of ``log`` and ``profile``."""
+@dataclass(frozen=True)
+class CaseFiles(Record):
+    """Names of the log and of its vessel's profile in the folder of a case."""
+
+    log: str
+    profile: str
+
+
+def write_case(generate: Generate, logs: Path, case: Case) -> dict[str, Any]:
+    """Write the log of a case into a folder of its own, whole or not at all; return its `CaseFiles` as plain data."""
     with replacing(logs / case.name) as temporary:
         temporary.mkdir(parents=True)
         made = generate(case, temporary)
         more = {path.name for path in temporary.iterdir()} - {made.log.name, made.profile.name}
         if more:  # it may be an answer
             raise ValueError(f"beside a log there may be its profile only, found {', '.join(sorted(more))}")
-    return {"log": made.log.name, "profile": made.profile.name}
+    return CaseFiles(made.log.name, made.profile.name).to_json()
 
 
 def diagnose_case(job: LogJob) -> dict[str, Any]:

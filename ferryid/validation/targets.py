@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ferryid.validation.json_record import Record
+from ferryid.json_record import Record
 from ferryid.validation.name_scores import Share
 from ferryid.validation.scores import CLEAN, Scores
 

@@ -9,8 +9,8 @@ from math import inf, isfinite, nan, prod
 import numpy as np
 from scipy.stats import binom
 
-from ferryid.diagnose import AXES
-from ferryid.validation.json_record import Record
+from ferryid.json_record import Record
+from ferryid.types import AXES
 from ferryid.validation.name_scores import Share, names, wrong_names
 from ferryid.validation.records import DIAGNOSED, UNKNOWN, CaseResult, TransferScore
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,23 +70,23 @@ def transfer_test(
     base = base_of(other, profile).prediction
     found: dict[str, Prediction] = {}
     # What is known of each method beside its errors.
-    known: dict[str, dict[str, Any]] = {DIAGNOSED: {}}
+    known: dict[str, TransferScore] = {}
     if diagnosed is None:
         found[DIAGNOSED] = base
-        known[DIAGNOSED]["why"] = "the diagnosis wrote no model: the base model takes its place"
+        known[DIAGNOSED] = TransferScore({}, why="the diagnosis wrote no model: the base model takes its place")
     else:
         model = diagnosed if isinstance(diagnosed, Model) else load_file(Path(diagnosed))
         moved = transferred(model, one, other)
         found[DIAGNOSED] = predict(moved, other, profile, window_s=WINDOW_S, smoother=SMOOTHER)
-        known[DIAGNOSED] |= _acting_effects(found[DIAGNOSED], other.recording.sha256)
+        known[DIAGNOSED] = _acting_effects(found[DIAGNOSED], other.recording.sha256)
     for name, learn in rivals.items():
         try:
             learnt = learn(first_log, profile, out)
             found[name] = learnt.predict(other)
         except FerryIdError as error:
-            known[name] = {"why": str(error)}
+            known[name] = TransferScore({}, why=str(error))
             continue
-        known[name] = {"names": learnt.names}
+        known[name] = TransferScore({}, names=learnt.names)
     motion = other.motion
     # On the same rows for all, so that nobody gains by what it cannot predict.
     rows = usable_rows(motion, base.tau, *(each.tau for each in found.values()))
@@ -131,16 +130,16 @@ def transferred(model: Model, first: Prepared, second: Prepared) -> Model:
     )
 
 
-def _acting_effects(found: Prediction, sha256: str) -> dict[str, Any]:
+def _acting_effects(found: Prediction, sha256: str) -> TransferScore:
     """Return which effects of a diagnosed model act, and which do not."""
     idle = [one for one in found.idle if "conditions are those of one log" not in one]
     acting = (*found.vessel, *found.conditions)
     notes = tuple(StoredEffectNote(one.effect, one.instance, one.says(sha256)) for one in acting)
-    return {"effects": notes, "why": " ".join(idle)}
+    return TransferScore({}, effects=notes, why=" ".join(idle))
 
 
 def _score(
-    tau: Floats, base: Floats, found: Prediction | None, rows: Rows, base_run: FreeRun, known: Mapping[str, Any]
+    tau: Floats, base: Floats, found: Prediction | None, rows: Rows, base_run: FreeRun, known: TransferScore
 ) -> TransferScore:
     """Return the errors of a method, none where it has no prediction; several reasons become one text."""
     _, base_position_m, base_heading_rad = _free_run_errors(base_run)
@@ -150,13 +149,14 @@ def _score(
         ran = _free_run_score(found.free_run(rows))
         ratio = force_scores(tau, base, found.tau, rows).ratio
         mse = {axis: _number(value) for axis, value in zip(AXES, ratio.tolist(), strict=True)}
-    why = "; ".join(one for one in (known.get("why", ""), ran.why) if one)
     return replace(
         ran,
         mse=mse,
         base_position_m=base_position_m,
         base_heading_rad=base_heading_rad,
-        **{**known, "why": why},
+        why="; ".join(one for one in (known.why, ran.why) if one),
+        names=known.names,
+        effects=known.effects,
     )
 
 

@@ -45,13 +45,15 @@ def diagnose_log(log: Path, profile: Path, out: Path) -> Diagnosis:
     UnwritableError
         Where the model could not be written.
     """
-    from ferryid.diagnose import diagnose_and_store, to_json
+    from ferryid.diagnose import DiagnosisSettings, diagnose_and_store, to_json
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
     start = time.perf_counter()
     try:
         vessel = load_profile(profile)
-        (found,) = diagnose_and_store([str(log)], vessel, out, tables=None, progress=lambda stage: None)
+        run = RunContext(out, keep_tables=False)
+        (found,) = diagnose_and_store([str(log)], vessel, DiagnosisSettings(), run)
         seconds = time.perf_counter() - start
         made = to_json(found)
     except UnwritableError:

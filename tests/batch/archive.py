@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ferryid.batch import task
-from ferryid.batch.kept import Row
+from ferryid.batch.log_result import LogResult
 from ferryid.batch.run import batch
+from ferryid.report.batch_rows import BatchResult
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 
@@ -32,7 +33,7 @@ def recipe(folder: Path, text: str = 'steps = ["evaluate"]\n') -> Path:
     return path
 
 
-def run(folder: Path, *asked: Path | str, **options: Any) -> tuple[dict[str, Any], list[str]]:
+def run(folder: Path, *asked: Path | str, **options: Any) -> tuple[BatchResult, list[str]]:
     """Carry out a batch below a folder; return its result and the lines that were told."""
     told: list[str] = []
     chosen: dict[str, Any] = {"vessel": "milliampere", "processes": 1, "recipe": folder / "recipe.toml", **options}
@@ -48,13 +49,13 @@ def rows_of(folder: Path) -> dict[str, tuple[int, int]]:
     }
 
 
-def same(result: dict[str, Any]) -> str:
+def same(result: BatchResult) -> str:
     """Return what two runs must agree on: all rows but time and memory."""
-    rows = [{k: v for k, v in row.items() if k not in ("seconds", "peak_bytes")} for row in result["rows"]]
+    rows = [{k: v for k, v in row.items() if k not in ("seconds", "peak_bytes")} for row in result.to_json()["rows"]]
     return json.dumps(rows, indent=1)
 
 
-def deadly(one: task.Task) -> Row:
+def deadly(one: task.Task) -> LogResult:
     """Work, but die at once at a log of that name."""
     if "deadly" in one.name:
         os.kill(os.getpid(), signal.SIGKILL)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from ferryid.batch.log_result import LogResult
 from ferryid.batch.logs import Entry
-from ferryid.batch.summary import lines_of
+from ferryid.batch.summary import summary_row
+from ferryid.report.batch_rows import BatchResult, MemoryUse, SummaryRow, Trend
 
 AXES = ("surge", "sway", "yaw")
 
@@ -14,11 +16,12 @@ def axes(value: float) -> dict[str, float]:
     return dict.fromkeys(AXES, value)
 
 
-def row(log: str, day: int = 1, *, findings: tuple[dict[str, Any], ...] = (), **more: Any) -> dict[str, Any]:
-    """Return the line of a log that was done on a day of May 2024."""
+def row(log: str, day: int = 1, *, findings: tuple[dict[str, Any], ...] = (), **more: Any) -> SummaryRow:
+    """Return the row of a log that was done on a day of May 2024."""
     kept = {
         "name": log.rpartition("/")[2],
         "files": [[log, 1000 * day, 5]],
+        "stamp": {},
         "status": "done",
         "reason": "",
         "sha256": f"{day:064x}",
@@ -38,10 +41,13 @@ def row(log: str, day: int = 1, *, findings: tuple[dict[str, Any], ...] = (), **
             "findings": list(findings), "before": axes(4.0), "after": axes(1.0),
         },
         "seconds": {"fit": 2.0, "diagnose": 3.5},
+        "memory_bytes": 4 << 30,
         "peak_bytes": 3 << 28,
     }  # fmt: skip
     entry = {name: more.pop(name) for name in ("date", "note") if name in more}
-    return lines_of(Entry(log, **entry), "milliampere", {**kept, **more}, f"{kept['name']}-0123")
+    return summary_row(
+        Entry(log, **entry), "milliampere", LogResult.from_json({**kept, **more}), f"{kept['name']}-0123"
+    )
 
 
 def finding(
@@ -52,18 +58,18 @@ def finding(
     return {"effect": effect, "instance": instance, "probability": probability, "parameters": parameters, "says": says}
 
 
-def result(*rows: dict[str, Any], trends: list[dict[str, Any]] | None = None, model: str = "") -> dict[str, Any]:
+def result(*rows: SummaryRow, trends: tuple[Trend, ...] = (), model: str = "") -> BatchResult:
     """Return the result of a batch with these rows."""
     statuses = ("done", "partly", "refused", "failed", "memory", "lost")
-    return {
-        "schema": "ferryid.batch/1",
-        "ferryid_version": "0.1.0",
-        "counts": {
+    return BatchResult(
+        schema="ferryid.batch/1",
+        ferryid_version="0.1.0",
+        counts={
             "logs": len(rows), "done_before": 0,
-            **{status: sum(one["status"] == status for one in rows) for status in statuses},
+            **{status: sum(one.status == status for one in rows) for status in statuses},
         },
-        "recipe": {"steps": ["fit", "evaluate", "diagnose"], "model": model},
-        "memory": {"limit_bytes": 4 << 30, "bounded": True, "peak_bytes": 3 << 28},
-        "folder": "out/batch", "summary": "out/batch/summary.parquet", "page": "out/batch/index.html", "seconds": 1.0,
-        "rows": list(rows), "trends": trends or [],
-    }  # fmt: skip
+        recipe={"steps": ["fit", "evaluate", "diagnose"], "model": model},
+        memory=MemoryUse(4 << 30, True, 3 << 28),
+        folder="out/batch", summary="out/batch/summary.parquet", page="out/batch/index.html", seconds=1.0,
+        rows=rows, trends=trends,
+    )  # fmt: skip

@@ -36,9 +36,9 @@ def test_patterns_paths_folders_and_parts(season: Path) -> None:
     assert named(joined) == [joined]
     (entry,) = entries_of([joined], "x", lambda line: None)
     assert entry.paths == [season / "a.mcap", season / "b.mcap"]
-    assert [file[:2] for file in entry.files] == [[str(season / "a.mcap"), 6], [str(season / "b.mcap"), 6]]
+    assert [file[:2] for file in entry.files] == [(str(season / "a.mcap"), 6), (str(season / "b.mcap"), 6)]
     (folder,) = entries_of(["season/sub"], "x", lambda line: None)
-    assert [Path(file[0]).name for file in folder.files] == ["[1] x.mcap", "c.mcap"]
+    assert [Path(file.path).name for file in folder.files] == ["[1] x.mcap", "c.mcap"]
     assert Entry("season/p+q.mcap").paths == [season / "p+q.mcap"]
 
 

@@ -20,9 +20,11 @@ import pytest
 
 from ferryid.batch import kept, steps, task
 from ferryid.batch import run as running
+from ferryid.batch.log_result import LogFile, StepSummary
 from ferryid.batch.remaining import Remaining, told_time
 from ferryid.errors import FerryIdError, UnwritableError
-from ferryid.files import unwritable
+from ferryid.files import dump_json, unwritable
+from ferryid.report.batch_rows import BatchResult
 from tests.batch.archive import archive, deadly, recipe, rows_of, run, same
 from tests.batch.work import children_of, default_interrupts, ended, environment
 
@@ -31,8 +33,8 @@ pytestmark = pytest.mark.slow
 FIT = 'steps = ["fit"]\n[fit]\ndelta = 0.4\nsigma = 0.4\ndraws = 20\n'
 
 
-def statuses(result: dict[str, Any]) -> dict[str, str]:
-    return {row["name"]: row["status"] for row in result["rows"]}
+def statuses(result: BatchResult) -> dict[str, str]:
+    return {row.name: row.status for row in result.rows}
 
 
 def results(folder: Path) -> Path:
@@ -52,9 +54,9 @@ def test_a_bad_log_is_a_row_and_the_rest_goes_on(tmp_path: Path) -> None:
         "day0": "done", "day1": "done", "a_broken": "refused", "z_other": "refused", "gone": "refused",
     }  # fmt: skip
     assert [line for line in told if line.startswith("refused: ")] == told
-    assert told[0] == f"refused: {logs / 'a_broken.mcap'}: {result['rows'][2]['reason']}"
-    assert result["rows"][2]["reason"].startswith("the file is empty, a log was expected, found 0 bytes. Fix: ")
-    assert result["counts"] == {
+    assert told[0] == f"refused: {logs / 'a_broken.mcap'}: {result.rows[2].reason}"
+    assert result.rows[2].reason.startswith("the file is empty, a log was expected, found 0 bytes. Fix: ")
+    assert result.counts == {
         "logs": 5, "done": 2, "partly": 0, "refused": 3, "failed": 0, "memory": 0, "lost": 0, "done_before": 0,
     }  # fmt: skip
     # Refused ones are no more tried than others, until they change or somebody asks.
@@ -63,11 +65,11 @@ def test_a_bad_log_is_a_row_and_the_rest_goes_on(tmp_path: Path) -> None:
     assert same(again) == same(result)
     shutil.copy(logs / "day0.mcap", logs / "gone.mcap")
     again, told = run(tmp_path, logs / "list.csv")
-    assert again["rows"][4]["status"] == "done"
-    assert again["counts"]["done_before"] == 4
+    assert again.rows[4].status == "done"
+    assert again.counts["done_before"] == 4
     before = rows_of(tmp_path)
     again, told = run(tmp_path, logs / "list.csv", again=True)
-    assert again["counts"]["done_before"] == 3
+    assert again.counts["done_before"] == 3
     assert len(set(before.items()) - set(rows_of(tmp_path).items())) == 2
 
 
@@ -75,24 +77,24 @@ def test_every_step_of_one_log(tmp_path: Path) -> None:
     logs = archive(tmp_path, 1)
     recipe(tmp_path, "[fit]\ndelta = 0.4\nsigma = 0.4\n")
     result, _ = run(tmp_path, logs / "*.mcap")
-    (row,) = result["rows"]
-    assert row["status"] == "done", row["reason"]
-    folder = tmp_path / "out" / "batch" / row["folder"]
-    fitted = json.loads((folder / row["fit"]["report"]).with_name("fit.json").read_text("utf-8"))
-    assert row["fit"]["normalised_mse"] == fitted["scores"]["normalised_mse"]
-    assert row["fit"]["accepted"]
+    (row,) = result.rows
+    assert row.status == "done", row.reason
+    folder = tmp_path / "out" / "batch" / row.folder
+    fitted = json.loads((folder / row.fit.report).with_name("fit.json").read_text("utf-8"))
+    assert row.fit.normalised_mse == fitted["scores"]["normalised_mse"]
+    assert row.fit.accepted
     # Results of a log are its own: its model is no version of anybody else's.
-    assert json.loads((folder / row["fit"]["model"]).read_text("utf-8"))["version"] == 1
-    assert row["fit"]["model"].startswith("models/milliampere-day0/")
-    evaluated = json.loads((folder / row["evaluate"]["result"]).read_text("utf-8"))
-    assert row["evaluate"]["mse"] == evaluated["logs"][0]["mse"]["model"]
+    assert json.loads((folder / row.fit.model).read_text("utf-8"))["version"] == 1
+    assert row.fit.model.startswith("models/milliampere-day0/")
+    evaluated = json.loads((folder / row.evaluate.file).read_text("utf-8"))
+    assert row.evaluate.mse == evaluated["logs"][0]["mse"]["model"]
     assert evaluated["logs"][0]["mse"]["model"] == pytest.approx(evaluated["logs"][0]["mse"]["base"])
-    diagnosed = json.loads((folder / row["diagnose"]["report"]).with_name("diagnosis.json").read_text("utf-8"))
-    assert row["diagnose"]["verdict"] == diagnosed["verdict"]
+    diagnosed = json.loads((folder / row.diagnose.report).with_name("diagnosis.json").read_text("utf-8"))
+    assert row.diagnose.verdict == diagnosed["verdict"]
     assert Path(diagnosed["report"]).exists()
-    assert (row["date"], row["date_from"]) == ("2021-04-20T10:00:00+00:00", "log")
-    assert set(row["seconds"]) == {"read", "fit", "evaluate", "diagnose"}
-    assert 1 << 27 < row["peak_bytes"] <= result["memory"]["limit_bytes"]
+    assert (row.date, row.date_from) == ("2021-04-20T10:00:00+00:00", "log")
+    assert set(row.seconds) == {"read", "fit", "evaluate", "diagnose"}
+    assert 1 << 27 < row.peak_bytes <= result.memory.limit_bytes
     # The tables are where other commands look for them.
     assert list((tmp_path / "out" / "logs").glob("day0-*/*.parquet"))
 
@@ -105,11 +107,11 @@ def test_what_one_step_refuses_another_may_take(tmp_path: Path) -> None:
     recipe(tmp_path, 'steps = ["fit", "evaluate"]\n[fit]\ndraws = 20\n')
     result, told = run(tmp_path, logs / "long.mcap", logs / "brief")
     assert statuses(result) == {"long": "done", "brief": "partly"}
-    row = result["rows"][1]
-    assert row["fit"] is None
-    assert row["evaluate"]["mse"]["surge"] > 0.0
-    assert row["reason"].startswith("fit: too short for three blocks")
-    assert told == [f"partly: {logs / 'brief'}: {row['reason']}"]
+    row = result.rows[1]
+    assert row.fit is None
+    assert row.evaluate.mse["surge"] > 0.0
+    assert row.reason.startswith("fit: too short for three blocks")
+    assert told == [f"partly: {logs / 'brief'}: {row.reason}"]
 
 
 def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> None:
@@ -119,7 +121,7 @@ def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> No
     recipe(tmp_path, FIT.replace("20", "30"))
     other, told = run(tmp_path, logs / "*.mcap")
     assert told == ["2 of the logs left were done with another recipe, and are done again"]
-    assert other["counts"]["done_before"] == 0
+    assert other.counts["done_before"] == 0
     # Both are kept.
     recipe(tmp_path, FIT)
     again, told = run(tmp_path, logs / "*.mcap")
@@ -127,13 +129,13 @@ def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> No
     assert same(again) == same(first)
     # What settings there are for steps that are not asked for is no matter.
     recipe(tmp_path, FIT + '[diagnose]\nwithhold = ["wind"]\n')
-    assert run(tmp_path, logs / "*.mcap")[0]["counts"]["done_before"] == 2
+    assert run(tmp_path, logs / "*.mcap")[0].counts["done_before"] == 2
 
-    model = Path("out/batch") / first["rows"][0]["folder"] / first["rows"][0]["fit"]["model"]
+    model = Path("out/batch") / first.rows[0].folder / first.rows[0].fit.model
     recipe(tmp_path, f'steps = ["evaluate"]\nmodel = "{tmp_path / model}"\n')
     evaluated, _ = run(tmp_path, logs / "day1.mcap")
-    assert evaluated["rows"][0]["evaluate"]["of"] == "milliampere-day0@1"
-    ratio = evaluated["rows"][0]["evaluate"]["normalised_mse"]
+    assert evaluated.rows[0].evaluate.evaluated == "milliampere-day0@1"
+    ratio = evaluated.rows[0].evaluate.normalised_mse
     assert ratio < 1.0
     assert f"force MSE of milliampere-day0@1: {ratio:.3f} of its" in running.render_batch(evaluated)
     profile = tmp_path / "boat.toml"
@@ -142,7 +144,7 @@ def test_another_recipe_profile_or_model_is_another_result(tmp_path: Path) -> No
     profile.write_text(load_profile("milliampere").text + "\n# another day\n", encoding="utf-8")
     changed, told = run(tmp_path, logs / "day1.mcap", vessel=str(profile))
     assert told == ["1 of the logs left were done with another profile, and are done again"]
-    assert changed["counts"]["done_before"] == 0
+    assert changed.counts["done_before"] == 0
 
 
 def test_a_log_is_known_by_its_content_where_it_was_touched_or_moved(tmp_path: Path) -> None:
@@ -155,20 +157,20 @@ def test_a_log_is_known_by_its_content_where_it_was_touched_or_moved(tmp_path: P
     (logs / "day1.mcap").rename(logs / "moved.mcap")
     second, told = run(tmp_path, logs / "*.mcap")
     assert told == ["2 of 2 logs done already; 0 left"]
-    assert [row["folder"] for row in second["rows"]] == [row["folder"] for row in first["rows"]]
-    assert second["rows"][1]["log"].endswith("moved.mcap")
+    assert [row.folder for row in second.rows] == [row.folder for row in first.rows]
+    assert second.rows[1].log.endswith("moved.mcap")
     # A copy beside it is another log.
     shutil.copy(logs / "moved.mcap", logs / "copy.mcap")
     third, _ = run(tmp_path, logs / "*.mcap")
-    assert third["counts"]["done_before"] == 2
-    assert [row["folder"] for row in third["rows"][1:]] == [row["folder"] for row in first["rows"]]
+    assert third.counts["done_before"] == 2
+    assert [row.folder for row in third.rows[1:]] == [row.folder for row in first.rows]
     # As long as before, and another.
     data = bytearray((logs / "day0.mcap").read_bytes())
     data[len(data) // 2] ^= 1
     (logs / "day0.mcap").write_bytes(data)
     fourth, _ = run(tmp_path, logs / "*.mcap")
-    assert fourth["counts"]["done_before"] == 2
-    assert fourth["rows"][1]["sha256"] != first["rows"][0]["sha256"]
+    assert fourth.counts["done_before"] == 2
+    assert fourth.rows[1].sha256 != first.rows[0].sha256
 
 
 def test_a_log_that_kills_its_process_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,7 +187,7 @@ def test_a_log_that_kills_its_process_is_a_row(tmp_path: Path, monkeypatch: pyte
     # With more memory it is worth another try.
     more, _ = run(tmp_path, logs / "*.mcap", memory_limit="5G")
     assert statuses(more)["deadly"] == "done"
-    assert more["counts"]["done_before"] == 2
+    assert more.counts["done_before"] == 2
 
 
 @pytest.fixture
@@ -202,7 +204,7 @@ def one(tmp_path: Path) -> task.Task:
 
 
 def failing(error: Callable[[], BaseException]) -> Any:
-    def step(job: steps.Job) -> dict[str, Any]:
+    def step(job: steps.Job) -> StepSummary:
         (job.folder / "half").mkdir()
         raise error()
 
@@ -212,14 +214,14 @@ def failing(error: Callable[[], BaseException]) -> Any:
 def test_a_bug_is_a_row_with_its_traceback(one: task.Task, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(steps.CARRY_OUT, "evaluate", failing(lambda: ValueError("wind\nx")))
     row = task.work(one)
-    assert row["status"] == "failed"
-    assert row["reason"].startswith("a bug of ferryid: ValueError: wind\\nx (test_run.py:")
-    assert "\n" not in row["reason"]
+    assert row.status == "failed"
+    assert row.reason.startswith("a bug of ferryid: ValueError: wind\\nx (test_run.py:")
+    assert "\n" not in row.reason
     assert "in step" in (one.folder / "traceback.txt").read_text("utf-8")
     assert kept.read_row(one.folder) == row
     monkeypatch.undo()
     assert task.work(one) == row, "nothing has changed"
-    assert task.work(replace(one, again=True))["status"] == "done"
+    assert task.work(replace(one, again=True)).status == "done"
     assert not (one.folder / "half").exists(), "what was half done before is gone"
 
 
@@ -236,8 +238,8 @@ def test_what_a_system_does_not_give(
 ) -> None:
     monkeypatch.setitem(steps.CARRY_OUT, "evaluate", failing(lambda: error))
     row = task.work(one)
-    assert row["status"] == status
-    assert row["reason"].startswith(reason)
+    assert row.status == status
+    assert row.reason.startswith(reason)
 
 
 @pytest.mark.parametrize("wrapped", [False, True])
@@ -259,7 +261,7 @@ def test_a_full_disk_is_no_result_of_a_log(one: task.Task, monkeypatch: pytest.M
     with pytest.raises(UnwritableError):
         task.work(one)
     monkeypatch.undo()
-    assert task.work(one)["status"] == "done"
+    assert task.work(one).status == "done"
 
 
 def test_more_memory_than_there_may_be(one: task.Task, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -267,11 +269,11 @@ def test_more_memory_than_there_may_be(one: task.Task, monkeypatch: pytest.Monke
         pytest.skip("other systems hold no process to a bound")
     import numpy as np
 
-    def greedy(job: steps.Job) -> dict[str, Any]:
-        return {"sum": float(np.ones(6 << 27).sum())}
+    def greedy(job: steps.Job) -> StepSummary:
+        raise AssertionError(np.ones(6 << 27).sum())
 
     monkeypatch.setitem(steps.CARRY_OUT, "evaluate", greedy)
-    assert task.work(one)["status"] == "memory"
+    assert task.work(one).status == "memory"
 
 
 COMMAND = "import sys; from ferryid.cli.main import main; main()"
@@ -411,7 +413,7 @@ def test_on_a_cluster_that_loses_a_worker(tmp_path: Path, cluster: tuple[str, li
     assert workers[0].poll() is not None
     assert statuses(result) == {f"day{k}": "refused" if k == 3 else "done" for k in range(8)}
     here, _ = run(tmp_path, logs / "*.mcap")
-    assert here["counts"]["done_before"] == 8
+    assert here.counts["done_before"] == 8
     assert same(here) == same(result)
 
 
@@ -429,8 +431,8 @@ def test_a_task_that_somebody_else_has_done_meanwhile_is_not_done_again(one: tas
     state = (one.folder / "row.json").stat()
     assert task.work(one) == row
     assert (one.folder / "row.json").stat().st_ino == state.st_ino
-    changed = replace(one, files=[[one.files[0][0], 1, 1]])
-    assert task.work(changed)["files"] == changed.files
+    changed = replace(one, files=(LogFile(one.files[0].path, 1, 1),))
+    assert task.work(changed).files == changed.files
 
 
 def test_what_is_begun_to_be_removed_counts_no_more(one: task.Task, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -454,7 +456,7 @@ def test_a_damaged_row_is_none(one: task.Task, text: str) -> None:
     task.work(one)
     (one.folder / "row.json").write_text(text, encoding="utf-8")
     assert kept.read_row(one.folder) is None
-    assert task.work(one)["status"] == "done"
+    assert task.work(one).status == "done"
 
 
 @pytest.mark.parametrize(
@@ -467,7 +469,32 @@ def test_an_altered_row_is_none(one: task.Task, altered: dict[str, Any]) -> None
     assert whole is not None
     path.write_text(json.dumps({**json.loads(path.read_text("utf-8")), **altered}), encoding="utf-8")
     assert kept.read_row(one.folder) is None
-    assert task.work(one)["status"] == "done"
+    assert task.work(one).status == "done"
+
+
+def rewritten(folder: Path, changes: dict[str, Any]) -> None:
+    """Write a row again with changes, None removing a key, and the hash that belongs to it."""
+    data = json.loads((folder / "row.json").read_text("utf-8")) | changes
+    row = {key: value for key, value in data.items() if key not in changes or value is not None}
+    del row[kept.CHECK]
+    (folder / "row.json").write_text(dump_json({**row, kept.CHECK: kept._check(row)}), encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "changes", [{"evaluate": {"mse": 1}}, {"files": None}, {"more": 1}, {"seconds": {"read": "1"}}]
+)
+def test_a_row_of_another_form_is_none(one: task.Task, changes: dict[str, Any]) -> None:
+    task.work(one)
+    rewritten(one.folder, changes)
+    assert kept.read_row(one.folder) is None
+    assert task.work(one).status == "done"
+
+
+def test_a_row_that_does_not_tell_what_was_lost_stands(one: task.Task) -> None:
+    row = task.work(one)
+    rewritten(one.folder, {"lost": None})
+    assert kept.read_row(one.folder) == replace(row, lost=None)
+    assert task.work(one) == replace(row, lost=None)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems take no such name")
@@ -478,9 +505,9 @@ def test_a_name_of_bytes_that_are_no_characters(tmp_path: Path) -> None:
     Path(os.fsdecode(bytes(logs) + b"/bad\xff.mcap")).write_bytes(b"")
     result, _ = run(tmp_path, logs / "*.mcap")
     assert statuses(result) == {"bad": "refused", "day": "done"}
-    assert [row["log"] for row in result["rows"]] == [rf"{logs}/{name}\udcff.mcap" for name in ("bad", "day")]
+    assert [row.log for row in result.rows] == [rf"{logs}/{name}\udcff.mcap" for name in ("bad", "day")]
     again, _ = run(tmp_path, logs / "*.mcap")
-    assert again["counts"]["done_before"] == 2
+    assert again.counts["done_before"] == 2
 
 
 def test_nothing_says_whose_log_it_is(tmp_path: Path) -> None:

@@ -69,4 +69,4 @@ def test_where_nothing_came_of_any_log() -> None:
 )
 def test_dates(start_ns: int, date: str | None, said: str | None, source: str | None) -> None:
     made = row("a.mcap", start_ns=start_ns, date=date)
-    assert (made["date"], made["date_from"]) == (said, source)
+    assert (made.date, made.date_from) == (said, source)

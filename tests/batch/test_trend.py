@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import comb
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +11,9 @@ from scipy.stats import rankdata
 
 from ferryid.batch import trend as trending
 from ferryid.batch.trend import trend, trends_of
+from ferryid.report.batch_rows import DiagnosisSummary, FindingSummary, ParameterEstimate, SummaryRow
 from ferryid.vessel import load_profile
+from tests.batch.rows import row as any_row
 
 
 def test_growth_and_its_chance() -> None:
@@ -52,27 +54,30 @@ def test_ranks_are_those_of_scipy() -> None:
         assert np.array_equal(trending._ranks(y), rankdata(y))
 
 
-def row(day: int, verdict: str = "matched", date: str | None = "", **found: dict[str, float]) -> dict[str, Any]:
+def row(
+    day: int, verdict: str = "matched", date: str | None = "", vessel: str = "milliampere", **found: dict[str, float]
+) -> SummaryRow:
     """Return a row with findings; their probability is 0.9 but where ``p`` says else."""
-    findings = [
-        {
-            "effect": effect,
-            "instance": None,
-            "probability": values.pop("p", 0.9),
-            "parameters": {
-                name: {"value": value, "low": value - 1.0, "high": value + 1.0, "unit": "-"}
+    findings = tuple(
+        FindingSummary(
+            effect,
+            None,
+            values.get("p", 0.9),
+            {
+                name: ParameterEstimate(value, value - 1.0, value + 1.0, "-")
                 for name, value in values.items()
+                if name != "p"
             },
-            "says": "",
-        }
+            "",
+        )
         for effect, values in found.items()
-    ]
-    return {
-        "name": f"day{day}",
-        "vessel": "milliampere",
-        "date": f"2024-05-{day:02d}T00:00:00+00:00" if date == "" else date,
-        "diagnose": {"verdict": verdict, "findings": findings},
-    }
+    )
+    return replace(
+        any_row(f"day{day}"),
+        vessel=vessel,
+        date=f"2024-05-{day:02d}T00:00:00+00:00" if date == "" else date,
+        diagnose=DiagnosisSummary("", None, verdict, findings, {}, {}),
+    )
 
 
 PROFILES = {"milliampere": load_profile("milliampere")}
@@ -85,11 +90,11 @@ def test_over_dates_whatever_their_order_with_absence_as_neutral() -> None:
     # What could not be tested says nothing of absence.
     days.append(row(11, "not_testable"))
     (found,) = trends_of(days[::-1], PROFILES)
-    assert [point["log"] for point in found["points"]] == [f"day{day}" for day in range(4, 11)]
-    assert [where["log"] for where in found["absent"]] == ["day1", "day2", "day3"]
-    assert found["neutral"] == 1.0
-    assert found["kind"] == "grows"
-    assert found["says"] == (
+    assert [point.log for point in found.points] == [f"day{day}" for day in range(4, 11)]
+    assert [where.log for where in found.absent] == ["day1", "day2", "day3"]
+    assert found.neutral == 1.0
+    assert found.kind == "grows"
+    assert found.sentence == (
         "milliampere: Fouling, surge grows from 1 to 1.9 (first and last third), 2024-05-01 to 2024-05-10 "
         "(4 of 7 findings are hints)"
     )
@@ -97,23 +102,23 @@ def test_over_dates_whatever_their_order_with_absence_as_neutral() -> None:
 
 def test_a_payload_steps_and_its_place_has_no_meaning_without_it() -> None:
     rows = [row(day) for day in range(1, 7)] + [row(day, payload={"mass": 200.0, "x": 0.5}) for day in range(7, 13)]
-    found = {one["parameter"]: one for one in trends_of(rows, PROFILES)}
-    assert found["mass"]["says"] == (
+    found = {one.parameter: one for one in trends_of(rows, PROFILES)}
+    assert found["mass"].sentence == (
         "milliampere: Payload, mass steps from 0 - to 200 - between 2024-05-06 and 2024-05-07".replace(" -", "")
     )
-    assert found["x"]["neutral"] is None
-    assert found["x"]["kind"] is None
+    assert found["x"].neutral is None
+    assert found["x"].kind is None
 
 
 def test_without_dates_in_the_order_of_the_logs_and_no_times_within_them() -> None:
     rows = [row(day, date=None if day == 3 else "", wind={"north": 1.0, "onset": 9.0}) for day in (5, 3, 1)]
     (found,) = trends_of(rows, PROFILES)
-    assert found["parameter"] == "north"
-    assert not found["dated"]
-    assert [point["log"] for point in found["points"]] == ["day5", "day3", "day1"]
+    assert found.parameter == "north"
+    assert not found.dated
+    assert [point.log for point in found.points] == ["day5", "day3", "day1"]
 
 
 def test_vessels_by_themselves() -> None:
-    rows = [row(1, fouling={"surge": 1.2}), row(2, fouling={"surge": 1.3}) | {"vessel": "revolt"}]
+    rows = [row(1, fouling={"surge": 1.2}), row(2, vessel="revolt", fouling={"surge": 1.3})]
     found = trends_of(rows, {**PROFILES, "revolt": load_profile("revolt")})
-    assert [(one["vessel"], len(one["points"])) for one in found] == [("milliampere", 1), ("revolt", 1)]
+    assert [(one.vessel, len(one.points)) for one in found] == [("milliampere", 1), ("revolt", 1)]

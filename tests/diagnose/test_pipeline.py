@@ -15,6 +15,7 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_campaign
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.simulate import Scenario, load_scenario, parse_scenario, scenarios, simulate, write_log
+from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
 
 pytestmark = pytest.mark.slow
@@ -32,7 +33,7 @@ def one_round(name: str) -> Scenario:
 def diagnosed(scenario: Scenario, folder: Path) -> Diagnosis:
     log = folder / f"{scenario.name}.mcap"
     write_log(simulate(scenario), log)
-    return diagnose([str(log)], load_profile("milliampere"), None, progress=lambda stage: None)[0]
+    return diagnose([str(log)], load_profile("milliampere"), DiagnosisSettings(), IN_MEMORY)[0]
 
 
 @pytest.mark.parametrize("together", [False, True])
@@ -50,17 +51,15 @@ def test_every_log_is_read_aligned_and_checked_once(
         monkeypatch.setattr(module, name, counted)
     logs = [str(shutil.copy(SHORT, tmp_path / f"{name}.mcap")) for name in "ab"]
     settings = DiagnosisSettings(together=together)
-    made = diagnose(logs, load_profile("milliampere"), None, settings, progress=lambda stage: None)
+    made = diagnose(logs, load_profile("milliampere"), settings, IN_MEMORY)
     assert [one.log for one in made] == ["a", "b"]
     assert counts == {"record": 2, "align": 2, "examine": 2}
 
 
 def test_one_log_is_a_campaign_of_one() -> None:
     ferry, log = load_profile("milliampere"), str(SHORT)
-    (alone,) = diagnose([log], ferry, None, progress=lambda stage: None)
-    (one,) = diagnose_campaign(
-        [log], ferry, None, HullBaseline(ferry), DiagnosisSettings(), progress=lambda stage: None
-    )
+    (alone,) = diagnose([log], ferry, DiagnosisSettings(), IN_MEMORY)
+    (one,) = diagnose_campaign([log], ferry, HullBaseline(ferry), DiagnosisSettings(), IN_MEMORY)
     assert to_json(alone) == to_json(one)
 
 
@@ -121,6 +120,6 @@ def test_a_squall_that_no_steady_wind_explains_is_not_matched(tmp_path: Path) ->
     )
     log = tmp_path / "squall.mcap"
     write_log(simulate(parse_scenario(scenario, "squall", tmp_path), 3), log)
-    result = diagnose([str(log)], load_profile("milliampere"), None, progress=lambda stage: None)[0]
+    result = diagnose([str(log)], load_profile("milliampere"), DiagnosisSettings(), IN_MEMORY)[0]
     assert result.verdict in ("unexplained", "partly_explained")
     assert not [one for one in result.findings if one.sure and one.effect not in ("wind", "gusts", "unknown")]

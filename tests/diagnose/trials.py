@@ -14,6 +14,7 @@ from ferryid.diagnose.inference.stages import AveragedLog, average
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects.force_model import Measurements
 from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.types import IN_MEMORY, no_progress
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 
@@ -36,19 +37,13 @@ def sailed(folder: Path, name: str, scenario: str, seed: int) -> Measurements:
     """Simulate a scenario, TOML without a true hull, and return the measurements that its log shows."""
     log = folder / f"{name}.mcap"
     write_log(simulate(replace(parse_scenario(scenario, name), true_hull=OFF), seed), log)
-    return read_measurements(str(log), FERRY, None)[0]
+    return read_measurements(str(log), FERRY)[0]
 
 
 def averaged(paths: Sequence[str], vessel: Profile, withhold: Sequence[str] = ()) -> list[AveragedLog]:
     """Return logs as the first stages of a diagnosis leave them."""
-
-    def quiet(_stage: str) -> None:
-        pass
-
-    return [
-        average(screen_sensors(measure_log(path, vessel, None, withhold=withhold, progress=quiet), quiet))
-        for path in paths
-    ]
+    measured = [measure_log(path, vessel, IN_MEMORY, withhold=withhold) for path in paths]
+    return [average(screen_sensors(log, no_progress)) for log in measured]
 
 
 def trial_on(measurements: Measurements) -> EstimationProblem:

@@ -65,7 +65,7 @@ def found_in(tables: dict[str, Any], seed: int, folder: Path) -> Search:
         hull[coefficient] = sign * hull.get(coefficient, 1.0)
     log = folder / "trial.mcap"
     write_log(simulate(replace(scenario, true_hull=hull), seed), log)
-    measurements, _ = read_measurements(str(log), FERRY, None)
+    measurements, _ = read_measurements(str(log), FERRY)
     seen = windows(measurements, *window_lengths(FERRY))
     plain, spread = prior_force_model(seen.measurements, FERRY)
     return search(estimation_problem(seen, plain, spread), lambda stage: None)
@@ -105,7 +105,7 @@ def test_related_effects_are_not_mistaken_for_each_other(name: str, seed: int, t
 def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
     log = tmp_path / "trial.mcap"
     write_log(simulate(parse_scenario(BASE, "effect"), 1), log)
-    measurements, _ = read_measurements(str(log), FERRY, None)
+    measurements, _ = read_measurements(str(log), FERRY)
     seen = windows(measurements, *window_lengths(FERRY))
     plain, spread = prior_force_model(seen.measurements, FERRY)
     result = search(estimation_problem(seen, replace(plain, hull=0.4 * plain.hull), 0.4 * spread), lambda stage: None)

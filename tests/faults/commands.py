@@ -67,12 +67,13 @@ def archived(folder: Path, out: Path) -> None:
 
 def diagnose(folder: Path, out: Path) -> None:
     from ferryid.diagnose.judging.model_update import store_updated_model
-    from ferryid.diagnose.pipeline import diagnose
+    from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
     from ferryid.report.diagnosis_report import report
+    from ferryid.types import RunContext
     from ferryid.vessel import load_profile
 
     profile = load_profile("milliampere")
-    found = diagnose([str(LOG)], profile, out, progress=_quiet)
+    found = diagnose([str(LOG)], profile, DiagnosisSettings(), RunContext(out, _quiet))
     report(store_updated_model(found, profile, None, out), out, ["ferryid", "diagnose"])
 
 

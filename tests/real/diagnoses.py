@@ -20,6 +20,7 @@ from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.report import diagnosis_figures
 from ferryid.report.diagnosis_words import numbers, probability
+from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
 from tests.evidence import stamp
 from tests.real import esso, pictures, witnesses
@@ -95,9 +96,8 @@ def told(
     made = diagnose(
         logs,
         load_profile(vessel),
-        None,
         DiagnosisSettings(together=together, withhold=tuple(withhold)),
-        progress=lambda stage: None,
+        IN_MEMORY,
     )
     lines = ["| log | verdict | finding | probability | |", "|---|---|---|---|---|"]
     for one in made:
@@ -152,7 +152,7 @@ def osaka() -> str:
         pictures.course(true, random.names, (3, 4, 5)), encoding="utf-8"
     )
     profile = load_profile("esso-osaka")
-    lags = [witnesses.velocity_lag(read_measurements(path, profile, None)[0]) for path in esso.logs("random")]
+    lags = [witnesses.velocity_lag(read_measurements(path, profile)[0]) for path in esso.logs("random")]
     (FOLDER / "diagnosis-esso-osaka-lag.svg").write_text(pictures.lag(lags, random.names), encoding="utf-8")
     seconds = [one.seconds for one in lags]
     by_log = dict(zip(random.names, seconds, strict=True))
@@ -270,7 +270,7 @@ def milliampere() -> str:
     """Return the section on the ferry with four thrusters."""
     folder = DATA / MILLIAMPERE
     profile = load_profile("milliampere-2025")
-    measurements = read_measurements(str(folder), profile, None)[0]
+    measurements = read_measurements(str(folder), profile)[0]
     lag, gain = witnesses.velocity_lag(measurements), witnesses.slow_gain(measurements)
     at, offsets, used = witnesses.antenna(folder), witnesses.encoder_offsets(folder), witnesses.sectors(measurements)
     sectors = "; ".join(
@@ -416,7 +416,7 @@ def pool() -> str:
     ]
     steps, shown = [], None
     for log in logs:
-        measurements = read_measurements(log, profile, None)[0]
+        measurements = read_measurements(log, profile)[0]
         steps.append(witnesses.position_steps(_poses(log)))
         told_ = witnesses.idle(measurements)
         if told_ is not None:

@@ -127,7 +127,7 @@ def study(kind: str, *, judged: bool) -> tuple[Study, list[Member], list[Floats]
 
 def hidden_wind(path: str, member: Member) -> Floats:
     """Return the wind that a run measured, on the rows of its windows' measurements, shape (n, 2)."""
-    measurements, _ = read_measurements(path, ESSO, None)
+    measurements, _ = read_measurements(path, ESSO)
     corrected = windows(
         replace(examine(replace(measurements, wind=None))[1], wind=measurements.wind), *window_lengths(ESSO)
     ).measurements

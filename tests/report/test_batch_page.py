@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from ferryid.batch.trend import trends_of
 from ferryid.report.batch_page import render
+from ferryid.report.batch_rows import BatchResult
 from ferryid.vessel import load_profile
 from tests.batch.rows import finding, result, row
 
@@ -57,7 +59,7 @@ class Table(HTMLParser):
 EVIL = '<script>alert("x")</script>'
 
 
-def hostile() -> dict[str, Any]:
+def hostile() -> BatchResult:
     nameless = finding("unknown")
     bad = {"fit": None, "evaluate": None, "diagnose": None, "start_ns": None, "duration_s": None}
     return result(
@@ -154,7 +156,8 @@ def test_trends_are_drawn_and_told() -> None:
 @pytest.mark.parametrize("model", ["", "mine@2"])
 def test_what_was_evaluated_is_named(model: str) -> None:
     made = row("a.mcap")
-    made["evaluate"]["of"] = "mine@2"
+    assert made.evaluate is not None
+    made = replace(made, evaluate=replace(made.evaluate, evaluated="mine@2"))
     page = render(result(made, model="a/path/of/mine/2.json" if model else ""))
     assert f"rms error of {model or 'the hull'} [N, N, N·m]" in page
     assert ("MSE of mine@2 over base" in page) == bool(model)
@@ -166,8 +169,7 @@ def test_counts_memory_and_time() -> None:
     assert "4 logs, 2 done; 1 refused; 1 failed by a bug of ferryid" in page
     assert "each process is held to 4.0 GB" in page
     assert "22 s of work" in page
-    free = hostile()
-    free["memory"]["bounded"] = False
+    free = replace(hostile(), memory=replace(hostile().memory, bounded=False))
     assert "holds no process to a bound" in render(free)
 
 

@@ -11,9 +11,9 @@ from random import Random
 from typing import Any
 
 from ferryid.errors import FerryIdError
+from ferryid.json_record import Record
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.interfaces import Evaluator, Pipeline, Trial
-from ferryid.validation.json_record import Record
 from ferryid.validation.records import CaseResult
 from ferryid.validation.targets import Target
 

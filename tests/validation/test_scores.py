@@ -15,10 +15,10 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.effects import effects
 from ferryid.effects.shallow_water import HEAVIER
 from ferryid.effects.wind import COEFFICIENTS
+from ferryid.json_record import Record
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.detection_curves import Curve
 from ferryid.validation.estimate_errors import estimate_errors
-from ferryid.validation.json_record import Record
 from ferryid.validation.name_scores import (
     NONE,
     OTHER,

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.judging.model_update import store_updated_model
-from ferryid.diagnose.pipeline import diagnose
+from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.errors import FerryIdError
 from ferryid.models.model import Model, blank_model
 from ferryid.models.prediction.log_prediction import Prediction
 from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect
 from ferryid.signals.prepare import Prepared
-from ferryid.types import Floats
+from ferryid.types import Floats, RunContext
 from ferryid.validation.records import TransferResult
 from ferryid.validation.rivals import stepwise
 from ferryid.validation.rivals.base import base_of, prepared_log
@@ -193,9 +193,9 @@ def test_a_model_of_another_log_is_refused(logs: tuple[str, str, Path]) -> None:
 def test_what_is_diagnosed_beats_base_model_and_stepwise_regression(logs: tuple[str, str, Path]) -> None:
     """From one end to the other, by way of the model's file; the only test here that diagnoses."""
     first, other, folder = logs
-    found = store_updated_model(diagnose([first], PROFILE, folder, progress=lambda stage: None), PROFILE, None, folder)[
-        0
-    ]
+    found = store_updated_model(
+        diagnose([first], PROFILE, DiagnosisSettings(), RunContext(folder)), PROFILE, None, folder
+    )[0]
     assert found.model is not None
     result = transfer_test(first, other, PROFILE, folder, diagnosed=found.model, rivals={"stepwise": stepwise.learn})
     diagnosed, rival = result.methods["diagnosed"], result.methods["stepwise"]

@@ -9,10 +9,8 @@ from ferryid.diagnose.data.measurements import (
     read_measurements,
     window_lengths,
 )
-from ferryid.types import AXES
 
 __all__ = [
-    "AXES",
     "Estimate",
     "MeasuredLog",
     "Survey",

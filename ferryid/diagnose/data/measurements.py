@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, sqrt
 from pathlib import Path
@@ -22,7 +22,7 @@ from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
 from ferryid.signals.track import LeftOut, Motion, Track
-from ferryid.types import Flags, Floats
+from ferryid.types import IN_MEMORY, Flags, Floats, RunContext
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
 
@@ -81,31 +81,21 @@ class MeasuredLog:
 def measure_log(
     path: str,
     profile: Profile,
-    out: Path | None,
+    run: RunContext,
     *,
     withhold: Sequence[str] = (),
-    verify: bool = False,
-    progress: Callable[[str], None],
 ) -> MeasuredLog:
     """Read and align a log; parameters and errors as of `read_measurements`."""
-    return MeasuredLog(
-        path, *read_measurements(path, profile, out, withhold=withhold, verify=verify, progress=progress)
-    )
-
-
-def quiet(_stage: str) -> None:
-    """Show no progress."""
+    return MeasuredLog(path, *read_measurements(path, profile, run, withhold=withhold))
 
 
 def read_measurements(
     path: str,
     profile: Profile,
-    out: Path | None,
+    run: RunContext = IN_MEMORY,
     *,
     withhold: Sequence[str] = (),
     window_s: float = MEAN_S,
-    verify: bool = False,
-    progress: Callable[[str], None] = quiet,
 ) -> tuple[Measurements, Survey]:
     """Return the measurements that a log shows, and what else is known of the log.
 
@@ -118,16 +108,12 @@ def read_measurements(
         A file or folder; parts of one recording joined by ``+``.
     profile
         The vessel.
-    out
-        Output folder, whose ``logs`` keep the ingested tables; None keeps none.
+    run
+        Folder of the ingested tables, progress, and whether to check every checksum.
     withhold
         Signals to hide, of `WITHHELD`.
     window_s
         Moving mean [s].
-    verify
-        Check every checksum.
-    progress
-        Called with the name of each stage.
 
     Raises
     ------
@@ -140,8 +126,8 @@ def read_measurements(
             f"{profile.path}: a diagnosis weighs motion against the actuators' force, found no actuator in the profile. "
             "Fix: describe them in [[actuator]] and map their signals"
         )
-    progress(f"reading {Path(path).name}")
-    recording = record(path, profile, out, verify=verify)
+    run.progress(f"reading {Path(path).name}")
+    recording = record(path, profile, run.tables, verify=run.verify)
     check_sampling(recording, profile)
     track = align(recording, profile)
     track, hidden = _without(track, withhold)

@@ -7,10 +7,9 @@ the difference. An effect that the simulation has already has the simulation's v
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import inf, isfinite
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +31,7 @@ from ferryid.effects.effect import Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
-from ferryid.types import Floats
+from ferryid.types import IN_MEMORY, Floats, RunContext
 from ferryid.vessel.profile import Profile
 
 SHOWN_ROWS = 400
@@ -77,9 +76,7 @@ class Simulation:
     sensors: tuple[SensorFinding, ...]
 
 
-def learn_simulation(
-    path: str, profile: Profile, out: Path | None, *, verify: bool = False, progress: Callable[[str], None]
-) -> Simulation:
+def learn_simulation(path: str, profile: Profile, run: RunContext = IN_MEMORY) -> Simulation:
     """Return the force model that a simulated log shows.
 
     Parameters
@@ -88,15 +85,15 @@ def learn_simulation(
         The log, recorded with the same signals as the vessel's own.
     profile
         The vessel that it simulates.
-    out, verify, progress
-        As in `ferryid.diagnose.pipeline.diagnose`.
+    run
+        Folder of the ingested tables, progress, and whether to check every checksum.
 
     Raises
     ------
     FerryIdError
         For a log that cannot be used, is too short, or moves like no vessel of this profile.
     """
-    measurements, survey = read_measurements(path, profile, out, verify=verify, progress=progress)
+    measurements, survey = read_measurements(path, profile, run)
     sensors, measurements = examine(measurements)
     name = survey.motion.log
     simulated_windows = windows(measurements, *window_lengths(profile))
@@ -109,8 +106,8 @@ def learn_simulation(
         )
     plain, spread = prior_force_model(simulated_windows.measurements, profile)
     wide = INFERENCE.simulator_hull_factor * spread if profile.hull.has_model else spread
-    progress(f"learning what {name} simulates")
-    result = search(estimation_problem(simulated_windows, plain, wide), progress)
+    run.progress(f"learning what {name} simulates")
+    result = search(estimation_problem(simulated_windows, plain, wide), run.progress)
     made = result.fit
     left = float(
         np.mean(

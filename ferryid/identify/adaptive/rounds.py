@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,13 +25,11 @@ from ferryid.models import Model
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
 from ferryid.signals.track import Motion
-from ferryid.types import AXES, Flags, Floats, RunContext
+from ferryid.types import AXES, IN_MEMORY, Flags, Floats
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
 
 _LETTERS = ("u", "v", "r")
-_IN_MEMORY = RunContext(Path())
-"""A fit to motions in memory writes nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,8 +209,8 @@ def _update_mask(functions: Basis, axes: Sequence[int], terms: Sequence[str] | N
 
 
 def _fit(data: AdaptiveData, name: str) -> FitOutcome:
-    estimate = estimate_correction(data, _components(data), data.draws, _IN_MEMORY.progress)
-    return accept_estimate(data, estimate, name, _IN_MEMORY)
+    estimate = estimate_correction(data, _components(data), data.draws, IN_MEMORY.progress)
+    return accept_estimate(data, estimate, name, IN_MEMORY)
 
 
 def _components(data: AdaptiveData) -> int:

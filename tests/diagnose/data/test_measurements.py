@@ -27,7 +27,7 @@ FERRY = load_profile("milliampere")
 @pytest.fixture(scope="module")
 def short() -> Measurements:
     """The measurements of the short fixture, nothing smoothed."""
-    return read_measurements(SHORT, FERRY, None, window_s=0.0)[0]
+    return read_measurements(SHORT, FERRY, window_s=0.0)[0]
 
 
 def model_of(
@@ -70,13 +70,13 @@ def test_each_thruster_pushes_along_its_angle_and_turns_by_its_lever(short: Meas
 
 
 def test_the_thrusters_together_are_the_applied_force() -> None:
-    measurements, survey = read_measurements(SHORT, FERRY, None, window_s=0.0)
+    measurements, survey = read_measurements(SHORT, FERRY, window_s=0.0)
     rows = survey.motion.valid & measurements.usable
     np.testing.assert_allclose(measurements.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
 
 
 def test_the_velocity_is_kept_as_measured_beside_the_calmer_one() -> None:
-    measurements, survey = read_measurements(SHORT, FERRY, None)
+    measurements, survey = read_measurements(SHORT, FERRY)
     np.testing.assert_array_equal(measurements.nu_raw[measurements.usable], survey.motion.raw_nu[measurements.usable])
     assert np.isfinite(measurements.nu).all()
     rough, calm = (np.abs(np.diff(values, axis=0)).mean(axis=0) for values in (measurements.nu_raw, measurements.nu))
@@ -84,9 +84,9 @@ def test_the_velocity_is_kept_as_measured_beside_the_calmer_one() -> None:
 
 
 def test_a_withheld_wind_is_hidden_and_kept() -> None:
-    seen, _ = read_measurements(SHORT, FERRY, None, window_s=0.0)
+    seen, _ = read_measurements(SHORT, FERRY, window_s=0.0)
     assert seen.wind is not None
-    blind, survey = read_measurements(SHORT, FERRY, None, window_s=0.0, withhold=("wind",))
+    blind, survey = read_measurements(SHORT, FERRY, window_s=0.0, withhold=("wind",))
     assert blind.wind is None
     assert survey.motion.wind is None
     np.testing.assert_array_equal(survey.hidden["wind"][: len(seen.t)][seen.usable], seen.wind[seen.usable])
@@ -95,19 +95,19 @@ def test_a_withheld_wind_is_hidden_and_kept() -> None:
 @pytest.mark.parametrize(("what", "told"), [("wimd", 'Did you mean "wind"?'), ("heading", "choose one of")])
 def test_what_cannot_be_withheld_is_refused(what: str, told: str) -> None:
     with pytest.raises(FerryIdError, match="--withhold") as caught:
-        read_measurements(SHORT, FERRY, None, withhold=(what,))
+        read_measurements(SHORT, FERRY, withhold=(what,))
     assert told in str(caught.value)
 
 
 def test_what_the_log_does_not_have_cannot_be_withheld(shared_data: Callable[[str], Path]) -> None:
     log = shared_data("kvlcc2/HSVA_CPMC_KVLCC2_Z_10_05.dat")
     with pytest.raises(FerryIdError, match="wind cannot be withheld"):
-        read_measurements(str(log), load_profile("kvlcc2-model"), None, withhold=("wind",))
+        read_measurements(str(log), load_profile("kvlcc2-model"), withhold=("wind",))
 
 
 def test_a_vessel_without_actuators_is_refused() -> None:
     with pytest.raises(FerryIdError, match="no actuator in the profile"):
-        read_measurements(SHORT, replace(FERRY, actuators=()), None)
+        read_measurements(SHORT, replace(FERRY, actuators=()))
 
 
 def test_the_plain_force_model_moves_as_the_hull_in_the_measured_wind(short: Measurements) -> None:
@@ -194,7 +194,7 @@ def test_broad_beliefs_hold_what_was_measured_of_a_ferry(short: Measurements) ->
 def test_a_tanker_with_propeller_and_rudder_is_measured(shared_data: Callable[[str], Path]) -> None:
     log = shared_data("esso_osaka/random/random_06-Aug-2020_16_24_25_1.csv")
     profile = load_profile("esso-osaka")
-    measurements, survey = read_measurements(str(log), profile, None, withhold=("wind",), window_s=0.0)
+    measurements, survey = read_measurements(str(log), profile, withhold=("wind",), window_s=0.0)
     rows = survey.motion.valid & measurements.usable
     np.testing.assert_allclose(measurements.parts.sum(axis=1)[rows], survey.motion.tau[rows], atol=1e-9)
     assert np.isnan(measurements.angles).all()

@@ -19,6 +19,7 @@ from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
 from ferryid.errors import FerryIdError
+from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.diagnose.judging.test_held_out import sailed
@@ -147,7 +148,7 @@ def test_a_common_hull_needs_two_logs() -> None:
 
 def test_a_common_hull_and_another_model_exclude_each_other() -> None:
     with pytest.raises(FerryIdError, match="--together"):
-        diagnose(["a", "b"], FERRY, None, DiagnosisSettings(against="c", together=True), progress=lambda stage: None)
+        diagnose(["a", "b"], FERRY, DiagnosisSettings(against="c", together=True), IN_MEMORY)
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects.force_model import Measurements, acceleration
 from ferryid.errors import FerryIdError
 from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.types import IN_MEMORY, no_progress
 from ferryid.vessel import load_profile
 
 FERRY = load_profile("milliampere")
@@ -52,10 +53,6 @@ def sailed(folder: Path, name: str, tables: str, seed: int, hull: float = 1.0, d
     return str(folder / f"{name}.mcap")
 
 
-def quietly(stage: str) -> None:
-    pass
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("against")
@@ -68,21 +65,21 @@ def windy(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def simulated(windy: str) -> Simulation:
-    return learn_simulation(windy, FERRY, None, progress=quietly)
+    return learn_simulation(windy, FERRY)
 
 
 def found(simulated: Simulation, log: str) -> Search:
-    seen = windows(read_measurements(log, FERRY, None)[0], *window_lengths(FERRY))
+    seen = windows(read_measurements(log, FERRY)[0], *window_lengths(FERRY))
     plain, spread = simulated_force_model(simulated, seen.measurements)
     return search(
-        estimation_problem(seen, plain, spread), quietly, known=differing_candidates(simulated, seen.measurements)
+        estimation_problem(seen, plain, spread), no_progress, known=differing_candidates(simulated, seen.measurements)
     )
 
 
 @pytest.mark.slow
 def test_only_the_fault_is_found_where_both_have_the_wind(folder: Path, windy: str) -> None:
     log = sailed(folder, "recording", wind(2.0) + FAULT, 4)
-    result = diagnose([log], FERRY, None, DiagnosisSettings(against=windy), progress=quietly)[0]
+    result = diagnose([log], FERRY, DiagnosisSettings(against=windy), IN_MEMORY)[0]
     assert result.verdict == "explained"
     (fault,) = result.findings
     assert (fault.effect, fault.instance) == ("thruster_gain", "thruster1")
@@ -124,7 +121,7 @@ def test_a_wind_that_differs_is_told_with_both_values(folder: Path, simulated: S
 
 @pytest.mark.slow
 def test_a_simulated_hull_of_seven_tenths_hides_no_fault(folder: Path) -> None:
-    light = learn_simulation(sailed(folder, "light", wind(2.0), 5, hull=0.7), FERRY, None, progress=quietly)
+    light = learn_simulation(sailed(folder, "light", wind(2.0), 5, hull=0.7), FERRY)
     assert light.hull[0] == pytest.approx(0.7 * FERRY.hull.M[0, 0], rel=0.1)
     result = found(light, sailed(folder, "heavy", wind(2.0) + FAULT, 6))
     names = {one.key: values for one, values in zip(result.fit.candidates, result.fit.values, strict=True)}
@@ -164,7 +161,7 @@ def test_paths_of_another_manoeuvre_are_not_compared(simulated: Simulation) -> N
 
 def test_a_simulation_too_short_to_learn_from_is_refused() -> None:
     with pytest.raises(FerryIdError, match="simulate and record the whole trial"):
-        learn_simulation(str(FIXTURES / "short.mcap"), FERRY, None, progress=quietly)
+        learn_simulation(str(FIXTURES / "short.mcap"), FERRY)
 
 
 @pytest.mark.slow
@@ -173,12 +170,12 @@ def test_a_simulation_of_another_vessel_is_refused(folder: Path) -> None:
     other = replace(FERRY, actuators=tuple(replace(one, position_m=(0.3, 1.5)) for one in FERRY.actuators))
     log = sailed(folder, "hasty", "", 7, dwell_s=20)
     with pytest.raises(FerryIdError, match="needs a simulation of milliampere"):
-        learn_simulation(log, other, None, progress=quietly)
+        learn_simulation(log, other)
 
 
 def test_model_and_simulation_exclude_each_other(windy: str) -> None:
     with pytest.raises(FerryIdError, match="both --model and --against"):
-        diagnose([windy], FERRY, None, DiagnosisSettings(model=object(), against=windy), progress=quietly)  # type: ignore[arg-type]
+        diagnose([windy], FERRY, DiagnosisSettings(model=object(), against=windy), IN_MEMORY)  # type: ignore[arg-type]
 
 
 def test_a_load_that_a_simulation_records_for_a_part_of_it_is_aboard_for_that_part() -> None:

@@ -39,7 +39,7 @@ IMITATORS = ("wind", "gusts", "waves", "time_delay", "thruster_lag")
 def found_in(environment: str, seed: int, folder: Path) -> Search:
     log = folder / "trial.mcap"
     write_log(simulate(parse_scenario(BASE + environment, "unsteady"), seed), log)
-    measurements, _ = read_measurements(str(log), FERRY, None)
+    measurements, _ = read_measurements(str(log), FERRY)
     seen = windows(measurements, *window_lengths(FERRY))
     plain, spread = prior_force_model(seen.measurements, FERRY)
     candidates, _ = list_candidates(seen.measurements)

@@ -31,7 +31,7 @@ from ferryid.report.comparison_words import render_effects
 from ferryid.report.evaluation_text import render_evaluation
 from ferryid.simulate import load_scenario, parse_scenario, simulate, write_log
 from ferryid.simulate.vessel_model import sailed_by
-from ferryid.types import AXES, RunContext
+from ferryid.types import AXES, IN_MEMORY, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 
@@ -68,7 +68,7 @@ def sailed(folder: Path, name: str, path: str, seed: int, more: str) -> str:
 
 
 def trial_on(log: str, model: Model | None = None) -> tuple[EstimationProblem, Survey]:
-    measurements, survey = read_measurements(log, FERRY, None)
+    measurements, survey = read_measurements(log, FERRY)
     seen = windows(measurements, *window_lengths(FERRY))
     plain, spread = prior_force_model(seen.measurements, FERRY, model, survey.recording.sha256)
     return estimation_problem(seen, plain, spread), survey
@@ -127,10 +127,6 @@ def told(*several: Posterior) -> list[Diagnosis]:
         )
         for one in several
     ]
-
-
-def quiet(stage: str) -> None:
-    pass
 
 
 def judged(model: Model, log: str, out: Path) -> dict[str, Any]:
@@ -437,7 +433,7 @@ def test_nothing_is_left_to_find_in_a_log_of_the_model(model: Model, folder: Pat
     quick = replace(sailing.scenario.sensors, imu_rate_hz=0.0, camera_rate_hz=0.0)
     log = folder / "of-the-model.mcap"
     write_log(simulate(replace(sailing.scenario, sensors=quick, duration_s=720.0), 21, vessel=sailing.vessel), log)
-    (with_model,) = diagnose([str(log)], FERRY, None, DiagnosisSettings(model=model), progress=quiet)
+    (with_model,) = diagnose([str(log)], FERRY, DiagnosisSettings(model=model), IN_MEMORY)
     assert with_model.verdict == "matched"
     assert with_model.posterior is None
     entry = judged(model, str(log), folder / "out")["logs"][0]

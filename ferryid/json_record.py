@@ -1,13 +1,25 @@
-"""Frozen dataclasses as JSON objects: keys are the names of the fields, values follow the type hints."""
+"""Frozen dataclasses as JSON objects: keys are the names of the fields, values follow the type hints.
+
+A named tuple is an array. A field whose key in JSON is another than its name is declared by
+`json_key`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from math import isfinite, nan
 from types import UnionType
 from typing import Any, ClassVar, Self, Union, get_args, get_origin, get_type_hints
+
+Number = int | float
+"""A number that is written as it was read: a whole one stays whole."""
+
+
+def json_key(key: str) -> dict[str, str]:
+    """Return the metadata of a dataclass field whose key in JSON is another than its name."""
+    return {"key": key}
 
 
 class Record:
@@ -43,7 +55,7 @@ class Record:
 
 def _plain(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
-        made = {one.name: _plain(getattr(value, one.name)) for one in fields(value)}
+        made = {_key(one): _plain(getattr(value, one.name)) for one in fields(value)}
         derived = getattr(type(value), "DERIVED", {})
         return made | {key: _plain(getattr(value, name)) for key, name in derived.items()}
     if isinstance(value, Mapping):
@@ -57,6 +69,10 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def _key(one: Field[Any]) -> str:
+    return str(one.metadata.get("key", one.name))
+
+
 @cache
 def _hints(kind: type) -> dict[str, Any]:
     return get_type_hints(kind)
@@ -68,10 +84,14 @@ def _parsed(kind: Any, value: Any) -> Any:
     if kind is Any:
         return value
     if origin in (Union, UnionType):
-        if value is None:
+        if value is None and type(None) in arguments:
             return None
-        (kind,) = (one for one in arguments if one is not type(None))
-        return _parsed(kind, value)
+        kinds = [one for one in arguments if one is not type(None)]
+        # Of several only simple ones: an integer that may be one is not made a float.
+        return _parsed(next((one for one in kinds if type(value) is one), kinds[-1]), value)
+    if isinstance(kind, type) and issubclass(kind, tuple) and isinstance(value, list):
+        inner = tuple(_hints(kind).values())
+        return kind(*(_parsed(one, each) for one, each in zip(inner, value, strict=True)))
     if origin is tuple and isinstance(value, list):
         inner = arguments[:1] * len(value) if arguments[-1] is Ellipsis else arguments
         return tuple(_parsed(one, each) for one, each in zip(inner, value, strict=True))
@@ -90,15 +110,15 @@ def _parsed_dataclass(kind: type, value: Any) -> Any:
     if not isinstance(value, dict):
         raise ValueError(f"{kind.__name__}: expected an object, found {type(value).__name__}")
     assert is_dataclass(kind)
-    known = {one.name: one for one in fields(kind)}
+    known = {_key(one): one for one in fields(kind)}
     derived = getattr(kind, "DERIVED", {})
     missing = [
-        name
-        for name, one in known.items()
-        if name not in value and one.default is MISSING and one.default_factory is MISSING
+        key
+        for key, one in known.items()
+        if key not in value and one.default is MISSING and one.default_factory is MISSING
     ]
-    unknown = [name for name in value if name not in known and name not in derived]
+    unknown = [key for key in value if key not in known and key not in derived]
     if missing or unknown:
         raise ValueError(f"{kind.__name__}: missing {missing}, unknown {unknown}")
     hints = _hints(kind)
-    return kind(**{name: _parsed(hints[name], value[name]) for name in known if name in value})
+    return kind(**{one.name: _parsed(hints[one.name], value[key]) for key, one in known.items() if key in value})

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, isnan, nan
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import pytest
 
 from ferryid.diagnose.data.estimate import Estimate
+from ferryid.json_record import Number, Record, json_key
 from ferryid.validation.case import Case, Truth
 from ferryid.validation.case_sampling import sample_cases
-from ferryid.validation.json_record import Record
 from ferryid.validation.name_scores import Share
 from ferryid.validation.records import Diagnosis, Finding, OracleEstimate, OracleResult, TransferResult, TransferScore
 
@@ -57,6 +57,29 @@ def test_what_is_not_finite_becomes_none_and_properties_are_written() -> None:
     assert isnan(made.size)
     assert (made.pair, made.values) == ((1.0, 2.0), {"a": None})
     assert Share(1, 4).to_json()["value"] == 0.25
+
+
+class File(NamedTuple):
+    path: str
+    size: int
+
+
+@dataclass(frozen=True)
+class Listed(Record):
+    files: tuple[File, ...] = field(metadata=json_key("paths"))
+    seconds: Number
+    at: Number | None
+
+
+def test_keys_other_than_names_arrays_with_names_and_whole_numbers() -> None:
+    record = Listed((File("a", 1),), 0, 0.5)
+    assert json.dumps(record.to_json()) == '{"paths": [["a", 1]], "seconds": 0, "at": 0.5}'
+    made = back(record)
+    assert (made, type(made.seconds), made.files[0].size) == (record, int, 1)
+    assert back(replace(record, at=None)).at is None
+    for other in ({"files": []}, {"paths": [["a"]]}, {"paths": [["a", "1"]]}, {"seconds": True}, {"at": "1"}):
+        with pytest.raises(ValueError, match=r"expected|missing|argument|shorter|longer"):
+            Listed.from_json({**record.to_json(), **other})
 
 
 @pytest.mark.parametrize(
