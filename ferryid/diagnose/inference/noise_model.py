@@ -349,7 +349,7 @@ def _most_likely(
     """Return the least cost nearby, minus the logarithm of the likelihood, and its parameters, shape (k,), by Fisher's scoring.
 
     What the likelihood's second derivatives are on average follows from first ones of the predictions, which are found by
-    differences (Harvey 1989, section 3.4.5); steps are damped as by Levenberg and Marquardt.
+    differences (Harvey 1989, section 3.4); steps are damped as by Levenberg and Marquardt.
 
     Parameters
     ----------
