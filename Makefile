@@ -1,10 +1,13 @@
 # Needs python3 (3.11 or newer), make and a package index; everything else is installed, pinned, into .venv.
+# Test modules are compiled once, also where the environment says otherwise.
+unexport PYTHONDONTWRITEBYTECODE
+
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: quick test docs evidence demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
+.PHONY: quick test docs evidence size demo picture bench attack faults real thesis proof wavy fixtures wheel-check lint clean
 
 # On two cores: a worker takes a slow test at a time and the rest by files, so that the fixtures of a file are made once.
 SPREAD = -n 2 --dist loadgroup --no-loadscope-reorder
@@ -29,6 +32,10 @@ docs: $(VENV)/installed
 # Which pages in reports/ are older than the sources that they were made from.
 evidence: $(VENV)/installed
 	$(BIN)/python -m tests.evidence
+
+# Lines, files and the modules that a diagnosis loads; the figures in CHANGELOG.md. CHECKOUT=PATH counts another version's.
+size: $(VENV)/installed
+	$(BIN)/python -m tests.size $(CHECKOUT)
 
 demo: $(VENV)/installed
 	$(BIN)/ferryid simulate twelve-corner --out $(DEMO) --overwrite

@@ -43,6 +43,7 @@ def test_importing_it_imports_nothing_heavy() -> None:
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
+@pytest.mark.slow
 def test_from_a_log_to_a_comparison(tmp_path: Path) -> None:
     seen = api.inspect(SHORT, "milliampere")
     assert seen.json["schema"] == "ferryid.inspect/1"

@@ -47,6 +47,7 @@ def test_what_is_compiled_is_used_again(fresh: Any) -> None:
     assert _hits(fresh()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
 @pytest.mark.parametrize("damage", ["empty", "cut", "flipped", "gone", "zeros"])
 def test_a_damaged_file_counts_as_none_and_is_replaced(fresh: Any, tmp_path: Path, suffix: str, damage: str) -> None:

@@ -162,6 +162,7 @@ def _needed(path: Path) -> Iterator[str]:
                 yield from (package for package in around if not own.startswith(f"{package}."))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "unwanted"),
     [

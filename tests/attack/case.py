@@ -12,6 +12,8 @@ from random import Random
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.attack import formats as package
+
 # What checksums of a format promise for the payload that is returned.
 EXACT = "exact"
 """Values that differ are never returned."""
@@ -127,16 +129,16 @@ HEAVY_SHARE = 0.1
 COMMAND_EVERY = 200
 
 
+def format_names() -> list[str]:
+    """Return the names of the modules in `tests.attack.formats`."""
+    return sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+
+
 @cache
 def formats() -> dict[str, tuple[list[Base], dict[str, Mutation]]]:
     """Return the undamaged logs and the mutations of every module in `tests.attack.formats`."""
-    import tests.attack.formats as package
-
-    found = {}
-    for name in sorted(module.name for module in pkgutil.iter_modules(package.__path__)):
-        module = importlib.import_module(f"{package.__name__}.{name}")
-        found[name] = (module.bases(), dict(module.MUTATIONS))
-    return found
+    modules = {name: importlib.import_module(f"{package.__name__}.{name}") for name in format_names()}
+    return {name: (module.bases(), dict(module.MUTATIONS)) for name, module in modules.items()}
 
 
 def draw(seed: int, number: int, only: str = "") -> Case:

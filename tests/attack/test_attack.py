@@ -15,7 +15,7 @@ import pytest
 
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Loss, Series
-from tests.attack.case import EXACT, Case, Mutated, draw, formats
+from tests.attack.case import EXACT, Case, Mutated, draw, format_names, formats
 from tests.attack.check import Outcome, examine
 from tests.attack.page import grouped, table
 from tests.attack.raw import text_total
@@ -134,7 +134,7 @@ def test_a_planted_fault_is_found(fault: Any, sentence: str, tmp_path: Path) -> 
     assert any(sentence in violation for violation in outcome.violations), outcome
 
 
-@pytest.mark.parametrize("name", sorted(formats()))
+@pytest.mark.parametrize("name", format_names())
 def test_a_silent_loss_is_found_in_every_format(name: str, tmp_path: Path) -> None:
     assert any("silent loss" in each for each in _examined(_undamaged(name), tmp_path, drops).violations)
 
@@ -144,7 +144,8 @@ def test_a_reported_loss_is_no_violation(tmp_path: Path) -> None:
     assert (outcome.result, outcome.violations) == ("loss", ())
 
 
-@pytest.mark.parametrize("name", sorted(formats()))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", format_names())
 def test_undamaged_logs_are_read_whole(name: str, tmp_path: Path) -> None:
     (tmp_path / "tmp").mkdir()
     for base in formats()[name][0]:

@@ -29,6 +29,7 @@ def test_what_is_no_size(text: str) -> None:
         memory.size_bytes("100M")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems hold no process to a bound")
 def test_a_bound_holds_and_ends_with_its_block() -> None:
     before = resource.getrlimit(resource.RLIMIT_DATA)

@@ -110,6 +110,7 @@ def test_impossible_numbers(processes: int) -> None:
         pass
 
 
+@pytest.mark.slow
 def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
     code = f"""
 import sys

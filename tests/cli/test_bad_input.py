@@ -210,6 +210,7 @@ def test_an_output_folder_that_is_a_file(ferryid, fixtures: Path, tmp_path: Path
     )
 
 
+@pytest.mark.slow
 def test_a_full_disk(ferryid, fixtures: Path, tmp_path: Path) -> None:
     if not os.path.exists("/dev/full"):
         pytest.skip("no /dev/full on this machine")
@@ -284,6 +285,7 @@ def test_a_model_name_that_is_a_path(ferryid, fixtures: Path, tmp_path: Path, na
     refused(run, "--name")
 
 
+@pytest.mark.slow
 def test_json_is_never_written_over_an_input(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log = tmp_path / "copy.mcap"
     log.write_bytes((fixtures / "short.mcap").read_bytes())
@@ -291,6 +293,7 @@ def test_json_is_never_written_over_an_input(ferryid, fixtures: Path, tmp_path: 
     assert log.read_bytes() == (fixtures / "short.mcap").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_same_log_twice(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log = fixtures / "short.bag"
     refused(ferryid("fit", log, log, "--vessel", "milliampere", "--out", tmp_path, "--split", "logs"), "the same log")

@@ -34,6 +34,7 @@ def test_what_does_not_belong_together(
     assert not (tmp_path / "reports").exists()
 
 
+@pytest.mark.slow
 def test_a_simulation_too_short_to_learn_from(ferryid, fixtures: Path, tmp_path: Path) -> None:
     log = fixtures / "short.mcap"
     run = ferryid("diagnose", log, "--vessel", "milliampere", "--against", log, "--out", tmp_path)
@@ -48,6 +49,7 @@ def test_one_bad_log_among_two_is_named(ferryid, fixtures: Path, tmp_path: Path)
     assert not (tmp_path / "out" / "reports").exists()
 
 
+@pytest.mark.slow
 def test_a_log_of_two_minutes_cannot_tell(ferryid, fixtures: Path, tmp_path: Path) -> None:
     run = ferryid("diagnose", fixtures / "short.mcap", "--vessel", "milliampere", "--out", tmp_path, "--json", "-")
     assert run.code == 0

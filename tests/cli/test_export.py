@@ -25,6 +25,7 @@ def out(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("form", "suffix"),
     [("c", ".h"), ("matlab", ".m"), ("python", ".py"), ("ros2", ".yaml")],

@@ -79,6 +79,7 @@ def started(code: str, *arguments: str | Path) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", ["ferryid.cli.main", "typer"])
 def test_an_interrupt_while_the_command_line_is_loaded_shows_no_traceback(module: str) -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -100,6 +101,7 @@ from {entry} import {function}
     assert (process.returncode, out, error) == (130, "", MESSAGE)
 
 
+@pytest.mark.slow
 def test_two_threads_that_end_a_process_say_so_once() -> None:
     ending = """
 import threading, time
@@ -112,6 +114,7 @@ for _ in range(3):
     assert (process.returncode, error) == (130, MESSAGE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["interrupt", "terminate"])
 @pytest.mark.parametrize("how", ["pool", "compiled_alone", "clean_up", "swallow", "child"])
 def test_a_command_ends_within_two_seconds_whatever_it_is_at(tmp_path: Path, number: signal.Signals, how: str) -> None:
@@ -147,6 +150,7 @@ main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["typer", "ferryid.cli.app", "ferryid.cli.cmd_fit", "ferryid.errors", "numpy", "scipy.special", "numba"]
 )
@@ -157,6 +161,7 @@ def test_an_interrupt_during_imports_is_one(tmp_path: Path, fixtures: Path, name
     assert (working.returncode, told) == (130, MESSAGE)
 
 
+@pytest.mark.slow
 def test_an_ignored_interrupt_stays_ignored() -> None:
     code = (
         "import os, signal, sys; import ferryid.signals.inspect as module\n"

@@ -20,6 +20,8 @@ from ferryid.types import RunContext
 from ferryid.vessel import load_profile
 from tests.export.models import fitted
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 SECONDS = (400.0, 300.0)
 
@@ -65,7 +67,6 @@ def compared(field: CandidateSet, folder: Path) -> Comparison:
     return compare(field, logs_in(folder), RunContext(folder / "out"))
 
 
-@pytest.mark.slow
 def test_errors_are_those_that_one_sums_by_hand(field: CandidateSet, folder: Path, compared: Comparison) -> None:
     squares, forces, errors = [], [], []
     for log, entry in zip(logs_in(folder), compared.json["logs"], strict=True):
@@ -113,7 +114,6 @@ def test_the_true_model_is_found_better(compared: Comparison) -> None:
     assert all(row["p_corrected"] <= 15 * row["p"] for row in told.values())
 
 
-@pytest.mark.slow
 def test_blocks_of_free_runs_are_twice_as_long_as_a_run(compared: Comparison) -> None:
     # Starts from 0 s to 400 s but for the length of a run: 30 s blocks, then 40, 60 and 120 s.
     blocks = compared.json["logs"][0]["free_run"]["blocks"]
@@ -129,7 +129,6 @@ def test_a_log_with_a_reference_tells_how_it_was_kept(compared: Comparison) -> N
     assert first["tracking"]["IAEW"] == pytest.approx(first["tracking"]["IAE"] * first["tracking"]["EC"])
 
 
-@pytest.mark.slow
 def test_a_training_log_is_no_evidence(folder: Path, compared: Comparison) -> None:
     sha256 = compared.json["logs"][0]["sha256"]
     learnt = replace(
@@ -153,7 +152,6 @@ def test_a_training_log_is_no_evidence(folder: Path, compared: Comparison) -> No
     assert rows[None, BASE]["evidence"]
 
 
-@pytest.mark.slow
 def test_a_short_log_has_no_intervals_and_says_so(field: CandidateSet, tmp_path: Path) -> None:
     short = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
     result = compare(field, [str(short)], RunContext(tmp_path)).json
@@ -178,14 +176,12 @@ def test_a_force_without_bounds_is_refused(folder: Path) -> None:
         compare(field, logs_in(folder), RunContext(folder / "out"))
 
 
-@pytest.mark.slow
 def test_a_log_is_given_once(field: CandidateSet, folder: Path) -> None:
     log = logs_in(folder)[0]
     with pytest.raises(FerryIdError, match="the same log as another"):
         compare(field, [log, log], RunContext(folder / "out"))
 
 
-@pytest.mark.slow
 def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: Path) -> None:
     backwards = fitted("modulus", "decoupled")
     theta = backwards.theta.copy()

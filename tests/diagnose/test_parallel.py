@@ -22,6 +22,7 @@ def several(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parallel.os, "sched_getaffinity", lambda pid: set(range(CORES)), raising=False)
 
 
+@pytest.mark.slow
 def test_results_are_in_the_order_of_the_items_whatever_ends_first() -> None:
     ended: list[int] = []
 

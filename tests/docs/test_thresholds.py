@@ -148,6 +148,7 @@ def test_a_threshold_has_unit_meaning_and_basis(name: str, one: Field[Any]) -> N
     assert len(basis) > len(begin) + 2, f"{name}.{one.name} does not say from or for what"
 
 
+@pytest.mark.slow
 def test_every_threshold_is_used() -> None:
     used = {
         (node.value.id, node.attr)
@@ -196,6 +197,7 @@ def written(path: Path) -> set[str]:
     return {f"{name.removeprefix('ferryid.')} {one}" for one in found if is_number(getattr(module, one))}
 
 
+@pytest.mark.slow
 def test_no_other_number_decides() -> None:
     listed = [line.split() for text in NO_DECISION.values() for line in text.strip().splitlines()]
     allowed = [f"{module} {name}" for module, *names in listed for name in names]

@@ -94,6 +94,7 @@ def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     effects.cache_clear()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("library")
 def test_a_load_acts_on_the_hull_while_it_lasts() -> None:
     push = '[[effects]]\neffect = "push"\nnorth = 30\neast = -20\nmoment = 15\nfrom_s = 20\nuntil_s = 30\n'
@@ -108,6 +109,7 @@ def test_a_load_acts_on_the_hull_while_it_lasts() -> None:
     assert step[after - 1] == pytest.approx(15.0 / FERRY.hull.M[2, 2], rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("library")
 def test_a_change_of_thrust_acts_on_its_thruster() -> None:
     stuck = '[[effects]]\neffect = "stuck"\nthruster = "thruster1"\nahead = 300\n'

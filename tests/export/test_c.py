@@ -89,6 +89,7 @@ def test_the_self_test_finds_a_wrong_number(tmp_path: Path) -> None:
     assert run.returncode == 1
 
 
+@pytest.mark.slow
 def test_without_a_flow_that_the_terms_need_it_gives_no_number(tmp_path: Path) -> None:
     one = exported(MODELS["wind alone"], SHA)
     program = built(formats()["c"].render(one), one.name, tmp_path, "C99")

@@ -31,6 +31,7 @@ def test_a_file_is_a_form() -> None:
     assert files == [form.name for form in formats().values()] == FORMATS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_same_model_gives_the_same_bytes_anywhere(name: str, tmp_path: Path) -> None:
     texts = []

@@ -34,6 +34,7 @@ def test_the_rule(ratios: tuple[float, float, float], accepted: bool) -> None:
     assert judge(*ratios)[0] is accepted
 
 
+@pytest.mark.slow
 @given(st.tuples(*[st.floats(0.01, 3.0)] * 3), st.tuples(*[st.floats(1e-3, 1e6)] * 3))
 def test_the_scale_of_the_forces_does_not_matter(ratios: tuple[float, ...], sizes: tuple[float, ...]) -> None:
     base = np.array(sizes)

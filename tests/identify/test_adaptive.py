@@ -137,6 +137,7 @@ def test_components_by_cross_validation() -> None:
     assert (force_mse(model, UNSEEN) < force_mse(Estimator(PROFILE, WEAK.scale), UNSEEN)).all()
 
 
+@pytest.mark.slow
 def test_draws_give_intervals_that_hold_the_truth() -> None:
     quiet = motion(1, seconds=600.0)
     truth = fit_motions(PROFILE, [quiet], WEAK).model
@@ -196,6 +197,7 @@ def test_surge_update_beats_a_whole_fit_of_a_crossing_elsewhere() -> None:
     assert (force_mse(update_axes(before, [log]).model, elsewhere) < 0.1 * force_mse(whole, elsewhere)).all()
 
 
+@pytest.mark.slow
 def test_update_of_given_terms_and_axes() -> None:
     before = fit_motions(PROFILE, [motion(1, noise=30.0)], COUPLED, draws=50).model
     after = update_axes(before, [motion(2, noise=30.0)], axes=("yaw", "sway"), terms=("v", "r"), draws=50).model
@@ -218,6 +220,7 @@ def test_update_of_given_terms_and_axes() -> None:
     assert after.low[rows[0], 1] < after.theta[rows[0], 1] < after.high[rows[0], 1]
 
 
+@pytest.mark.slow
 def test_models_are_stored_and_read_like_any_other(tmp_path: Path) -> None:
     first = fit_motions(PROFILE, [motion(1)], WEAK, name="first").model
     for model in (first, update_axes(first, [crossing()], name="updated").model):

@@ -28,6 +28,8 @@ from ferryid.simulate import load_scenario, simulate, write_log
 from ferryid.types import RunContext
 from ferryid.vessel import load_profile, parse_profile
 
+pytestmark = pytest.mark.slow
+
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 PROFILE = load_profile("milliampere")
 SETTINGS = FitSettings(delta=0.4, sigma=0.4, draws=60)
@@ -50,7 +52,6 @@ def season(logs: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("components", "split"), [("auto", "blocks"), (12, "blocks")])
 def test_the_same_as_a_fit_to_the_rows(logs: list[str], season: Path, components: str | int, split: str) -> None:
     settings = replace(SETTINGS, components=components, split=split)
@@ -67,7 +68,6 @@ def test_the_same_as_a_fit_to_the_rows(logs: list[str], season: Path, components
     np.testing.assert_allclose(sums.excitation.heading_coverage, rows.excitation.heading_coverage, atol=0.09)
 
 
-@pytest.mark.slow
 def test_rows_are_read_once(season: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = fit_archive(PROFILE, SETTINGS, RunContext(season))
 
@@ -81,7 +81,6 @@ def test_rows_are_read_once(season: Path, monkeypatch: pytest.MonkeyPatch) -> No
         fit_archive(PROFILE, replace(SETTINGS, delta=0.5), RunContext(season))
 
 
-@pytest.mark.slow
 def test_a_damaged_file_is_made_anew(season: Path) -> None:
     whole = fit_archive(PROFILE, SETTINGS, RunContext(season))
     for path in season.glob("logs/*/pieces-*.parquet"):
@@ -89,7 +88,6 @@ def test_a_damaged_file_is_made_anew(season: Path) -> None:
     np.testing.assert_array_equal(fit_archive(PROFILE, SETTINGS, RunContext(season)).model.theta, whole.model.theta)
 
 
-@pytest.mark.slow
 def test_the_same_fit_again_is_the_same_model_file(season: Path, tmp_path: Path) -> None:
     shutil.copytree(season / "logs", tmp_path / "logs", ignore=shutil.ignore_patterns("pieces-*"))
     texts = [
@@ -139,7 +137,6 @@ def test_sums_that_are_no_numbers_are_made_anew(season: Path, tmp_path: Path) ->
     np.testing.assert_array_equal(fit_archive(PROFILE, SETTINGS, RunContext(tmp_path)).model.theta, whole.model.theta)
 
 
-@pytest.mark.slow
 def test_two_recordings_of_one_file_are_refused(tmp_path: Path, logs: list[str]) -> None:
     path = tmp_path / "day.mcap"
     for log in logs[:2]:
@@ -178,7 +175,6 @@ def test_whole_logs_validate(season: Path) -> None:
     assert held[0].sha256 not in {log["sha256"] for log in result.model.training}
 
 
-@pytest.mark.slow
 def test_a_sweep_of_the_archive_is_that_of_the_logs(logs: list[str], season: Path) -> None:
     settings = replace(SETTINGS, components="auto")
     by_rows = sweep_settings("both", logs, PROFILE, settings, RunContext(season), windows_s=(0.5, 1.0, 2.0))
@@ -232,7 +228,6 @@ def test_what_an_archive_cannot_do_is_said(season: Path) -> None:
         fit_archive(PROFILE, replace(SETTINGS, split="every-kth"), RunContext(season))
 
 
-@pytest.mark.slow
 def test_the_page_has_a_line_for_each_log(season: Path) -> None:
     outcome = fit_archive_and_report(PROFILE, SETTINGS, RunContext(season), name="season")
     page = outcome.report.read_text(encoding="utf-8")

@@ -104,6 +104,7 @@ def test_a_model_of_weight_nothing_leaves_no_trace_but_its_name() -> None:
     assert len(alone.settings["made_of"]) == 3
 
 
+@pytest.mark.slow
 def test_covariance_of_models_without_a_common_log_is_that_of_independent_ones() -> None:
     a, b = model(1, draws=60), model(2, draws=60)
     rng = np.random.default_rng(0)
@@ -149,6 +150,7 @@ def test_intervals_are_normal_ones() -> None:
     assert mean.intercept[0] - mean.intercept_low[0] == pytest.approx(1.959964 * mean.covariance[0, -1, -1] ** 0.5)
 
 
+@pytest.mark.slow
 def test_a_mean_is_stored_and_read_like_any_model(tmp_path: Path) -> None:
     mean = mean_of_last(MODELS, 3, name="mean")
     plain = json.loads(dump_json(model_to_json(mean)))

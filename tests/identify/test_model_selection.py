@@ -38,6 +38,7 @@ def chosen(settings: FitSettings, windows_s: tuple[float, ...], *logs: Measured)
     return select_model(PROFILE, settings, FUNCTIONS, windows_s, folds_by_blocks(pieces), force_free_axes(pieces))
 
 
+@pytest.mark.slow
 def test_the_best_window_is_the_test_rows_own() -> None:
     """Of all coefficients those fitted to rows smoothed alike have the least error on test rows, where rows are many.
 

@@ -50,6 +50,7 @@ def run(monkeypatch: pytest.MonkeyPatch, opened: Opened) -> Run:
     return swept
 
 
+@pytest.mark.slow
 def test_both_is_every_window_of_components(run: Run) -> None:
     log, windows_s = measured(1, noise=50.0), (0.5, 1.0, 2.0)
     both = run("both", [log], windows_s=windows_s)
@@ -62,6 +63,7 @@ def test_both_is_every_window_of_components(run: Run) -> None:
     assert one.windows_s == (2.0,)
 
 
+@pytest.mark.slow
 def test_stretches_and_whole_logs_choose_apart(run: Run) -> None:
     """A steady load of each day's own can be learnt within that day and not from another."""
     days = [measured(seed, noise=5.0, force=lambda made, push=push: np.full((len(made.t), 3), push))
@@ -74,12 +76,14 @@ def test_stretches_and_whole_logs_choose_apart(run: Run) -> None:
     assert (found.by["logs"].curves.mse.min(axis=(0, 1)) > 2.0 * 200.0**2 / 3.0).all()
 
 
+@pytest.mark.slow
 def test_a_number_of_components_is_kept_to_where_windows_are_swept(run: Run) -> None:
     settings = replace(SETTINGS, components=4)
     assert run("window", [measured(1)], settings).choice.components == 4
     assert run("both", [measured(1)], settings).settings.components == "auto"
 
 
+@pytest.mark.slow
 def test_notes(run: Run) -> None:
     log = measured(1, noise=20.0)
     assert run("components", [log]).notes == ()

@@ -67,6 +67,7 @@ def check(parts: Split, logs: list[Motion], window_s: float, guard_s: float) -> 
         assert gap_s(training, validation, log.rate_hz) >= window_s + 2 / log.rate_hz + guard_s - 0.5 / log.rate_hz
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(logs=motions(), window_s=st.floats(0, 2), guard_s=st.floats(0, 3))
 def test_blocks_keep_apart(logs: list[Motion], window_s: float, guard_s: float) -> None:

@@ -405,6 +405,7 @@ def test_any_times_give_rising_times_and_account_for_every_row(data: st.DataObje
         np.testing.assert_array_equal(times, receive[rows])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=50)
 @given(st.permutations(list(range(30))))
 def test_shuffled_rows_come_back_in_order(order: list[int]) -> None:

@@ -281,6 +281,7 @@ def descriptors(*types: dict[str, str], syntax: str = "proto3") -> bytes:
     return FileDescriptorSet(file=[file]).SerializeToString()
 
 
+@pytest.mark.slow
 def test_protobuf_types_that_share_their_parts_are_listed_within_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(definitions, "MAX_FIELDS", 1000)
     chain = [{f"f{k}": str(level + 1) for k in range(3)} for level in range(30)]

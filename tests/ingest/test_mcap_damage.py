@@ -49,6 +49,7 @@ def test_files_written_by_record_are_sound(compression: str, verify: bool) -> No
     assert all("end" in loss.what for loss in losses)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 def test_a_flipped_bit_in_either_size_of_a_chunk_loses_nothing(compression: str) -> None:
     chunks = chunk_records(compression)
@@ -362,6 +363,7 @@ def test_the_records_that_chunks_hold_are_bounded_for_the_whole_file(monkeypatch
     assert any("more records than it has bytes in the file" in loss.what for loss in log.losses)
 
 
+@pytest.mark.slow
 def test_small_chunks_are_read_some_at_a_time() -> None:
     chunks = [chunk(message(number), "lz4", start=T0 + number) for number in range(500)]
     log = McapLog(Path("log.mcap"), HEAD + b"".join(chunks) + DATA_END + footer(0))

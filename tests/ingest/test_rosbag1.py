@@ -85,6 +85,7 @@ def test_every_compression_gives_what_was_written(tmp_path: Path, compression: s
     assert reader.losses == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 def test_a_truncated_bag_yields_every_message_before_the_cut(tmp_path: Path, compression: str) -> None:
     path = write_bag(tmp_path / "a.bag", compression)

@@ -185,6 +185,7 @@ def test_a_destroyed_page_costs_its_own_messages_and_they_are_counted(tmp_path: 
     assert loss.end_ns == START + (missing[-1] + 1) * 10_000_000
 
 
+@pytest.mark.slow
 def test_many_destroyed_pages_are_as_long_as_they_are_together(tmp_path: Path) -> None:
     path = database(tmp_path / "log.db3", points(0, 6000), page_size=1024)
     with closing(sqlite3.connect(path)) as connection:
@@ -201,6 +202,7 @@ def test_many_destroyed_pages_are_as_long_as_they_are_together(tmp_path: Path) -
     assert loss.seconds == pytest.approx((len(missing) + stretches) * 0.01)
 
 
+@pytest.mark.slow
 def test_messages_below_a_destroyed_interior_page_are_counted(tmp_path: Path) -> None:
     path = database(tmp_path / "log.db3", points(0, 6000), page_size=512)
     root = root_page(path)
@@ -363,6 +365,7 @@ def test_a_bare_compressed_file_is_read(tmp_path: Path, compress: Callable[[byte
     assert log.paths == (packed,)
 
 
+@pytest.mark.slow
 def test_a_cut_compressed_file_yields_its_beginning(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     rows = [(1, START + i * 10_000_000, point(i, rng.bytes(30).hex())) for i in range(4000)]

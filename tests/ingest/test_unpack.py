@@ -64,6 +64,7 @@ def test_a_bomb_is_refused_and_leaves_nothing(tmp_path: Path, codec: str, monkey
         assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.slow
 def test_zeros_are_unpacked_in_small_pieces() -> None:
     packed_zeros = zstandard.ZstdCompressor().compress(bytes(64 << 20))
     stream = unpack._streams("zstd")()

@@ -104,6 +104,7 @@ def test_the_scaled_hull_is_new_and_the_profile_unchanged() -> None:
     np.testing.assert_array_equal(PROFILE.hull.M, before)
 
 
+@pytest.mark.slow
 def test_measured_wind_belongs_to_the_base_model() -> None:
     assert PROFILE.wind is not None
     areas, wind = PROFILE.wind, np.array([4.0, -6.0])
@@ -131,6 +132,7 @@ def test_a_measured_current_acts_through_the_relative_velocity() -> None:
     )
 
 
+@pytest.mark.slow
 def test_commanded_force_in_place_of_measured(pushed: Motion) -> None:
     more = np.array([5.0, -6.0, 7.0])
     commanded = replace(pushed, tau_d=pushed.tau + more)
@@ -167,6 +169,7 @@ def test_the_parallel_simulation_does_not_cross_a_gap(pushed: Motion) -> None:
     np.testing.assert_array_equal(np.flatnonzero(lost[100:500]) + 100, np.arange(290, 311))
 
 
+@pytest.mark.slow
 def test_a_log_shorter_than_the_horizon_gives_no_parallel_residual(calm: Motion) -> None:
     assert np.isnan(compute_residual(PROFILE, sail(none, 0.5), NOTHING, "parallel")).all()
 

@@ -59,6 +59,7 @@ def test_a_model_comes_back_to_the_last_digit(tmp_path: Path) -> None:
     assert model_to_json(again) == model_to_json(stored.model)
 
 
+@pytest.mark.slow
 def test_current_moves_only_on_acceptance(tmp_path: Path) -> None:
     assert save(made(), tmp_path).current
     rejected = save(made(accepted=False, seed=1), tmp_path)
@@ -154,6 +155,7 @@ DAMAGE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_version_is_a_row_and_keeps_its_number(tmp_path: Path, damage: str) -> None:
     save(made(), tmp_path)

@@ -73,6 +73,7 @@ def test_every_effect_is_known_to_be_of_the_vessel_or_of_a_log() -> None:
         assert name in (VESSEL if effect.vessel else CONDITIONS), name
 
 
+@pytest.mark.slow
 def test_a_diagnosed_model_comes_back_and_keeps_to_its_schema(tmp_path: Path) -> None:
     path = save(diagnosed(), tmp_path).path
     again = load_file(path)

@@ -64,6 +64,7 @@ def test_the_order_and_the_unit_do_not_matter() -> None:
     np.testing.assert_array_equal(judged(1024.0 * errors), p)
 
 
+@pytest.mark.slow
 def test_two_models_against_the_normal_distribution() -> None:
     """With two models and many blocks, p is that of a two-sided z-test of the mean difference."""
     from scipy.stats import norm

@@ -44,6 +44,7 @@ def test_qr_triangle_is_the_cholesky_factor_of_the_cross_products() -> None:
     np.testing.assert_array_equal(np.tril(factor.triangle, -1), 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=25, deadline=None)
 @given(

@@ -144,6 +144,7 @@ def cut() -> dict[str, Folds]:
     return {"stretches": folds_by_blocks(pieces), "logs": folds_by_logs(pieces)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("components", [1, 2, 4, 7, K])
 @pytest.mark.parametrize("by", ["stretches", "logs"])
 def test_scores_are_those_of_fits_from_scratch(cut: dict[str, Folds], by: str, components: int) -> None:

@@ -177,6 +177,7 @@ def truth(functions: Basis, seed: int) -> Floats:
     return theta * functions.mask
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_truth_of_its_form_is_found_again(name: str) -> None:
     functions = built(name, "decoupled")

@@ -131,6 +131,7 @@ def test_says_when_it_did_not_settle_and_leaves_the_data_alone() -> None:
     np.testing.assert_array_equal(Y, before[1])
 
 
+@pytest.mark.slow
 def test_covariance_is_the_largest_with_any_combination_of_outputs() -> None:
     X, Y = data()
     fit = fit_nipals(X, Y, 3)

@@ -59,6 +59,7 @@ def test_intervals_cover_what_is_true_as_often_as_they_say(lengths_s: tuple[floa
         assert np.mean(p <= 0.05) > 0.3
 
 
+@pytest.mark.slow
 def test_intervals_of_free_runs_that_overlap_cover_as_often() -> None:
     """Errors that grow along a run of 30 s, from starts 12 s apart, in blocks of twice a run."""
     rng, run = np.random.default_rng(9), 60

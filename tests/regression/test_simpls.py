@@ -253,6 +253,7 @@ def test_an_output_without_variance_leaves_the_others_alone(kind) -> None:
     np.testing.assert_allclose(fit.intercepts[:, 1], -2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=20, deadline=None)
 @given(

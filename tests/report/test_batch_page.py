@@ -72,6 +72,7 @@ def hostile() -> BatchResult:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_is_well_formed_and_needs_nothing_else() -> None:
     page = render(hostile())
     table = Table(page)
@@ -101,6 +102,7 @@ def test_what_rows_say() -> None:
     assert fourth["links"] == ["results/d.mcap-0123/traceback.txt"]
 
 
+@pytest.mark.slow
 def test_paths_are_told_from_the_folder_of_the_logs_that_were_read() -> None:
     bad = {"fit": None, "evaluate": None, "diagnose": None, "start_ns": None, "duration_s": None}
     gone = row("gone.mcap", status="refused", reason="no such file", **bad)
@@ -135,6 +137,7 @@ def test_filters_offer_what_there_is() -> None:
     assert 'type="date"' not in undated
 
 
+@pytest.mark.slow
 def test_trends_are_drawn_and_told() -> None:
     rows = [
         row(f"s/{k}.mcap", k, findings=(finding("fouling", surge=1.0 + 0.1 * k, probability=0.1 * k),) if k > 2 else ())
@@ -173,6 +176,7 @@ def test_counts_memory_and_time() -> None:
     assert "holds no process to a bound" in render(free)
 
 
+@pytest.mark.slow
 def test_what_was_lost_and_every_warning_stands_on_the_page() -> None:
     lost = {
         "messages": 12,

@@ -95,6 +95,7 @@ def test_what_comes_from_outside_is_escaped(found: StructureSweep) -> None:
     assert page.count("&lt;script&gt;") >= 5
 
 
+@pytest.mark.slow
 def test_without_interval_there_is_still_a_page(found: StructureSweep) -> None:
     """A base model without error leaves no ratio."""
     one = found.by["blocks"]

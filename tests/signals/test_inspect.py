@@ -36,6 +36,7 @@ def look(path: Path, profile: str | None = None) -> tuple[dict[str, Any], str]:
     return result, render_inspect(result, 160)
 
 
+@pytest.mark.slow
 def test_mcap_without_a_profile() -> None:
     result, text = look(FIXTURES / "short.mcap")
     assert result["schema"] == "ferryid.inspect/1"
@@ -57,6 +58,7 @@ def test_mcap_without_a_profile() -> None:
     assert "Lost: nothing" in text
 
 
+@pytest.mark.slow
 def test_mcap_with_its_profile_shows_signals_in_si() -> None:
     result, text = look(FIXTURES / "short.bag", "milliampere")
     vessel = result["vessel"]
@@ -69,6 +71,7 @@ def test_mcap_with_its_profile_shows_signals_in_si() -> None:
     assert "rpm" in text
 
 
+@pytest.mark.slow
 def test_truncated_log_shows_what_is_lost() -> None:
     result, text = look(FIXTURES / "truncated.mcap")
     assert result["losses"]
@@ -77,6 +80,7 @@ def test_truncated_log_shows_what_is_lost() -> None:
     assert "(0 messages)" not in text
 
 
+@pytest.mark.slow
 def test_truncated_bag_says_what_is_recovered() -> None:
     result, text = look(FIXTURES / "truncated.bag")
     assert f"found {result['messages']} messages without it" in text.replace("\n      ", " ")
@@ -88,6 +92,7 @@ def test_amount_of_a_loss(messages: int | None, told: str) -> None:
     assert loss_sentence(Loss("a/b.bag", "x", None, messages)) == f"b.bag: {told}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["broken", "renamed"])
 def test_a_metadata_file_that_costs_no_message_is_a_remark(tmp_path: Path, change: str) -> None:
     folder = tmp_path / "log"
@@ -126,6 +131,7 @@ def with_stray_times(folder: Path, *changes: tuple[str, int]) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_stray_receive_time_does_not_make_the_log_longer(tmp_path: Path) -> None:
     camera, thruster = "/camera/image/compressed", "/thruster1/state"
     result, text = look(with_stray_times(tmp_path / "log", (camera, 2), (thruster, 100)), "milliampere")
@@ -193,6 +199,7 @@ def test_long_names_keep_their_end_and_fit() -> None:
     assert "/" + "t" * 40 in text
 
 
+@pytest.mark.slow
 def test_names_are_cut_only_where_the_terminal_is_narrow() -> None:
     result = inspect(FIXTURES / "short.bag", load_profile("milliampere"))
     assert "…" not in render_inspect(result, 240)
@@ -280,6 +287,7 @@ def test_a_pause_is_judged_by_inspect_as_by_a_fit_with_and_without_a_profile(tmp
     assert f"milliampere: {found}, but a fit refuses the log: " in re.sub(r"\s+", " ", text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["short.mcap", "short.bag", "truncated.mcap", "truncated.bag"])
 def test_a_fixture_is_judged_the_same_with_and_without_its_profile(name: str) -> None:
     with_profile, without = inspect(FIXTURES / name, load_profile("milliampere"))["vessel"], inspect(FIXTURES / name)

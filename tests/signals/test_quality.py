@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 T = np.arange(0, 120, 0.05)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     places=st.lists(st.integers(0, 110), min_size=1, max_size=8, unique=True),

@@ -134,6 +134,7 @@ def test_quality_tells_all_of_it(log: Path, boat: Profile) -> None:
         assert told in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["short.mcap", "short.bag", "short_ros2", "short_ros2_mcap", "truncated.bag"])
 def test_cache_gives_the_identical_recording(
     tmp_path: Path, ferry: Profile, name: str, monkeypatch: pytest.MonkeyPatch
@@ -148,6 +149,7 @@ def test_cache_of_a_damaged_table_is_identical_too(tmp_path: Path, log: Path, bo
     assert_same(record(log, boat, tmp_path), record(log, boat, tmp_path))
 
 
+@pytest.mark.slow
 def test_same_trial_in_every_format_gives_the_same_signals(ferry: Profile) -> None:
     bag, mcap = record(FIXTURES / "short.bag", ferry), record(FIXTURES / "short.mcap", ferry)
     assert set(bag.streams) == set(mcap.streams)
@@ -216,6 +218,7 @@ def test_a_changed_profile_or_version_is_seen(
         record(log, boat, tmp_path)
 
 
+@pytest.mark.slow
 def test_verify_does_not_take_what_was_not_verified(
     tmp_path: Path, ferry: Profile, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -55,6 +55,7 @@ def trial(n: int = 2400, **changes: Floats) -> Track:
     return Track("trial", t, 0, RATE, columns, valid, ("aligned",))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     n=st.integers(1, 300),

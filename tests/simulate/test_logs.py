@@ -130,6 +130,7 @@ def test_same_seed_same_bytes(trial, tmp_path, name):
     assert len(hashes[0]) >= 1
 
 
+@pytest.mark.slow
 def test_messages_stand_in_the_order_of_their_receipt(trial, tmp_path):
     write_log(trial, tmp_path / "t.mcap")
     with (tmp_path / "t.mcap").open("rb") as file:
@@ -147,6 +148,7 @@ def test_folder_and_storage_carry_the_name_asked_for(trial, tmp_path):
     assert sorted(p.name for p in tmp_path.rglob("*")) == ["metadata.yaml", "sea_trial", "sea_trial.db3"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
 def test_existing_output_is_refused_unless_asked(trial, tmp_path, name):
     out = tmp_path / name

@@ -80,6 +80,7 @@ def test_mcap_names_no_library(logs):
         assert (header.profile, header.library) == ("ros2", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["t_sqlite", "t_mcap"])
 def test_ros2_metadata_is_that_of_the_release_whose_version_it_has(logs, name):
     # Version 9 is that of Jazzy, the first with quality of service as a list.

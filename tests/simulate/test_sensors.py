@@ -187,6 +187,7 @@ def test_encoders_round_to_their_step():
     assert error.max() > radians(0.49)
 
 
+@pytest.mark.slow
 def test_silences_are_as_frequent_and_as_long_as_asked():
     asked = scenario(dropouts_per_min=6.0, dropout_s=1.0)
     silent, full = streams(asked), streams(scenario())

@@ -22,6 +22,7 @@ CONTRACT = (
 )
 
 
+@pytest.mark.slow
 def test_every_effect_of_the_contract_at_five_sizes() -> None:
     assert sorted(plant_effects()) == sorted(CONTRACT.split())
     every = sample_cases(5, 1.0)

@@ -35,6 +35,7 @@ def test_two_sizes_without_a_prior_worked_by_hand() -> None:
     assert made.low < exp(place) < made.high
 
 
+@pytest.mark.slow
 def test_without_a_prior_it_is_logistic_regression() -> None:
     rng = np.random.default_rng(1)
     x = rng.normal(size=200)
@@ -69,6 +70,7 @@ def test_perfect_separation_has_an_answer_between_the_sizes() -> None:
     assert many.high / many.low < made.high / made.low
 
 
+@pytest.mark.slow
 def test_what_is_always_or_never_named_is_a_bound() -> None:
     always, never = curve(*runs((6, 6, 6, 6, 6))), curve(*runs((0, 0, 0, 0, 0)))
     assert (always.size, always.bound, always.low) == (None, "always", 0.0)

@@ -112,6 +112,7 @@ def test_a_stronger_thruster_leaves_its_force_and_a_turned_one_that_turned(base:
     np.testing.assert_allclose(turned[:, :2], expected, atol=0.006 * np.abs(own).max())
 
 
+@pytest.mark.slow
 def test_a_term_with_an_onset_is_nothing_before_it(base: Base) -> None:
     later = next(one for one in candidates(base) if one.effect == "thruster_gain" and one.onset_s > 100.0)
     column, t = later.column(base), base.force_model.measurements.t

@@ -28,6 +28,8 @@ from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.validation.two_logs import EAST_MPS, NORTH_MPS, WIND, two_logs
 
+pytestmark = pytest.mark.slow
+
 PROFILE = load_profile("milliampere")
 
 
@@ -109,7 +111,6 @@ def scored(logs: tuple[str, str, Path]) -> TransferResult:
     return transfer_test(first, other, PROFILE, folder, diagnosed=model, rivals=RIVALS)
 
 
-@pytest.mark.slow
 def test_a_rival_that_learnt_nothing_is_worth_the_base_model(scored: TransferResult) -> None:
     blank_one, base = scored.methods["blank"], scored.base
     assert blank_one.mse == {"surge": 1.0, "sway": 1.0, "yaw": 1.0}
@@ -122,7 +123,6 @@ def test_twice_the_error_is_four_times_its_square(scored: TransferResult) -> Non
     assert scored.methods["twice"].mse == pytest.approx({"surge": 4.0, "sway": 4.0, "yaw": 4.0})
 
 
-@pytest.mark.slow
 def test_the_truth_of_the_first_log_holds_in_the_second(scored: TransferResult) -> None:
     """A wind of 6.4 m/s pushes with 200 N: with it in the model, what is left is the noise of the acceleration."""
     true = scored.methods["diagnosed"]
@@ -171,7 +171,6 @@ def test_all_of_it_goes_into_json(scored: TransferResult) -> None:
     assert list(scored.methods) == ["diagnosed", *RIVALS]
 
 
-@pytest.mark.slow
 def test_a_diagnosis_that_wrote_no_model_leaves_the_base_model(logs: tuple[str, str, Path]) -> None:
     nothing = transfer_test(*logs[:2], PROFILE, logs[2], diagnosed=None, rivals={}).methods["diagnosed"]
     assert nothing.mse == {"surge": 1.0, "sway": 1.0, "yaw": 1.0}
@@ -189,7 +188,6 @@ def test_a_model_of_another_log_is_refused(logs: tuple[str, str, Path]) -> None:
         transfer_test(*logs[:2], PROFILE, logs[2], diagnosed=model, rivals={})
 
 
-@pytest.mark.slow
 def test_what_is_diagnosed_beats_base_model_and_stepwise_regression(logs: tuple[str, str, Path]) -> None:
     """From one end to the other, by way of the model's file; the only test here that diagnoses."""
     first, other, folder = logs

@@ -416,6 +416,7 @@ def test_bundled_names_and_text_survive_embedding() -> None:
         assert again.signals == profile.signals
 
 
+@pytest.mark.slow
 def test_import_is_cheap() -> None:
     heavy = "('pandas', 'scipy', 'matplotlib', 'pyarrow')"
     code = f"import sys, ferryid.vessel; print([name for name in {heavy} if name in sys.modules])"

@@ -31,6 +31,7 @@ def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> tuple[Float
     return tuple(np.array([value]) for value in (x, y, z, w))
 
 
+@pytest.mark.slow
 @given(st.floats(-3.1, 3.1), st.floats(-1.4, 1.4), st.floats(-3.0, 3.0), st.sampled_from([1.0, -1.0, 2.5]))
 def test_yaw_survives_pitch_roll_sign_and_length(yaw: float, pitch: float, roll: float, scale: float) -> None:
     x, y, z, w = (scale * part for part in quaternion(yaw, pitch, roll))

@@ -29,6 +29,7 @@ def test_coriolis_by_hand() -> None:
     np.testing.assert_allclose(matrix, [[0, 0, c13], [0, 0, c23], [-c13, -c23, 0]], rtol=1e-12)
 
 
+@pytest.mark.slow
 @given(SPEEDS)
 def test_coriolis_does_no_work(nu: Floats) -> None:
     matrix = coriolis(MILLIAMPERE.M, nu)
@@ -47,6 +48,7 @@ def test_damping_by_hand() -> None:
     np.testing.assert_allclose(matrix, [[d11, 0, 0], [0, d22, d23], [0, d32, d33]], rtol=1e-12)
 
 
+@pytest.mark.slow
 @given(SPEEDS)
 def test_port_and_starboard_mirror(nu: Floats) -> None:
     mirror = np.array([1.0, -1.0, -1.0])
@@ -55,6 +57,7 @@ def test_port_and_starboard_mirror(nu: Floats) -> None:
     np.testing.assert_allclose(mirrored, force * mirror, atol=1e-9)
 
 
+@pytest.mark.slow
 @given(SPEEDS, SPEEDS)
 def test_force_is_the_sum_of_the_matrices(nu: Floats, nu_dot: Floats) -> None:
     expected = MILLIAMPERE.M @ nu_dot + (coriolis(MILLIAMPERE.M, nu) + damping(MILLIAMPERE.D, nu)) @ nu

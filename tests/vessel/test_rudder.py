@@ -30,6 +30,7 @@ def tau(delta: float, thrust: float, u: float, v: float = 0.0, r: float = 0.0) -
     )[0]
 
 
+@pytest.mark.slow
 @given(st.floats(0.2, 2.0), st.floats(0.05, 0.9), st.floats(-0.6, 0.6))
 def test_agrees_with_the_papers_form(u: float, k_t: float, delta: float) -> None:
     """Yasukawa & Yoshimura (2015): u_R = eps u_P sqrt(eta {1 + kappa (sqrt(1 + 8 K_T/(pi J²)) - 1)}² + 1 - eta)."""
@@ -83,6 +84,7 @@ def test_flow_straightening_by_side() -> None:
     assert -starboard / port == pytest.approx(0.395 / 0.640, rel=1e-3)
 
 
+@pytest.mark.slow
 @given(st.floats(-0.6, 0.6), st.floats(-40, 80), st.floats(-1, 2))
 def test_mirror(delta: float, thrust: float, u: float) -> None:
     np.testing.assert_allclose(tau(-delta, thrust, u), tau(delta, thrust, u) * [1.0, -1.0, -1.0], rtol=1e-9, atol=1e-12)

@@ -130,6 +130,7 @@ def test_allocated_forces_sum_to_the_demand(boat: Boat, X_d: float, Y_d: float, 
     np.testing.assert_allclose(force(profile, **columns), [X_d, Y_d, N_d], atol=1e-9)
 
 
+@pytest.mark.slow
 @given(st.floats(-1050, 1050), st.floats(-1050, 1050), st.floats(-4, 4), st.floats(-4, 4))
 def test_mirror(n1: float, n2: float, a1: float, a2: float) -> None:
     one = force(MILLIAMPERE, n_thruster1=n1, n_thruster2=n2, alpha_thruster1=a1, alpha_thruster2=a2)

@@ -112,12 +112,14 @@ def test_every_check_is_registered_once_and_in_order() -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_clean_trials_have_no_findings(seed: int) -> None:
     wind = Wind(2.0 * np.cos(seed), 2.0 * np.sin(seed), 0.5) if seed % 2 else Wind()
     assert examine(sailed(seed, 360.0, wind=wind))[0] == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_gyro_that_reads_too_much(seed: int) -> None:
     measurements = sailed(seed, navigation=Navigation(yaw_rate_factor=1.06), noise=QUIET)
@@ -126,6 +128,7 @@ def test_a_gyro_that_reads_too_much(seed: int) -> None:
     assert examine(finding.correct(measurements))[0] == ()
 
 
+@pytest.mark.slow
 def test_a_gyro_of_the_wrong_sign() -> None:
     finding = alone(scaled(sailed(1), 1.0, 1.0, -1.0), "yaw_rate_scale")
     holds(finding, factor=-1.0)
@@ -215,6 +218,7 @@ def _coarse(values: Floats, step: float) -> Floats:
     return np.round(values / step) * step
 
 
+@pytest.mark.slow
 def test_a_coarse_or_slow_sensor_holds_nothing() -> None:
     measurements = sailed(1)
     eta = np.column_stack([_coarse(measurements.eta[:, :2], 0.02), _coarse(measurements.psi, np.radians(0.5))])

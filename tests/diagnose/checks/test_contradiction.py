@@ -95,6 +95,7 @@ def test_a_stern_drive_that_pushes_outward_in_a_turn_is_no_contradiction(turn_s:
     assert opposed(swung(t, -helm, r, push=0.01)) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period_s", [6.0, 8.0, 10.0])
 def test_a_controller_in_a_swell_is_no_clock_that_is_late(period_s: float) -> None:
     random = np.random.default_rng(5)

@@ -26,6 +26,7 @@ def sailed(seed: int, factor: float) -> Measurements:
     return Measurements(PROFILE, control.t, control.measured[:, :3], nu, nu, forces, angles, np.ones(n, dtype=np.bool_))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_six_per_cent_are_found_and_none_is_not(seed: int) -> None:
     finding = find(sailed(seed, 1.06))

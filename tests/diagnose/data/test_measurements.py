@@ -83,6 +83,7 @@ def test_the_velocity_is_kept_as_measured_beside_the_calmer_one() -> None:
     assert np.all(calm < rough)
 
 
+@pytest.mark.slow
 def test_a_withheld_wind_is_hidden_and_kept() -> None:
     seen, _ = read_measurements(SHORT, FERRY, window_s=0.0)
     assert seen.wind is not None

@@ -25,6 +25,8 @@ from ferryid.vessel.wind import wind_force
 from tests.diagnose.judging.test_held_out import sailed
 from tests.real.campaign_evidence import EXCHANGED, MIRRORED, held_out_gains, placebos
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 WIND = effects()["wind"]
 # Without factors on its load, so that logs add up in straight lines.
@@ -65,7 +67,6 @@ def fitted() -> CampaignHull:
     return fit_campaign_hull(members(), SPREAD, NONE_INDUCED)
 
 
-@pytest.mark.slow
 def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
     hull = fitted()
     for wind, values, errors in zip(WINDS, hull.values, hull.errors, strict=True):
@@ -73,7 +74,6 @@ def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
         assert (np.abs(values[0] - wind) < 5.0 * errors[0]).all()
 
 
-@pytest.mark.slow
 def test_the_common_hull_is_nearer_the_true_one_than_it_was_thought() -> None:
     mean, covariance = fitted().belief()
     known = np.sqrt(np.diag(covariance))[: len(SPREAD)] < 0.3 * SPREAD
@@ -83,7 +83,6 @@ def test_the_common_hull_is_nearer_the_true_one_than_it_was_thought() -> None:
     assert after[known].sum() < 0.35 * before[known].sum()
 
 
-@pytest.mark.slow
 def test_a_log_has_no_part_in_what_the_others_say() -> None:
     alone = fit_campaign_hull(members()[:2], SPREAD, NONE_INDUCED)
     mean, covariance = fitted().belief(without=2)
@@ -96,7 +95,6 @@ def test_a_log_has_no_part_in_what_the_others_say() -> None:
     assert np.linalg.norm(mean - fitted().belief()[0]) > np.linalg.norm(mean - expected)
 
 
-@pytest.mark.slow
 def test_logs_of_one_hull_agree_and_of_another_do_not() -> None:
     assert fitted().disagreement < 1.6
     assert fit_campaign_hull(members(1.4), SPREAD, NONE_INDUCED).disagreement > 2.0 * fitted().disagreement
@@ -122,7 +120,6 @@ def test_the_hull_as_a_suspect_has_the_same_mean_and_covariance() -> None:
     )
 
 
-@pytest.mark.slow
 def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
     hull = fitted()
     first = members()[0]
@@ -131,7 +128,6 @@ def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
     assert made.values[0] == pytest.approx(WINDS[0], abs=0.35)
 
 
-@pytest.mark.slow
 def test_winds_hold_on_held_out_stretches_and_placebos_do_not() -> None:
     bare = [replace(member, candidates=()) for member in members()]
     gains = held_out_gains({"found": members(), **placebos(members())}, bare, SPREAD, NONE_INDUCED)

@@ -118,6 +118,7 @@ def test_evidence_weighs_filters_against_each_other() -> None:
     np.testing.assert_allclose(np.array(told) - told[0], np.array(known) - known[0], atol=0.1)
 
 
+@pytest.mark.slow
 def test_slopes_by_the_hull_are_those_of_whitened_gaps() -> None:
     case = problem(60.0)
     n = len(case.plain.measurements.t)
@@ -138,11 +139,13 @@ def test_slopes_by_the_hull_are_those_of_whitened_gaps() -> None:
         np.testing.assert_allclose(found[:, k], slope, rtol=0.0, atol=1e-6 * np.abs(slope).max())
 
 
+@pytest.mark.slow
 def test_limits_are_kept() -> None:
     narrow = replace(PUSH, parameters=(Parameter("force", "N", 50.0, -5.0, 5.0),))
     assert fit(problem(60.0), [narrow]).values[0] == 5.0
 
 
+@pytest.mark.slow
 def test_a_limit_does_not_keep_the_others_from_their_best() -> None:
     def shove(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
         more = np.zeros((len(force_model.measurements.t), 3))
@@ -165,6 +168,7 @@ def test_a_limit_does_not_keep_the_others_from_their_best() -> None:
     np.testing.assert_allclose(limited.values[0][0], alone.values[0][0], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_an_onset_leaves_what_was_before_it_alone() -> None:
     late = replace(PUSH, onset_s=150.0)
     case = problem(0.0)

@@ -68,6 +68,7 @@ def test_the_span_of_a_push_is_the_most_promising_one(first_s: float, last_s: fl
     assert sharp.offset_s == pytest.approx(last_s, abs=2.0)
 
 
+@pytest.mark.slow
 def test_what_lasts_less_than_two_blocks_is_brief() -> None:
     case = problem(0.0)
     two_s = 2.0 * block_s(case.windows)
@@ -80,6 +81,7 @@ def test_what_lasts_less_than_two_blocks_is_brief() -> None:
     assert compare_rivals(case, made, 0, [PUSH]).rivals == ()
 
 
+@pytest.mark.slow
 def test_where_nothing_pushes_no_span_is_promising() -> None:
     case = problem(0.0)
     bare = fit(case, ())
@@ -113,6 +115,7 @@ def test_the_gain_of_a_span_is_that_of_its_fit(monkeypatch: pytest.MonkeyPatch) 
         assert gains[k] == pytest.approx(exact, abs=0.1 + 0.15 * abs(exact))
 
 
+@pytest.mark.slow
 def test_in_a_gap_nothing_begins_or_ends() -> None:
     case = problem(0.0)
     t = case.plain.measurements.t

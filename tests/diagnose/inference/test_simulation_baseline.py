@@ -29,6 +29,8 @@ from ferryid.simulate import parse_scenario, simulate, write_log
 from ferryid.types import IN_MEMORY, no_progress
 from ferryid.vessel import load_profile
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
 BASE = """
@@ -76,7 +78,6 @@ def found(simulated: Simulation, log: str) -> Search:
     )
 
 
-@pytest.mark.slow
 def test_only_the_fault_is_found_where_both_have_the_wind(folder: Path, windy: str) -> None:
     log = sailed(folder, "recording", wind(2.0) + FAULT, 4)
     result = diagnose([log], FERRY, DiagnosisSettings(against=windy), IN_MEMORY)[0]
@@ -93,21 +94,18 @@ def test_only_the_fault_is_found_where_both_have_the_wind(folder: Path, windy: s
     assert result.against["says"] in result.notes
 
 
-@pytest.mark.slow
 def test_what_the_simulation_learnt_is_what_was_simulated(simulated: Simulation) -> None:
     (blown,) = simulated.conditions
     assert blown.candidate.effect.id == "wind"
     np.testing.assert_allclose(blown.values[:2], [2.0, 0.0], atol=0.1)
 
 
-@pytest.mark.slow
 def test_the_same_trial_with_other_noise_differs_in_nothing(folder: Path, simulated: Simulation) -> None:
     result = found(simulated, sailed(folder, "again", wind(2.0), 11))
     assert result.fit.candidates == ()
     assert result.rounds[0].none > 0.9
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("north", [3.1, 0.0])
 def test_a_wind_that_differs_is_told_with_both_values(folder: Path, simulated: Simulation, north: float) -> None:
     result = found(simulated, sailed(folder, f"wind-{north}", wind(north), 3))
@@ -119,7 +117,6 @@ def test_a_wind_that_differs_is_told_with_both_values(folder: Path, simulated: S
     assert "C_X" not in says
 
 
-@pytest.mark.slow
 def test_a_simulated_hull_of_seven_tenths_hides_no_fault(folder: Path) -> None:
     light = learn_simulation(sailed(folder, "light", wind(2.0), 5, hull=0.7), FERRY)
     assert light.hull[0] == pytest.approx(0.7 * FERRY.hull.M[0, 0], rel=0.1)
@@ -164,7 +161,6 @@ def test_a_simulation_too_short_to_learn_from_is_refused() -> None:
         learn_simulation(str(FIXTURES / "short.mcap"), FERRY)
 
 
-@pytest.mark.slow
 def test_a_simulation_of_another_vessel_is_refused(folder: Path) -> None:
     # The same signals, from a hull that answers its thrusters in another way altogether.
     other = replace(FERRY, actuators=tuple(replace(one, position_m=(0.3, 1.5)) for one in FERRY.actuators))

@@ -50,6 +50,7 @@ def still_air(measurements: Measurements) -> ForceModel:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("placed", [True, False], ids=["positions", "velocities"])
 def test_the_right_force_model_leaves_no_gap(placed: bool) -> None:
     measurements, _ = sailed()
@@ -63,6 +64,7 @@ def test_the_right_force_model_leaves_no_gap(placed: bool) -> None:
     assert np.abs(seen.measured[:, seen.channels]).max() > 0.03
 
 
+@pytest.mark.slow
 def test_a_current_leaves_no_gap_once_it_is_in_the_force_model() -> None:
     measurements, _ = sailed(current=(0.3, -0.2))
     seen = windows(measurements, 8.0, 2.0)

@@ -21,6 +21,8 @@ from ferryid.effects import effects
 from ferryid.types import AXES
 from tests.diagnose.judging.test_held_out import WIND, candidate, sailed, trial_on
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def windy() -> tuple[EstimationProblem, Elimination]:
@@ -48,7 +50,6 @@ def judged_by_rules(problem: EstimationProblem, stands: Elimination) -> tuple[Fi
     return finding, notes
 
 
-@pytest.mark.slow
 def test_a_wind_that_blew_is_told_for_sure(windy: tuple[EstimationProblem, Elimination]) -> None:
     finding, notes = judged_by_rules(*windy)
     assert finding.sure
@@ -65,7 +66,6 @@ def test_what_is_seen_to_improve_nothing_that_it_claims_is_a_hint(windy: tuple[E
     )
 
 
-@pytest.mark.slow
 def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
     problem, stands = windy
     (blown,) = stands.fit.candidates
@@ -75,7 +75,6 @@ def test_what_acted_in_a_place_that_was_visited_once_is_a_hint(windy: tuple[Esti
     assert "the vessel was in that place once" in note
 
 
-@pytest.mark.slow
 def test_what_acts_for_less_than_two_blocks_is_a_hint(windy: tuple[EstimationProblem, Elimination]) -> None:
     problem, stands = windy
     (blown,) = stands.fit.candidates
@@ -86,7 +85,6 @@ def test_what_acts_for_less_than_two_blocks_is_a_hint(windy: tuple[EstimationPro
         assert any("held-out data judge nothing below 80 s" in note for note in notes) != sure
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("onset_s", "offset_s", "passing", "sure"),
     [(100.0, 300.0, 4.0, False), (100.0, 300.0, 1.0, True), (100.0, inf, 4.0, True), (0.0, inf, 4.0, True)],

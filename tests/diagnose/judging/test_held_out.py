@@ -23,6 +23,8 @@ from ferryid.vessel import load_profile
 from ferryid.vessel.wind import wind_force
 from tests.vessel.hull_matrices import forward
 
+pytestmark = pytest.mark.slow
+
 FERRY = load_profile("milliampere")
 WIND = np.array([-2.0, 1.5])
 
@@ -85,7 +87,6 @@ def calm() -> EstimationProblem:
     return trial_on(sailed(480.0, np.zeros(2)))
 
 
-@pytest.mark.slow
 def test_what_is_left_over_is_model_minus_measured(windy: EstimationProblem) -> None:
     """A wind that the model does not know pushes the vessel; what is left over is that push with its sign turned round."""
     seen, plain = windy.windows, windy.plain
@@ -134,7 +135,6 @@ def test_a_log_too_short_to_hold_anything_out_has_no_evidence(windy: EstimationP
     assert held_out_evidence(replace(windy, windows=few), found) is None
 
 
-@pytest.mark.slow
 def test_a_force_that_was_left_out_is_the_force_error(calm: EstimationProblem) -> None:
     push = np.array([20.0, -30.0, 40.0])
     pushed = replace(calm.plain, external=calm.plain.external + push)
@@ -143,7 +143,6 @@ def test_a_force_that_was_left_out_is_the_force_error(calm: EstimationProblem) -
     np.testing.assert_allclose(mass_of(hull_of(FERRY)), FERRY.hull.M)
 
 
-@pytest.mark.slow
 def test_a_block_is_judged_by_fits_that_have_not_seen_it(windy: EstimationProblem) -> None:
     folds = folds_of(windy.windows)
     assert folds is not None
@@ -159,7 +158,6 @@ def test_a_block_is_judged_by_fits_that_have_not_seen_it(windy: EstimationProble
     np.testing.assert_allclose(other.gaps[own], judged.gaps[own] - 0.5, atol=1e-9)
 
 
-@pytest.mark.slow
 def test_a_wind_that_blew_holds_and_beats_every_placebo(windy: EstimationProblem) -> None:
     found = fit(windy, [candidate("wind")])
     told = held_out_evidence(windy, found)
@@ -178,7 +176,6 @@ def test_a_wind_that_blew_holds_and_beats_every_placebo(windy: EstimationProblem
         np.testing.assert_allclose(values[:2], WIND, atol=0.15)
 
 
-@pytest.mark.slow
 def test_what_did_not_happen_gains_less_than_its_prior_odds_or_does_not_hold(calm: EstimationProblem) -> None:
     """The interval of a gain by chance excludes zero now and then; no such gain makes up for the prior odds."""
     for name in ("wind", "current", "payload", "mooring"):
@@ -187,7 +184,6 @@ def test_what_did_not_happen_gains_less_than_its_prior_odds_or_does_not_hold(cal
         assert not told.proofs[0].holds or told.proofs[0].improvement.score < INFERENCE.prior_odds, name
 
 
-@pytest.mark.slow
 def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: EstimationProblem) -> None:
     found = np.array([*WIND, 1.1, 0.9, 0.6])
     for placebo in placebos(windy, candidate("wind"), found).values():
@@ -196,7 +192,6 @@ def test_a_placebo_keeps_what_is_fitted_beside_an_effect_and_never_told(windy: E
         np.testing.assert_array_equal(placebo.start[2:], found[2:])
 
 
-@pytest.mark.slow
 def test_a_constant_push_is_matched_by_its_placebo(calm: EstimationProblem) -> None:
     # The held-out errors shrink, but the same force late shrinks them as much: it tells nothing of when it acts.
     base = candidate("wind").effect
@@ -223,7 +218,6 @@ def test_only_what_depends_on_the_heading_has_a_mirrored_placebo(windy: Estimati
     assert HEADING not in placebos(windy, candidate("payload"), np.array([300.0, 0.5]))
 
 
-@pytest.mark.slow
 def test_free_runs_of_the_true_force_model_stay_with_the_vessel(windy: EstimationProblem) -> None:
     folds = folds_of(windy.windows)
     assert folds is not None

@@ -80,6 +80,7 @@ def test_nsca_gives_the_forces_worked_by_hand():
     np.testing.assert_allclose(acting(FERRY, orders), [[100.0, 55.0, 99.0], [100.0, 5.0, -9.0]], atol=1e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.floats(-400, 400), st.floats(-300, 300), st.floats(-400, 400), st.floats(-9, 9))
 def test_nsca_forces_sum_to_the_desired_force(X, Y, N, last):
@@ -104,6 +105,7 @@ def test_shares_are_the_pseudo_inverse(profile):
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.floats(-500, 500), st.floats(-250, 250), st.floats(-300, 300), st.sampled_from([FERRY, QUAD, MIXED]))
 def test_pseudo_inverse_forces_sum_to_the_desired_force(X, Y, N, profile):
@@ -118,6 +120,7 @@ def test_pseudo_inverse_forces_sum_to_the_desired_force(X, Y, N, profile):
         np.testing.assert_allclose(forces.sum(axis=0), (X, Y, N), atol=2e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.floats(-400, 400), st.floats(-300, 300), st.floats(-400, 400))
 def test_nsca_is_the_pseudo_inverse_of_its_layout(X, Y, N):

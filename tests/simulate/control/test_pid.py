@@ -66,6 +66,7 @@ def test_feedback_pushes_back_in_the_body_frame(controller):
     assert tau == pytest.approx((-0.5 * gains.Kd[0], 0.25 * gains.Kd[1], -0.1 * gains.Kd[2]))
 
 
+@pytest.mark.slow
 def test_the_integral_is_limited_and_rests_when_saturated(controller):
     gains = Gains()
     force, _ = controller(gains)

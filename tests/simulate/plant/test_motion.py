@@ -316,6 +316,7 @@ def test_mean_drift_by_hand(adrift):
         assert tuple(forces[0] - forces[1])[:2] == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("direction", "psi"), [(0.0, 0.0), (90.0, 0.0), (180.0, 0.0), (60.0, 0.3), (0.0, 0.5 * pi)])
 def test_in_a_long_wave_group_an_undamped_hull_moves_as_the_water_does(adrift, direction, psi):
     """Particles by linear wave theory, integrated from rest; waves of 100 m against a hull of 5 m."""

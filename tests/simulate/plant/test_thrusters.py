@@ -37,6 +37,7 @@ def load(profile, dynamics, thrusters, nu=(0.0, 0.0, 0.0), factor=None, offset=N
     return thrust_load(gear, 0, *nu)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.floats(-200, 1200), st.floats(-200, 1200), st.floats(0.01, 2), st.floats(1, 900), st.floats(0.001, 3))
 def test_follow_is_the_exact_lag_with_its_rate_limit(value, order, lag, limit, h):
