@@ -39,6 +39,9 @@ def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss
     cut = found.index is None and announced > size
     if cut:
         add(*_estimate(data, found.chunks, announced))
+    elif found.index is None and not announced:
+        extent = _extent(data, found.chunks)
+        add("the file ends without an index, and whatever followed is missing", None, extent and extent[1], None)
     for info in found.missing:
         messages = sum(info.counts.values())
         what = (
@@ -98,16 +101,24 @@ def _add_chunks(data: Any, found: Walked, add: Callable[..., None]) -> None:
 
 def _estimate(data: Any, chunks: Sequence[Chunk], index: int) -> tuple[str, None, int | None, int | None]:
     """Estimate how much of a bag is missing behind the end of the file, from the bytes that its header announces."""
+    size, part = len(data), (index - len(data)) / len(data)
+    what = f"the file ends at byte {size} of more than {index}: about {100 * (index - size) / index:.0f} % is lost at the end"
+    extent = _extent(data, chunks)
+    if extent is None:
+        return what, None, None, None
+    first, last, count = extent
+    messages, seconds = part * count, part * (last - first) * 1e-9
+    return f"{what}, by the rate before it {messages:.0f} messages in {seconds:.1f} s", None, last, None
+
+
+def _extent(data: Any, chunks: Sequence[Chunk]) -> tuple[int, int, int] | None:
+    """Return the first and the last receive time [ns] of the messages in chunks, and their number; None without any."""
     times = [
         nanoseconds(entries)
         for chunk in chunks
         for entries in (chunk.entries(data, number) for number in chunk.connections)
         if len(entries)
     ]
-    size, part = len(data), (index - len(data)) / len(data)
-    what = f"the file ends at byte {size} of more than {index}: about {100 * (index - size) / index:.0f} % is lost at the end"
     if not times:
-        return what, None, None, None
-    first, last = min(int(one.min()) for one in times), max(int(one.max()) for one in times)
-    messages, seconds = part * sum(len(one) for one in times), part * (last - first) * 1e-9
-    return f"{what}, by the rate before it {messages:.0f} messages in {seconds:.1f} s", None, last, None
+        return None
+    return min(int(one.min()) for one in times), max(int(one.max()) for one in times), sum(map(len, times))
