@@ -313,6 +313,10 @@ def _walk_chunks(data: Any, found: Walked) -> None:
         if chunk.walked is not None or (trusted and known):
             continue
         content = decompressed(data, chunk, allowance, exact=True)
+        if content.whole and content.behind:
+            # Its length is known now: what stands behind it, up to the record found there, may have been other chunks.
+            end, chunk.end = chunk.end, chunk.end - content.behind
+            found.gap(chunk.end, end)
         walked = walk_chunk(content.buffer, allowance)
         for number, connection in walked.connections.items():
             found.connections.setdefault(number, connection)
@@ -327,3 +331,4 @@ def _walk_chunks(data: Any, found: Walked) -> None:
                 found.faults[chunk.position] = content.fault or (EXCESS if walked.excess else "its records are damaged")
             elif last and chunk.position not in found.doubts and missing(chunk, chunk, found.connections):
                 found.faults[chunk.position] = "its index records count more messages than it holds"
+    found.gaps.sort()

@@ -417,3 +417,23 @@ def test_a_bag_that_was_not_closed_may_lack_messages_at_its_end(tmp_path: Path, 
 def test_an_index_that_is_there_shows_that_the_bag_ends_where_it_should(tmp_path: Path, whole: bytes) -> None:
     rows, reader = read_changed(tmp_path / "a.bag", whole, change_field(3, 0, b"index_pos", bytes(8)))
     assert (rows, {loss.messages for loss in reader.losses}) == (ALL, {0})
+
+
+@pytest.mark.parametrize("verify", [False, True])
+@pytest.mark.parametrize("behind", ["the index records", "the chunk"])
+def test_a_stretch_that_is_gone_behind_a_chunk_may_have_held_others(
+    tmp_path: Path, whole: bytes, behind: str, verify: bool
+) -> None:
+    content = never_closed(whole)
+    records = parsed(content)
+    chunks = places(records, CHUNK)
+    starts = 13 + np.cumsum([0, *(len(record.packed()) for record in records)])
+    # From the first bytes of the index records of a chunk into, or to the end of, the next chunk's.
+    first, end = starts[chunks[2] + 1] + 30, starts[chunks[3] + 1] + (50 if behind == "the index records" else 0)
+    if behind == "the index records":
+        content = content[:first] + content[end:]
+    else:
+        content = content[: first - 30] + bytes(end - first + 30) + content[starts[chunks[4]] :]
+    rows, reader = rows_and_reader(tmp_path / "a.bag", content, verify=verify)
+    assert rows < ALL
+    assert any(loss.messages is None for loss in reader.losses if "without an index" not in loss.what), reader.losses
