@@ -131,19 +131,20 @@ def content(file: memoryview, whole_file: Bytes, chunk: Chunk, crc: int, room: B
         return data
     if len(data) != chunk.uncompressed_size:
         raise DamagedRecord("a chunk is not of the size that it states")
-    check(data, crc)
+    if crc or chunk.checksummed:
+        check(data, crc)
     return data
 
 
 def check(data: Bytes, crc: int) -> None:
-    """Compare a chunk's content with its checksum; zero says that the writer made none.
+    """Compare a chunk's content with its checksum.
 
     Raises
     ------
     DamagedRecord
         Where they differ.
     """
-    if crc and crc32(data.data) != crc:
+    if crc32(data.data) != crc:
         raise DamagedRecord("the checksum of a chunk is wrong")
 
 

@@ -138,6 +138,8 @@ class Chunk:
         True for the chunk in which the file ends.
     refused
         True for a chunk that would take the file past the bound on what is decompressed of it.
+    checksummed
+        True in a walked file most chunks of which have a checksum: one of zero is damage there, and not left out.
     """
 
     offset: int
@@ -152,6 +154,7 @@ class Chunk:
     table: Messages | None = None
     truncated: bool = False
     refused: bool = False
+    checksummed: bool = False
 
     def counts(self) -> dict[int, int]:
         """Return the number of messages per channel id, as far as it is known without reading the chunk."""

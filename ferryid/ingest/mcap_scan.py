@@ -36,6 +36,7 @@ from ferryid.ingest.mcap_index import (
     message_table,
     record_header,
     sound_chunk,
+    stored_crc,
     walk,
 )
 
@@ -264,7 +265,8 @@ def _repaired(file: memoryview, offset: int) -> Chunk | None:
         return None
     stated = chunk.data_offset + chunk.compressed_size, offset + RECORD_HEADER + record_header(file, offset)[1]
     for end in sorted(set(stated)):
-        if chunk.data_offset <= end and _records_at(file, end):
+        # What an uncompressed chunk holds are records too, so that one of no bytes always seems to lead to the next.
+        if chunk.data_offset < end and _records_at(file, end):
             return replace(chunk, compressed_size=end - chunk.data_offset)
     return None
 
@@ -323,7 +325,10 @@ def _chunks(file: memoryview, found: _Found, odd: list[Record], index: Index, na
         )
         index.losses.append(Loss(name, what, messages=0))
     broken = {start for start, _ in found.gaps}
-    return [_with_index(file, chunk, records, broken) for chunk, records in distinct]
+    made = [_with_index(file, chunk, records, broken) for chunk, records in distinct]
+    # A writer makes checksums of all chunks or of none; tools that rescue a file may have rewritten a few of them.
+    checksummed = 2 * sum(stored_crc(file, chunk.offset) != 0 for chunk in made) > len(made)
+    return [replace(chunk, checksummed=checksummed) for chunk in made]
 
 
 def _with_index(file: memoryview, chunk: Chunk, records: Sequence[Record], broken: Container[int]) -> Chunk:

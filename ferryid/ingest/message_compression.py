@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from ferryid.ingest.bulk import Decoder
 from ferryid.ingest.log import Loss, Series
-from ferryid.ingest.unpack import message_unpacker, unpacked_batches
+from ferryid.ingest.unpack import unpacked_batches
 from ferryid.types import Nanoseconds
 
 # All messages of a topic together may unpack to this many times their size; constant pictures reach a thousand.
@@ -24,13 +25,13 @@ class UnpackingDecoder:
     ----------
     decoder
         Takes the unpacked messages.
-    codec
-        ``"zstd"`` or ``"lz4"``.
+    unpack
+        What `message_unpacker` returns. The topics of a file share it: its memory would count for each of them.
     """
 
-    def __init__(self, decoder: Decoder, codec: str) -> None:
+    def __init__(self, decoder: Decoder, unpack: Callable[[bytes], bytes | None]) -> None:
         self._decoder = decoder
-        self._unpack = message_unpacker(codec)
+        self._unpack = unpack
         self._lost = 0
         self._left = FREE_BYTES
 

@@ -63,11 +63,15 @@ class Allowance:
 
 
 class Content(NamedTuple):
-    """Decompressed chunk: `fault` is what is wrong, empty if nothing; `whole` when nothing of it is missing."""
+    """Decompressed chunk: `fault` is what is wrong, empty if nothing; `whole` when nothing of it is missing.
+
+    `behind` counts the stored bytes behind the end of the compressed data, which are no part of them.
+    """
 
     buffer: Any
     fault: str
     whole: bool
+    behind: int = 0
 
 
 def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool, salvage: bool = True) -> Content:
@@ -103,7 +107,7 @@ def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool, 
             return Content(memoryview(_lz4().decompress(stored, chunk.size)), "", True)
         except DAMAGE:
             pass
-    content, fault, eof = _expanded(stored, chunk.compression, min(chunk.size, limit), limit, salvage)
+    content, fault, eof, behind = _expanded(stored, chunk.compression, min(chunk.size, limit), limit, salvage)
     allowance.left -= len(content)
     if not fault and not eof:
         fault = (
@@ -111,7 +115,7 @@ def decompressed(data: Any, chunk: Chunk, allowance: Allowance, *, exact: bool, 
             if len(content) == limit
             else f"{len(content)} of {counted(chunk.size, 'byte')} decompress"
         )
-    return Content(content, cut or fault or (stated if len(content) != chunk.size else ""), eof and not cut)
+    return Content(content, cut or fault or (stated if len(content) != chunk.size else ""), eof and not cut, behind)
 
 
 def checksummed(data: Any, chunk: Chunk) -> bool:
@@ -147,23 +151,25 @@ def _feed(decoder: Any, stored: Any, first: int, limit: int) -> bytes:
     return b"".join(parts)
 
 
-def _expanded(stored: memoryview, compression: str, size: int, limit: int, salvage: bool) -> tuple[bytes, str, bool]:
-    """Return the content, what is wrong with it, and whether its end was reached."""
+def _expanded(
+    stored: memoryview, compression: str, size: int, limit: int, salvage: bool
+) -> tuple[bytes, str, bool, int]:
+    """Return the content, what is wrong with it, whether its end was reached and how many bytes are stored behind it."""
     decoder = _decoder(compression)
     try:
         # One byte more than the stated size lets the decoder come to the end mark and its checksum.
         content = _feed(decoder, stored, size + 1, limit)
-        return content, "", decoder.eof
+        return content, "", decoder.eof, len(decoder.unused_data or b"")
     except DAMAGE as error:
         fault = f"it does not decompress ({error})"
         if "contentChecksum" in str(error):
             fault, salvage = "its content does not match its checksum", False
         # All of it decompresses in these two cases, and any part of it may be wrong.
         if "frameSize_wrong" in str(error) or (compression == "lz4" and not salvage):
-            return b"", fault, False
+            return b"", fault, False, 0
     # Up to the first damaged byte: in steps to near it, then from the start again and up to it byte by byte.
     good = _steps(stored, 0, SALVAGE_STEP, compression, limit)[1]
-    return _steps(stored, good, 1, compression, limit)[0], fault, False
+    return _steps(stored, good, 1, compression, limit)[0], fault, False, 0
 
 
 def _steps(stored: memoryview, first: int, step: int, compression: str, limit: int) -> tuple[bytes, int]:

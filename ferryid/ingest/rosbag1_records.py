@@ -166,6 +166,13 @@ class Records:
             fields = self._parsed(header, position)
         return Record(position, fields, stop + 4, stop + 4 + _U32(self.data, stop)[0])
 
+    def kind(self, position: int) -> int:
+        """Return the kind of the record at a byte, 0 where none is."""
+        try:
+            return self.at(position).op
+        except RecordError:
+            return 0
+
     def _parsed(self, header: bytes, position: int) -> dict[bytes, bytes]:
         spans: list[tuple[bytes, int, int]] = []
         mask = bytearray(b"\xff" * len(header))

@@ -7,14 +7,11 @@ import re
 import sys
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ferryid.counts import counted, verb
-from ferryid.ingest.log import Loss
 from ferryid.ingest.rosbag1_chunks import Allowance, decompressed, missing, walk_chunk
 from ferryid.ingest.rosbag1_records import (
     BAG_HEADER,
@@ -205,7 +202,7 @@ def _check_numbers(found: Walked) -> None:
 def _end_of_chunk(finder: _Finder, chunk: Chunk) -> int:
     """Correct the end of a chunk whose stored length is damaged, from the record that must follow; returns the end."""
     size = len(finder.records.data)
-    kind = _kind(finder.records, chunk.end)
+    kind = finder.records.kind(chunk.end)
     if (
         chunk.end == size
         or kind in (INDEX, CHUNK)
@@ -216,14 +213,6 @@ def _end_of_chunk(finder: _Finder, chunk: Chunk) -> int:
     if end < size:
         chunk.end = end
     return min(chunk.end, size)
-
-
-def _kind(records: Records, position: int) -> int:
-    """Return the kind of the record at a byte, 0 where none is."""
-    try:
-        return records.at(position).op
-    except RecordError:
-        return 0
 
 
 class _Finder:
@@ -324,6 +313,10 @@ def _walk_chunks(data: Any, found: Walked) -> None:
         if chunk.walked is not None or (trusted and known):
             continue
         content = decompressed(data, chunk, allowance, exact=True)
+        if content.whole and content.behind:
+            # Its length is known now: what stands behind it, up to the record found there, may have been other chunks.
+            end, chunk.end = chunk.end, chunk.end - content.behind
+            found.gap(chunk.end, end)
         walked = walk_chunk(content.buffer, allowance)
         for number, connection in walked.connections.items():
             found.connections.setdefault(number, connection)
@@ -338,97 +331,4 @@ def _walk_chunks(data: Any, found: Walked) -> None:
                 found.faults[chunk.position] = content.fault or (EXCESS if walked.excess else "its records are damaged")
             elif last and chunk.position not in found.doubts and missing(chunk, chunk, found.connections):
                 found.faults[chunk.position] = "its index records count more messages than it holds"
-
-
-def losses(file: str, data: Any, found: Walked, error: RecordError) -> list[Loss]:
-    """Return what a walk found to be lost, and what it read in spite of damage, of a bag whose index failed."""
-    size = len(data)
-    lost: list[Loss] = []
-
-    def add(what: str, messages: int | None, start_ns: int | None = None, end_ns: int | None = None) -> None:
-        lost.append(Loss(file, what, None, messages, start_ns, end_ns))
-
-    count = sum(chunk.count(number) for chunk in found.chunks for number in chunk.connections)
-    add(f"the index cannot be used ({error}): a walk over all records found {counted(count, 'message')} without it", 0)
-    _add_chunks(data, found, add)
-    try:
-        header = Records(data).at(len(MAGIC))
-        announced, chunks = header.number(b"index_pos"), header.number(b"chunk_count")
-    except RecordError:
-        announced = chunks = 0
-    # An index that is there shows that only its announced place is damaged, not that the file was cut.
-    cut = found.index is None and announced > size
-    if cut:
-        add(*_estimate(data, found.chunks, announced))
-    for info in found.missing:
-        messages = sum(info.counts.values())
-        what = (
-            f"the chunk at byte {info.chunk} is damaged: its {counted(messages, 'message')} {verb(messages, 'is')} lost"
-        )
-        add(what, messages, info.start_ns, info.end_ns)
-    reported = {info.chunk for info in found.missing}
-    index = found.index if found.index is not None else size
-    if announced < size and _kind(Records(data), announced) in (CONNECTION, CHUNK_INFO):
-        index = announced
-    # Without a gap in it the index lists every chunk that there was, as many as the bag header counts.
-    listed = chunks == found.infos and index < size and all(chunk.counts is not None for chunk in found.chunks)
-    listed = listed and all(end <= index for _, end in found.gaps)
-    for first, end in found.gaps:
-        # Damage to the index itself, the end of a cut file and chunks with a count are in the list already.
-        if first in reported or first >= index or (end >= size and cut):
-            continue
-        if listed:
-            add(f"bytes {first} to {end} are damaged: every chunk that the index lists was found without them", 0)
-        else:
-            add(f"bytes {first} to {end} are damaged: what they held is lost", None)
-    return lost
-
-
-def _add_chunks(data: Any, found: Walked, add: Callable[..., None]) -> None:
-    """Report what each chunk lost, and in one line the chunks that were read in spite of their index records."""
-    walked = [chunk for chunk in found.chunks if chunk.position in found.doubts and chunk.position not in found.faults]
-    if walked:
-        first = walked[0].position
-        more = f" and {len(walked) - 1} more" if len(walked) > 1 else ""
-        add(
-            f"the index records of the chunk at byte {first}{more} are damaged ({found.doubts[first]}): "
-            "its messages were read from the chunk itself",
-            0,
-        )
-    for position, first in found.repeats.items():
-        add(f"the chunk at byte {position} repeats that at byte {first}: its messages are taken once", 0)
-    for chunk in found.chunks:
-        fault = found.faults.get(chunk.position)
-        if fault is None:
-            continue
-        kept = sum(chunk.count(number) for number in chunk.connections)
-        if chunk.end > len(data):
-            what = (
-                f"the file ends in the chunk at byte {chunk.position}, which has {len(data) - chunk.start} of its "
-                f"{counted(chunk.end - chunk.start, 'byte')}: {counted(kept, 'message')} of it {verb(kept, 'is')} intact"
-            )
-        else:
-            what = (
-                f"the chunk at byte {chunk.position} is damaged, {fault}: {counted(kept, 'message')} of it "
-                f"{verb(kept, 'is')} intact"
-            )
-        counts = chunk.counts
-        lost = None if counts is None else sum(max(0, n - chunk.count(one)) for one, n in counts.items())
-        add(what, lost, chunk.start_ns, chunk.end_ns)
-
-
-def _estimate(data: Any, chunks: Sequence[Chunk], index: int) -> tuple[str, None, int | None, int | None]:
-    """Estimate how much of a bag is missing behind the end of the file, from the bytes that its header announces."""
-    times = [
-        nanoseconds(entries)
-        for chunk in chunks
-        for entries in (chunk.entries(data, number) for number in chunk.connections)
-        if len(entries)
-    ]
-    size, part = len(data), (index - len(data)) / len(data)
-    what = f"the file ends at byte {size} of more than {index}: about {100 * (index - size) / index:.0f} % is lost at the end"
-    if not times:
-        return what, None, None, None
-    first, last = min(int(one.min()) for one in times), max(int(one.max()) for one in times)
-    messages, seconds = part * sum(len(one) for one in times), part * (last - first) * 1e-9
-    return f"{what}, by the rate before it {messages:.0f} messages in {seconds:.1f} s", None, last, None
+    found.gaps.sort()

@@ -64,6 +64,41 @@ def test_a_flipped_bit_in_either_size_of_a_chunk_loses_nothing(compression: str)
             assert any("two different sizes" in loss.what for loss in losses)
 
 
+def with_another_value(one: bytes, number: int) -> bytes:
+    """Return a chunk that is not compressed with another value in one of its messages, and its checksum as it was."""
+    value = struct.pack("<d", number)
+    assert one.count(value) == 1
+    return one.replace(value, struct.pack("<d", 1000 + number))
+
+
+UNCOMPRESSED_SIZE, CRC, COMPRESSED_SIZE = slice(25, 33), slice(33, 37), slice(41, 49)
+
+
+@pytest.mark.parametrize("verify", [False, True])
+@pytest.mark.parametrize(
+    "zeroed", [[COMPRESSED_SIZE], [UNCOMPRESSED_SIZE, COMPRESSED_SIZE], [CRC], [CRC, COMPRESSED_SIZE]]
+)
+def test_no_zero_in_the_header_of_a_chunk_lets_its_messages_escape_its_checksum(
+    zeroed: list[slice], verify: bool
+) -> None:
+    chunks = chunk_records("")
+    damaged = bytearray(with_another_value(chunks[1][0], PER_CHUNK + 4))
+    for place in zeroed:
+        damaged[place] = bytes(place.stop - place.start)
+    chunks[1] = bytes(damaged), chunks[1][1]
+    got, losses = accounted(without_summary(chunks), verify=verify)
+    assert got == [value for value in ALL if not PER_CHUNK <= value < 2 * PER_CHUNK]
+    assert sum(loss.messages or 0 for loss in losses) == PER_CHUNK
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_a_file_of_which_few_chunks_have_a_checksum_is_read_whole(compression: str) -> None:
+    # A tool that rescues a file copies the chunks that are sound and writes the others anew.
+    chunks = [*chunk_records(compression, crc=False)[:3], chunk_records(compression)[3]]
+    got, losses = accounted(without_summary(chunks))
+    assert (got, len(losses)) == (ALL, 2)
+
+
 @pytest.mark.parametrize("summary", [True, False])
 @pytest.mark.parametrize("change", ["replaced", "added", "dropped"])
 def test_index_entries_that_name_a_message_twice_or_leave_one_out(summary: bool, change: str) -> None:

@@ -383,3 +383,57 @@ def test_a_damaged_time_is_no_repair_where_the_index_means_the_connection_record
     count, reader = read_changed(tmp_path / "b.bag", whole, change)
     assert count == ALL - 1
     assert [loss.messages for loss in reader.losses if loss.messages] == [1]
+
+
+def never_closed(whole: bytes, change: Callable[[list[Raw]], Any] = lambda records: None) -> bytes:
+    """Return what a recorder leaves that lost its power, changed: chunks and index records, and nothing that counts them."""
+    records = parsed(whole)
+    del records[places(records, CHUNK)[-1] + 3 :]
+    records[0].fields[b"index_pos"] = bytes(8)
+    change(records)
+    return b"#ROSBAG V2.0\n" + b"".join(record.packed() for record in records)
+
+
+def rows_and_reader(path: Path, content: bytes, *, verify: bool = False) -> tuple[int, Any]:
+    path.write_bytes(content)
+    reader = open_log(path)
+    series = reader.read(WANTED, verify=verify)
+    assert_rows_are_right(series)
+    return sum(len(one.receive_ns) for one in series.values()), reader
+
+
+@pytest.mark.parametrize("left", [-1, -2, -3, -4])
+def test_a_bag_that_was_not_closed_may_lack_messages_at_its_end(tmp_path: Path, whole: bytes, left: int) -> None:
+    def cut(records: list[Raw]) -> None:
+        del records[left + 1 or len(records) :]
+
+    rows, reader = rows_and_reader(tmp_path / "a.bag", never_closed(whole, cut))
+    assert (rows < ALL) == (left == -4)
+    (end,) = [loss for loss in reader.losses if "without an index" in loss.what]
+    assert end.messages is None
+    assert START < end.start_ns < START + COUNT * 10**9 // 100
+
+
+def test_an_index_that_is_there_shows_that_the_bag_ends_where_it_should(tmp_path: Path, whole: bytes) -> None:
+    rows, reader = read_changed(tmp_path / "a.bag", whole, change_field(3, 0, b"index_pos", bytes(8)))
+    assert (rows, {loss.messages for loss in reader.losses}) == (ALL, {0})
+
+
+@pytest.mark.parametrize("verify", [False, True])
+@pytest.mark.parametrize("behind", ["the index records", "the chunk"])
+def test_a_stretch_that_is_gone_behind_a_chunk_may_have_held_others(
+    tmp_path: Path, whole: bytes, behind: str, verify: bool
+) -> None:
+    content = never_closed(whole)
+    records = parsed(content)
+    chunks = places(records, CHUNK)
+    starts = 13 + np.cumsum([0, *(len(record.packed()) for record in records)])
+    # From the first bytes of the index records of a chunk into, or to the end of, the next chunk's.
+    first, end = starts[chunks[2] + 1] + 30, starts[chunks[3] + 1] + (50 if behind == "the index records" else 0)
+    if behind == "the index records":
+        content = content[:first] + content[end:]
+    else:
+        content = content[: first - 30] + bytes(end - first + 30) + content[starts[chunks[4]] :]
+    rows, reader = rows_and_reader(tmp_path / "a.bag", content, verify=verify)
+    assert rows < ALL
+    assert any(loss.messages is None for loss in reader.losses if "without an index" not in loss.what), reader.losses

@@ -8,6 +8,7 @@ import sqlite3
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -318,14 +319,16 @@ def recording(
     storage: StoragePlugin = StoragePlugin.SQLITE3,
     mode: CompressionMode = CompressionMode.NONE,
     count: int = 500,
+    topics: Sequence[str] = ("/point",),
 ) -> Path:
     """Folder written by rosbags."""
     writer = Writer(folder, version=9, storage_plugin=storage)
     writer.set_compression(mode, CompressionFormat.ZSTD)
     with writer:
-        connection = writer.add_connection("/point", POINT, typestore=STORE)
-        for _, time, data in points(0, count):
-            writer.write(connection, time, data)
+        for name in topics:
+            connection = writer.add_connection(name, POINT, typestore=STORE)
+            for _, time, data in points(0, count):
+                writer.write(connection, time, data)
     return folder
 
 
@@ -351,6 +354,27 @@ def test_every_storage_and_compression_gives_the_same_columns(
     assert log.losses == ()
     assert folder / "metadata.yaml" in log.paths
     assert xs(open_log(folder / "metadata.yaml")) == list(range(500))
+
+
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_topics_share_what_unpacks_their_messages(
+    tmp_path: Path, storage: StoragePlugin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+
+    def counted(*args: Any, **settings: Any) -> Any:
+        made.append(settings)
+        return decompressor(*args, **settings)
+
+    topics = [f"/point{number}" for number in range(20)]
+    folder = recording(tmp_path / "trial", storage, CompressionMode.MESSAGE, topics=topics)
+    decompressor = zstandard.ZstdDecompressor
+    log = open_log(folder)
+    monkeypatch.setattr(zstandard, "ZstdDecompressor", counted)
+    series = log.read({name: ["point.x"] for name in topics})
+    assert [len(one.receive_ns) for one in series.values()] == [500] * len(topics)
+    # A context of zstd takes some 100 kB, and a file may list tens of thousands of topics.
+    assert len(made) == 1
 
 
 @pytest.mark.parametrize("compress", [zstandard.ZstdCompressor().compress, lz4.frame.compress])

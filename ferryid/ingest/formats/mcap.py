@@ -41,7 +41,8 @@ class McapLog:
     Checksums: that of the summary is always checked, a chunk's whenever the chunk is read to its end: unless only an
     early part of a large compressed chunk, or less than a quarter of a large uncompressed one, is wanted. ``verify``
     checks them all, and that of the data section. Where a chunk's checksum is wrong none of its messages can be
-    trusted: they are left out and counted.
+    trusted: they are left out and counted. In a file that had to be walked and most chunks of which have a checksum, a
+    chunk without one is damaged.
 
     Parameters
     ----------

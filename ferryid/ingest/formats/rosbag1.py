@@ -34,6 +34,7 @@ from ferryid.ingest.rosbag1_chunks import (
     missing,
     replaced,
 )
+from ferryid.ingest.rosbag1_losses import losses
 from ferryid.ingest.rosbag1_messages import Messages
 from ferryid.ingest.rosbag1_records import (
     MAGIC,
@@ -46,7 +47,7 @@ from ferryid.ingest.rosbag1_records import (
     nanoseconds,
     read_index,
 )
-from ferryid.ingest.rosbag1_recovery import losses, walk
+from ferryid.ingest.rosbag1_recovery import walk
 
 SUFFIXES = (".bag", ".bag.active")
 SEVERAL_TYPES = "recorded with different message types or definitions: cannot be read as one topic"

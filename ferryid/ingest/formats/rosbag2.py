@@ -20,7 +20,7 @@ from ferryid.ingest.join import join
 from ferryid.ingest.log import Format, Loss, Reader, Series, TableLayout, Topic
 from ferryid.ingest.message_compression import UnpackingDecoder
 from ferryid.ingest.rosbag2_metadata import KEY, NAME, File, Metadata, read_metadata
-from ferryid.ingest.unpack import FORMATS, unpack_file
+from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file
 
 ENDINGS = tuple(end + packed for end in (SQLITE, MCAP) for packed in ("", *FORMATS.values()))
 
@@ -213,7 +213,8 @@ class _McapLog(McapLog):
     def _groups(self, wanted: Mapping[str, Sequence[str]]) -> Any:
         groups, losses = super()._groups(wanted)
         if self._codec:
-            groups = [replace(group, decoder=UnpackingDecoder(group.decoder, self._codec)) for group in groups]
+            unpack = message_unpacker(self._codec)
+            groups = [replace(group, decoder=UnpackingDecoder(group.decoder, unpack)) for group in groups]
         return groups, losses
 
 

@@ -23,7 +23,7 @@ from ferryid.ingest.sqlite_data import read_data
 from ferryid.ingest.sqlite_database import FAULTS, MAGIC, Database
 from ferryid.ingest.sqlite_rows import Rows, Scan, Stretch, scan_rows
 from ferryid.ingest.stray_times import stray_times
-from ferryid.ingest.unpack import FORMATS, unpack_file, working_folder
+from ferryid.ingest.unpack import FORMATS, message_unpacker, unpack_file, working_folder
 
 SUFFIX = ".db3"
 DECODABLE = frozenset({"cdr", "ros1", "protobuf", "json"})
@@ -245,6 +245,7 @@ class Sqlite3Log:
         path = self.paths[0]
         known = {topic.name: topic for topic in self.topics}
         decoders: dict[str, Decoder] = {}
+        unpack = message_unpacker(self._storage.codec) if self._storage.codec else None
         for name, fields in wanted.items():
             topic = known.get(name)
             if topic is None:
@@ -259,7 +260,7 @@ class Sqlite3Log:
                     "Fix: record with a newer rosbag2, which stores definitions, as cdr, or map another topic"
                 )
             decoder = decoder_for("cdr", definition.typestore, topic.type, name, fields, topic.count, str(path))
-            decoders[name] = UnpackingDecoder(decoder, self._storage.codec) if self._storage.codec else decoder
+            decoders[name] = UnpackingDecoder(decoder, unpack) if unpack else decoder
         return decoders
 
     def read(self, wanted: Mapping[str, Sequence[str]], *, verify: bool = False) -> dict[str, Series]:
