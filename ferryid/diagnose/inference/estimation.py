@@ -252,8 +252,8 @@ def fit(
     every = [parameter for candidate in candidates for parameter in candidate.parameters]
     size = np.array([parameter.size for parameter in every])
     neutral = np.array([parameter.neutral for parameter in every])
-    low = (np.array([parameter.low for parameter in every]) - neutral) / size if every else np.empty(0)
-    high = (np.array([parameter.high for parameter in every]) - neutral) / size if every else np.empty(0)
+    low = (np.array([parameter.low for parameter in every]) - neutral) / size
+    high = (np.array([parameter.high for parameter in every]) - neutral) / size
     cuts = np.cumsum([len(candidate.parameters) for candidate in candidates])[:-1].tolist()
     q, h = len(every), len(problem.hull_spread)
     # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.
