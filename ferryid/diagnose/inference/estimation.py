@@ -11,13 +11,8 @@ import numpy as np
 
 from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
 from ferryid.diagnose.inference.newton_step import newton_step
-from ferryid.diagnose.inference.noise_model import (
-    NoiseModel,
-    WhiteningFilter,
-    excerpt,
-    fit_noise,
-    make_whitening_filter,
-)
+from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
+from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
