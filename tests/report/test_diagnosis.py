@@ -30,6 +30,7 @@ from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
+from ferryid.report.diagnosis_errors import force_rows, free_run_rows, ratio_of
 from ferryid.report.diagnosis_figures import _profile, binned, in_regime
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import patient, report
@@ -37,11 +38,8 @@ from ferryid.report.diagnosis_words import (
     about_errors,
     changed,
     estimate,
-    force_rows,
-    free_run_rows,
     headline,
     numbers,
-    ratio_of,
     rivals,
     said,
     trust,
