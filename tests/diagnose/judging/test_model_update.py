@@ -76,20 +76,15 @@ def trial_on(log: str, model: Model | None = None) -> tuple[EstimationProblem, S
 
 def finding(candidate: Candidate, probability: float) -> Finding:
     return Finding(
-        candidate.effect.id,
-        candidate.instance,
-        probability,
-        {},
-        {},
-        (),
-        None,
-        "",
-        dict.fromkeys(AXES, 0.5),
-        True,
-        (),
-        (),
-        None,
-        "",
+        effect=candidate.effect.id,
+        instance=candidate.instance,
+        probability=probability,
+        parameters={},
+        axes={},
+        intervals=(),
+        improvement=dict.fromkeys(AXES, 0.5),
+        held_out=True,
+        says="",
     )
 
 
