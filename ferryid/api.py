@@ -200,7 +200,6 @@ def compare(
     vessel: str | Path | Profile | None = None,
     window_s: float = 1.0,
     command: Sequence[str] = (),
-    verify: bool = False,
     progress: Progress = _quiet,
 ) -> Report:
     """Compare models on the same rows of logs, and by their coefficients; without logs by their coefficients alone.

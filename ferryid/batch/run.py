@@ -10,7 +10,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -103,7 +102,7 @@ def batch(
         for number, (entry, task) in enumerate(zip(entries, tasks, strict=True)):
             table = patients[entry.vessel][0].table
             found = kept.of(task.folder, task.files, task.stamp, partial(_content, task.log, table))
-            if found is not None and replace(task, files=found[1].files).stands(found[1]):
+            if found is not None and task.stands(found[1]):
                 rows[number] = found
         left = [number for number in range(len(tasks)) if number not in rows]
         already = len(rows)

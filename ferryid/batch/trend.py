@@ -7,7 +7,6 @@ non-parametric approach to the change-point problem", Applied Statistics 28, for
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from math import nan
 
 import numpy as np
@@ -17,7 +16,7 @@ from ferryid.counts import counted, verb
 from ferryid.diagnose import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.wording import titled
-from ferryid.report.batch_rows import FindingSummary, Key, SummaryRow, Trend, TrendLog, TrendPoint
+from ferryid.report.batch_rows import FindingSummary, Key, SummaryRow, Trend, TrendLog, TrendPoint, by_date
 from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
@@ -51,10 +50,7 @@ def trends_of(rows: Sequence[SummaryRow], profiles: Mapping[str, Profile]) -> tu
     """
     found = []
     for vessel, profile in profiles.items():
-        own = [row for row in rows if row.vessel == vessel and row.diagnose]
-        dated = bool(own) and all(row.date for row in own)
-        if dated:
-            own.sort(key=lambda row: datetime.fromisoformat(row.date or ""))
+        own, dated = by_date([row for row in rows if row.vessel == vessel and row.diagnose])
         for key, name in parameters_of(own).values():
             several = [row.finding(key) for row in own]
             if name not in NO_TREND:

@@ -3,14 +3,32 @@
 from ferryid.compare.candidates import BASE, select_candidates
 from ferryid.compare.coefficient_table import is_of_a_hull
 from ferryid.compare.comparison import ComparedLog, Comparison, compare
+from ferryid.compare.comparison_result import (
+    Coefficient,
+    CommonErrors,
+    ComparedModel,
+    ComparisonResult,
+    EffectRow,
+    LogErrors,
+    ModelPair,
+    Statement,
+)
 from ferryid.compare.evaluation import evaluate
 from ferryid.compare.tracking import MEASURES, Tracking, cumulative_integral, signal_power, tracking_error
 
 __all__ = [
     "BASE",
     "MEASURES",
+    "Coefficient",
+    "CommonErrors",
     "ComparedLog",
+    "ComparedModel",
     "Comparison",
+    "ComparisonResult",
+    "EffectRow",
+    "LogErrors",
+    "ModelPair",
+    "Statement",
     "Tracking",
     "compare",
     "cumulative_integral",

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from ferryid.compare.candidates import Candidate
+from ferryid.compare.comparison_result import Coefficient, CoefficientRow, EffectInModel, EffectRow, TermRow
 from ferryid.effects.force_model import COEFFICIENTS, LIFT, MASS, UNITS
-from ferryid.models import Model, StoredEffect, effect_to_json
+from ferryid.models import Model, StoredEffect
 from ferryid.models.forces import MAPPED, hull_coefficients, hull_contribution, model_estimator
 from ferryid.types import AXES, Floats
-
-Row = dict[str, Any]
 
 PRODUCTS = (
     ("vr in surge", "vr", 0, "kg"),
@@ -30,7 +28,7 @@ CONSTANT = "1"
 """Name of the constant among the terms, as in a model file."""
 
 
-def coefficient_rows(candidates: Sequence[Candidate]) -> list[Row]:
+def coefficient_rows(candidates: Sequence[Candidate]) -> tuple[CoefficientRow, ...]:
     """Return the coefficients of the equations of motion, base model and correction counted together.
 
     With these the force that a motion takes in still water and without wind is::
@@ -45,10 +43,10 @@ def coefficient_rows(candidates: Sequence[Candidate]) -> list[Row]:
     known = [_effective(one.model) for one in candidates]
     rows = []
     for name, unit in _UNITS.items():
-        values = {one.label: _plain(found[name]) for one, found in zip(candidates, known, strict=True)}
-        if any(value["value"] != 0.0 for value in values.values()):
-            rows.append({"coefficient": name, "unit": unit, "values": values})
-    return rows
+        values = {one.label: Coefficient(*found[name].tolist()) for one, found in zip(candidates, known, strict=True)}
+        if any(one.value != 0.0 for one in values.values()):
+            rows.append(CoefficientRow(name, unit, values))
+    return tuple(rows)
 
 
 _HULL = dict(zip(COEFFICIENTS, UNITS, strict=True))
@@ -96,12 +94,7 @@ def _opposite(interval: Floats) -> Floats:
     return -interval[[0, 2, 1]]
 
 
-def _plain(interval: Floats) -> Row:
-    value, low, high = interval.tolist()
-    return {"value": value, "low": low, "high": high}
-
-
-def term_rows(candidates: Sequence[Candidate]) -> list[Row]:
+def term_rows(candidates: Sequence[Candidate]) -> tuple[TermRow, ...]:
     """Return the terms of the corrections, on every axis on which a model has them, as they stand in the model files."""
     rows = []
     for term in dict.fromkeys((*(term for one in candidates for term in one.model.terms), CONSTANT)):
@@ -111,19 +104,20 @@ def term_rows(candidates: Sequence[Candidate]) -> list[Row]:
                 found = _raw(one.model, term, axis)
                 if found is not None:
                     unit, values[one.label] = found
-            if any(value["value"] != 0.0 for value in values.values()):
-                rows.append({"term": term, "axis": name, "unit": unit, "values": values})
-    return rows
+            if any(one.value != 0.0 for one in values.values()):
+                rows.append(TermRow(term, name, unit, values))
+    return tuple(rows)
 
 
-def _raw(model: Model, term: str, axis: int) -> tuple[str, Row] | None:
+def _raw(model: Model, term: str, axis: int) -> tuple[str, Coefficient] | None:
     if term == CONSTANT:
         interval = (model.intercept[axis], model.intercept_low[axis], model.intercept_high[axis])
-        return ("N·m" if axis == 2 else "N"), _plain(np.array(interval))
+        return ("N·m" if axis == 2 else "N"), Coefficient(*map(float, interval))
     if term not in model.terms:
         return None
     k = model.terms.index(term)
-    return model.units[k][axis], _plain(np.array([model.theta[k, axis], model.low[k, axis], model.high[k, axis]]))
+    interval = (model.theta[k, axis], model.low[k, axis], model.high[k, axis])
+    return model.units[k][axis], Coefficient(*map(float, interval))
 
 
 def is_of_a_hull(term: str, axis: str) -> bool:
@@ -133,16 +127,20 @@ def is_of_a_hull(term: str, axis: str) -> bool:
     return place in mapped | {(term, axis) for _, term, axis, _ in (*PRODUCTS, *CUBES)}
 
 
-def effect_rows(candidates: Sequence[Candidate]) -> list[Row]:
+def effect_rows(candidates: Sequence[Candidate]) -> tuple[EffectRow, ...]:
     """Return the effects that are not the same in all models: of the vessel, then of the logs that each was diagnosed on."""
     known = {one.label: _all(one.model) for one in candidates if not one.is_base}
     rows = []
     for key in dict.fromkeys(key for effects_of in known.values() for key in effects_of):
-        told = {label: _effect_values(effects_of.get(key)) for label, effects_of in known.items()}
-        if any(value != next(iter(told.values())) for value in told.values()):
-            log, _, effect, instance = key
-            rows.append({"effect": effect, "instance": instance, "log": log or None, "values": told})
-    return rows
+        log, _, effect, instance = key
+        row = EffectRow(
+            effect, instance, log or None, {label: _in_model(known_of.get(key)) for label, known_of in known.items()}
+        )
+        # As plain data: an end of an interval that is not known is no difference.
+        first, *others = row.to_json()["values"].values()
+        if any(other != first for other in others):
+            rows.append(row)
+    return tuple(rows)
 
 
 def _all(model: Model) -> dict[tuple[str, str, str, str | None], StoredEffect]:
@@ -152,5 +150,5 @@ def _all(model: Model) -> dict[tuple[str, str, str, str | None], StoredEffect]:
     }
 
 
-def _effect_values(stored: StoredEffect | None) -> Row | None:
-    return None if stored is None else {"parameters": effect_to_json(stored)["parameters"], "says": stored.says()}
+def _in_model(stored: StoredEffect | None) -> EffectInModel | None:
+    return None if stored is None else EffectInModel(stored.parameters, stored.says())

@@ -5,13 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ferryid.compare.candidates import Candidate, CandidateSet
 from ferryid.compare.coefficient_table import coefficient_rows, effect_rows, term_rows
-from ferryid.compare.comparison_statements import PairedErrors, Row, comparison_statements
+from ferryid.compare.comparison_result import (
+    Coefficients,
+    CommonErrors,
+    ComparedModel,
+    ComparisonResult,
+    FreeRunCounts,
+    LogErrors,
+    ModelErrors,
+    ModelPair,
+    Ratio,
+)
+from ferryid.compare.comparison_statements import PairedErrors, comparison_statements
 from ferryid.compare.evaluation import range_warnings
 from ferryid.compare.thresholds import COMPARE
 from ferryid.compare.tracking import tracking_scores
@@ -79,9 +89,9 @@ class ComparedLog:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The result as one JSON object (schema ``ferryid.compare/1``), and the logs for figures."""
+    """The result, and the logs for figures."""
 
-    json: dict[str, Any]
+    result: ComparisonResult
     logs: tuple[ComparedLog, ...]
 
 
@@ -124,47 +134,47 @@ def compare(
     judged = [_pair_errors(field, [log], runnable) for log in compared]
     pooled = _pair_errors(field, compared, runnable) if len(compared) > 1 else None
     every = [*judged, *([pooled] if pooled else [])]
-    result = {
-        "schema": "ferryid.compare/1",
-        "vessel": field.profile.name,
-        "window_s": window_s,
-        "models": [_entry(one) for one in field.candidates],
-        "warnings": [*field.warnings, *notes],
-        "logs": [
-            {
-                "name": log.name,
-                "sha256": log.sha256,
-                "block_s": log.block_s,
-                **_scores(field, [log], one, runnable),
-                "tracking": tracking_scores(log.motion, field.profile.hull.length_m),
-                "warnings": [*log.warnings, *_too_few_blocks(log)],
-            }
+    result = ComparisonResult(
+        schema="ferryid.compare/1",
+        vessel=field.profile.name,
+        window_s=window_s,
+        models=tuple(_model(one) for one in field.candidates),
+        warnings=(*field.warnings, *notes),
+        logs=tuple(
+            LogErrors(
+                name=log.name,
+                sha256=log.sha256,
+                block_s=log.block_s,
+                **vars(_errors(field, [log], one, runnable)),
+                tracking=tracking_scores(log.motion, field.profile.hull.length_m),
+                warnings=(*log.warnings, *_too_few_blocks(log)),
+            )
             for log, one in zip(compared, judged, strict=True)
-        ],
-        "pooled": _scores(field, compared, pooled, runnable) if pooled else None,
-        "better": [row for one in every for row in comparison_statements(one)],
-        "coefficients": {"physical": coefficient_rows(field.candidates), "terms": term_rows(field.candidates)},
-        "effects": effect_rows(field.candidates),
-    }
+        ),
+        pooled=_errors(field, compared, pooled, runnable) if pooled else None,
+        statements=tuple(statement for one in every for statement in comparison_statements(one)),
+        coefficients=Coefficients(coefficient_rows(field.candidates), term_rows(field.candidates)),
+        effects=effect_rows(field.candidates),
+    )
     run.progress("")
     return Comparison(result, tuple(compared))
 
 
-def _entry(candidate: Candidate) -> Row:
+def _model(candidate: Candidate) -> ComparedModel:
     model = candidate.model
-    return {
-        "label": candidate.label,
-        "name": model.name,
-        "version": model.version,
-        "base": candidate.is_base,
-        "accepted": None if candidate.is_base else model.accepted,
-        "basis": str(model.settings["basis"]),
-        "diagnosed": model.diagnosed,
-        "scale": dict(model.scale),
-        "training": [str(log["name"]) for log in model.training],
-        "validation": None if model.scores is None else by_axis(model.scores.force.ratio),
-        "normalised_mse": None if model.scores is None else model.scores.force.normalised_mse,
-    }
+    return ComparedModel(
+        label=candidate.label,
+        name=model.name,
+        version=model.version,
+        is_base=candidate.is_base,
+        accepted=None if candidate.is_base else model.accepted,
+        basis=str(model.settings["basis"]),
+        diagnosed=model.diagnosed,
+        scale=model.scale,
+        training=tuple(str(log["name"]) for log in model.training),
+        validation=None if model.scores is None else by_axis(model.scores.force.ratio),
+        normalised_mse=None if model.scores is None else model.scores.force.normalised_mse,
+    )
 
 
 def _compare_log(
@@ -317,7 +327,9 @@ def _too_few_blocks(log: ComparedLog) -> list[str]:
     ]
 
 
-def _scores(field: CandidateSet, compared: Sequence[ComparedLog], judged: PairedErrors, runnable: Flags) -> Row:
+def _errors(
+    field: CandidateSet, compared: Sequence[ComparedLog], judged: PairedErrors, runnable: Flags
+) -> CommonErrors:
     """Return rows, blocks, errors of every model and ratios of every two, on one log or on several together."""
     tau = np.concatenate([log.motion.tau[log.rows] for log in compared])
     mse = np.sum([log.sums.sum(axis=0) for log in compared], axis=0) / len(tau)
@@ -331,41 +343,41 @@ def _scores(field: CandidateSet, compared: Sequence[ComparedLog], judged: Paired
         )
         rms = np.sqrt(squares / np.sum([use.sum(axis=0) for use in counted], axis=0))
     rms[~runnable] = np.nan
-    return {
-        "rows": len(tau),
-        "seconds": float(sum(log.rows.sum() / log.motion.rate_hz for log in compared)),
-        "blocks": sum(len(log.sums) for log in compared),
-        "scores": {
-            label: {
-                "mse": by_axis(mse[k]),
-                "r2": by_axis(r2[k]),
-                "trained": label in judged.trained,
-                "free_run": {key: rms[k, :, c].tolist() for c, key in enumerate(KEYS)},
-            }
+    return CommonErrors(
+        rows=len(tau),
+        seconds=float(sum(log.rows.sum() / log.motion.rate_hz for log in compared)),
+        blocks=sum(len(log.sums) for log in compared),
+        scores={
+            label: ModelErrors(
+                mse=by_axis(mse[k]),
+                r2=by_axis(r2[k]),
+                trained=label in judged.trained,
+                free_run={key: tuple(rms[k, :, c].tolist()) for c, key in enumerate(KEYS)},
+            )
             for k, label in enumerate(field.labels)
         },
-        "free_run": {
-            "horizons_s": list(HORIZONS_S),
-            "told_s": judged.told_s,
-            "starts": sum(len(log.starts_s) for log in compared),
-            "counted": [int(sum(use[:, h].any(axis=1).sum() for use in counted)) for h in range(len(HORIZONS_S))],
-            "blocks": [sum(len(_run_sums(log, runnable, h)) for log in compared) for h in range(len(HORIZONS_S))],
-        },
-        "pairs": [
-            {
-                "first": field.labels[i],
-                "second": field.labels[j],
-                "mse": {axis: _ratio(judged.force, k, c) for c, axis in enumerate(AXES)},
-                "free_run": {
-                    key: [_ratio(runs, k, c, root=True) for runs in judged.runs] for c, key in enumerate(KEYS)
+        free_run=FreeRunCounts(
+            horizons_s=HORIZONS_S,
+            told_s=judged.told_s,
+            starts=sum(len(log.starts_s) for log in compared),
+            counted=tuple(int(sum(use[:, h].any(axis=1).sum() for use in counted)) for h in range(len(HORIZONS_S))),
+            blocks=tuple(sum(len(_run_sums(log, runnable, h)) for log in compared) for h in range(len(HORIZONS_S))),
+        ),
+        pairs=tuple(
+            ModelPair(
+                first=field.labels[i],
+                second=field.labels[j],
+                mse={axis: _ratio(judged.force, k, c) for c, axis in enumerate(AXES)},
+                free_run={
+                    key: tuple(_ratio(runs, k, c, root=True) for runs in judged.runs) for c, key in enumerate(KEYS)
                 },
-            }
+            )
             for k, (i, j) in enumerate(judged.force.pairs)
-        ],
-    }
+        ),
+    )
 
 
-def _ratio(paired: PairedRatios, k: int, column: int, *, root: bool = False) -> Row:
+def _ratio(paired: PairedRatios, k: int, column: int, *, root: bool = False) -> Ratio:
     values = np.array([values[k, column] for values in (paired.ratio, paired.low, paired.high)])
     value, low, high = (np.sqrt(values) if root else values).tolist()
-    return {"value": value, "low": low, "high": high, "p": float(paired.p[k, column])}
+    return Ratio(value, low, high, float(paired.p[k, column]))

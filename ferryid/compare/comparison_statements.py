@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, sqrt
-from typing import Any
 
 import numpy as np
 
+from ferryid.compare.comparison_result import Statement
 from ferryid.compare.thresholds import COMPARE
 from ferryid.regression.resampling import PairedRatios, holm
 from ferryid.types import AXES
-
-Row = dict[str, Any]
 
 QUANTITIES = ("position", "heading", "speed", "yaw rate")
 """What free runs are judged by, in the order of their errors."""
@@ -52,7 +50,7 @@ class PairedErrors:
     trained: frozenset[str]
 
 
-def comparison_statements(judged: PairedErrors) -> list[Row]:
+def comparison_statements(judged: PairedErrors) -> list[Statement]:
     """Return one entry for every two models and everything that they are compared by.
 
     Probabilities are corrected for the number of these entries after Holm; intervals are of each by itself.
@@ -71,7 +69,7 @@ def comparison_statements(judged: PairedErrors) -> list[Row]:
                 continue
             numbers = [float(values[k, column]) for values in (paired.ratio, paired.low, paired.high)]
             rows.append(
-                _entry(
+                _statement(
                     judged,
                     (judged.labels[i], judged.labels[j]),
                     (kind, what, horizon),
@@ -83,13 +81,13 @@ def comparison_statements(judged: PairedErrors) -> list[Row]:
     return rows
 
 
-def _entry(
+def _statement(
     judged: PairedErrors,
     pair: tuple[str, str],
     of: tuple[str, str, float | None],
     numbers: Sequence[float],
     chances: tuple[float, float],
-) -> Row:
+) -> Statement:
     kind, what, horizon = of
     (first, second), (ratio, low, high), (p, corrected) = pair, numbers, chances
     if ratio > 1.0:
@@ -121,23 +119,23 @@ def _entry(
         )
     if not evidence:
         says += f"; no evidence, as {first} was fitted to {'this log' if judged.on else 'some of these logs'}"
-    return {
-        "on": judged.on,
-        "kind": kind,
-        "what": what,
-        "horizon_s": horizon,
-        "first": first,
-        "second": second,
-        "ratio": ratio,
-        "low": low,
-        "high": high,
-        "p": p,
-        "p_corrected": corrected,
-        "better": first if clear else None,
-        "perhaps": first if hint else None,
-        "evidence": evidence,
-        "says": says,
-    }
+    return Statement(
+        on=judged.on,
+        kind=kind,
+        what=what,
+        horizon_s=horizon,
+        first=first,
+        second=second,
+        ratio=ratio,
+        low=low,
+        high=high,
+        p=p,
+        p_corrected=corrected,
+        better=first if clear else None,
+        perhaps=first if hint else None,
+        evidence=evidence,
+        sentence=says,
+    )
 
 
 def format_probability(p: float) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from ferryid.compare.comparison_result import TrackingScores
 from ferryid.signals.track import Motion, segments
 from ferryid.types import Floats
 
@@ -63,7 +63,7 @@ class Tracking:
         }
 
 
-def tracking_scores(motion: Motion, length_m: float) -> dict[str, Any] | None:
+def tracking_scores(motion: Motion, length_m: float) -> TrackingScores | None:
     """Return the measures of a log that tells where the vessel was to be; None for another.
 
     The integrals are taken over unbroken stretches of measured data and added up; what lies between is left out.
@@ -95,15 +95,17 @@ def tracking_scores(motion: Motion, length_m: float) -> dict[str, Any] | None:
     ]
     if not parts:
         return None
-    sums = {name: sum(getattr(part, name) for part in parts) for name in ("ISE", "IAE", "EC")}
+    ISE, IAE, EC = (sum(values) for values in zip(*((part.ISE, part.IAE, part.EC) for part in parts), strict=True))
     turn = np.arctan2(np.sin(off[valid, 2]), np.cos(off[valid, 2]))
-    return {
-        **sums,
-        "IAEW": sums["IAE"] * sums["EC"],
-        "seconds": float(sum(part.t[-1] - part.t[0] for part in parts)),
-        "position_m": float(np.sqrt(np.mean(np.sum(off[valid, :2] ** 2, axis=1)))),
-        "heading_rad": float(np.sqrt(np.mean(turn**2))),
-    }
+    return TrackingScores(
+        ISE=ISE,
+        IAE=IAE,
+        EC=EC,
+        IAEW=IAE * EC,
+        seconds=float(sum(part.t[-1] - part.t[0] for part in parts)),
+        position_m=float(np.sqrt(np.mean(np.sum(off[valid, :2] ** 2, axis=1)))),
+        heading_rad=float(np.sqrt(np.mean(turn**2))),
+    )
 
 
 def tracking_error(eta: Floats, eta_d: Floats, length_m: float) -> Floats:

@@ -17,7 +17,7 @@ from ferryid.counts import counted
 from ferryid.effects.equations_of_motion import accelerations, from_antenna, required, slopes
 from ferryid.types import Floats, Ints
 from ferryid.vessel.hull import payload_mass
-from ferryid.vessel.profile import Profile, WindAreas
+from ferryid.vessel.profile import Profile
 from ferryid.vessel.wind import relative_wind_force, wind_force
 
 MASS = ("m11", "m22", "m23", "m32", "m33")
@@ -39,7 +39,7 @@ UNITS = (
 _NO_FLOW, _NO_LOAD, _NO_FACTOR = np.empty((0, 2)), np.empty((0, 5)), np.empty(0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurements:
     """What was measured, n rows on a uniform grid, and the vessel that it was measured on.
 
@@ -167,6 +167,14 @@ class ForceModel:
     turned: float = 0.0
     antenna: tuple[float, float] = (0.0, 0.0)
 
+    def with_load(self, load: Floats) -> ForceModel:
+        """Return it with more added to the mass matrix, shape (n, 5)."""
+        return replace(self, load=load if self.load is None else self.load + load)
+
+    def damped(self, factor: Floats) -> ForceModel:
+        """Return it with all damping multiplied by a factor, shape (n,)."""
+        return replace(self, damping_factor=factor if self.damping_factor is None else self.damping_factor * factor)
+
 
 def hull_of(profile: Profile) -> Floats:
     """Return the coefficients of a profile's hull in the order of `COEFFICIENTS`, zero where unknown."""
@@ -277,11 +285,13 @@ def aboard(payload: Floats) -> Floats:
     return payload_mass(payload)[:, [0, 1, 1, 2, 2], [0, 1, 2, 1, 2]]
 
 
-def wind_load(measurements: Measurements, areas: WindAreas, air: Floats) -> Floats:
-    """Return the load of a wind that is steady over ground [N, N, N·m], shape (n, 3).
+def wind_load(measurements: Measurements, air: Floats) -> Floats:
+    """Return the load of a wind that is steady over ground, on a vessel with wind areas [N, N, N·m], shape (n, 3).
 
     `air` is where it goes to, north and east [m/s], shape (2,).
     """
+    areas = measurements.profile.wind
+    assert areas is not None
     cos, sin = measurements.pointing
     north, east = air.tolist()
     u_w, v_w = cos * north + sin * east, cos * east - sin * north

@@ -28,14 +28,12 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def unsteady(force_model: ForceModel) -> Processes:
     """Return the load of a gust to the north and to the east; none in still air, whose load is of second order."""
-    measurements, areas = force_model.measurements, force_model.measurements.profile.wind
-    if areas is None or force_model.air is None:
+    measurements = force_model.measurements
+    if measurements.profile.wind is None or force_model.air is None:
         return lambda p: ()
     loads, factors = [], 1.0 if force_model.air_factors is None else force_model.air_factors
     for towards in np.eye(2):
-        ends = [
-            wind_load(measurements, areas, force_model.air + side * DIFFERENCE_MPS * towards) for side in (1.0, -1.0)
-        ]
+        ends = [wind_load(measurements, force_model.air + side * DIFFERENCE_MPS * towards) for side in (1.0, -1.0)]
         loads.append(factors * (ends[0] - ends[1]) / (2.0 * DIFFERENCE_MPS))
     return lambda p: tuple(Process(load, float(p[0]), float(p[1])) for load in loads)
 

@@ -6,7 +6,6 @@ drawing says, and not told: without it, what is only damping would seem to be mi
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,14 +44,11 @@ def _by_mass(profile: Profile) -> float:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Put the mass aboard."""
     n = len(force_model.measurements.t)
-    load, damping = aboard(np.tile(p[:2], (n, 1))), force_model.damping_factor
-    if len(p) > 2:
-        more = float(p[2] * p[0]) * _by_mass(force_model.measurements.profile)
-        load = load + more * added_mass(force_model)
-        damping = np.full(n, 1.0 + more) if damping is None else damping * (1.0 + more)
-    return replace(
-        force_model, load=load if force_model.load is None else force_model.load + load, damping_factor=damping
-    )
+    load = aboard(np.tile(p[:2], (n, 1)))
+    if len(p) < 3:
+        return force_model.with_load(load)
+    more = float(p[2] * p[0]) * _by_mass(force_model.measurements.profile)
+    return force_model.with_load(load + more * added_mass(force_model)).damped(np.full(n, 1.0 + more))
 
 
 def unreported(measurements: Measurements, p: Floats) -> frozenset[str]:

@@ -6,7 +6,6 @@ added mass grows is fitted as well and not told: without it, water that moves al
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import log
 from typing import Any
 
@@ -58,15 +57,7 @@ def inside(measurements: Measurements, sides: Floats) -> Floats:
 def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
     """Multiply the damping in the place, and let the added mass grow."""
     growth = (float(p[0]) - 1.0) * inside(force_model.measurements, p[1:5])
-    load = float(p[5]) * growth[:, None] * added_mass(force_model)
-    return replace(
-        _damped(force_model, 1.0 + growth), load=load if force_model.load is None else force_model.load + load
-    )
-
-
-def _damped(force_model: ForceModel, factor: Floats) -> ForceModel:
-    before = force_model.damping_factor
-    return replace(force_model, damping_factor=factor if before is None else before * factor)
+    return force_model.damped(1.0 + growth).with_load(float(p[5]) * growth[:, None] * added_mass(force_model))
 
 
 def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> Choice:
@@ -83,7 +74,7 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
             rows = (cell[:, 0] == i) & (cell[:, 1] == j)
             share[i, j] = float(np.mean(rows[measurements.usable]))
             if share[i, j] > 0.0:
-                by_cell[i, j] = (residual(_damped(force_model, 1.0 + 0.5 * rows)) - e) / 0.5
+                by_cell[i, j] = (residual(force_model.damped(1.0 + 0.5 * rows)) - e) / 0.5
     # Columns of rectangles are sums of those of their cells, here as differences of sums from the corner.
     sums = np.zeros((CELLS + 1, CELLS + 1, len(e)))
     sums[1:, 1:] = by_cell.cumsum(axis=0).cumsum(axis=1)

@@ -92,15 +92,12 @@ def mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Float
 
 
 def _mean_load(measurements: Measurements, air: Floats, gust_std: float) -> Floats:
-    areas = measurements.profile.wind
-    if areas is None:
-        return np.zeros((len(measurements.t), 3))
-    steady = wind_load(measurements, areas, air)
+    steady = wind_load(measurements, air)
     if gust_std == 0.0:
         return steady
     around = np.zeros_like(steady)
     for one in sqrt(3.0) * gust_std * np.eye(2):
-        around += wind_load(measurements, areas, air + one) + wind_load(measurements, areas, air - one) - 2.0 * steady
+        around += wind_load(measurements, air + one) + wind_load(measurements, air - one) - 2.0 * steady
     return steady + around / 6.0
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,25 +17,15 @@ from numpy.typing import NDArray
 
 from ferryid.counts import counted, verb
 from ferryid.ingest.log import Series
+from ferryid.ingest.stamp_clock import CONSTANT_OFFSET_NS, SECOND_NS, STEP_NS, ClockFacts, compare_clocks, spread_sample
 from ferryid.ingest.stray_times import stray_times
 from ferryid.types import Nanoseconds
 
 Rows = NDArray[np.int64]
 
-_SECOND = 1_000_000_000
-_CONSTANT_OFFSET_NS = _SECOND
-"""Offsets below this are latency and kept; above, the sender's clock was set differently."""
-_STEP_NS = _SECOND
-"""Receive and stamp must advance alike within this from one message to the next, else a clock may have been set."""
-_CORRECTED_DRIFT_NS = 50_000_000
-_LARGEST_CLOCK_DRIFT_PPM = 500.0
-_LONGEST_LOG_NS = 30 * 86_400 * 1e9
-"""Quartz drifts by less; beyond it the stamps run on simulated time or the log was replayed at another speed."""
 _GAP_PERIODS = 3.0
 _SHORTEST_GAP_NS = 200_000_000
-_BLOCKS = 64
-_BLOCK_SAMPLES = 256
-_QUARTER_HOUR_NS = 900 * _SECOND
+_QUARTER_HOUR_NS = 900 * SECOND_NS
 
 
 @dataclass(frozen=True)
@@ -135,7 +124,7 @@ def repair_all(series: Mapping[str, Series]) -> dict[str, tuple[Nanoseconds, Row
     shifts = dict.fromkeys(found, 0)
     first = float("nan")
     for offset_s, topic in stamped:
-        if not offset_s - first < _CONSTANT_OFFSET_NS * 1e-9:
+        if not offset_s - first < CONSTANT_OFFSET_NS * 1e-9:
             first = offset_s
         shifts[topic] = _base_shift(first)
     return {topic: _shifted(*found[topic], shifts[topic]) for topic in found}
@@ -145,12 +134,12 @@ def _base_shift(offset_s: float) -> int:
     """Shift [ns] that brings stamps with this median offset to the recorder's time base, 0 for plain latency."""
     if not np.isfinite(offset_s):
         return 0
-    offset = round(offset_s * _SECOND)
-    if abs(offset) <= _CONSTANT_OFFSET_NS:
+    offset = round(offset_s * SECOND_NS)
+    if abs(offset) <= CONSTANT_OFFSET_NS:
         return 0
     zone = round(offset / _QUARTER_HOUR_NS) * _QUARTER_HOUR_NS
     # Two clocks that are right but written in different time zones: what remains is latency, and is kept.
-    return zone if zone != 0 and 0 <= offset - zone < _SECOND // 2 else offset
+    return zone if zone != 0 and 0 <= offset - zone < SECOND_NS // 2 else offset
 
 
 def _shifted(
@@ -166,12 +155,12 @@ def _shifted(
     return (
         time_ns + np.int64(shift_ns),
         rows,
-        replace(report, shift_s=shift_ns / _SECOND, gaps=gaps, notes=(*report.notes, note)),
+        replace(report, shift_s=shift_ns / SECOND_NS, gaps=gaps, notes=(*report.notes, note)),
     )
 
 
 def _span_text(nanoseconds: int) -> str:
-    seconds = nanoseconds / _SECOND
+    seconds = nanoseconds / SECOND_NS
     if seconds < 600:
         return f"{seconds:.3f} s"
     if seconds < 172_800:
@@ -188,7 +177,7 @@ def _one_topic(
         note = f'times are those of its time column "{time_column}"' if time_column else "no header: receive times only"
         return _ordered(receive, "receive", (note,), drop_far_side=True)
     stamp = np.ascontiguousarray(stamp_ns, dtype=np.int64)
-    reason, notes, stamp, facts = _judge(receive, stamp)
+    reason, notes, stamp, facts = compare_clocks(receive, stamp)
     if reason:
         return _ordered(receive, "receive", (f"{reason}: receive times are used", *notes), facts, drop_far_side=True)
     astray = int(np.count_nonzero(stray_times(receive)[0]))
@@ -200,112 +189,16 @@ def _one_topic(
     return _ordered(stamp, "stamp", notes, facts)
 
 
-@dataclass(frozen=True)
-class _Facts:
-    """What the comparison of both clocks gave."""
-
-    offset_s: float = float("nan")
-    drift_ppm: float = float("nan")
-    jitter_s: float = float("nan")
-    resets: int = 0
-    replaced: int = 0
-
-
-def _judge(receive: Nanoseconds, stamp: Nanoseconds) -> tuple[str, tuple[str, ...], Nanoseconds, _Facts]:
-    """Compare both clocks: why stamps cannot be used (or ""), notes, repaired stamps, facts."""
-    count = len(stamp)
-    if count == 0:
-        return "", (), stamp, _Facts()
-    unset = stamp <= 0
-    zeros = int(np.count_nonzero(unset))
-    if zeros == count and not (count > 1 and stamp.max() == 0 and stamp.min() < 0):
-        return "all stamps are zero", (), stamp, _Facts()
-    if zeros * 100 > count and zeros > 1:
-        return f"{zeros} of {counted(count, 'stamp')} {verb(zeros, 'is')} zero", (), stamp, _Facts()
-    notes: list[str] = []
-    steps = np.diff(stamp)
-    repeated = int(np.count_nonzero(steps == 0))
-    if count > 2 and repeated == count - 1:
-        return "all stamps are the same", (), stamp, _Facts()
-    if repeated * 5 > count:
-        return (
-            f"{repeated} of {counted(count, 'stamp')} {verb(repeated, 'repeats')} the one before",
-            (),
-            stamp,
-            _Facts(),
-        )
-    latency = receive - stamp
-    usual = _median(latency[~unset] if zeros else latency)
-    replaced = 0
-    # A stamp in the future by itself is no late message (which would be old): the sender wrote nonsense.
-    strange = unset | _alone_in_future(latency) | stray_times(stamp)[0]
-    if strange.any():
-        replaced = int(np.count_nonzero(strange))
-        if replaced * 100 > max(count, 200):
-            return f"{replaced} of {counted(count, 'stamp')} {verb(replaced, 'makes')} no sense", (), stamp, _Facts()
-        stamp = np.where(strange, receive - usual, stamp)
-        latency = np.where(strange, usual, latency)
-        notes.append(f"{counted(replaced, 'senseless stamp')} replaced by receive time less the usual latency")
-    # Receive time and stamp advance alike unless a message was held up or a clock was set.
-    jumps = np.flatnonzero(np.abs(np.diff(latency)) > _STEP_NS)
-    if len(jumps) * 10 > count:
-        return (
-            "stamps and receive times have nothing in common",
-            tuple(notes),
-            stamp,
-            _Facts(replaced=replaced),
-        )
-    sets = _lasting_steps(latency, jumps)
-    if sets:
-        facts = _Facts(usual / _SECOND, float("nan"), float("nan"), len(sets), replaced)
-        by_sender = sum(_is_senders(receive, stamp, place) for place in sets)
-        where = f"{sets[0] + 1} of {count}"
-        if by_sender:
-            reason = (
-                f"the sender's clock was set {counted(by_sender, 'time')} during the recording, first at row {where}"
-            )
-            return reason, tuple(notes), stamp, facts
-        notes.append(
-            f"the recorder's clock was set {counted(len(sets), 'time')} during the recording, first at row {where}: stamps are "
-            "used, topics without stamps may be off"
-        )
-        return "", tuple(notes), stamp, facts
-    places, middles, spread = _blocks(stamp, latency)
-    slope = _theil_sen(places, middles)
-    jitter = spread / _SECOND
-    facts = _Facts(usual / _SECOND, slope * 1e6, jitter, 0, replaced)
-    span = float(stamp.max() - stamp.min())
-    # Over months the slope only reflects that a clock was set, by both sender and recorder alike.
-    drifted = slope * span if np.isfinite(slope) and span < _LONGEST_LOG_NS else 0.0
-    if abs(drifted) > _CORRECTED_DRIFT_NS:
-        if abs(slope) * 1e6 > _LARGEST_CLOCK_DRIFT_PPM:
-            notes.append(f"{_pace(slope)} (simulated time, or a replay?): stamps are used as they are")
-        else:
-            stamp = stamp + np.rint(slope * (stamp - stamp[0])).astype(np.int64)
-            notes.append(
-                f"the sender's clock drifts by {slope * 1e6:.1f} ppm, {drifted / _SECOND:.3f} s in all: taken out"
-            )
-    if -_CONSTANT_OFFSET_NS <= usual < -1_000_000:
-        notes.append(f"stamps are {-usual / _SECOND:.3f} s later than receipt: the sender's clock is ahead; kept")
-    return "", tuple(notes), stamp, facts
-
-
-def _pace(slope: float) -> str:
-    if slope <= -1.0:
-        return "receive times stand still while stamps advance"
-    return f"stamps advance {1 / (1 + slope):.4g} times as fast as the recorder's clock"
-
-
 def _ordered(
     times: Nanoseconds,
     source: str,
     notes: tuple[str, ...],
-    facts: _Facts | None = None,
+    facts: ClockFacts | None = None,
     *,
     drop_far_side: bool = False,
 ) -> tuple[Nanoseconds, Rows, ClockReport]:
     """Sort the rows, leave out repeated times, find gaps, and write the report."""
-    facts = facts or _Facts()
+    facts = facts or ClockFacts()
     told = list(notes)
     count = len(times)
     rows = np.arange(count, dtype=np.int64)
@@ -324,7 +217,7 @@ def _ordered(
         rows, times, late = rows[~stray], times[~stray], late[~stray]
         steps = np.diff(times)
         lowest = int(steps.min(initial=1))
-    if lowest < -_STEP_NS and drop_far_side:
+    if lowest < -STEP_NS and drop_far_side:
         start, stop, backward = _longest_stretch(times, late)
         if stop - start < len(times):
             resets += backward
@@ -356,12 +249,12 @@ def _ordered(
         told.append("the period varies: gaps are counted against the longer of its periods")
     jitter = facts.jitter_s
     if not np.isfinite(jitter) and len(steps) > 1:
-        sample = _sample(steps)
-        jitter = 1.4826 * float(np.median(np.abs(sample - period))) / _SECOND
+        sample = spread_sample(steps)
+        jitter = 1.4826 * float(np.median(np.abs(sample - period))) / SECOND_NS
     report = ClockReport(
         source=source,
         count=len(times),
-        rate_hz=spoken / (span / _SECOND) if span > 0 and spoken > 0 else float("nan"),
+        rate_hz=spoken / (span / SECOND_NS) if span > 0 and spoken > 0 else float("nan"),
         offset_s=facts.offset_s,
         drift_ppm=facts.drift_ppm,
         jitter_s=jitter,
@@ -381,7 +274,7 @@ def _gaps(times: Nanoseconds, steps: Nanoseconds) -> tuple[tuple[tuple[int, int]
     """Stretches without rows, the usual period [ns], and whether the period varies too much to be one."""
     if len(steps) == 0:
         return (), float("nan"), False
-    sample = _sample(steps)
+    sample = spread_sample(steps)
     period = float(np.median(sample))
     limit = max(_GAP_PERIODS * period, _SHORTEST_GAP_NS)
     varies = len(sample) >= 20 and bool(np.mean(sample > limit) > 0.05)
@@ -389,81 +282,6 @@ def _gaps(times: Nanoseconds, steps: Nanoseconds) -> tuple[tuple[tuple[int, int]
         limit = max(_GAP_PERIODS * float(np.quantile(sample, 0.95)), _SHORTEST_GAP_NS)
     places = np.flatnonzero(steps > limit)
     return tuple((int(times[place]), int(times[place + 1])) for place in places), period, varies
-
-
-def _sample(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    """At most 16384 values, in runs spread over the whole array."""
-    most = _BLOCKS * _BLOCK_SAMPLES
-    if len(values) <= most:
-        return values
-    starts = np.linspace(0, len(values) - _BLOCK_SAMPLES, _BLOCKS).astype(np.int64)
-    sampled: NDArray[np.int64] = values[starts[:, None] + np.arange(_BLOCK_SAMPLES)].reshape(-1)
-    return sampled
-
-
-def _median(values: Nanoseconds) -> int:
-    """Median to the nanosecond, which floats cannot hold at 1.7e18."""
-    sample = _sample(values)
-    middle = (len(sample) - 1) // 2
-    return int(np.partition(sample, middle)[middle])
-
-
-def _alone_in_future(latency: Nanoseconds) -> NDArray[np.bool_]:
-    """Rows whose latency falls by more than a second and comes back with the next row."""
-    alone = np.zeros(len(latency), dtype=bool)
-    if len(latency) < 3:
-        return alone
-    change = np.diff(latency)
-    if int(change.min()) >= -_STEP_NS:
-        return alone
-    alone[1:-1] = (change[:-1] < -_STEP_NS) & (change[1:] > _STEP_NS)
-    # A held-up message before a normal one also falls and may rise again: only below the usual is it the future.
-    return alone & (latency < _median(latency) - _STEP_NS)
-
-
-def _lasting_steps(latency: Nanoseconds, jumps: NDArray[np.intp]) -> list[int]:
-    """Of the places where the latency jumps, those where it stays: medians of the stretches on both sides differ."""
-    edges = [0, *(int(place) + 1 for place in jumps), len(latency)]
-    stretches = [(a, b) for a, b in pairwise(edges) if b - a >= 3]
-    lasting = []
-    for (start, middle), (after, end) in pairwise(stretches):
-        if abs(_median(latency[after:end]) - _median(latency[start:middle])) > _STEP_NS // 2:
-            lasting.append(after - 1)
-    return lasting
-
-
-def _is_senders(receive: Nanoseconds, stamp: Nanoseconds, place: int) -> bool:
-    """True where at this step the stamp departs from the usual period by more than the receive time does."""
-    period = _median(np.diff(stamp))
-    by_stamp = abs(int(stamp[place + 1] - stamp[place]) - period)
-    by_receive = abs(int(receive[place + 1] - receive[place]) - period)
-    return by_stamp >= by_receive
-
-
-def _blocks(stamp: Nanoseconds, latency: Nanoseconds) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Medians of stamp and latency [ns, from the first] in up to 64 blocks, and the latency's spread in blocks [ns]."""
-    count = len(stamp)
-    blocks = min(_BLOCKS, max(1, count // 8))
-    edges = np.linspace(0, count, blocks + 1).astype(np.int64)
-    places, middles, spreads = np.empty(blocks), np.empty(blocks), np.empty(blocks)
-    base = int(latency[0])
-    for number, (start, end) in enumerate(pairwise(edges)):
-        stride = max(1, int(end - start) // _BLOCK_SAMPLES)
-        values = (latency[start:end:stride] - base).astype(np.float64)
-        middles[number] = np.median(values)
-        spreads[number] = np.median(np.abs(values - middles[number]))
-        places[number] = float(stamp[(start + end) // 2] - stamp[0])
-    return places, middles, 1.4826 * float(np.median(spreads))
-
-
-def _theil_sen(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
-    """Median of the slopes between all pairs of points; NaN for fewer than four points."""
-    if len(x) < 4:
-        return float("nan")
-    first, second = np.triu_indices(len(x), 1)
-    run = x[second] - x[first]
-    apart = run != 0
-    return float(np.median((y[second] - y[first])[apart] / run[apart])) if apart.any() else float("nan")
 
 
 def _longest_stretch(times: Nanoseconds, late: NDArray[np.bool_]) -> tuple[int, int, int]:
@@ -475,7 +293,7 @@ def _longest_stretch(times: Nanoseconds, late: NDArray[np.bool_]) -> tuple[int, 
     places = np.append(np.flatnonzero(~late), whole)
     places[0] = 0
     times = times[~late]
-    backward = np.flatnonzero(np.diff(times) < -_STEP_NS)
+    backward = np.flatnonzero(np.diff(times) < -STEP_NS)
     highest = np.maximum.accumulate(times)
     # A jump back lasts unless later rows soon rise past what came before; a single late row does so at once.
     lasting = [int(p) + 1 for p in backward if int(np.max(times[p + 1 : p + 4])) < int(highest[p])]

@@ -2,7 +2,7 @@
 
 from ferryid.models.model import Model, blank_model, model_from_json, model_to_json
 from ferryid.models.scores import ForceScores, ModelScores, force_scores, mean_square, usable_rows
-from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect, effect_to_json
+from ferryid.models.stored_effect import Conditions, Quantity, Source, StoredEffect
 from ferryid.models.validity import RANGE_UNITS, outside_ranges, payload_kg, span_ranges, validity_ranges
 
 __all__ = [
@@ -15,7 +15,6 @@ __all__ = [
     "Source",
     "StoredEffect",
     "blank_model",
-    "effect_to_json",
     "force_scores",
     "mean_square",
     "model_from_json",

@@ -15,7 +15,7 @@ from urllib.parse import quote
 from ferryid.counts import counted
 from ferryid.diagnose import JUDGING
 from ferryid.report import batch_figures
-from ferryid.report.batch_rows import BatchResult, EvaluationSummary, FindingSummary, SummaryRow, Trend
+from ferryid.report.batch_rows import BatchResult, EvaluationSummary, FindingSummary, SummaryRow, Trend, by_date
 from ferryid.report.diagnosis_words import title
 from ferryid.report.html import template
 from ferryid.signals.data_quality import LostData
@@ -248,12 +248,9 @@ def _findings(trends: Sequence[Trend]) -> list[Figure]:
 def _errors(rows: Sequence[SummaryRow]) -> list[Figure]:
     shown = []
     for vessel in dict.fromkeys(row.vessel for row in rows):
-        own = [row for row in rows if row.vessel == vessel and (row.fit or row.evaluate)]
-        dated = all(row.date for row in own)
+        own, dated = by_date([row for row in rows if row.vessel == vessel and (row.fit or row.evaluate)])
         if len(own) < FEWEST_DRAWN:
             continue
-        if dated:
-            own.sort(key=lambda row: datetime.fromisoformat(row.date or ""))
         of = next((row.evaluate.evaluated for row in own if row.evaluate), "")
         evaluated = f" Crosses: {of}, on the whole log." if of else ""
         fitted = (

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import Any
 
 from ferryid.json_record import Number, Record, json_key
@@ -191,6 +192,13 @@ class SummaryRow(Record):
     def finding(self, key: Key) -> FindingSummary | None:
         """Return the first finding of an effect, None where there is none."""
         return next((one for one in self.findings if one.key == key), None)
+
+
+def by_date(rows: Sequence[SummaryRow]) -> tuple[list[SummaryRow], bool]:
+    """Return rows in the order of their dates and True; in their own order and False where one has no date."""
+    if not all(row.date for row in rows):
+        return list(rows), False
+    return sorted(rows, key=lambda row: datetime.fromisoformat(row.date or "")), True
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from ferryid.compare import ComparedLog
+from ferryid.compare import CommonErrors, ComparedLog, ComparedModel, ComparisonResult, ModelPair
 from ferryid.report.figures import MEASURED, STYLE, SYMBOLS, UNITS, canvas, legend_above, margins, svg_text
 from ferryid.report.structure import envelope
 from ferryid.types import AXES, Floats
-
-Row = dict[str, Any]
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's, which the colour-blind tell apart."""
@@ -34,15 +33,15 @@ WILD = 3.0
 """An estimate whose error is this many times the least may leave the frame, lest it flatten the others."""
 
 
-def looks(models: Sequence[Row]) -> dict[str, dict[str, Any]]:
+def looks(models: Sequence[ComparedModel]) -> dict[str, dict[str, Any]]:
     """Return colour, mark and dashes of every model by its label; the base model is grey."""
     found: dict[str, dict[str, Any]] = {}
     k = 0
     for model in models:
-        if model["base"]:
-            found[model["label"]] = {"color": GREY, "marker": "x", "linestyle": (0, (2, 2))}
+        if model.is_base:
+            found[model.label] = {"color": GREY, "marker": "x", "linestyle": (0, (2, 2))}
             continue
-        found[model["label"]] = {
+        found[model.label] = {
             "color": COLOURS[k % len(COLOURS)],
             "marker": MARKS[k % len(MARKS)],
             # Dashes set models of one colour apart, the seventh from the first.
@@ -52,30 +51,20 @@ def looks(models: Sequence[Row]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def over_reference(scope: Row, label: str, reference: str) -> Row:
-    """Return the part of a scope that holds a model's ratios over a reference's; turned round where it holds the inverse."""
-    for pair in scope["pairs"]:
-        if (pair["first"], pair["second"]) == (label, reference):
-            return {"mse": pair["mse"], "free_run": pair["free_run"]}
-        if (pair["first"], pair["second"]) == (reference, label):
-            return {
-                "mse": {axis: _inverse(ratio) for axis, ratio in pair["mse"].items()},
-                "free_run": {key: [_inverse(one) for one in ratios] for key, ratios in pair["free_run"].items()},
-            }
+def over_reference(pairs: Sequence[ModelPair], label: str, reference: str) -> ModelPair:
+    """Return a model's ratios over a reference's; turned round where the pairs hold the inverse."""
+    for pair in pairs:
+        if (pair.first, pair.second) == (label, reference):
+            return pair
+        if (pair.first, pair.second) == (reference, label):
+            return pair.inverse()
     raise KeyError(label)
 
 
-def _inverse(ratio: Row) -> Row:
-    def over(value: float | None) -> float | None:
-        return None if not value else 1.0 / value
-
-    return {"value": over(ratio["value"]), "low": over(ratio["high"]), "high": over(ratio["low"])}
-
-
-def mse_ratios(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> str:
+def mse_ratios(result: ComparisonResult, shown: Sequence[tuple[str, CommonErrors]], reference: str) -> str:
     """Mean squared force error of every model over a reference's, per axis and log, with 95 % intervals."""
-    look = looks(result["models"])
-    labels = [model["label"] for model in result["models"] if model["label"] != reference]
+    look = looks(result.models)
+    labels = [label for label in result.labels if label != reference]
     rows = len(shown) * (len(labels) + 1)
     with mpl.rc_context(STYLE):
         figure = margins(1.25 + 0.21 * rows, top=0.3 + 0.2 * ((len(labels) + 2) // 3), left=0.15, between=(0.08, 0.1))
@@ -93,15 +82,15 @@ def mse_ratios(result: Row, shown: Sequence[tuple[str, Row]], reference: str) ->
                         title, (0.02, top), xycoords=("axes fraction", "data"), fontsize=9, va="center", bbox=box
                     )
                 for k, label in enumerate(labels):
-                    ratio = over_reference(scope, label, reference)["mse"][axis]
-                    if ratio["value"] is None:
+                    ratio = over_reference(scope.pairs, label, reference).mse[axis]
+                    if not isfinite(ratio.value):
                         continue
                     y = top - 1 - k
-                    known = ratio["low"] is not None and ratio["high"] is not None
+                    known = isfinite(ratio.low) and isfinite(ratio.high)
                     if known:
-                        ax.plot((ratio["low"], ratio["high"]), (y, y), color=look[label]["color"], linewidth=1.6)
+                        ax.plot((ratio.low, ratio.high), (y, y), color=look[label]["color"], linewidth=1.6)
                     ax.plot(
-                        ratio["value"],
+                        ratio.value,
                         y,
                         marker=look[label]["marker"],
                         color=look[label]["color"],
@@ -111,7 +100,7 @@ def mse_ratios(result: Row, shown: Sequence[tuple[str, Row]], reference: str) ->
                         linestyle="none",
                         label=label if group == 0 else "_nolegend_",
                     )
-                    spans += [one for one in (ratio["value"], ratio["low"], ratio["high"]) if one]
+                    spans += [one for one in (ratio.value, ratio.low, ratio.high) if isfinite(one) and one > 0.0]
             ax.axvline(1.0, color=MEASURED, linewidth=0.8)
             _ratio_axis(ax, spans)
             ax.set_title(axis, fontsize=10)
@@ -138,9 +127,9 @@ def _plain_ticks(axis: Any, low: float, high: float) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def forces(result: Row, trial: ComparedLog, start_s: float | None) -> str:
+def forces(result: ComparisonResult, trial: ComparedLog, start_s: float | None) -> str:
     """Measured force and every model's estimate in the minute of a log that starts at `start_s`; in all of it where None."""
-    look = looks(result["models"])
+    look = looks(result.models)
     with mpl.rc_context(STYLE):
         figure, axes = canvas(3, 5.4, top=0.3 + 0.2 * ((len(look) + 3) // 3))
         t = trial.motion.t
@@ -179,10 +168,10 @@ def _frame(ax: Any, measured: Floats, estimates: Floats) -> None:
         ax.set_ylim(values.min() - margin, values.max() + margin)
 
 
-def free_runs(result: Row, scope: Row, reference: str) -> str:
+def free_runs(result: ComparisonResult, scope: CommonErrors, reference: str) -> str:
     """Free-run errors against horizon, and below them their ratios over a reference's with 95 % intervals."""
-    look = looks(result["models"])
-    horizons = np.array(scope["free_run"]["horizons_s"])
+    look = looks(result.models)
+    horizons = np.array(scope.free_run.horizons_s)
     with mpl.rc_context(STYLE):
         figure = margins(5.0, top=0.3 + 0.2 * ((len(look) + 2) // 3), between=(0.3, 0.12))
         grid = figure.subplots(2, 2, sharex=True)
@@ -193,15 +182,13 @@ def free_runs(result: Row, scope: Row, reference: str) -> str:
             spans: list[float] = []
             others = [label for label in look if label != reference]
             for label in look:
-                if not any(scope["scores"][label]["free_run"][key]):
+                errors = np.array(scope.scores[label].free_run[key])
+                if not np.nan_to_num(errors).any():
                     continue
-                errors = np.array(scope["scores"][label]["free_run"][key], dtype=float)
                 upper.plot(horizons, errors * factor, markersize=4, label=label, **look[label])
             for k, label in enumerate(others):
-                ratios = over_reference(scope, label, reference)["free_run"][key]
-                value, low, high = (
-                    np.array([one[part] for one in ratios], dtype=float) for part in ("value", "low", "high")
-                )
+                ratios = over_reference(scope.pairs, label, reference).free_run[key]
+                value, low, high = np.array([(one.value, one.low, one.high) for one in ratios]).T
                 # Side by side, so that no interval hides another.
                 at = horizons * 1.04 ** (k - (len(others) - 1) / 2)
                 lower.plot(at, value, markersize=4, **look[label])

@@ -5,30 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ferryid.compare import ComparedLog
+from ferryid.compare import Coefficient, CommonErrors, ComparedLog, ComparisonResult
 from ferryid.report import comparison_figures, comparison_words
 from ferryid.report.comparison_words import render_effects
 from ferryid.report.html import template
 from ferryid.report.structure import worst_minute
-from ferryid.types import AXES
-
-Row = dict[str, Any]
 
 MAX_LOGS = 6
 """Logs that are drawn; the page stays readable."""
 
 
-def render(result: Row, logs: Sequence[ComparedLog], made: Mapping[str, str]) -> tuple[str, dict[str, str]]:
+def render(
+    result: ComparisonResult, logs: Sequence[ComparedLog], made: Mapping[str, str]
+) -> tuple[str, dict[str, str]]:
     """Return the page and its drawings (SVG) by name; `made` are date, version and command."""
     known = comparison_words.scopes(result)
-    reference = result["models"][0]["label"]
+    labels = result.labels
+    reference = labels[0]
     # What counts most comes first: all logs together.
-    ordered = [*known[len(result["logs"]) :], *known[: len(result["logs"])]]
+    ordered = [*known[len(logs) :], *known[: len(logs)]]
     drawn = [log.name for log in logs[:MAX_LOGS]]
     left = [log.name for log in logs[MAX_LOGS:]]
     shown = [(title, scope) for on, title, scope in ordered if on is None or on in drawn]
     overall = _overall(result, shown, reference) if shown else []
-    sections = []
+    sections: list[dict[str, Any]] = []
     for on, title, scope in ordered:
         log = next((one for one in logs[:MAX_LOGS] if one.name == on), None)
         sections.append(
@@ -39,35 +39,32 @@ def render(result: Row, logs: Sequence[ComparedLog], made: Mapping[str, str]) ->
                 "rows": comparison_words.score_rows(result, scope),
                 "sentences": comparison_words.sentences(result, on),
                 "tracking": comparison_words.tracking_line(scope),
-                "warnings": scope.get("warnings", ()),
+                "warnings": comparison_words.warnings_of(scope),
                 "figures": _figures(result, log) if log is not None else [],
             }
         )
-    labels = [model["label"] for model in result["models"]]
     page = template("compare.html").render(
-        title=" · ".join([result["vessel"], *(model["label"] for model in result["models"] if not model["base"])]),
+        title=" · ".join([result.vessel, *(model.label for model in result.models if not model.is_base)]),
         headline=comparison_words.headline(result),
         made=made,
-        warnings=result["warnings"],
-        models=[(model["label"], comparison_words.model_line(model)) for model in result["models"]],
+        warnings=result.warnings,
+        models=[(model.label, comparison_words.model_line(model)) for model in result.models],
         overall=overall,
         sections=sections,
         about_p=comparison_words.ABOUT_P if known else "",
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
         labels=labels,
-        axes=AXES,
-        coefficients=[_cells(row, labels) for row in comparison_words.coefficient_table(result)],
-        terms=[
-            _cells({"name": f"{row['term']} in {row['axis']}", **row}, labels)
-            for row in result["coefficients"]["terms"]
-        ],
-        effects=[line.strip() for line in render_effects(result["effects"])],
+        coefficients=[_row(*row, labels) for row in comparison_words.coefficient_table(result)],
+        terms=[_row(f"{row.term} in {row.axis}", row.unit, row.values, labels) for row in result.coefficients.terms],
+        effects=[line.strip() for line in render_effects(result.effects)],
     )
     figures = [*overall, *(figure for section in sections for figure in section["figures"])]
     return page, {figure["file"]: figure["svg"] for figure in figures}
 
 
-def _overall(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> list[dict[str, str]]:
+def _overall(
+    result: ComparisonResult, shown: Sequence[tuple[str, CommonErrors]], reference: str
+) -> list[dict[str, str]]:
     title, scope = shown[0]
     figures = [
         {
@@ -77,7 +74,7 @@ def _overall(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> l
             "pairs; left of the line is better. Hollow marks have too few blocks for an interval.",
         }
     ]
-    if any(scope["free_run"]["counted"]):
+    if any(scope.free_run.counted):
         figures.append(
             {
                 "file": "free-runs",
@@ -90,7 +87,7 @@ def _overall(result: Row, shown: Sequence[tuple[str, Row]], reference: str) -> l
     return figures
 
 
-def _figures(result: Row, log: ComparedLog) -> list[dict[str, str]]:
+def _figures(result: ComparisonResult, log: ComparedLog) -> list[dict[str, str]]:
     start = worst_minute(log.motion, log.taus, log.rows, comparison_figures.MINUTE_S)
     which = "This log" if start is None else f"The minute in which the models err most, from {start:.0f} s"
     return [
@@ -102,6 +99,5 @@ def _figures(result: Row, log: ComparedLog) -> list[dict[str, str]]:
     ]
 
 
-def _cells(row: Row, labels: Sequence[str]) -> Row:
-    cells = [comparison_words.cell(row["values"].get(label)) for label in labels]
-    return {"name": row["name"], "unit": row["unit"], "cells": cells}
+def _row(name: str, unit: str, values: Mapping[str, Coefficient], labels: Sequence[str]) -> dict[str, Any]:
+    return {"name": name, "unit": unit, "cells": [comparison_words.cell(values.get(label)) for label in labels]}

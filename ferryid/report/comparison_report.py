@@ -8,11 +8,10 @@ import shlex
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from ferryid import __version__
-from ferryid.compare import Comparison
-from ferryid.files import dump_json, finite, replacing
+from ferryid.compare import CommonErrors, Comparison, ComparisonResult
+from ferryid.files import dump_json, replacing
 from ferryid.report import comparison_words
 from ferryid.report.comparison_page import render
 from ferryid.report.comparison_words import render_effects
@@ -32,57 +31,50 @@ def report(comparison: Comparison, out: Path, command: Sequence[str] = ()) -> Re
     FerryIdError
         For a folder that cannot be written; nothing half-written is left.
     """
-    plain: dict[str, Any] = finite(comparison.json)
-    folder = out / "reports" / _folder(plain)
+    result = comparison.result
+    folder = out / "reports" / _folder(result)
     made = {
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "version": __version__,
         "command": shlex.join(command),
     }
     file = folder / "report.html"
-    plain = {**plain, "report": str(file)}
-    page, drawings = render(plain, comparison.logs, made)
+    plain = {**result.to_json(), "report": str(file)}
+    page, drawings = render(result, comparison.logs, made)
     with replacing(folder) as temporary:
         temporary.mkdir()
         (temporary / file.name).write_text(page, encoding="utf-8", errors="backslashreplace")
         for name, drawing in drawings.items():
             (temporary / f"{name}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
         (temporary / "compare.json").write_text(dump_json(plain), encoding="utf-8")
-    return Report(plain, f"{as_text(plain)}\n\nreport  {file}", file)
+    return Report(plain, f"{as_text(result)}\n\nreport  {file}", file)
 
 
-def as_text(result: dict[str, Any]) -> str:
+def as_text(result: ComparisonResult) -> str:
     """Return a comparison for a terminal."""
-    models = result["models"]
-    wide = max(len(model["label"]) for model in models) + 2
+    wide = max(map(len, result.labels)) + 2
     lines = [comparison_words.headline(result), ""]
-    lines += [f"{model['label']:<{wide}}{comparison_words.model_line(model)}" for model in models]
-    lines += [f"warning: {warning}" for warning in result["warnings"]]
+    lines += [f"{model.label:<{wide}}{comparison_words.model_line(model)}" for model in result.models]
+    lines += [f"warning: {warning}" for warning in result.warnings]
     for on, title, scope in comparison_words.scopes(result):
         lines += ["", f"{title}: {comparison_words.about(scope)}", *_score_table(result, scope, wide)]
         tracking = comparison_words.tracking_line(scope)
         lines += [f"  {tracking}"] if tracking else []
         lines += [f"  {sentence}" for sentence in comparison_words.sentences(result, on)]
-        lines += [f"  warning: {warning}" for warning in scope.get("warnings", ())]
-    if result["logs"]:
+        lines += [f"  warning: {warning}" for warning in comparison_words.warnings_of(scope)]
+    if result.logs:
         lines += ["", comparison_words.ABOUT_P]
-    columns = [max(12, len(model["label"]) + 2) for model in models]
-    lines += [
-        "",
-        f"{'equations of motion':<18}" + "".join(f"{m['label']:>{w}}" for m, w in zip(models, columns, strict=True)),
-    ]
-    for row in result["coefficients"]["physical"]:
-        cells = "".join(
-            f"{comparison_words.cell(row['values'][model['label']])[0]:>{width}}"
-            for model, width in zip(models, columns, strict=True)
-        )
-        lines.append(f"  {row['coefficient']:<16}{cells}  {row['unit']}")
+    columns = {label: max(12, len(label) + 2) for label in result.labels}
+    lines += ["", f"{'equations of motion':<18}" + "".join(f"{label:>{width}}" for label, width in columns.items())]
+    for row in result.coefficients.physical:
+        cells = "".join(f"{comparison_words.cell(row.values[label])[0]:>{width}}" for label, width in columns.items())
+        lines.append(f"  {row.coefficient:<16}{cells}  {row.unit}")
     lines.append("Intervals, and terms that are no hull's, such as wind and the constant: in the report.")
-    effects = render_effects(result["effects"])
+    effects = render_effects(result.effects)
     return "\n".join([*lines, *(["", *effects] if effects else [])])
 
 
-def _score_table(result: dict[str, Any], scope: dict[str, Any], wide: int) -> list[str]:
+def _score_table(result: ComparisonResult, scope: CommonErrors, wide: int) -> list[str]:
     heads = comparison_words.score_columns(scope)
     lines = [f"  {'':<{wide}}" + "".join(f"{head:>{max(10, len(head) + 2)}}" for head in heads)]
     for label, cells in comparison_words.score_rows(result, scope):
@@ -91,11 +83,11 @@ def _score_table(result: dict[str, Any], scope: dict[str, Any], wide: int) -> li
     return lines
 
 
-def _folder(result: dict[str, Any]) -> str:
+def _folder(result: ComparisonResult) -> str:
     """Return a name that tells what was compared on what, and is another one for other models or logs."""
-    models = [f"{model['name']}-v{model['version']}" for model in result["models"] if not model["base"]]
-    logs = [entry["name"] for entry in result["logs"]]
-    what = repr([[model["label"] for model in result["models"]], [entry["sha256"] for entry in result["logs"]]])
+    models = [f"{model.name}-v{model.version}" for model in result.models if not model.is_base]
+    logs = [log.name for log in result.logs]
+    what = repr([list(result.labels), [log.sha256 for log in result.logs]])
     parts = ["compare", *_some(models), *(["on", *_some(logs)] if logs else [])]
     if len(models) > NAMED or len(logs) > NAMED:
         parts.append(hashlib.sha256(what.encode()).hexdigest()[:8])

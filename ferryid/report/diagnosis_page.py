@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, campaign_verdict
 from ferryid.models.prediction import FreeRun
-from ferryid.report import diagnosis_figures, diagnosis_words, figures
+from ferryid.report import diagnosis_errors, diagnosis_figures, diagnosis_words, figures
 from ferryid.report.html import template
 from ferryid.report.left_out import left_out_table
 from ferryid.signals.track import LeftOut
@@ -64,15 +64,15 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
         lines = [f"{one.log}: {diagnosis_words.headline(one)}"]
         for k, finding in enumerate(one.findings, 1):
             lines += ["", f"{k}. {diagnosis_words.said(finding)}", *(f"   {line}" for line in _lines(finding))]
-        rows = diagnosis_words.force_rows(one)
+        rows = diagnosis_errors.force_rows(one)
         if rows:
             lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]
             lines.append(f"{'':<44}" + "".join(f"{unit:>22}" for unit in UNITS))
             lines += [f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"]) for row in rows]
             lines += diagnosis_words.about_errors(one)
-        runs = diagnosis_words.free_run_rows(one)
+        runs = diagnosis_errors.free_run_rows(one)
         if runs:
-            names = ("without", "with", "with over without") if diagnosis_words.fitted(one) else ("error",)
+            names = ("without", "with", "with over without") if diagnosis_errors.fitted(one) else ("error",)
             lines += ["", f"{'free run on held-out data':<44}" + "".join(f"{name:>22}" for name in names)]
             for row in runs:
                 lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
@@ -113,7 +113,7 @@ def _folded(line: str) -> str:
 
 
 def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) -> dict[str, Any]:
-    force_rows, free_run_rows = diagnosis_words.force_rows(diagnosis), diagnosis_words.free_run_rows(diagnosis)
+    force_rows, free_run_rows = diagnosis_errors.force_rows(diagnosis), diagnosis_errors.free_run_rows(diagnosis)
     return {
         "name": diagnosis.log,
         "vessel": diagnosis.vessel,
@@ -151,7 +151,7 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) ->
         ],
         "notes": diagnosis_words.notes_of(diagnosis, told),
         "drawn": drawn and any(one.evidence for one in diagnosis.findings),
-        "fitted": diagnosis_words.fitted(diagnosis),
+        "fitted": diagnosis_errors.fitted(diagnosis),
         "about_errors": diagnosis_words.about_errors(diagnosis),
         "about": diagnosis_words.about_log(diagnosis),
         "model": diagnosis_words.new_model(diagnosis),

@@ -8,8 +8,7 @@ from ferryid.batch.log_result import LogResult
 from ferryid.batch.logs import Entry
 from ferryid.batch.summary import summary_row
 from ferryid.report.batch_rows import BatchResult, MemoryUse, SummaryRow, Trend
-
-AXES = ("surge", "sway", "yaw")
+from ferryid.types import AXES
 
 
 def axes(value: float) -> dict[str, float]:

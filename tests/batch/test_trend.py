@@ -104,7 +104,7 @@ def test_a_payload_steps_and_its_place_has_no_meaning_without_it() -> None:
     rows = [row(day) for day in range(1, 7)] + [row(day, payload={"mass": 200.0, "x": 0.5}) for day in range(7, 13)]
     found = {one.parameter: one for one in trends_of(rows, PROFILES)}
     assert found["mass"].sentence == (
-        "milliampere: Payload, mass steps from 0 - to 200 - between 2024-05-06 and 2024-05-07".replace(" -", "")
+        "milliampere: Payload, mass steps from 0 to 200 between 2024-05-06 and 2024-05-07"
     )
     assert found["x"].neutral is None
     assert found["x"].kind is None

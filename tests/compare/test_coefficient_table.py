@@ -22,7 +22,7 @@ PROFILE = load_profile("milliampere")
 def equations(model: Model, nu: np.ndarray, nu_dot: np.ndarray) -> np.ndarray:
     """Return the force on states of shape (n, 3) from nothing but the rows, as their documentation writes it out."""
     candidates = [Candidate("it", model)]
-    c = {row["coefficient"]: row["values"]["it"]["value"] for row in coefficient_rows(candidates)}
+    c = {row.coefficient: row.values["it"].value for row in coefficient_rows(candidates)}
     found: set[str] = set()
 
     def of(name: str) -> float:
@@ -58,8 +58,8 @@ def equations(model: Model, nu: np.ndarray, nu_dot: np.ndarray) -> np.ndarray:
         "1": 1.0,
     }
     for row in term_rows(candidates):
-        if not is_of_a_hull(row["term"], row["axis"]):
-            force[:, AXES.index(row["axis"])] += row["values"]["it"]["value"] * values[row["term"]]
+        if not is_of_a_hull(row.term, row.axis):
+            force[:, AXES.index(row.axis)] += row.values["it"].value * values[row.term]
     return force
 
 
@@ -84,13 +84,13 @@ def test_so_are_those_of_a_diagnosed_model() -> None:
 
 
 def test_a_base_model_has_the_coefficients_of_its_profile() -> None:
-    rows = {row["coefficient"]: row for row in coefficient_rows([Candidate("base", blank_model(PROFILE, "base"))])}
-    assert rows["m22"]["values"]["base"]["value"] == PROFILE.hull.M[1, 1]
-    assert rows["m22"]["unit"] == "kg"
-    assert rows["N_r"]["values"]["base"]["value"] == PROFILE.hull.D["N_r"]
-    assert np.isnan(rows["N_r"]["values"]["base"]["low"])
+    rows = {row.coefficient: row for row in coefficient_rows([Candidate("base", blank_model(PROFILE, "base"))])}
+    assert rows["m22"].values["base"].value == PROFILE.hull.M[1, 1]
+    assert rows["m22"].unit == "kg"
+    assert rows["N_r"].values["base"].value == PROFILE.hull.D["N_r"]
+    assert np.isnan(rows["N_r"].values["base"].low)
     # The Munk moment.
-    assert rows["uv in yaw"]["values"]["base"]["value"] == pytest.approx(PROFILE.hull.M[1, 1] - PROFILE.hull.M[0, 0])
+    assert rows["uv in yaw"].values["base"].value == pytest.approx(PROFILE.hull.M[1, 1] - PROFILE.hull.M[0, 0])
 
 
 def test_intervals_follow_the_covariance_and_turn_with_the_sign() -> None:
@@ -100,20 +100,20 @@ def test_intervals_follow_the_covariance_and_turn_with_the_sign() -> None:
         k = model.terms.index(term)
         covariance[axis, k, k] = deviation**2
     rows = {
-        row["coefficient"]: row["values"]["it"]
+        row.coefficient: row.values["it"]
         for row in coefficient_rows([Candidate("it", replace(model, covariance=covariance))])
     }
     for name, deviation in (("X_u", 5.0), ("ur in sway", 30.0), ("m33", 100.0)):
-        assert rows[name]["high"] - rows[name]["value"] == pytest.approx(1.96 * deviation)
-        assert rows[name]["value"] - rows[name]["low"] == pytest.approx(1.96 * deviation)
+        assert rows[name].high - rows[name].value == pytest.approx(1.96 * deviation)
+        assert rows[name].value - rows[name].low == pytest.approx(1.96 * deviation)
 
 
 def test_effects_that_differ_are_told_for_every_model() -> None:
     found, bare = MODELS["diagnosed"], MODELS["diagnosed"].undiagnosed()
     rows = effect_rows([Candidate("with", found), Candidate("without", bare)])
     assert len(rows) == len(found.vessel_effects) + sum(len(one.effects) for one in found.conditions)
-    assert all(row["values"]["without"] is None and row["values"]["with"] for row in rows)
+    assert all(row.values["without"] is None and row.values["with"] for row in rows)
     lines = render_effects(rows)
     assert "  without: not in it" in lines
     assert any("a property of the vessel" in line for line in lines)
-    assert effect_rows([Candidate("a", found), Candidate("b", replace(found, version=9))]) == []
+    assert effect_rows([Candidate("a", found), Candidate("b", replace(found, version=9))]) == ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import pytest
 
 from ferryid.compare.candidates import BASE, CandidateSet, select_candidates
 from ferryid.compare.comparison import Comparison, compare
+from ferryid.compare.comparison_result import ComparisonResult
 from ferryid.errors import FerryIdError
+from ferryid.files import dump_json
 from ferryid.models.model import Model, blank_model
 from ferryid.models.prediction.log_prediction import predict
 from ferryid.models.scores import usable_rows
@@ -69,98 +72,101 @@ def compared(field: CandidateSet, folder: Path) -> Comparison:
 
 def test_errors_are_those_that_one_sums_by_hand(field: CandidateSet, folder: Path, compared: Comparison) -> None:
     squares, forces, errors = [], [], []
-    for log, entry in zip(logs_in(folder), compared.json["logs"], strict=True):
+    for log, entry in zip(logs_in(folder), compared.result.logs, strict=True):
         prepared = prepare(log, FERRY, folder / "out", window_s=1.0)
         tau = prepared.motion.tau
         seen = [predict(one.model, prepared, FERRY, window_s=1.0, smoother="square") for one in field.candidates]
         rows = usable_rows(prepared.motion, *(one.tau for one in seen))
-        assert entry["rows"] == rows.sum()
+        assert entry.rows == rows.sum()
         for one, prediction in zip(field.candidates, seen, strict=True):
-            scores = entry["scores"][one.label]
-            assert scores["mse"]["sway"] == pytest.approx(np.mean((tau - prediction.tau)[rows, 1] ** 2))
-            assert scores["r2"]["yaw"] == pytest.approx(1.0 - scores["mse"]["yaw"] / np.var(tau[rows, 2]))
+            scores = entry.scores[one.label]
+            assert scores.mse["sway"] == pytest.approx(np.mean((tau - prediction.tau)[rows, 1] ** 2))
+            assert scores.r2["yaw"] == pytest.approx(1.0 - scores.mse["yaw"] / np.var(tau[rows, 2]))
             run = prediction.free_run(rows)
-            assert scores["free_run"]["position_m"] == pytest.approx(run.position_m.tolist(), nan_ok=True)
-            assert scores["free_run"]["yaw_rate_radps"] == pytest.approx(run.yaw_rate_radps.tolist(), nan_ok=True)
+            assert scores.free_run["position_m"] == pytest.approx(run.position_m.tolist(), nan_ok=True)
+            assert scores.free_run["yaw_rate_radps"] == pytest.approx(run.yaw_rate_radps.tolist(), nan_ok=True)
         squares.append(np.stack([np.sum((tau - one.tau)[rows] ** 2, axis=0) for one in seen]))
         forces.append(tau[rows])
-        errors.append((entry["free_run"]["counted"], entry["scores"]["ferry@2"]["free_run"]["heading_rad"]))
-    pooled, every = compared.json["pooled"], np.concatenate(forces)
+        errors.append((entry.free_run.counted, entry.scores["ferry@2"].free_run["heading_rad"]))
+    pooled, every = compared.result.pooled, np.concatenate(forces)
+    assert pooled is not None
     for k, one in enumerate(field.candidates):
         mse = sum(part[k] for part in squares) / len(every)
-        assert list(pooled["scores"][one.label]["mse"].values()) == pytest.approx(mse.tolist())
-        assert list(pooled["scores"][one.label]["r2"].values()) == pytest.approx(
-            (1.0 - mse / every.var(axis=0)).tolist()
-        )
-    pair = next(one for one in pooled["pairs"] if (one["first"], one["second"]) == ("ferry@1", "ferry@2"))
+        assert list(pooled.scores[one.label].mse.values()) == pytest.approx(mse.tolist())
+        assert list(pooled.scores[one.label].r2.values()) == pytest.approx((1.0 - mse / every.var(axis=0)).tolist())
+    pair = next(one for one in pooled.pairs if (one.first, one.second) == ("ferry@1", "ferry@2"))
     total = sum(squares)
-    assert pair["mse"]["surge"]["value"] == pytest.approx(total[1, 0] / total[2, 0])
+    assert pair.mse["surge"].value == pytest.approx(total[1, 0] / total[2, 0])
     (first, one), (second, other) = errors
     both = np.sqrt((first[2] * one[2] ** 2 + second[2] * other[2] ** 2) / (first[2] + second[2]))
-    assert pooled["scores"]["ferry@2"]["free_run"]["heading_rad"][2] == pytest.approx(both)
+    assert pooled.scores["ferry@2"].free_run["heading_rad"][2] == pytest.approx(both)
 
 
 def test_the_true_model_is_found_better(compared: Comparison) -> None:
-    told = {(row["what"], row["first"], row["second"]): row for row in compared.json["better"] if row["on"] is None}
+    told = {(row.what, row.first, row.second): row for row in compared.result.statements if row.on is None}
     row = told["sway", BASE, "ferry@2"]
-    assert row["better"] == BASE
-    assert row["p"] <= row["p_corrected"] <= 0.05
-    assert row["high"] < 1.0
-    assert row["says"].startswith(f"{BASE} is better than ferry@2 on sway (p 0.")
-    assert "of the other's [" in row["says"]
-    assert told["sway", "ferry@1", "ferry@2"]["better"] == "ferry@1"
+    assert row.better == BASE
+    assert row.p <= row.p_corrected <= 0.05
+    assert row.high < 1.0
+    assert row.sentence.startswith(f"{BASE} is better than ferry@2 on sway (p 0.")
+    assert "of the other's [" in row.sentence
+    assert told["sway", "ferry@1", "ferry@2"].better == "ferry@1"
     # Nine comparisons of forces and six of free runs: each p is raised, and none beyond their number.
     assert len(told) == 15
-    assert all(row["p_corrected"] <= 15 * row["p"] for row in told.values())
+    assert all(row.p_corrected <= 15 * row.p for row in told.values())
+
+
+def test_the_json_comes_back_as_it_was(compared: Comparison) -> None:
+    plain = json.loads(dump_json(compared.result.to_json()))
+    again = ComparisonResult.from_json(plain)
+    assert again.to_json() == plain
+    assert again.logs[0].pairs[0].mse["sway"] == compared.result.logs[0].pairs[0].mse["sway"]
 
 
 def test_blocks_of_free_runs_are_twice_as_long_as_a_run(compared: Comparison) -> None:
     # Starts from 0 s to 400 s but for the length of a run: 30 s blocks, then 40, 60 and 120 s.
-    blocks = compared.json["logs"][0]["free_run"]["blocks"]
+    blocks = compared.result.logs[0].free_run.blocks
     for horizon, count in zip((5.0, 10.0, 20.0, 30.0, 60.0), blocks, strict=True):
         assert count == pytest.approx((SECONDS[0] - horizon) / max(30.0, 2.0 * horizon), abs=1.0)
 
 
 def test_a_log_with_a_reference_tells_how_it_was_kept(compared: Comparison) -> None:
-    first, second = compared.json["logs"]
-    assert second["tracking"] is None
-    assert first["tracking"]["position_m"] < 1.0
-    assert first["tracking"]["seconds"] == pytest.approx(SECONDS[0], abs=5.0)
-    assert first["tracking"]["IAEW"] == pytest.approx(first["tracking"]["IAE"] * first["tracking"]["EC"])
+    first, second = compared.result.logs
+    assert second.tracking is None
+    assert first.tracking is not None
+    assert first.tracking.position_m < 1.0
+    assert first.tracking.seconds == pytest.approx(SECONDS[0], abs=5.0)
+    assert pytest.approx(first.tracking.IAE * first.tracking.EC) == first.tracking.IAEW
 
 
 def test_a_training_log_is_no_evidence(folder: Path, compared: Comparison) -> None:
-    sha256 = compared.json["logs"][0]["sha256"]
+    sha256 = compared.result.logs[0].sha256
     learnt = replace(
         heavier(1, 1.1), training=({"name": "trial-0", "sha256": sha256, "files": [], "seconds": 1.0, "rows": 1},)
     )
     field = select_candidates(["ferry@1", "ferry@2"], [learnt, heavier(2, 3.0)])
-    result = compare(field, logs_in(folder), RunContext(folder / "out")).json
-    first, second = result["logs"]
-    assert "ferry@1 was trained on this log: its scores here are no evidence" in first["warnings"]
-    assert first["scores"]["ferry@1"]["trained"]
-    assert not second["scores"]["ferry@1"]["trained"]
-    rows = {
-        (row["on"], row["first"]): row
-        for row in result["better"]
-        if (row["what"], row["second"]) == ("sway", "ferry@2")
-    }
-    assert rows[None, "ferry@1"]["better"] == "ferry@1"
-    assert rows[None, "ferry@1"]["says"].endswith("no evidence, as ferry@1 was fitted to some of these logs")
-    assert not rows[None, "ferry@1"]["evidence"]
+    result = compare(field, logs_in(folder), RunContext(folder / "out")).result
+    first, second = result.logs
+    assert "ferry@1 was trained on this log: its scores here are no evidence" in first.warnings
+    assert first.scores["ferry@1"].trained
+    assert not second.scores["ferry@1"].trained
+    rows = {(row.on, row.first): row for row in result.statements if (row.what, row.second) == ("sway", "ferry@2")}
+    assert rows[None, "ferry@1"].better == "ferry@1"
+    assert rows[None, "ferry@1"].sentence.endswith("no evidence, as ferry@1 was fitted to some of these logs")
+    assert not rows[None, "ferry@1"].evidence
     # What is better without having learnt is so all the more.
-    assert rows[None, BASE]["evidence"]
+    assert rows[None, BASE].evidence
 
 
 def test_a_short_log_has_no_intervals_and_says_so(field: CandidateSet, tmp_path: Path) -> None:
     short = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
-    result = compare(field, [str(short)], RunContext(tmp_path)).json
-    (entry,) = result["logs"]
-    assert entry["blocks"] == 3
-    assert "3 blocks of 30 s are too few for an interval" in entry["warnings"][-1]
-    assert all(row["better"] is None for row in result["better"])
-    assert all(row["says"].startswith("too little data to distinguish") for row in result["better"])
-    assert all(np.isnan(one["p"]) for pair in entry["pairs"] for one in pair["mse"].values())
+    result = compare(field, [str(short)], RunContext(tmp_path)).result
+    (entry,) = result.logs
+    assert entry.blocks == 3
+    assert "3 blocks of 30 s are too few for an interval" in entry.warnings[-1]
+    assert all(row.better is None for row in result.statements)
+    assert all(row.sentence.startswith("too little data to distinguish") for row in result.statements)
+    assert all(np.isnan(one.p) for pair in entry.pairs for one in pair.mse.values())
 
 
 def test_what_a_model_needs_and_a_log_lacks_is_named(folder: Path) -> None:
@@ -187,16 +193,16 @@ def test_a_model_that_cannot_be_run_free_is_left_out_of_free_runs_alone(folder: 
     theta = backwards.theta.copy()
     theta[backwards.terms.index("v_dot"), 1] = -9000.0
     field = select_candidates(["ferry@1", "odd"], [heavier(1, 1.1), replace(backwards, theta=theta)])
-    result = compare(field, logs_in(folder)[:1], RunContext(folder / "out")).json
-    assert any("milliampere@3 is left out of free runs" in warning for warning in result["warnings"])
-    scores = result["logs"][0]["scores"]
-    assert np.isnan(scores["milliampere@3"]["free_run"]["position_m"]).all()
-    assert np.isfinite(scores["ferry@1"]["free_run"]["position_m"]).all()
-    assert np.isfinite(scores["milliampere@3"]["mse"]["yaw"])
+    result = compare(field, logs_in(folder)[:1], RunContext(folder / "out")).result
+    assert any("milliampere@3 is left out of free runs" in warning for warning in result.warnings)
+    scores = result.logs[0].scores
+    assert np.isnan(scores["milliampere@3"].free_run["position_m"]).all()
+    assert np.isfinite(scores["ferry@1"].free_run["position_m"]).all()
+    assert np.isfinite(scores["milliampere@3"].mse["yaw"])
 
 
 def test_without_logs_coefficients_are_compared(field: CandidateSet, tmp_path: Path) -> None:
-    result = compare(field, [], RunContext(tmp_path)).json
-    assert result["logs"] == [] == result["better"]
-    mass = next(row for row in result["coefficients"]["physical"] if row["coefficient"] == "m11")
-    assert mass["values"]["ferry@2"]["value"] == pytest.approx(3.0 * mass["values"][BASE]["value"])
+    result = compare(field, [], RunContext(tmp_path)).result
+    assert result.logs == () == result.statements
+    mass = next(row for row in result.coefficients.physical if row.coefficient == "m11")
+    assert mass.values["ferry@2"].value == pytest.approx(3.0 * mass.values[BASE].value)

@@ -35,7 +35,7 @@ NO_DECISION = {
         effects.effect HELD
         effects.equations_of_motion MASSES DAMPED
         effects.force_model _NO_FLOW _NO_LOAD _NO_FACTOR
-        diagnose.inference.noise_model GROUPS
+        diagnose.inference.noise_estimation GROUPS
         regression.bases.term SURGE SWAY YAW DIMENSIONS
         regression.cross_validation.block_sums OUT
     """,
@@ -83,8 +83,8 @@ NO_DECISION = {
         diagnose.inference.estimation MAX_ITERATIONS HULL_SLOPE_ITERATIONS CONVERGED_GAIN HULL_DIFFERENCE DAMPINGS
         diagnose.inference.estimation PARAMETER_DIFFERENCE LONGEST_STEP
         diagnose.inference.kalman CONVERGED
-        diagnose.inference.noise_model START_SHARES DIFFERENCE_STEP FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING
-        diagnose.inference.noise_model LONGEST_STEP SUFFICIENT_GAIN
+        diagnose.inference.noise_estimation START_SHARES DIFFERENCE_STEP FIRST_DAMPING LEAST_DAMPING LARGEST_DAMPING
+        diagnose.inference.noise_estimation LONGEST_STEP SUFFICIENT_GAIN
         diagnose.inference.onset_estimation FIRST_TIME_STEP_S LAST_TIME_STEP_S COMPARING_ITERATIONS
         diagnose.inference.profile_likelihood FIRST_STEP STEP_GROWTH LARGEST_FALL MOST_REFINEMENTS QUANTILES
         diagnose.inference.search COARSE_ITERATIONS

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from math import inf, isnan, nan
 
 import numpy as np
 import pytest
 
 from ferryid.compare.candidates import BASE
+from ferryid.compare.comparison_result import (
+    Coefficients,
+    ComparedModel,
+    ComparisonResult,
+    FreeRunCounts,
+    LogErrors,
+    ModelPair,
+    Ratio,
+)
 from ferryid.compare.comparison_statements import PairedErrors, comparison_statements, format_probability
-from ferryid.files import finite
 from ferryid.regression.resampling.paired_bootstrap import PairedRatios, compare_pairs
 from ferryid.report import comparison_words
 from ferryid.report.comparison_figures import looks, over_reference
@@ -24,21 +32,29 @@ def paired(size: dict[tuple[int, int], float], p: float, m: int, columns: int) -
     return PairedRatios(pairs, ratio, 0.9 * ratio, 1.1 * ratio, np.full(ratio.shape, p))
 
 
+def model(label: str) -> ComparedModel:
+    return ComparedModel(label, label, 1, label == BASE, True, "modulus", False, {}, (), None, None)
+
+
 def result(
     labels: tuple[str, ...], p: float, trained: frozenset[str] = frozenset(), step: float = 1.3
-) -> dict[str, Any]:
+) -> ComparisonResult:
     """Return a comparison in which every model errs `step` times more than the one before."""
     m = len(labels)
     size = {(i, j): step ** (i - j) for i in range(m) for j in range(i + 1, m)}
     judged = PairedErrors("log", labels, paired(size, p, m, 3), (paired(size, p, m, 4),) * 2, HORIZONS, 30.0, trained)
-    scope = {"rows": 10, "seconds": 1.0, "blocks": 9, "block_s": 30.0, "name": "log", "free_run": {"starts": 3}}
-    return finite(
-        {
-            "models": [{"label": label, "base": label == BASE} for label in labels],
-            "logs": [scope],
-            "pooled": None,
-            "better": comparison_statements(judged),
-        }
+    runs = FreeRunCounts(HORIZONS, 30.0, 3, (3, 3), (9, 9))
+    return ComparisonResult(
+        schema="ferryid.compare/1",
+        vessel="ferry",
+        window_s=1.0,
+        models=tuple(map(model, labels)),
+        warnings=(),
+        logs=(LogErrors("log", "", 30.0, 10, 1.0, 9, {}, runs, (), None, ()),),
+        pooled=None,
+        statements=tuple(comparison_statements(judged)),
+        coefficients=Coefficients((), ()),
+        effects=(),
     )
 
 
@@ -51,10 +67,10 @@ def test_what_is_better_is_said_with_its_ratio_and_chance() -> None:
 
 
 def test_the_better_one_comes_first_whichever_was_named_first() -> None:
-    row = result(("one", "two"), 0.001, step=1.0 / 1.3)["better"][0]
-    assert (row["first"], row["better"]) == ("two", "two")
-    assert row["ratio"] == pytest.approx(1.0 / 1.3)
-    assert row["low"] < row["ratio"] < row["high"] < 1.0
+    row = result(("one", "two"), 0.001, step=1.0 / 1.3).statements[0]
+    assert (row.first, row.better) == ("two", "two")
+    assert row.ratio == pytest.approx(1.0 / 1.3)
+    assert row.low < row.ratio < row.high < 1.0
 
 
 def test_what_the_number_of_comparisons_makes_doubtful_may_be() -> None:
@@ -74,9 +90,9 @@ def test_what_is_not_shown_is_one_sentence_for_two_models() -> None:
 
 
 def test_alike_is_what_differs_by_next_to_nothing_however_surely() -> None:
-    row = result(("one", "two"), 0.0001, step=1.004)["better"][0]
-    assert row["better"] is None
-    assert row["says"] == "one and two are alike on surge: their MSE differs by less than 0.5%"
+    row = result(("one", "two"), 0.0001, step=1.004).statements[0]
+    assert row.better is None
+    assert row.sentence == "one and two are alike on surge: their MSE differs by less than 0.5%"
 
 
 def test_many_models_are_held_against_the_best() -> None:
@@ -88,14 +104,14 @@ def test_many_models_are_held_against_the_best() -> None:
     assert len(unclear) == 5
     assert unclear[0].startswith("on surge, a errs least, but no difference is shown: its error over that of b 0.769 [")
     # Holm's first factor is the number of all pairs, not of those that are told.
-    assert result(labels, 0.0001)["better"][0]["p_corrected"] == pytest.approx(10 * 5 * 0.0001)
+    assert result(labels, 0.0001).statements[0].p_corrected == pytest.approx(10 * 5 * 0.0001)
 
 
 def test_what_has_seen_the_log_is_no_evidence() -> None:
-    rows = result(("one", "two"), 0.001, frozenset({"one"}))
-    assert rows["better"][0]["says"].endswith("; no evidence, as one was fitted to this log")
-    assert "where it was trained, which is no evidence" in comparison_words.headline(rows)
-    assert result(("one", "two"), 0.001, frozenset({"two"}))["better"][0]["evidence"]
+    found = result(("one", "two"), 0.001, frozenset({"one"}))
+    assert found.statements[0].sentence.endswith("; no evidence, as one was fitted to this log")
+    assert "where it was trained, which is no evidence" in comparison_words.headline(found)
+    assert result(("one", "two"), 0.001, frozenset({"two"})).statements[0].evidence
 
 
 @pytest.mark.parametrize(
@@ -111,8 +127,8 @@ def test_too_few_blocks_are_too_little_data() -> None:
     judged = PairedErrors("log", ("one", "two"), compare_pairs([few]), (runs, runs), HORIZONS, None, frozenset())
     rows = comparison_statements(judged)
     # Without a horizon that has intervals, free runs have no sentence.
-    assert [row["what"] for row in rows] == ["surge", "sway", "yaw"]
-    assert all(row["says"].startswith("too little data to distinguish") for row in rows)
+    assert [row.what for row in rows] == ["surge", "sway", "yaw"]
+    assert all(row.sentence.startswith("too little data to distinguish") for row in rows)
 
 
 def test_chances_are_short() -> None:
@@ -126,21 +142,28 @@ def test_chances_are_short() -> None:
 
 
 def test_no_two_of_many_models_look_alike() -> None:
-    models = [{"label": str(k), "base": k == 0} for k in range(20)]
+    models = [model(str(k) if k else BASE) for k in range(20)]
     seen = [(look["color"], look["marker"], look["linestyle"]) for look in looks(models).values()]
     assert len(set(seen)) == 20
 
 
 def test_a_ratio_over_a_reference_is_turned_round_with_its_interval() -> None:
-    ratio = {"value": 2.0, "low": 1.6, "high": 4.0, "p": 0.1}
-    scope = {"pairs": [{"first": BASE, "second": "one", "mse": {"sway": ratio}, "free_run": {"position_m": [ratio]}}]}
-    turned = over_reference(scope, "one", BASE)
-    assert turned["mse"]["sway"] == {"value": 0.5, "low": 0.25, "high": 0.625}
-    assert turned["free_run"]["position_m"] == [turned["mse"]["sway"]]
-    assert over_reference(scope, BASE, "one")["mse"]["sway"] is ratio
+    ratio = Ratio(2.0, 1.6, 4.0, 0.1)
+    pair = ModelPair(BASE, "one", {"sway": ratio}, {"position_m": (ratio,)})
+    turned = over_reference([pair], "one", BASE)
+    assert turned.mse["sway"] == Ratio(0.5, 0.25, 0.625, 0.1)
+    assert turned.free_run["position_m"] == (turned.mse["sway"],)
+    assert over_reference([pair], BASE, "one") is pair
+
+
+@pytest.mark.parametrize("unknown", [nan, inf, 0.0])
+def test_the_inverse_of_what_is_not_known_is_not_known_either(unknown: float) -> None:
+    turned = Ratio(0.5, unknown, 2.0, 0.1).inverse()
+    assert (turned.value, turned.low) == (2.0, 0.5)
+    assert isnan(turned.high)
 
 
 def test_nor_is_it_where_it_may_be_better() -> None:
-    (row, *_) = result(("one", "two"), 0.03, frozenset({"one"}))["better"]
-    assert row["perhaps"] == "one"
-    assert row["says"].endswith("; no evidence, as one was fitted to this log")
+    (row, *_) = result(("one", "two"), 0.03, frozenset({"one"})).statements
+    assert row.perhaps == "one"
+    assert row.sentence.endswith("; no evidence, as one was fitted to this log")

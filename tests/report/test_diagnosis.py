@@ -30,6 +30,7 @@ from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
+from ferryid.report.diagnosis_errors import force_rows, free_run_rows, ratio_of
 from ferryid.report.diagnosis_figures import _profile, binned, in_regime
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_report import patient, report
@@ -37,11 +38,8 @@ from ferryid.report.diagnosis_words import (
     about_errors,
     changed,
     estimate,
-    force_rows,
-    free_run_rows,
     headline,
     numbers,
-    ratio_of,
     rivals,
     said,
     trust,
@@ -69,7 +67,6 @@ def wind() -> Finding:
         parameters={"north": Estimate(-3.02, -3.21, -2.83, "m/s"), "east": Estimate(2.96, 2.81, 3.11, "m/s")},
         axes=by_axis(0.1, 0.6, 0.3),
         intervals=((0.0, 720.0),),
-        onset_s=None,
         regime="headings 150-210 deg",
         improvement=by_axis(0.41, 0.9, 0.95),
         held_out=True,
@@ -100,12 +97,7 @@ def gain() -> Finding:
         axes=by_axis(0.7, 0.04, 0.26),
         intervals=((312.0, 720.0),),
         onset_s=312.0,
-        regime="",
         improvement=by_axis(0.6, -0.05, 0.01),
-        held_out=False,
-        rivals=(),
-        unresolved_with=(),
-        separating_manoeuvre=None,
         says="thruster1 gives 85 % of the force that its speed promises.",
         evidence={"t": T, "before": explained + noise, "after": noise, "explained": explained},
         labels={"residual": "surge force left over [N]"},
@@ -315,10 +307,6 @@ def nameless() -> Finding:
         effect="unknown",
         parameters={},
         intervals=((200.0, 260.0),),
-        improvement={},
-        rivals=(),
-        unresolved_with=(),
-        separating_manoeuvre=None,
         says="Something unsteady moves the vessel.",
         evidence={"t": T, "before": burst},
         labels={"residual": "yaw moment left over [N·m]"},

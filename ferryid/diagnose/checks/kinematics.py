@@ -120,19 +120,8 @@ class _Data:
         return self.derivatives(p, np.column_stack([u, v]) * p[SCALE])
 
 
-class _Same:
-    """Measurements compared by identity, as several checks ask for the kinematics of the same ones."""
-
-    def __init__(self, measurements: Measurements) -> None:
-        self.measurements = measurements
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.measurements is self.measurements
-
-    def __hash__(self) -> int:
-        return id(self.measurements)
-
-
+# Several checks ask for the kinematics of the same measurements.
+@lru_cache(maxsize=1)
 def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kinematics | None:
     """Compare positions and velocities; None where the measurements have too little of them.
 
@@ -143,12 +132,6 @@ def kinematics(measurements: Measurements, forced: tuple[int, ...] = ()) -> Kine
     forced
         Parameters that are let in from the start, because it is known that they are off.
     """
-    return _compared(_Same(measurements), forced)
-
-
-@lru_cache(maxsize=1)
-def _compared(same: _Same, forced: tuple[int, ...]) -> Kinematics | None:
-    measurements = same.measurements
     problem, both = spans(measurements, np.hstack([measurements.eta, measurements.nu_raw[:, :2]]))
     if len(problem.starts) < 8:
         return None

@@ -9,7 +9,8 @@ from ferryid.diagnose.inference.estimation import (
     fit,
     fitted_force_model,
 )
-from ferryid.diagnose.inference.noise_model import NoiseModel, fit_noise_with, likelihood
+from ferryid.diagnose.inference.noise_estimation import fit_noise_with
+from ferryid.diagnose.inference.noise_model import NoiseModel, likelihood
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.profile_likelihood import intervals
 from ferryid.diagnose.inference.search import is_negligible

@@ -27,7 +27,6 @@ from scipy.linalg import cho_factor, cho_solve
 from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
 from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.weak_form import Windows
-from ferryid.effects.effect import Effect, Parameter, Values
 from ferryid.effects.force_model import COEFFICIENTS, ForceModel
 from ferryid.types import Floats
 
@@ -104,11 +103,6 @@ class CampaignHull:
         without
             The log that has no part in it; None for what all logs say.
         """
-        z, covariance = self._believed(without)
-        return self.before + self.spread * z, covariance * np.outer(self.spread, self.spread)
-
-    def _believed(self, without: int | None) -> tuple[Floats, Floats]:
-        """Return mean and covariance in spreads."""
         A = np.eye(len(self.step)) + self.normal.sum(axis=0)
         z = self.step
         if without is not None:
@@ -117,39 +111,17 @@ class CampaignHull:
             z = z + np.linalg.solve(A, self.gradient[without])
         # Logs that differ by more than noise know less of the hull than their noise says, but never less than before.
         known = np.eye(len(A)) + (A - np.eye(len(A))) / max(1.0, self.disagreement)
-        return z, np.asarray(np.linalg.inv(known))
+        return self.before + self.spread * z, np.linalg.inv(known) * np.outer(self.spread, self.spread)
 
     def force_model(self, plain: ForceModel, without: int | None = None) -> tuple[ForceModel, Floats]:
         """Return a log's force model with the hull that is believed in, and the standard deviations of `COEFFICIENTS`.
 
-        The induced drag is an external force at the measured motion. Standard deviations alone say less than the covariance
-        does: `candidate` keeps all of it.
+        The induced drag is an external force at the measured motion.
         """
         mean, covariance = self.belief(without)
         h = len(COEFFICIENTS)
         modelled = induced(replace(plain, hull=mean[:h]), mean[h:])
         return modelled, np.sqrt(np.diag(covariance))[:h]
-
-    def candidate(self, without: int | None = None) -> Candidate:
-        """Return the hull as a candidate with the whole covariance, for `ferryid.diagnose.inference.estimation.fit`.
-
-        Its parameters are independent and of unit variance; a trial that holds it needs no spread of its own.
-        """
-        z, covariance = self._believed(without)
-        mean, root = self.before + self.spread * z, self.spread[:, None] * np.linalg.cholesky(covariance)
-        h = len(COEFFICIENTS)
-
-        def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
-            now = mean + root @ p
-            return induced(replace(force_model, hull=now[:h]), now[h:])
-
-        parameters = tuple(Parameter(name, "-", 1.0, -np.inf, np.inf) for name in self.names)
-        effect = Effect("hull", "Hull", lambda profile: parameters, apply, _says, lambda values, instance: {})
-        return Candidate(effect, None, parameters)
-
-
-def _says(values: Values, instance: str | None) -> str:
-    return "The hull is that of the vessel's other logs."
 
 
 def induced(force_model: ForceModel, coefficients: Floats) -> ForceModel:
@@ -186,15 +158,15 @@ def fit_campaign_hull(members: Sequence[Member], spread: Floats, induced_size: F
     own = [np.zeros(0) for _ in members]
     empty = [replace(member, candidates=()) for member in members]
     bare = replace(joint, members=empty)
-    noise = joint.noise(bare, z, own)
+    noise = bare.noise(z, own)
     for _ in range(ROUNDS):
         z, no_own = bare.solve(z, own, noise)
-        noise = joint.noise(bare, z, no_own)
+        noise = bare.noise(z, no_own)
     if any(member.candidates for member in members):
         own = [joint.start(i, z, noise) for i in range(len(members))]
         for _ in range(ROUNDS):
             z, own = joint.solve(z, own, noise)
-            noise = joint.noise(joint, z, own)
+            noise = joint.noise(z, own)
     return joint.result(z, own, noise)
 
 
@@ -221,10 +193,10 @@ class _Joint:
             first += q
         return tuple(found)
 
-    def noise(self, joint: _Joint, z: Floats, own: Sequence[Floats]) -> AutoregressiveNoise:
+    def noise(self, z: Floats, own: Sequence[Floats]) -> AutoregressiveNoise:
         gaps, runs, count = [], [], 0
-        for i, member in enumerate(joint.members):
-            gaps.append(joint.gap(i, z, own[i]))
+        for i, member in enumerate(self.members):
+            gaps.append(self.gap(i, z, own[i]))
             runs += [(first + count, end + count) for first, end in member.windows.runs]
             count += len(member.windows.starts)
         return fit_autoregression(np.vstack(gaps), tuple(runs))

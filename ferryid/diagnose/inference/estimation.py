@@ -11,13 +11,8 @@ import numpy as np
 
 from ferryid.diagnose.inference.autoregression import AutoregressiveNoise, fit_autoregression
 from ferryid.diagnose.inference.newton_step import newton_step
-from ferryid.diagnose.inference.noise_model import (
-    NoiseModel,
-    WhiteningFilter,
-    excerpt,
-    fit_noise,
-    make_whitening_filter,
-)
+from ferryid.diagnose.inference.noise_estimation import excerpt, fit_noise
+from ferryid.diagnose.inference.noise_model import NoiseModel, WhiteningFilter, make_whitening_filter
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, steps_of
 from ferryid.effects.effect import HELD, Effect, Parameter
@@ -252,8 +247,8 @@ def fit(
     every = [parameter for candidate in candidates for parameter in candidate.parameters]
     size = np.array([parameter.size for parameter in every])
     neutral = np.array([parameter.neutral for parameter in every])
-    low = (np.array([parameter.low for parameter in every]) - neutral) / size if every else np.empty(0)
-    high = (np.array([parameter.high for parameter in every]) - neutral) / size if every else np.empty(0)
+    low = (np.array([parameter.low for parameter in every]) - neutral) / size
+    high = (np.array([parameter.high for parameter in every]) - neutral) / size
     cuts = np.cumsum([len(candidate.parameters) for candidate in candidates])[:-1].tolist()
     q, h = len(every), len(problem.hull_spread)
     # Where an effect changes masses or damping itself, what the hull's coefficients do depends on it.

@@ -138,10 +138,8 @@ def gains(
         Q[i + 4, i + 4] = (1.0 - f * f) * pushed
     for i in range(s):
         for m in range(s):
-            P[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m], Q[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m] = (
-                drive[1, i, m],
-                drive[0, i, m],
-            )
+            P[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m] = drive[1, i, m]
+            Q[CHANNEL_STATES * c + i, CHANNEL_STATES * c + m] = drive[0, i, m]
     K, spread = np.zeros((n, c, S)), np.empty((n, c))
     for k in range(n):
         for j in range(c):

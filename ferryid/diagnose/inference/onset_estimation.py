@@ -149,10 +149,8 @@ def _gains(G: Floats, g: Floats, a: Ints, b: Ints, candidate: Candidate) -> Floa
     A = sums[b, :, b] - sums[a, :, b] - sums[b, :, a] + sums[a, :, a] + np.eye(p)
     total = np.concatenate([np.zeros((1, p)), g.cumsum(axis=0)])
     slope = total[b] - total[a]
-    low, high = (
-        np.array([(end - one.neutral) / one.size for one, end in zip(candidate.parameters, ends, strict=True)])
-        for ends in ([one.low for one in candidate.parameters], [one.high for one in candidate.parameters])
-    )
+    low = np.array([(one.low - one.neutral) / one.size for one in candidate.parameters])
+    high = np.array([(one.high - one.neutral) / one.size for one in candidate.parameters])
     z = np.clip(-np.linalg.solve(A, slope[:, :, None])[:, :, 0], low, high)
     gained = -np.sum(slope * z, axis=1) - 0.5 * np.einsum("si,sij,sj->s", z, A, z)
     return np.asarray(gained - 0.5 * np.linalg.slogdet(A)[1])

@@ -55,25 +55,25 @@ def intervals(problem: EstimationProblem, kept: Fit, index: int) -> dict[str, tu
         return made.evidence - 0.5 * ((value - own.neutral) / own.size) ** 2, made
 
     found = {top: conditional_fit(top, kept)}
+
+    def likely() -> float:
+        """Return the evidence below which a value is not likely."""
+        return max(evidence for evidence, _ in found.values()) - INFERENCE.profile_drop * INFERENCE.posterior_factor**2
+
     for side in (-1.0, 1.0):
         value, step, last = top, first, found[top][1]
         # Until nothing lies beyond, or nothing that is likely; the likeliest may lie at the end of what is possible itself.
         while (further := min(max(value + side * step, own.low), own.high)) != value:
             value = further
             found[value] = conditional_fit(value, last)
-            if (
-                found[value][0]
-                < max(evidence for evidence, _ in found.values())
-                - INFERENCE.profile_drop * INFERENCE.posterior_factor**2
-            ):
+            if found[value][0] < likely():
                 break
             step, last = STEP_GROWTH * step, found[value][1]
     for _ in range(MOST_REFINEMENTS):
         falls = [
             (abs(found[a][0] - found[b][0]), a, b)
             for a, b in pairwise(sorted(found))
-            if max(found[a][0], found[b][0])
-            > max(evidence for evidence, _ in found.values()) - INFERENCE.profile_drop * INFERENCE.posterior_factor**2
+            if max(found[a][0], found[b][0]) > likely()
         ]
         fall, a, b = max(falls)
         if fall < LARGEST_FALL:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, Fit, fitted_force_model
-from ferryid.diagnose.inference.noise_model import NoiseModel, fit_noise, fit_noise_with, likelihood, stride_s
+from ferryid.diagnose.inference.noise_estimation import fit_noise, fit_noise_with
+from ferryid.diagnose.inference.noise_model import NoiseModel, likelihood, stride_s
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects.effect import Process

@@ -101,13 +101,6 @@ def _claim(
         parameters=parameters,
         axes=dict(zip(AXES, (power / power.sum()).tolist(), strict=True)),
         intervals=((float(measurements.t[0]), float(measurements.t[-1])),),
-        onset_s=None,
-        regime="",
-        improvement={},
-        held_out=False,
-        rivals=(),
-        unresolved_with=(),
-        separating_manoeuvre=None,
         says=candidate.effect.says(values, None),
         **shown,
     )

@@ -32,7 +32,7 @@ class Rival:
     delta_score: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finding:
     """One piece of physics, or one sensor's error, that was left out.
 
@@ -88,19 +88,19 @@ class Finding:
     parameters: Mapping[str, Estimate]
     axes: Mapping[str, float]
     intervals: tuple[tuple[float, float], ...]
-    onset_s: float | None
-    regime: str
-    improvement: Mapping[str, float]
-    held_out: bool
-    rivals: tuple[Rival, ...]
-    unresolved_with: tuple[str, ...]
-    separating_manoeuvre: str | None
+    onset_s: float | None = None
+    offset_s: float | None = None
+    regime: str = ""
+    improvement: Mapping[str, float] = field(default_factory=dict)
+    held_out: bool = False
+    rivals: tuple[Rival, ...] = ()
+    unresolved_with: tuple[str, ...] = ()
+    separating_manoeuvre: str | None = None
     says: str
     evidence: Mapping[str, Floats] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
     band_hz: tuple[float, float] | None = None
     law: tuple[LawTerm, ...] = ()
-    offset_s: float | None = None
 
     @property
     def ends(self) -> tuple[tuple[str, float], ...]:

@@ -145,8 +145,7 @@ def _load(base: Base) -> Iterator[Candidate]:
 
 
 def _with_load(unit: Floats, force_model: ForceModel) -> ForceModel:
-    more = np.tile(unit, (len(force_model.measurements.t), 1))
-    return replace(force_model, load=more if force_model.load is None else force_model.load + more)
+    return force_model.with_load(np.tile(unit, (len(force_model.measurements.t), 1)))
 
 
 def _world(base: Base) -> Iterator[Candidate]:

@@ -100,26 +100,7 @@ def test_logs_of_one_hull_agree_and_of_another_do_not() -> None:
     assert fit_campaign_hull(members(1.4), SPREAD, NONE_INDUCED).disagreement > 2.0 * fitted().disagreement
 
 
-def test_the_hull_as_a_suspect_has_the_same_mean_and_covariance() -> None:
-    hull = fitted()
-    candidate = hull.candidate(without=0)
-    mean, covariance = hull.belief(without=0)
-    plain = members()[0].plain
-
-    def moved(k: int) -> np.ndarray:
-        p = np.zeros(len(candidate.parameters))
-        p[k] = 1.0
-        return candidate.act(plain, p).hull - mean[: len(SPREAD)]
-
-    assert candidate.act(plain, np.zeros(len(candidate.parameters))).hull == pytest.approx(mean[: len(SPREAD)])
-    columns = np.column_stack([moved(k) for k in range(len(candidate.parameters))])
-    size = np.sqrt(np.diag(covariance))[: len(SPREAD)]
-    scale = np.where(size > 0.0, size, 1.0)
-    assert columns @ columns.T / np.outer(scale, scale) == pytest.approx(
-        covariance[: len(SPREAD), : len(SPREAD)] / np.outer(scale, scale), abs=1e-6
-    )
-
-
+@pytest.mark.slow
 def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
     hull = fitted()
     first = members()[0]

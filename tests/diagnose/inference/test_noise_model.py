@@ -13,15 +13,8 @@ from scipy.stats import chi2, multivariate_normal
 from ferryid.diagnose.inference.autoregression import ORDER, AutoregressiveNoise
 from ferryid.diagnose.inference.estimation import Candidate, EstimationProblem, fit
 from ferryid.diagnose.inference.kalman import DIFFUSE, errors, errors_alone, gains, predictions_alone
-from ferryid.diagnose.inference.noise_model import (
-    NoiseModel,
-    _widths,
-    excerpt,
-    fit_noise,
-    likelihood,
-    make_whitening_filter,
-    stride_s,
-)
+from ferryid.diagnose.inference.noise_estimation import _widths, excerpt, fit_noise
+from ferryid.diagnose.inference.noise_model import NoiseModel, likelihood, make_whitening_filter, stride_s
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, steps_of, windows
 from ferryid.effects import effects

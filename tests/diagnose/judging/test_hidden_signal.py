@@ -31,7 +31,9 @@ def load(first: int, end: int) -> np.ndarray:
 
 def found(**parameters: Estimate) -> Finding:
     nothing = dict.fromkeys(("surge", "sway", "yaw"), 0.0)
-    return Finding("payload", None, 0.99, parameters, nothing, (), None, "", {}, False, (), (), None, "")
+    return Finding(
+        effect="payload", instance=None, probability=0.99, parameters=parameters, axes=nothing, intervals=(), says=""
+    )
 
 
 def test_a_load_is_compared_while_it_was_aboard() -> None:

@@ -76,20 +76,15 @@ def trial_on(log: str, model: Model | None = None) -> tuple[EstimationProblem, S
 
 def finding(candidate: Candidate, probability: float) -> Finding:
     return Finding(
-        candidate.effect.id,
-        candidate.instance,
-        probability,
-        {},
-        {},
-        (),
-        None,
-        "",
-        dict.fromkeys(AXES, 0.5),
-        True,
-        (),
-        (),
-        None,
-        "",
+        effect=candidate.effect.id,
+        instance=candidate.instance,
+        probability=probability,
+        parameters={},
+        axes={},
+        intervals=(),
+        improvement=dict.fromkeys(AXES, 0.5),
+        held_out=True,
+        says="",
     )
 
 
@@ -415,14 +410,14 @@ def test_a_wrong_hull_model_becomes_the_hull(fouled: str) -> None:
 def test_compare_tells_the_difference_in_physics(model: Model, fouled: str, folder: Path) -> None:
     clean = replace(model.undiagnosed(), version=7)
     field = select_candidates(["clean", "found"], [clean, model])
-    result = compare(field, [fouled], RunContext(folder / "out")).json
-    pair = result["logs"][0]["pairs"][-1]
-    assert (pair["first"], pair["second"]) == (clean.label, model.label)
-    assert pair["mse"]["surge"]["value"] > 1.25
-    assert result["logs"][0]["scores"][model.label]["trained"]
-    assert [(row["effect"], row["log"]) for row in result["effects"]] == [("fouling", None), ("wind", "fouled")]
-    assert result["effects"][0]["values"][clean.label] is None
-    text = render_effects(result["effects"])
+    result = compare(field, [fouled], RunContext(folder / "out")).result
+    pair = result.logs[0].pairs[-1]
+    assert (pair.first, pair.second) == (clean.label, model.label)
+    assert pair.mse["surge"].value > 1.25
+    assert result.logs[0].scores[model.label].trained
+    assert [(row.effect, row.log) for row in result.effects] == [("fouling", None), ("wind", "fouled")]
+    assert result.effects[0].values[clean.label] is None
+    text = render_effects(result.effects)
     assert "Fouling, a property of the vessel" in text
     assert f"  {clean.label}: not in it" in text
     assert "Steady wind, a condition of fouled" in text
