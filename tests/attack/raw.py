@@ -9,6 +9,7 @@ from tests.attack.case import Base, Mutated, Mutation, formats, replaced
 
 SECTORS = (512, 4096)
 _CELL_OF_TWO_LINES = re.compile(rb'(?:^|(?<=[,;\t\r\n]))"[^"\r\n]*[\r\n][^"\r\n]*"(?=[,;\t\r\n]|$)')
+_SEPARATOR = re.compile(rb"[,;\t ]")
 
 
 def main_file(random: Random, base: Base) -> str:
@@ -40,14 +41,20 @@ def edited_text(base: Base, name: str, content: bytes, what: str, total: int | N
 def text_total(base: Base, name: str, content: bytes) -> int:
     """Count the rows of all text files as lines that hold anything, but for the one with the names.
 
-    A line end inside a quoted cell ends no row: so Python's csv reads it, too.
+    A line end inside a quoted cell ends no row: so Python's csv reads it, too. A line of one cell that was put above
+    the names is no row either, but one before the table.
     """
     rows = 0
     for file, old in base.files.items():
-        text = _CELL_OF_TWO_LINES.sub(b'"cell"', content if file == name else old)
-        lines = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
-        rows += max(sum(bool(line.strip(b" \t,;")) for line in lines) - 1, 0)
+        lines = _filled_lines(content if file == name else old)
+        above = next((place for place, line in enumerate(lines) if _SEPARATOR.search(line)), 0)
+        rows += max(len(lines) - 1 - min(above, max(len(lines) - len(_filled_lines(old)), 0)), 0)
     return rows
+
+
+def _filled_lines(text: bytes) -> list[bytes]:
+    lines = _CELL_OF_TWO_LINES.sub(b'"cell"', text).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    return [line for line in lines if line.strip(b" \t,;")]
 
 
 def flip_bit(random: Random, base: Base) -> Mutated | None:
