@@ -25,7 +25,7 @@ def axes_without_force(tau: Floats, base: Floats) -> Flags:
 
 def implausible_inertia(profile: Profile, mass: Floats) -> Flags:
     """Return the axes whose effective inertia cannot be right, shape (3,); all of them where the matrix as a whole is."""
-    share = np.diag(mass) / np.diag(_rigid(profile.hull))
+    share = np.diag(mass) / np.diag(rigid_body(profile.hull))
     wrong = (share < IDENTIFY.least_inertia) | (share > IDENTIFY.most_inertia)
     positive = bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0.0))
     return wrong if wrong.any() or positive else np.ones(3, dtype=bool)
@@ -47,7 +47,7 @@ def held_inertia_reason(axis: int, mass: Floats, profile: Profile, force_free: b
             f"No actuator acts in {AXES[axis]}: its inertia is the base model's, and its error is that of an equation "
             "without a force."
         )
-    rigid = _rigid(profile.hull)[axis, axis]
+    rigid = rigid_body(profile.hull)[axis, axis]
     unit = "kg·m²" if axis == 2 else "kg"
     return (
         f"In {AXES[axis]} the log would give an inertia of {mass[axis, axis]:.3g} {unit} (rigid body: {rigid:.3g} {unit}), "
@@ -56,5 +56,6 @@ def held_inertia_reason(axis: int, mass: Floats, profile: Profile, force_free: b
     )
 
 
-def _rigid(hull: Hull) -> Floats:
+def rigid_body(hull: Hull) -> Floats:
+    """Return the rigid-body mass matrix of a hull [kg, kg·m, kg·m²], shape (3, 3)."""
     return np.asarray(rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z), dtype=np.float64)

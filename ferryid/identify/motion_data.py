@@ -15,6 +15,7 @@ from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import fit_warnings
 from ferryid.identify.inertia import axes_without_force
 from ferryid.identify.outcome import Excitation, LogFit
+from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.rows import basis_for, grids, known_rows, rows_of
 from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.split import Split
@@ -74,7 +75,9 @@ class MotionData(FitData):
         tau = stacked([motion.tau for motion in self.motions], rows)
         return axes_without_force(np.std(tau, axis=0), np.std(tau - stacked(self.targets, rows), axis=0))
 
-    def resampling_blocks(self, theta: Floats, intercept: Floats) -> tuple[Blocks, float, tuple[str, ...]]:
+    def resampling_blocks(
+        self, theta: Floats, intercept: Floats
+    ) -> tuple[Blocks | Sequence[CrossProducts], float, tuple[str, ...]]:
         """Return blocks of training rows as long as the residual of these coefficients is correlated."""
         rows, rates = self._training_rows(), [motion.rate_hz for motion in self.motions]
         block_s, notes = block_seconds(rows, rates, theta, intercept)
@@ -146,6 +149,17 @@ class LogData(MotionData):
         """Basis and error of the validation rows."""
         return type(self.training).of(*rows_of(self.functions, self.motions, self.errors, self.split.validation))
 
+    @cached_property
+    def windows(self) -> PredictionWindows:
+        """Windows in which models are judged."""
+        return PredictionWindows(self.profile, self.settings, self.functions, self.motions, self.split)
+
+    def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
+        """Return force errors for the thesis's estimator alone, and otherwise prediction errors in windows."""
+        if self.settings.estimator == "derivative":
+            return super().scores(found, logs)
+        return self.windows.scores(found)
+
     @property
     def qualities(self) -> Sequence[Mapping[str, Any]]:
         """The logs' part of the `inspect` output."""
@@ -179,7 +193,9 @@ class LogData(MotionData):
         return fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores)
 
 
-def compute_residuals(profile: Profile, settings: FitSettings, prepared: Sequence[Prepared]) -> LogData:
+def compute_residuals(
+    profile: Profile, settings: FitSettings, prepared: Sequence[Prepared], kind: type[LogData] = LogData
+) -> LogData:
     """Return smoothed logs with their residuals; rows on which something that is needed was not measured are no longer valid.
 
     No row trains or validates yet.
@@ -198,7 +214,7 @@ def compute_residuals(profile: Profile, settings: FitSettings, prepared: Sequenc
         replace(motion, valid=known_rows(motion, functions, target, error))
         for motion, target, error in zip(motions, targets, errors, strict=True)
     ]
-    return LogData(
+    return kind(
         profile,
         settings,
         functions,

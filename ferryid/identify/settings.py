@@ -15,6 +15,7 @@ CHOICES = {
     "residual": ("measured", "commanded", "parallel"),
     "split": ("blocks", "logs", "every-kth"),
     "inertia": ("auto", "fitted"),
+    "estimator": ("auto", "derivative", "weak"),
 }
 
 
@@ -35,7 +36,7 @@ class FitSettings:
     basis, structure
         See `make_basis`; wind and current join the basis when all logs have them, and the hull's length
         where the name lacks it.
-    smoother, residual, split, inertia
+    smoother, residual, split, inertia, estimator
         One of `CHOICES`; inertia ``"auto"`` holds it at the base model's on axes where the fitted one cannot be right.
     components
         Number of SIMPLS components, or ``"auto"`` for cross-validation within the training rows.
@@ -51,6 +52,12 @@ class FitSettings:
         Block-bootstrap draws for the coefficient intervals.
     seed
         Seed of the bootstrap.
+    estimator
+        ``"derivative"``: smoothed velocities are differentiated and forces regressed on accelerations, as in the thesis;
+        ``"weak"``: the equations of motion are averaged over windows and nothing is differentiated, see
+        `ferryid.identify.weak_rows`; ``"auto"``: the one of less error on folds of the training rows.
+    weak_window_s
+        Length of the windows of the weak form [s]; None: 8 s for a vessel of 5 m, by Froude's law for others.
 
     Raises
     ------
@@ -73,6 +80,8 @@ class FitSettings:
     zeta: float = 1.0
     draws: int = 500
     seed: int = 0
+    estimator: str = "auto"
+    weak_window_s: float | None = None
 
     def __post_init__(self) -> None:
         # Says what is wrong with either before any log is read; the hull's length comes with the profile.
