@@ -10,11 +10,10 @@ from ferryid.errors import FerryIdError
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import EstimatorScore
+from ferryid.identify.settings import FOLDS
 from ferryid.identify.split import Split
 from ferryid.identify.weak_data import WeakData
 from ferryid.types import Flags, Floats, no_progress
-
-FOLDS = 4
 
 
 def fold_error(data: LogData, components: int) -> float:

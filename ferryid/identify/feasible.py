@@ -14,8 +14,7 @@ import numpy as np
 
 from ferryid.identify.inertia import rigid_body
 from ferryid.identify.thresholds import IDENTIFY
-from ferryid.models.forces import ACCELERATIONS, effective_mass
-from ferryid.models.forces.residual import motion_force
+from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force
 from ferryid.regression.bases import Basis
 from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.profile import Profile

@@ -19,6 +19,7 @@ from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.rows import basis_for, grids, known_rows, rows_of
 from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.split import Split
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import ModelScores, force_scores
 from ferryid.models.forces import Estimator, compute_residual
 from ferryid.models.prediction import FreeRun, run_free
@@ -156,7 +157,8 @@ class LogData(MotionData):
 
     def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
         """Return force errors for the thesis's estimator alone, and otherwise prediction errors in windows."""
-        if self.settings.estimator == "derivative":
+        judged = self.windows.validation if self.held_out else self.windows.training
+        if self.settings.estimator == "derivative" or sum(len(one) for one in judged) < IDENTIFY.fewest_judged:
             return super().scores(found, logs)
         return self.windows.scores(found)
 
@@ -186,7 +188,7 @@ class LogData(MotionData):
 
     def model_settings(self, estimate: Estimate) -> dict[str, Any]:
         """Return grid rates and window lengths."""
-        return grids(self.motions, self.settings)
+        return {**grids(self.motions, self.settings), "estimator": "derivative"}
 
     def warnings(self, excitation: Excitation, scores: ModelScores) -> tuple[str, ...]:
         """Return what to know before trusting the scores, as sentences."""

@@ -73,24 +73,30 @@ def fit_logs(
         parts = split_rows(data.motions, settings.split, window_s=settings.window_s)
     data = replace(data, split=parts.within([motion.valid for motion in data.motions]))
     run.progress("fitting")
+    kind = settings.estimator
     weak = weak_data(data)
+    why = weak.impossible if kind == "auto" else ""
+    if why:
+        kind = "derivative"
     components: dict[str, int] = {}
-    if settings.estimator != "weak":
+    if kind != "weak":
         wanted = settings.components
         if wanted == "auto":
             windows_s = (settings.window_s,)
             wanted = _select(profile, settings, data.functions, opened, windows_s, parts.training).components
         components["derivative"] = int(wanted)
-    if settings.estimator != "derivative":
+    if kind != "derivative":
         components["weak"] = weak.components()
-    chosen: LogData = data if settings.estimator == "derivative" else weak
+    chosen: LogData = data if kind == "derivative" else weak
     compared: tuple[EstimatorScore, ...] = ()
-    if settings.estimator == "auto":
+    if kind == "auto":
         run.progress("comparing the estimators")
         chosen, compared = choose_estimator(data, weak, components)
     wanted = components["weak" if isinstance(chosen, WeakData) else "derivative"]
     estimate = estimate_correction(chosen, wanted, settings.draws, run.progress)
-    return replace(accept_estimate(chosen, estimate, name, run), estimators=compared)
+    outcome = accept_estimate(chosen, estimate, name, run)
+    told = (f"The derivative's estimator was used: {why}.",) if why else ()
+    return replace(outcome, warnings=(*outcome.warnings, *told), estimators=compared)
 
 
 def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContext) -> FitOutcome:

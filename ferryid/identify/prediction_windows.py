@@ -90,6 +90,7 @@ class PredictionWindows:
             seconds=sum(float(mask.sum()) / m.rate_hz for m, mask in zip(self.motions, masks, strict=True)),
             split=self.split.kind,
             split_notes=self.split.notes,
+            measure="prediction",
         )
 
 

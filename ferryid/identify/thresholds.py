@@ -94,7 +94,13 @@ class IdentifyThresholds:
         "convention: as `worsening`",
     )
     fewest_windows: int = threshold(
-        30, "windows", "fewest that the weak form trains on", "convention: more than the coefficients of any one axis"
+        12, "windows", "fewest that the weak form trains on", "convention: more than the coefficients of any one axis"
+    )
+    fewest_judged: int = threshold(
+        6,
+        "windows",
+        "fewest that a model is judged in; with fewer its force errors are",
+        "convention: as `fewest_blocks`",
     )
     most_autocorrelation: float = threshold(
         0.95,
@@ -130,13 +136,16 @@ class IdentifyThresholds:
         "derived: added mass in sway about equals the displacement",
     )
     widest_prior: float = threshold(
-        10.0, "-", "most by which a prior is widened that the data contradict", "convention: wider, it says nothing"
+        10.0,
+        "-",
+        "most by which a prior that the data contradict is widened",
+        "convention: a wider prior has no effect",
     )
     visited_quantile: float = threshold(
         0.99, "-", "quantile of the velocities up to which damping has to dissipate", "convention: beyond single errors"
     )
     damping_margin: float = threshold(
-        1.25, "-", "factor on these velocities", "convention: a free run goes somewhat beyond what it learnt from"
+        1.25, "-", "factor on these velocities", "convention: a free run leaves the training velocities a little"
     )
     structure_level: float = threshold(
         0.95, "-", "confidence level of the set of structures that the data support", "convention: 95 %"

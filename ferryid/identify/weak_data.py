@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ferryid.identify.feasible import Feasible, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation
+from ferryid.identify.settings import FOLDS
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import STRIDES, WeakRows, to_force
 from ferryid.models.forces import ACCELERATIONS, MAPPED
@@ -22,8 +24,6 @@ from ferryid.regression import CrossProducts, QrFactor, Rows, Simpls, fit_simpls
 from ferryid.regression.cross_validation import Folds
 from ferryid.regression.resampling import Blocks, block_seconds
 from ferryid.types import Flags, Floats
-
-FOLDS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +71,14 @@ class Whitened:
 class WeakData(LogData):
     """Motions of logs as windows of the weak form, of which some train and others validate."""
 
+    def model_settings(self, estimate: Estimate) -> dict[str, Any]:
+        """Return grid rates, window lengths, and the estimator."""
+        return {
+            **super().model_settings(estimate),
+            "estimator": "weak",
+            "weak_window_s": self.windows.length_s,
+        }
+
     @cached_property
     def training_windows(self) -> tuple[WeakRows, ...]:
         """Windows within training rows, one a log.
@@ -80,14 +88,21 @@ class WeakData(LogData):
         FerryIdError
             For fewer windows than a fit needs.
         """
-        windows, length_s = self.windows.training, self.windows.length_s
-        found = sum(len(one) for one in windows)
+        if why := self.impossible:
+            raise FerryIdError(f"{self.where}: {why}. Fix: give more or longer logs, or use --estimator derivative")
+        return self.windows.training
+
+    @property
+    def impossible(self) -> str:
+        """Why the weak form cannot be used; empty where it can."""
+        if self.settings.residual != "measured":
+            return f"the weak form explains the measured force, found --residual {self.settings.residual}"
+        found, length_s = sum(len(one) for one in self.windows.training), self.windows.length_s
         if found < IDENTIFY.fewest_windows:
-            raise FerryIdError(
-                f"{self.where}: the weak form needs {IDENTIFY.fewest_windows} windows of {length_s:.3g} s to train on, "
-                f"found {found}. Fix: give more or longer logs, or use --estimator derivative"
+            return (
+                f"the weak form needs {IDENTIFY.fewest_windows} windows of {length_s:.3g} s to train on, found {found}"
             )
-        return windows
+        return ""
 
     @cached_property
     def whitening(self) -> Whitening:
