@@ -260,7 +260,8 @@ def fit_archive(
         raise FerryIdError("--split every-kth: an archive keeps blocks, no rows. Fix: give blocks or logs")
     if settings.estimator == "weak":
         raise FerryIdError(
-            "--estimator weak: an archive keeps sums of the derivative's rows. Fix: fit the logs, or give --estimator derivative"
+            "--estimator weak: an archive keeps sums of the derivative's rows. "
+            "Fix: fit the logs, or give --estimator derivative"
         )
     windows_s = settings.windows_s or (settings.window_s,)
     where = archived_folders(run.tables or run.out, profile, names)
