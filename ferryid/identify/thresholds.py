@@ -102,6 +102,12 @@ class IdentifyThresholds:
         "fewest that a model is judged in; with fewer its force errors are",
         "convention: as `fewest_blocks`",
     )
+    pose_agreement: float = threshold(
+        0.5,
+        "-",
+        "correlation of accelerations from poses with those from velocities from which poses may be used",
+        "convention: half of what either shows is in the other",
+    )
     most_autocorrelation: float = threshold(
         0.95,
         "-",

@@ -108,7 +108,7 @@ class WeakData(LogData):
     def whitening(self) -> Whitening:
         """How the windows are made alike and independent, from what a first fit leaves."""
         candidates = [np.zeros(3, dtype=bool)]
-        if all(np.isfinite(one.by_pose).all() for one in self.training_windows):
+        if self._poses_agree():
             candidates.append(np.ones(3, dtype=bool))
         tried = [(posed, self._first_residuals(posed)) for posed in candidates]
         spread = np.array([np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)) for _, left in tried])
@@ -122,6 +122,16 @@ class WeakData(LogData):
         autocorrelation = self._autocorrelation([one / sigma for one in left])
         condition = self._condition_spread([one / sigma for one in left], autocorrelation)
         return Whitening(posed, autocorrelation, condition, sigma)
+
+    def _poses_agree(self) -> bool:
+        """Return whether the acceleration from poses is known and goes with that from velocities: a stuck pose leaves nothing."""
+        pose, velocity = (
+            np.concatenate([getattr(one, name) for one in self.training_windows]) for name in ("by_pose", "by_velocity")
+        )
+        if not np.isfinite(pose).all() or np.any(np.std(pose, axis=0) == 0.0):
+            return False
+        agreement = [np.corrcoef(pose[:, axis], velocity[:, axis])[0, 1] for axis in range(3)]
+        return min(agreement) >= IDENTIFY.pose_agreement
 
     def _first_residuals(self, posed: Flags) -> list[Floats]:
         """Return what a fit without whitening leaves of every log, shape (J, 3) each."""
