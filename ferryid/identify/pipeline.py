@@ -86,6 +86,7 @@ def fit_logs(
             wanted = _select(profile, settings, data.functions, opened, windows_s, parts.training).components
         components["derivative"] = int(wanted)
     if kind != "derivative":
+        weak.refuse_wrong_way()
         components["weak"] = weak.components()
     chosen: LogData = data if kind == "derivative" else weak
     compared: tuple[EstimatorScore, ...] = ()

@@ -102,6 +102,12 @@ class IdentifyThresholds:
         "fewest that a model is judged in; with fewer its force errors are",
         "convention: as `fewest_blocks`",
     )
+    wrong_way_sigmas: float = threshold(
+        2.3,
+        "standard deviations",
+        "by which an acceleration goes against the applied force before a fit is refused",
+        "derived: one in a hundred by chance",
+    )
     pose_agreement: float = threshold(
         0.5,
         "-",

@@ -12,8 +12,10 @@ import numpy as np
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
+from ferryid.identify.contradictions import response_of, wrong_way
 from ferryid.identify.feasible import Feasible, feasible_gains
 from ferryid.identify.fit_data import Estimate
+from ferryid.identify.inertia import without_inertia
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation
 from ferryid.identify.settings import FOLDS
@@ -124,14 +126,14 @@ class WeakData(LogData):
         return Whitening(posed, autocorrelation, condition, sigma)
 
     def _poses_agree(self) -> bool:
-        """Return whether the acceleration from poses is known and goes with that from velocities: a stuck pose leaves nothing."""
+        """Return whether acceleration from poses is known and goes with that from velocities, as it does not of a stuck pose."""
         pose, velocity = (
             np.concatenate([getattr(one, name) for one in self.training_windows]) for name in ("by_pose", "by_velocity")
         )
         if not np.isfinite(pose).all() or np.any(np.std(pose, axis=0) == 0.0):
             return False
         agreement = [np.corrcoef(pose[:, axis], velocity[:, axis])[0, 1] for axis in range(3)]
-        return min(agreement) >= IDENTIFY.pose_agreement
+        return bool(min(agreement) >= IDENTIFY.pose_agreement)
 
     def _first_residuals(self, posed: Flags) -> list[Floats]:
         """Return what a fit without whitening leaves of every log, shape (J, 3) each."""
@@ -295,6 +297,24 @@ class WeakData(LogData):
             for n, products in zip(stacked.n, stacked.products, strict=True)
         ]
         return blocks, block_s, notes
+
+    def refuse_wrong_way(self) -> None:
+        """Refuse logs in which the vessel accelerates against the applied force.
+
+        Raises
+        ------
+        FerryIdError
+            With what explains it and the line of the profile to change.
+        """
+        terms = self.functions.terms
+        if not all(name in terms for name in ACCELERATIONS):
+            return
+        mask = without_inertia(self.functions.mask, terms, self.without_force)
+        gains = fit_simpls(self.training, len(terms), allowed=mask).coefficients[-1]
+        places = (terms.index("u_dot"), terms.index("v_dot"), terms.index("r_dot"))
+        response, spread = response_of(gains, self._information(), mask, places)
+        if told := wrong_way(response, spread, f"the profile {self.profile.name}"):
+            raise FerryIdError(f"{self.where}: {told}")
 
     def feasible(self, gains: Floats, mask: Flags) -> Feasible:
         """Return the gains nearest to given ones that physics allows, (K, 3), nearest as the training windows measure it."""

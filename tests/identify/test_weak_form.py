@@ -294,3 +294,24 @@ def test_the_weak_form_explains_the_measured_force_alone() -> None:
     assert "commanded" in weak.impossible
     with pytest.raises(FerryIdError, match="--residual commanded"):
         _ = weak.training_windows
+
+
+@pytest.mark.parametrize(
+    ("signs", "cause"),
+    [
+        ((1.0, 1.0, -1.0), "port and starboard actuators are exchanged"),
+        ((1.0, -1.0, -1.0), "y axes that point to opposite sides"),
+        ((-1.0, 1.0, 1.0), "the thrust or the surge velocity has the wrong sign"),
+    ],
+)
+def test_forces_that_act_the_wrong_way_are_refused_with_their_cause(
+    signs: tuple[float, float, float], cause: str
+) -> None:
+    logs = [measured(seed, seconds=300.0, jitter=0.03) for seed in range(2)]
+    data_of(logs).refuse_wrong_way()
+    turned = [replace(one, tau=one.tau * signs) for one in logs]
+    with pytest.raises(
+        FerryIdError,
+        match=rf"accelerates the vessel in .* of what the base model expects.*{cause}.* Fix: in the profile",
+    ):
+        data_of(turned).refuse_wrong_way()
