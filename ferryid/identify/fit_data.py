@@ -128,6 +128,10 @@ class FitData(ABC):
         """Return estimated coefficients, shape (..., K, 3), and intercepts, (..., 3), as those of the applied force."""
         return coefficients, intercepts
 
+    def scattered(self, coefficients: Floats) -> Floats:
+        """Return coefficients of draws, (draws, K, 3), with the scatter that drawing rows again does not bring."""
+        return coefficients
+
     def feasible(self, coefficients: Floats, mask: Flags) -> Feasible | None:
         """Return the coefficients nearest to estimated ones, (K, 3), that physics allows; None: they stay as they are."""
         return None

@@ -126,7 +126,7 @@ class WeakData(LogData):
         return Whitening(posed, autocorrelation, condition, sigma)
 
     def _poses_agree(self) -> bool:
-        """Return whether acceleration from poses is known and goes with that from velocities, as it does not of a stuck pose."""
+        """Return whether acceleration from poses is known and goes with that from velocities; of a stuck pose it does not."""
         pose, velocity = (
             np.concatenate([getattr(one, name) for one in self.training_windows]) for name in ("by_pose", "by_velocity")
         )
@@ -297,6 +297,22 @@ class WeakData(LogData):
             for n, products in zip(stacked.n, stacked.products, strict=True)
         ]
         return blocks, block_s, notes
+
+    def scattered(self, gains: Floats) -> Floats:
+        """Return drawn gains, (draws, K, 3), with the scatter of the prior: the truth is as far from its mean as it states.
+
+        Drawing windows again leaves the prior where it is, so that what only the prior determines would have no interval.
+        """
+        rng = np.random.default_rng(self.settings.seed)
+        information, out = self._information(), gains.copy()
+        for axis in range(3):
+            own = np.flatnonzero(self.functions.mask[:, axis] & np.isfinite(self.prior_spread[:, axis]))
+            every = np.flatnonzero(self.functions.mask[:, axis])
+            spread = self.prior_factor * self.prior_spread[own, axis]
+            covariance = np.linalg.pinv(information[axis][np.ix_(every, every)], hermitian=True)
+            pulls = rng.standard_normal((len(gains), len(own))) / spread
+            out[:, every, axis] += pulls @ covariance[np.searchsorted(every, own)]
+        return out
 
     def refuse_wrong_way(self) -> None:
         """Refuse logs in which the vessel accelerates against the applied force.

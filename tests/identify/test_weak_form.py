@@ -315,3 +315,18 @@ def test_forces_that_act_the_wrong_way_are_refused_with_their_cause(
         match=rf"accelerates the vessel in .* of what the base model expects.*{cause}.* Fix: in the profile",
     ):
         data_of(turned).refuse_wrong_way()
+
+
+def test_what_only_the_prior_determines_has_its_spread() -> None:
+    # The vessel goes straight ahead, so that nothing is learnt of damping in yaw.
+    def straight(one: Any) -> Any:
+        keep = np.array([1.0, 0.0, 0.0])
+        return replace(one, nu=one.nu * keep, tau=one.tau * keep)
+
+    data = data_of([straight(measured(seed, seconds=300.0, jitter=0.02)) for seed in range(2)])
+    drawn = data.scattered(np.zeros((4000, K, 3)))
+    r = BASIS.terms.index("r")
+    assert drawn[:, r, 2].std() == pytest.approx(data.prior_factor * data.prior_spread[r, 2], rel=0.1)
+    # In surge the data leave less of it.
+    u = BASIS.terms.index("u_dot")
+    assert drawn[:, u, 0].std() < 0.2 * data.prior_spread[u, 0]
