@@ -109,6 +109,10 @@ class FitSettings:
             )
         if self.rate_hz is not None and not 0.1 <= self.rate_hz <= 1000.0:
             raise FerryIdError(f"--rate: {self.rate_hz} Hz is no usable rate. Fix: give 0.1 to 1000 Hz, 20 is usual")
+        if self.weak_window_s is not None and not 0.5 <= self.weak_window_s <= 300.0:
+            raise FerryIdError(
+                f"weak_window_s: {self.weak_window_s} s is no window of the weak form. Fix: give 0.5 to 300 s, or none"
+            )
         if not 1 <= self.draws <= 100_000:
             raise FerryIdError(f"draws: {self.draws} is no number of draws. Fix: give 1 to 100000, 500 is usual")
         if not 0 <= self.seed < 2**63:
