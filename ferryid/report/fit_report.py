@@ -149,7 +149,7 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path) -> str:
     lines.append(f"{'':<28}" + "".join(f"{unit:>12}" for unit in ("[N]", "[N]", "[N·m]")))
     for label, mse in (("base", scores.mse_base), ("new", scores.mse_model)):
         name = f"rms {result.scores.measure} error, {label}"
-        lines.append(f"{name:<28}" + "".join(f"{value:>12.3g}" for value in np.sqrt(mse)))
+        lines.append(f"{name:<28}" + "".join(f"{_three_digits(value):>12}" for value in np.sqrt(mse).tolist()))
     lines.append(f"{'R², new':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
     lines.append("")
     for one in result.estimators:
@@ -169,3 +169,8 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path) -> str:
 
 def _number(value: float) -> str:
     return f"{value:.3f}" if np.isfinite(value) else "–"
+
+
+def _three_digits(value: float) -> str:
+    """Return a number with three significant digits, those of its integer part all written."""
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:#.3g}".rstrip(".")
