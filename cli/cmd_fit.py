@@ -10,6 +10,7 @@ from ferryid.cli.options import (
     OUT,
     Basis,
     Delta,
+    Estimator,
     Inertia,
     Json,
     MaybeLogs,
@@ -43,6 +44,7 @@ def command(
     split: Annotated[str, typer.Option(help="blocks, logs, or every-kth as in the thesis.")] = "blocks",
     rate: Rate = None,
     inertia: Inertia = "auto",
+    estimator: Estimator = "auto",
     delta: Delta = 1.0,
     sigma: Sigma = 1.0,
     zeta: Zeta = 1.0,
@@ -66,7 +68,7 @@ def command(
 
     settings = FitSettings(
         basis=basis, structure=structure, components=components, **parse_window(window), smoother=smoother, residual=residual,
-        split=split, inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
+        split=split, inertia=inertia, estimator=estimator, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
     )  # fmt: skip
     chosen = logs or () if archive else given(logs)
     outcome = api.fit(chosen, vessel, settings, out, name=name, archive=archive, verify=verify, progress=progress)

@@ -42,6 +42,14 @@ Inertia = Annotated[
         "--inertia", help="auto: keep the base model's inertia where the fitted one cannot be right; or fitted."
     ),
 ]
+Estimator = Annotated[
+    str,
+    typer.Option(
+        "--estimator",
+        help="derivative: smooth, differentiate, regress, as in the thesis; weak: average the equations of motion over "
+        "windows, nothing is differentiated; auto: the one of less error on folds of the training rows.",
+    ),
+]
 Delta = Annotated[float, typer.Option("--delta", help="Factor on the base model's M and C.")]
 Sigma = Annotated[float, typer.Option("--sigma", help="Factor on the base model's D.")]
 Zeta = Annotated[float, typer.Option("--zeta", help="Factor on the base model's force.")]

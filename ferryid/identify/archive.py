@@ -292,6 +292,11 @@ def fit_archive(
     name, settings = check_name(name or profile.name), settings.on(profile)
     if settings.split == "every-kth":
         raise FerryIdError("--split every-kth: an archive keeps blocks, no rows. Fix: give blocks or logs")
+    if settings.estimator == "weak":
+        raise FerryIdError(
+            "--estimator weak: an archive keeps sums of the derivative's rows. "
+            "Fix: fit the logs, or give --estimator derivative"
+        )
     windows_s = settings.windows_s or (settings.window_s,)
     where = archived_folders(run.tables or run.out, profile, names)
     sums = _Sums(len(windows_s), len(where), by_logs=settings.split == "logs")

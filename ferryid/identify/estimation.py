@@ -13,6 +13,7 @@ from ferryid.models.forces import effective_mass
 from ferryid.regression import Simpls, fit_simpls
 from ferryid.regression.bases import Basis
 from ferryid.regression.resampling import bootstrap_coefficients
+from ferryid.types import Floats
 
 
 def estimate_correction(data: FitData, components: int, draws: int, progress: Callable[[str], None]) -> Estimate:
@@ -33,15 +34,24 @@ def estimate_correction(data: FitData, components: int, draws: int, progress: Ca
         Called with the name of each stage.
     """
     functions, regression, chosen, held = _regress(data, components)
-    theta, intercept = regression.coefficients[chosen - 1], regression.intercepts[chosen - 1]
+    found, offset = regression.coefficients[chosen - 1], regression.intercepts[chosen - 1]
+    feasible = data.feasible(found, functions.mask)
+    possible = found if feasible is None else feasible.gains
+    theta, intercept = data.force_form(possible, offset)
+    contradicted = () if feasible is None else feasible.notes
     if not draws:
         K = len(functions.terms)
         none = np.full((K, 3), np.nan)
         covariance = np.full((3, K + 1, K + 1), np.nan)
         coefficients = Coefficients(theta, intercept, none, none, none[0], none[0], covariance)
-        return Estimate(functions, regression, chosen, coefficients, held, ())
+        return Estimate(functions, regression, chosen, coefficients, (*held, *contradicted), ())
     progress("resampling blocks for the intervals")
-    blocks, block_s, notes = data.resampling_blocks(theta, intercept)
+    blocks, block_s, notes = data.resampling_blocks(found, offset)
+
+    def drawn(coefficients: Floats, intercepts: Floats) -> tuple[Floats, Floats]:
+        coefficients = data.scattered(coefficients)
+        return data.force_form(coefficients if feasible is None else feasible.moved(coefficients), intercepts)
+
     spread = bootstrap_coefficients(
         blocks,
         chosen,
@@ -51,11 +61,12 @@ def estimate_correction(data: FitData, components: int, draws: int, progress: Ca
         block_s=block_s,
         notes=notes,
         where=data.where,
+        transform=drawn,
     )
     coefficients = Coefficients(
         theta, intercept, spread.low, spread.high, spread.intercept_low, spread.intercept_high, spread.covariance
     )
-    return Estimate(functions, regression, chosen, coefficients, held, spread.notes)
+    return Estimate(functions, regression, chosen, coefficients, (*held, *contradicted), spread.notes)
 
 
 def _regress(data: FitData, components: int) -> tuple[Basis, Simpls, int, tuple[str, ...]]:
@@ -72,10 +83,12 @@ def _regress(data: FitData, components: int) -> tuple[Basis, Simpls, int, tuple[
     while True:
         functions = replace(functions, mask=without_inertia(functions.mask, functions.terms, axes))
         regression = fit_simpls(data.training, most, allowed=functions.mask)
-        theta = regression.coefficients[chosen - 1] + already
+        found, offset = regression.coefficients[chosen - 1], regression.intercepts[chosen - 1]
+        feasible = data.feasible(found, functions.mask)
+        theta = data.force_form(found if feasible is None else feasible.gains, offset)[0] + already
         mass = effective_mass(data.profile, settings.scale, functions.terms, theta)
         more = implausible_inertia(data.profile, mass) & fitted & ~axes
-        if settings.inertia == "fitted" or not more.any():
+        if settings.inertia == "fitted" or feasible is not None or not more.any():
             return functions, regression, chosen, tuple(held.values())
         held |= {axis: held_inertia_reason(axis, mass, data.profile, False) for axis in np.flatnonzero(more).tolist()}
         axes = axes | more

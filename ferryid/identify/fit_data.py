@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ferryid.identify.feasible import Feasible
 from ferryid.identify.outcome import ArchivedLog, Excitation, LogFit
 from ferryid.identify.settings import FitSettings
 from ferryid.models import ModelScores
@@ -118,6 +119,22 @@ class FitData(ABC):
         self, theta: Floats, intercept: Floats
     ) -> tuple[Blocks | Sequence[CrossProducts], float, tuple[str, ...]]:
         """Return blocks of training rows for the bootstrap of these coefficients, their length [s], and notes on it."""
+
+    def fitted(self, regression: Simpls) -> tuple[Floats, Floats]:
+        """Return coefficients and intercepts for every number of components, as `validation` takes them."""
+        return regression.coefficients, regression.intercepts
+
+    def force_form(self, coefficients: Floats, intercepts: Floats) -> tuple[Floats, Floats]:
+        """Return estimated coefficients, shape (..., K, 3), and intercepts, (..., 3), as those of the applied force."""
+        return coefficients, intercepts
+
+    def scattered(self, coefficients: Floats) -> Floats:
+        """Return coefficients of draws, (draws, K, 3), with the scatter that drawing rows again does not bring."""
+        return coefficients
+
+    def feasible(self, coefficients: Floats, mask: Flags) -> Feasible | None:
+        """Return the coefficients nearest to estimated ones, (K, 3), that physics allows; None: they stay as they are."""
+        return None
 
     def combined(self, found: Coefficients) -> Coefficients:
         """Return the coefficients of the new model: those found on top of what was there before."""

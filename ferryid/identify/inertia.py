@@ -32,7 +32,7 @@ def implausible_inertia(profile: Profile, mass: Floats) -> Flags:
 
 def relative_inertia(profile: Profile, mass: Floats) -> Floats:
     """Return the diagonal of an effective mass matrix over the rigid body's, shape (3,)."""
-    return np.asarray(np.diag(mass) / np.diag(_rigid(profile.hull)))
+    return np.asarray(np.diag(mass) / np.diag(rigid_body(profile.hull)))
 
 
 def scaled_eigenvalue(profile: Profile, mass: Floats) -> float:
@@ -40,7 +40,7 @@ def scaled_eigenvalue(profile: Profile, mass: Floats) -> float:
 
     So scaled, masses and moments of inertia compare; its sign is that of the matrix itself.
     """
-    root = np.sqrt(np.diag(_rigid(profile.hull)))
+    root = np.sqrt(np.diag(rigid_body(profile.hull)))
     return float(np.linalg.eigvalsh((mass + mass.T) / 2 / np.outer(root, root))[0])
 
 
@@ -60,7 +60,7 @@ def held_inertia_reason(axis: int, mass: Floats, profile: Profile, force_free: b
             f"No actuator acts in {AXES[axis]}: its inertia is the base model's, and its error is that of an equation "
             "without a force."
         )
-    rigid = _rigid(profile.hull)[axis, axis]
+    rigid = rigid_body(profile.hull)[axis, axis]
     unit = "kg·m²" if axis == 2 else "kg"
     return (
         f"In {AXES[axis]} the log would give an inertia of {mass[axis, axis]:.3g} {unit} (rigid body: {rigid:.3g} {unit}), "
@@ -69,5 +69,6 @@ def held_inertia_reason(axis: int, mass: Floats, profile: Profile, force_free: b
     )
 
 
-def _rigid(hull: Hull) -> Floats:
+def rigid_body(hull: Hull) -> Floats:
+    """Return the rigid-body mass matrix of a hull [kg, kg·m, kg·m²], shape (3, 3)."""
     return np.asarray(rigid_mass(hull.mass_kg, hull.x_g_m, hull.inertia_z), dtype=np.float64)

@@ -15,9 +15,11 @@ from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import fit_warnings
 from ferryid.identify.inertia import axes_without_force
 from ferryid.identify.outcome import Excitation, LogFit
+from ferryid.identify.prediction_windows import PredictionWindows
 from ferryid.identify.rows import basis_for, grids, known_rows, rows_of
 from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.split import Split
+from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import ModelScores, force_scores
 from ferryid.models.forces import Estimator, compute_residual, without_inputs
 from ferryid.models.prediction import FreeRun, run_free
@@ -85,7 +87,9 @@ class MotionData(FitData):
         tau = stacked([motion.tau for motion in self.motions], rows)
         return axes_without_force(np.std(tau, axis=0), np.std(tau - stacked(self.targets, rows), axis=0))
 
-    def resampling_blocks(self, theta: Floats, intercept: Floats) -> tuple[Blocks, float, tuple[str, ...]]:
+    def resampling_blocks(
+        self, theta: Floats, intercept: Floats
+    ) -> tuple[Blocks | Sequence[CrossProducts], float, tuple[str, ...]]:
         """Return blocks of training rows as long as the residual of these coefficients is correlated."""
         rows, rates = self._training_rows(), [motion.rate_hz for motion in self.motions]
         block_s, notes = block_seconds(rows, rates, theta, intercept)
@@ -161,6 +165,18 @@ class LogData(MotionData):
         """Basis and error of the validation rows."""
         return type(self.training).of(*rows_of(self.functions, self.motions, self.errors, self.split.validation))
 
+    @cached_property
+    def windows(self) -> PredictionWindows:
+        """Windows in which models are judged."""
+        return PredictionWindows(self.profile, self.settings, self.functions, self.motions, self.split)
+
+    def scores(self, found: Coefficients, logs: Sequence[LogFit]) -> ModelScores:
+        """Return force errors for the thesis's estimator alone, and otherwise prediction errors in windows."""
+        judged = self.windows.validation if self.held_out else self.windows.training
+        if self.settings.estimator == "derivative" or sum(len(one) for one in judged) < IDENTIFY.fewest_judged:
+            return super().scores(found, logs)
+        return self.windows.scores(found)
+
     @property
     def qualities(self) -> Sequence[Mapping[str, Any]]:
         """The logs' part of the `inspect` output."""
@@ -188,14 +204,16 @@ class LogData(MotionData):
 
     def model_settings(self, estimate: Estimate) -> dict[str, Any]:
         """Return grid rates and window lengths."""
-        return grids(self.motions, self.settings)
+        return {**grids(self.motions, self.settings), "estimator": "derivative"}
 
     def warnings(self, excitation: Excitation, scores: ModelScores) -> tuple[str, ...]:
         """Return what to know before trusting the scores, as sentences."""
         return fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores)
 
 
-def compute_residuals(profile: Profile, settings: FitSettings, prepared: Sequence[Prepared]) -> LogData:
+def compute_residuals(
+    profile: Profile, settings: FitSettings, prepared: Sequence[Prepared], kind: type[LogData] = LogData
+) -> LogData:
     """Return smoothed logs with their residuals; rows on which something that is needed was not measured are no longer valid.
 
     No row trains or validates yet.
@@ -214,7 +232,7 @@ def compute_residuals(profile: Profile, settings: FitSettings, prepared: Sequenc
         replace(motion, valid=known_rows(motion, functions, target, error))
         for motion, target, error in zip(motions, targets, errors, strict=True)
     ]
-    return LogData(
+    return kind(
         profile,
         settings,
         functions,

@@ -116,6 +116,33 @@ class ArchivedLog:
 
 
 @dataclass(frozen=True)
+class EstimatorScore:
+    """How well one estimator predicts.
+
+    Attributes
+    ----------
+    name
+        ``"weak"`` or ``"derivative"``.
+    folds
+        Squared prediction error over the base model's, mean of the axes, on folds of the training rows; infinite where a fold
+        gave no model that can be run, NaN where it was not tried.
+    held_out
+        The same of an estimate from all training rows, on the rows that validate.
+    chosen
+        Whether the model comes of it.
+    """
+
+    name: str
+    folds: float
+    held_out: float
+    chosen: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the score as plain values."""
+        return {"name": self.name, "folds": self.folds, "held_out": self.held_out, "chosen": self.chosen}
+
+
+@dataclass(frozen=True)
 class FitOutcome:
     """Everything that one fit found out: a fit to logs, to an archive or to motions in memory.
 
@@ -137,6 +164,8 @@ class FitOutcome:
         The logs of a fit to rows.
     archive
         The logs of a fit to sums.
+    estimators
+        How well either estimator predicts, where a fit chose between them.
     """
 
     model: Model
@@ -149,3 +178,4 @@ class FitOutcome:
     warnings: tuple[str, ...]
     logs: tuple[LogFit, ...] = ()
     archive: tuple[ArchivedLog, ...] = ()
+    estimators: tuple[EstimatorScore, ...] = ()

@@ -15,6 +15,7 @@ import numpy as np
 from ferryid import __version__
 from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, Check, accept
 from ferryid.identify.estimation import estimate_correction
+from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import free_run_warnings
 from ferryid.identify.free_run_checks import free_run_checks
@@ -22,12 +23,13 @@ from ferryid.identify.held_out_checks import held_out_checks
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
-from ferryid.identify.motion_data import compute_residuals, numbered_names
-from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome
+from ferryid.identify.motion_data import LogData, compute_residuals, numbered_names
+from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
 from ferryid.identify.physical_checks import damping_checks, inertia_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.split import Split, split_rows
+from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.models import Model, ModelScores
 from ferryid.models.forces import Estimator, effective_mass
 from ferryid.models.prediction import FreeRun
@@ -76,12 +78,31 @@ def fit_logs(
         parts = split_rows(data.motions, settings.split, window_s=settings.window_s)
     data = replace(data, split=parts.within([motion.valid for motion in data.motions]))
     run.progress("fitting")
-    components = settings.components
-    if components == "auto":
-        windows_s = (settings.window_s,)
-        components = _select(profile, settings, data.functions, opened, windows_s, parts.training).components
-    estimate = estimate_correction(data, int(components), settings.draws, run.progress)
-    return accept_estimate(data, estimate, name, run)
+    kind = settings.estimator
+    weak = weak_data(data)
+    why = weak.impossible if kind == "auto" else ""
+    if why:
+        kind = "derivative"
+    components: dict[str, int] = {}
+    if kind != "weak":
+        wanted = settings.components
+        if wanted == "auto":
+            windows_s = (settings.window_s,)
+            wanted = _select(profile, settings, data.functions, opened, windows_s, parts.training).components
+        components["derivative"] = int(wanted)
+    if kind != "derivative":
+        weak.refuse_wrong_way()
+        components["weak"] = weak.components()
+    chosen: LogData = data if kind == "derivative" else weak
+    compared: tuple[EstimatorScore, ...] = ()
+    if kind == "auto":
+        run.progress("comparing the estimators")
+        chosen, compared = choose_estimator(data, weak, components)
+    wanted = components["weak" if isinstance(chosen, WeakData) else "derivative"]
+    estimate = estimate_correction(chosen, wanted, settings.draws, run.progress)
+    outcome = accept_estimate(chosen, estimate, name, run)
+    told = (f"The derivative's estimator was used: {why}.",) if why else ()
+    return replace(outcome, warnings=(*outcome.warnings, *told), estimators=compared)
 
 
 def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContext) -> FitOutcome:
@@ -172,10 +193,8 @@ def _component_curve(data: FitData, estimate: Estimate, scores: ModelScores) -> 
     """Return errors for every number of components over the base model's error on the validation rows."""
     unit = np.where(scores.force.mse_base > 0, scores.force.mse_base, 1.0)
     regression = estimate.regression
-    training, validation = (
-        source.sse(regression.coefficients, regression.intercepts) / max(source.n, 1) / unit
-        for source in (data.training, data.validation)
-    )
+    training = data.training.sse(regression.coefficients, regression.intercepts) / max(data.training.n, 1) / unit
+    validation = data.validation.sse(*data.fitted(regression)) / max(data.validation.n, 1) / unit
     return ComponentCurve(
         np.arange(1, len(regression.coefficients) + 1),
         training,

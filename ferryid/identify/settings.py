@@ -15,6 +15,7 @@ CHOICES = {
     "residual": ("measured", "commanded", "parallel"),
     "split": ("blocks", "logs", "every-kth"),
     "inertia": ("auto", "fitted"),
+    "estimator": ("auto", "derivative", "weak"),
     "accept": ("full", "thesis"),
 }
 
@@ -36,7 +37,7 @@ class FitSettings:
     basis, structure
         See `make_basis`; wind and current join the basis when all logs have them, and the hull's length
         where the name lacks it.
-    smoother, residual, split, inertia
+    smoother, residual, split, inertia, estimator
         One of `CHOICES`; inertia ``"auto"`` holds it at the base model's on axes where the fitted one cannot be right.
     accept
         ``"full"``: besides the force error, inertia, damping, free runs and the amount of held-out data have to be right;
@@ -55,6 +56,12 @@ class FitSettings:
         Block-bootstrap draws for the coefficient intervals.
     seed
         Seed of the bootstrap.
+    estimator
+        ``"derivative"``: smoothed velocities are differentiated and forces regressed on accelerations, as in the thesis;
+        ``"weak"``: the equations of motion are averaged over windows and nothing is differentiated, see
+        `ferryid.identify.weak_rows`; ``"auto"``: the one of less error on folds of the training rows.
+    weak_window_s
+        Length of the windows of the weak form [s]; None: 8 s for a vessel of 5 m, by Froude's law for others.
 
     Raises
     ------
@@ -78,6 +85,8 @@ class FitSettings:
     zeta: float = 1.0
     draws: int = 500
     seed: int = 0
+    estimator: str = "auto"
+    weak_window_s: float | None = None
 
     def __post_init__(self) -> None:
         # Says what is wrong with either before any log is read; the hull's length comes with the profile.
@@ -105,6 +114,10 @@ class FitSettings:
             )
         if self.rate_hz is not None and not 0.1 <= self.rate_hz <= 1000.0:
             raise FerryIdError(f"--rate: {self.rate_hz} Hz is no usable rate. Fix: give 0.1 to 1000 Hz, 20 is usual")
+        if self.weak_window_s is not None and not 0.5 <= self.weak_window_s <= 300.0:
+            raise FerryIdError(
+                f"weak_window_s: {self.weak_window_s} s is no window of the weak form. Fix: give 0.5 to 300 s, or none"
+            )
         if not 1 <= self.draws <= 100_000:
             raise FerryIdError(f"draws: {self.draws} is no number of draws. Fix: give 1 to 100000, 500 is usual")
         if not 0 <= self.seed < 2**63:

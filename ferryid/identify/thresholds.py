@@ -127,6 +127,72 @@ class IdentifyThresholds:
         "growth of a free run's error that gives a warning",
         "convention: as `worsening`",
     )
+    fewest_windows: int = threshold(
+        12, "windows", "fewest that the weak form trains on", "convention: more than the coefficients of any one axis"
+    )
+    fewest_judged: int = threshold(
+        6,
+        "windows",
+        "fewest that a model is judged in; with fewer its force errors are",
+        "convention: as `fewest_blocks`",
+    )
+    wrong_way_sigmas: float = threshold(
+        2.3,
+        "standard deviations",
+        "by which an acceleration goes against the applied force before a fit is refused",
+        "derived: one in a hundred by chance",
+    )
+    pose_agreement: float = threshold(
+        0.5,
+        "-",
+        "correlation of accelerations from poses with those from velocities from which poses may be used",
+        "convention: half of what either shows is in the other",
+    )
+    most_autocorrelation: float = threshold(
+        0.95,
+        "-",
+        "highest autocorrelation of neighbouring windows that is whitened",
+        "derived: beyond it no window is left",
+    )
+    expectation_steps: int = threshold(
+        20, "steps", "of the estimate of how much steady forces differ between logs", "derived: it no longer changes"
+    )
+    hull_spread: float = threshold(
+        0.4,
+        "of the coefficient",
+        "standard deviation of the prior of a fit's damping where the profile has a hull model",
+        "convention: a model that is worth correcting may be so far off",
+    )
+    unmodelled_share: float = threshold(
+        0.1,
+        "of the largest for its size",
+        "standard deviation of the prior of damping that the hull model leaves out",
+        "convention: what is left out is small",
+    )
+    mass_spread: float = threshold(
+        0.2,
+        "of the inertia",
+        "standard deviation of the prior where the profile has a hull model",
+        "convention: as `hull_spread`",
+    )
+    unknown_mass_spread: float = threshold(
+        0.5,
+        "of the rigid body's inertia",
+        "standard deviation of the prior where the profile has none: added mass is not in it",
+        "derived: added mass in sway about equals the displacement",
+    )
+    widest_prior: float = threshold(
+        10.0,
+        "-",
+        "most by which a prior that the data contradict is widened",
+        "convention: a wider prior has no effect",
+    )
+    visited_quantile: float = threshold(
+        0.99, "-", "quantile of the velocities up to which damping has to dissipate", "convention: beyond single errors"
+    )
+    damping_margin: float = threshold(
+        1.25, "-", "factor on these velocities", "convention: a free run leaves the training velocities a little"
+    )
     structure_level: float = threshold(
         0.95, "-", "confidence level of the set of structures that the data support", "convention: 95 %"
     )

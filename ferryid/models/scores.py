@@ -69,6 +69,9 @@ class ModelScores:
         How these rows were set apart; ``"none"`` where nothing was held out.
     split_notes
         The same in sentences.
+    measure
+        ``"force"``: errors of the estimated force, row by row; ``"prediction"``: errors of the predicted acceleration, as a
+        force on the base model's mass, in windows of some seconds, which noise does not drown.
     """
 
     force: ForceScores
@@ -76,6 +79,7 @@ class ModelScores:
     seconds: float
     split: str
     split_notes: tuple[str, ...]
+    measure: str = "force"
 
     def to_json(self) -> dict[str, Any]:
         """Return the scores as a model file has them."""
@@ -85,6 +89,7 @@ class ModelScores:
             "seconds": self.seconds,
             "split": self.split,
             "split_notes": list(self.split_notes),
+            "measure": self.measure,
         }
 
     @classmethod
@@ -114,6 +119,7 @@ class ModelScores:
             seconds=float(data["seconds"]),
             split=str(data["split"]),
             split_notes=tuple(str(note) for note in data["split_notes"]),
+            measure=str(data.get("measure", "force")),
         )
 
 

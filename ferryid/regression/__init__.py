@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ferryid.regression.pca import principal_components
     from ferryid.regression.qr import QrFactor, factorise
     from ferryid.regression.simpls import Simpls, fit_simpls, total
+    from ferryid.regression.test_function import window_weights
     from ferryid.regression.thresholds import REGRESSION
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "singular_values",
     "total",
     "undetermined_terms",
+    "window_weights",
 ]
 
 __getattr__ = import_on_demand(
@@ -59,6 +61,7 @@ __getattr__ = import_on_demand(
             "fit_simpls",
             "total",
         ),
+        "test_function": ("window_weights",),
         "thresholds": ("REGRESSION",),
     },
 )

@@ -130,6 +130,7 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path) -> dict[str, 
         },
         "logs": [{"name": log.motion.log, **log.data_quality} for log in result.logs],
         **({"archive": [log.to_json() for log in result.archive]} if result.archive else {}),
+        **({"estimators": [one.to_json() for one in result.estimators]} if result.estimators else {}),
         "report": str(report),
     }
 
@@ -147,9 +148,16 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path) -> str:
     lines.append(f"{'on validation rows':<28}" + "".join(f"{axis:>12}" for axis in AXES))
     lines.append(f"{'':<28}" + "".join(f"{unit:>12}" for unit in ("[N]", "[N]", "[N·m]")))
     for label, mse in (("base", scores.mse_base), ("new", scores.mse_model)):
-        lines.append(f"{'rms force error, ' + label:<28}" + "".join(f"{value:>12.3g}" for value in np.sqrt(mse)))
+        name = f"rms {result.scores.measure} error, {label}"
+        lines.append(f"{name:<28}" + "".join(f"{value:>12.3g}" for value in np.sqrt(mse)))
     lines.append(f"{'R², new':<28}" + "".join(f"{_number(value):>12}" for value in scores.r2_model.tolist()))
     lines.append("")
+    for one in result.estimators:
+        lines.append(
+            f"estimator {one.name}: squared prediction error over the base model's {_number(one.folds)} on folds of the "
+            f"training rows, {_number(one.held_out)} held out{'; chosen' if one.chosen else ''}"
+        )
+    lines.extend([""] if result.estimators else [])
     lines.extend(f"warning: {warning}" for warning in result.warnings)
     state = "current" if stored.current else ("stored" if model.accepted else "stored, marked as rejected")
     if stored.current and stored.previous not in (None, model.version):

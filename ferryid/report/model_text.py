@@ -95,6 +95,7 @@ def describe_settings(model: Model) -> str:
     return (
         f"basis {settings.get('basis')}, {settings.get('structure')}, {counted(count, 'component')}, "
         f"window {settings.get('window_s')} s"
+        + (f", weak form over {settings['weak_window_s']:.3g} s" if settings.get("estimator") == "weak" else "")
     )
 
 

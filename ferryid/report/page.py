@@ -48,10 +48,10 @@ def headline(result: FitOutcome) -> str:
     hull = parse_profile(result.model.profile_text, result.model.name).hull
     base = "the base model's" if hull.has_model else "that of the base model, which is rigid-body mass alone,"
     if not np.isfinite(change):
-        told = "its force error could not be compared with the base model's"
+        told = f"its {result.scores.measure} error could not be compared with the base model's"
     else:
         word = "below" if change < 0 else "above"
-        told = f"mean square force error {abs(change):.1%} {word} {base} on data it did not see"
+        told = f"mean square {result.scores.measure} error {abs(change):.1%} {word} {base} on data it did not see"
     count = len(result.warnings)
     trust = (
         f" Read the {counted(count, 'warning')} first." if count > 1 else " Read the warning first." if count else ""

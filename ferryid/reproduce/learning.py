@@ -20,7 +20,14 @@ BASE = {"delta": 0.4, "sigma": 0.4, "zeta": 1.0}
 MASTER = {"delta": 1.0, "sigma": 1.0, "zeta": 1.0}
 
 THESIS = FitSettings(
-    basis="thesis", structure="coupled", components=12, window_s=1.0, inertia="fitted", delta=0.4, sigma=0.4
+    basis="thesis",
+    structure="coupled",
+    components=12,
+    window_s=1.0,
+    inertia="fitted",
+    estimator="derivative",
+    delta=0.4,
+    sigma=0.4,
 )
 """Basis (3.4), every function in every axis, and the choices of section 5.3."""
 

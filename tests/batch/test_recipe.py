@@ -36,12 +36,12 @@ def test_the_default_in_the_documentation_is_the_default(tmp_path: Path) -> None
 
 def test_every_setting_of_a_fit_can_stand_in_it(tmp_path: Path) -> None:
     values = {one.name: one.default for one in fields(FitSettings)} | {"rate_hz": 10, "components": 5, "window_s": 2}
-    values["windows_s"] = [0.5, 1]
+    values |= {"windows_s": [0.5, 1], "weak_window_s": 6.0}
     text = "\n".join(f"{name} = {value!r}" for name, value in values.items())
     recipe = loaded(tmp_path, f'steps = ["diagnose", "fit"]\n[diagnose]\nwithhold = ["wind"]\n[fit]\n{text}\n')
     assert recipe.steps == ("fit", "diagnose")
     assert recipe.withhold == ("wind",)
-    assert recipe.fit == FitSettings(rate_hz=10, components=5, window_s=2, windows_s=(0.5, 1))
+    assert recipe.fit == FitSettings(rate_hz=10, components=5, window_s=2, windows_s=(0.5, 1), weak_window_s=6.0)
 
 
 def test_results_depend_on_the_settings_of_the_steps_alone(tmp_path: Path) -> None:

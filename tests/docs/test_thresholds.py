@@ -22,7 +22,6 @@ NO_DECISION = {
     "constants of nature, of mathematics and of units": """
         signals.sampling GRAVITY
         signals.kalman WINDOW_PER_TIME
-        diagnose.data.measurements WATER_DENSITY BLOCK_COEFFICIENT
         effects.payload WATER WATERPLANE
         identify.adaptive.averaging NORMAL_95
         identify.split _GOLDEN
@@ -61,7 +60,8 @@ NO_DECISION = {
         signals.kalman _LONGEST_S
         signals.smooth _POLYNOMIAL
         diagnose.data.complementary_filter MEAN_S SLOW_S
-        diagnose.data.measurements WINDOW_S WINDOW_LENGTH_M STRIDES
+        diagnose.data.measurements STRIDES
+        identify.weak_rows STRIDES
         diagnose.data.path_comparison RATE_HZ
         diagnose.checks.spans LENGTH_S STRIDE_S RATE_HZ
         diagnose.checks.kinematics DERIVATIVE_S
@@ -94,11 +94,13 @@ NO_DECISION = {
         effects.linear_evidence DIFFERENCE_STEP
         effects.shallow_water CELLS
         effects.wind SPEEDS_MPS BEARINGS
+        identify.feasible _ROUNDS _SHARES _DIRECTIONS
         identify.settings WINDOWS_S
         models.forces.residual _PASSES
         regression.nipals MOST_ITERATIONS
     """,
     "sizes: rows held at once, draws, folds, bins, and how much is shown": """
+        identify.weak_rows _CHUNK_WINDOWS
         signals.kalman _LEAST_ROWS _FIT_ROWS
         signals.poses _STEPS_SAID
         signals.quality _MEDIAN_OF

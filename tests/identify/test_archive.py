@@ -32,7 +32,7 @@ pytestmark = pytest.mark.slow
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 PROFILE = load_profile("milliampere")
-SETTINGS = FitSettings(delta=0.4, sigma=0.4, draws=60)
+SETTINGS = FitSettings(delta=0.4, sigma=0.4, draws=60, estimator="derivative")
 
 
 @pytest.fixture(scope="module")

@@ -94,8 +94,9 @@ What `ferryid diagnose` says of the same recordings stands in [real/diagnosis.md
 
 Made by `make real` with the recordings at hand (they are not part of the project) and the default settings. *Base* is
 the model in the bundled profile: where a vessel has no hull model, that is rigid-body mass alone, which is easily improved
-upon. The numbers are of validation rows, which the fit did not use. The force error says how well the motion explains the
-measured actuator force; the free run is the harder test: the model gets the measured state once, then only the forces.
+upon. The numbers are of validation rows, which the fit did not use. The prediction error is that of the acceleration in
+windows of some seconds, as a force on the base model's mass; the free run is the harder test: the model gets the measured state
+once, then only the forces.
 
 The validation rows trained no coefficient, but some defaults (decoupled structure, blocks of 40 s, the limits within which an
 inertia is believed) were chosen after looking at scores on these same recordings. Take the figures as somewhat flattering:
@@ -114,12 +115,22 @@ def section(case: Case, result: FitOutcome, folder: Path) -> str:
     )
     lines = [f"\n## {case.name}\n", case.about, "", f"**{headline(result)}** {' '.join(result.acceptance.reasons)}", ""]
     lines += ["| validation | " + " | ".join(AXES) + " |", "|---|" + "---|" * 3]
-    for label, part in (("rms force error, base [N, N, N·m]", "base"), ("rms force error, new", "model")):
+    for label, part in (
+        (f"rms {result.scores.measure} error, base [N, N, N·m]", "base"),
+        (f"rms {result.scores.measure} error, new", "model"),
+    ):
         lines.append(f"| {label} | " + " | ".join(f"{scores['mse'][part][axis] ** 0.5:.3g}" for axis in AXES) + " |")
     lines.append(
         "| MSE over the base model's | " + " | ".join(f"{scores['per_axis'][axis]:.3f}" for axis in AXES) + " |"
     )
     lines.append("")
+    if result.estimators:
+        shown = "; ".join(
+            f"{one.name} {one.folds:.3f} on folds of the training rows, {one.held_out:.3f} held out"
+            f"{' (chosen)' if one.chosen else ''}"
+            for one in result.estimators
+        )
+        lines += [f"Squared prediction error over the base model's by estimator: {shown}.", ""]
     base, new = result.free_run_base, result.free_run_model
     lines += [
         "| free run, horizon | " + " | ".join(f"{h:g} s" for h in new.horizons_s) + " |",

@@ -32,7 +32,7 @@ K = len(FUNCTIONS.terms)
 def curves_of(score: Sequence[Sequence[float]], band: Sequence[Sequence[float]]) -> Curves:
     """Curves that are alike on every axis."""
     mse, error = (np.repeat(np.array(values)[:, :, None], 3, axis=2) for values in (score, band))
-    return Curves(mse, error, np.ones(3), 5, 100)
+    return Curves(mse, error, np.ones(3), 5, 100, np.repeat(mse[:, None], 5, axis=1))
 
 
 def test_the_choice_by_hand() -> None:
@@ -47,7 +47,7 @@ def test_the_choice_by_hand() -> None:
 
 def test_every_axis_counts_alike_by_hand() -> None:
     mse = np.array([[[4.0, 100.0, 0.0], [2.0, 300.0, 0.0]]])
-    curves = Curves(mse, 0.1 * mse, np.ones(3), 5, 100)
+    curves = Curves(mse, 0.1 * mse, np.ones(3), 5, 100, mse[:, None])
     score, band = curves.normalised()
     # Surge over 2, sway over 100, and yaw, without error, as it is.
     np.testing.assert_allclose(score, [[(2.0 + 1.0 + 0.0) / 3.0, (1.0 + 3.0 + 0.0) / 3.0]])

@@ -13,10 +13,12 @@ pytestmark = pytest.mark.slow
 
 def test_a_hull_learnt_in_waves_serves_in_calm_water(tmp_path: Path) -> None:
     told = wavy(tmp_path, rounds=1)
-    corrected, diagnosed = told["fit"], told["diagnose"]
+    corrected, fitted, diagnosed = told["fit --estimator derivative"], told["fit"], told["diagnose"]
     assert corrected["mse"]["sway"] > 1.1
     assert corrected["position_m"] > corrected["base_position_m"]
     assert sum(diagnosed["mse"][axis] for axis in AXES) < 0.8 * sum(corrected["mse"][axis] for axis in AXES)
+    assert sum(fitted["mse"][axis] for axis in AXES) < 0.8 * sum(corrected["mse"][axis] for axis in AXES)
+    assert fitted["position_m"] < corrected["position_m"]
     assert diagnosed["mse"]["yaw"] < 0.5
     assert diagnosed["position_m"] < 0.8 * diagnosed["base_position_m"]
     assert diagnosed["heading_deg"] < 0.8 * diagnosed["base_heading_deg"]

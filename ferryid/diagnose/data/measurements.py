@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, odd_rows, smooth_measured, steady_mean
 from ferryid.signals.track import LeftOut, Motion, Track
 from ferryid.types import IN_MEMORY, Flags, Floats, RunContext
+from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.hull import current_in_body
 from ferryid.vessel.profile import Profile
 
@@ -32,12 +32,7 @@ WITHHELD = {
     "payload": ("payload_kg", "payload_x"),
 }
 """What may be kept from the diagnosis, to be compared with what it finds, and the columns of it."""
-WINDOW_S, WINDOW_LENGTH_M = 8.0, 5.0
-"""Length of the weak form's windows for a vessel of this length; slower for longer ones, by Froude's law of time."""
 STRIDES = 4
-WATER_DENSITY = 1000.0
-BLOCK_COEFFICIENT = 0.7
-"""Usual part of the box around a hull that it fills."""
 
 
 @dataclass(frozen=True)
@@ -147,22 +142,8 @@ def read_measurements(
 
 def window_lengths(profile: Profile) -> tuple[float, float]:
     """Return length and stride [s] of the weak form's windows for a vessel."""
-    length_s = WINDOW_S * sqrt(dimensions(profile)[0] / WINDOW_LENGTH_M)
+    length_s = window_seconds(profile)
     return length_s, length_s / STRIDES
-
-
-def dimensions(profile: Profile) -> tuple[float, float, float]:
-    """Return length, beam and draught [m], from mass and inertia where the profile does not state them."""
-    hull = profile.hull
-    # The radius of gyration is about a quarter of the length.
-    length = hull.length_m if isfinite(hull.length_m) else 4.0 * sqrt(hull.inertia_z / hull.mass_kg)
-    beam = hull.beam_m if isfinite(hull.beam_m) else 0.4 * length
-    draught = (
-        hull.draught_m
-        if isfinite(hull.draught_m)
-        else hull.mass_kg / (BLOCK_COEFFICIENT * WATER_DENSITY * length * beam)
-    )
-    return length, beam, draught
 
 
 def check_withheld(withhold: Collection[str]) -> None:

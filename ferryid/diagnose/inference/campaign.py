@@ -9,7 +9,6 @@ from math import sqrt
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.diagnose.data.measurements import dimensions
 from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, Member, fit_campaign_hull, induced_spread
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import prior_force_model
@@ -20,6 +19,7 @@ from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel
 from ferryid.errors import FerryIdError
 from ferryid.types import Floats
+from ferryid.vessel.dimensions import dimensions
 from ferryid.vessel.profile import Profile
 
 OWN = "wind"

@@ -14,7 +14,6 @@ Shinbrot (1957); Messenger and Bortz (2021), Weak SINDy, for the choice of test 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from ferryid.compiled import compiled
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.effects.equations_of_motion import to_ground
 from ferryid.effects.force_model import ForceModel, Measurements, as_measured, hull_changes
+from ferryid.regression import window_weights
 from ferryid.types import Floats, Ints
 
 CHANNELS = ("north", "east", "heading", "surge", "sway", "yaw rate")
@@ -120,11 +120,11 @@ def windows(measurements: Measurements, length_s: float, stride_s: float) -> Win
     channels = np.repeat([known, not known], 3)
     eta = np.where(np.isfinite(measurements.eta), measurements.eta, 0.0)
     nu = np.where(np.isfinite(measurements.nu_raw), measurements.nu_raw, 0.0)
-    _, slope, bend = _weights(m * every, measurements.step_s)
+    _, slope, bend = window_weights(m * every, measurements.step_s)
     measured = np.hstack(
         [_means(eta, bend, rows * every, measurements.step_s), -_means(nu, slope, rows * every, measurements.step_s)]
     )
-    return Windows(thin, rows, tuple(runs), _weights(m, thin.step_s)[0], measured, channels)
+    return Windows(thin, rows, tuple(runs), window_weights(m, thin.step_s)[0], measured, channels)
 
 
 def steps_of(long: Windows) -> Windows:
@@ -160,18 +160,6 @@ def steps_of(long: Windows) -> Windows:
     return Windows(
         measurements, at, tuple(runs), weight / (weight.sum() * measurements.step_s), measured, long.channels
     )
-
-
-def _weights(m: int, step_s: float) -> tuple[Floats, Floats, Floats]:
-    """Return w, w' and w'' in the middle of m rows that share a window evenly, shape (m,) each."""
-    x = (np.arange(m) + 0.5) / m
-    T = m * step_s
-    sine, cosine = np.sin(pi * x), np.cos(pi * x)
-    weight = sine**4
-    scale = 1.0 / (weight.sum() * step_s)
-    slope = 4.0 * sine**3 * cosine * (pi / T)
-    bend = (12.0 * sine**2 * cosine**2 - 4.0 * sine**4) * (pi / T) ** 2
-    return scale * weight, scale * slope, scale * bend
 
 
 def _means(values: Floats, weight: Floats, starts: NDArray[np.int64], step_s: float) -> Floats:

@@ -43,6 +43,8 @@ class Curves:
     base: Floats
     folds: int
     rows: int
+    by_fold: Floats
+    """Mean square error of every fold's test rows, shape (W, F, A, 3)."""
 
     def normalised(self) -> tuple[Floats, Floats]:
         """Return error and its standard error, each axis over its smallest error and averaged, shape (W, A) each."""
@@ -61,6 +63,19 @@ class Curves:
         near = curve <= curve[best] + band[best]
         fewest = int(np.argmax(near.any(axis=0)))
         return int(np.argmin(curve[:, fewest])), fewest + 1
+
+    def most_supported(self) -> int:
+        """Return the largest number of components, at the first window, that is not worse than the best beyond chance.
+
+        Beyond chance is more than one standard error of the paired differences over the folds. For estimates with a prior,
+        which shrinks where the data say little: more components then cost nothing.
+        """
+        least = self.mse[0].min(axis=0)
+        error = (self.by_fold[0] / np.where(least > 0.0, least, 1.0)).mean(axis=2)
+        best = int(np.argmin(error.mean(axis=0)))
+        worse = error - error[:, best : best + 1]
+        band = np.std(worse, axis=0, ddof=1) / sqrt(len(error))
+        return int(np.flatnonzero(worse.mean(axis=0) <= band)[-1]) + 1
 
     def best(self) -> tuple[int, int]:
         """Return number of window and of components (1..A) of the least error."""
@@ -125,6 +140,7 @@ class Folds:
             base=np.asarray(base),
             folds=len(held),
             rows=int(rows.sum()),
+            by_fold=errors / rows[:, None, None],
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -129,6 +129,7 @@ def bootstrap_coefficients(
     block_s: float = float("nan"),
     notes: tuple[str, ...] = (),
     where: str = "fit",
+    transform: Callable[[Floats, Floats], tuple[Floats, Floats]] | None = None,
 ) -> Bootstrap:
     """Refit SIMPLS on as many blocks as there are, drawn with replacement, `draws` times over.
 
@@ -153,6 +154,9 @@ def bootstrap_coefficients(
         Passed on to the result.
     where
         What is fitted, for messages.
+    transform
+        Takes the coefficients of all draws, shape (draws, K, m), and their intercepts, (draws, m), to those whose spread is
+        wanted.
 
     Raises
     ------
@@ -177,6 +181,8 @@ def bootstrap_coefficients(
             f"Only {counted(count, 'independent stretch')} to draw from: the intervals are probably too narrow.",
         )
     coefficients, intercepts = _draw(stacked, components, draws, seed, scale, scale_y, allowed)
+    if transform is not None:
+        coefficients, intercepts = transform(coefficients, intercepts)
     table = np.concatenate([coefficients, intercepts[:, None, :]], axis=1).transpose(2, 1, 0)
     widened = count / (count - 1)
     low, high = percentiles(table, count, level)

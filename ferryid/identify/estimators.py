@@ -1,0 +1,89 @@
+"""The choice between the estimators: both are tried on folds of the training rows, and judged by the same windows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.errors import FerryIdError
+from ferryid.identify.estimation import estimate_correction
+from ferryid.identify.motion_data import LogData
+from ferryid.identify.outcome import EstimatorScore
+from ferryid.identify.settings import FOLDS
+from ferryid.identify.split import Split
+from ferryid.identify.weak_data import WeakData
+from ferryid.types import Flags, Floats, no_progress
+
+
+def fold_error(data: LogData, components: int) -> float:
+    """Return the squared prediction error over the base model's on folds of the training rows; see `EstimatorScore.folds`."""
+    base, model = np.zeros(3), np.zeros(3)
+    for part in _parts(data.split):
+        one = replace(data, split=part)
+        try:
+            found = estimate_correction(one, components, 0, no_progress).coefficients
+        except FerryIdError:
+            return float("inf")
+        errors, windows = one.windows.errors(found), sum(len(rows) for rows in one.windows.validation)
+        if windows:
+            base, model = base + windows * errors.mse_base, model + windows * errors.mse_model
+    return mean_ratio(base, model)
+
+
+def held_out_error(data: LogData, components: int) -> float:
+    """Return the squared prediction error over the base model's on the rows that validate."""
+    errors = data.windows.errors(estimate_correction(data, components, 0, no_progress).coefficients)
+    return mean_ratio(errors.mse_base, errors.mse_model)
+
+
+def mean_ratio(base: Floats, model: Floats) -> float:
+    """Return the mean over the axes of the model's error over the base model's; NaN where no axis has any."""
+    some = base > 0.0
+    return float(np.mean(model[some] / base[some])) if some.any() else float("nan")
+
+
+def _parts(split: Split) -> list[Split]:
+    """Return splits of the training rows: every log's in contiguous parts, or whole logs where there are enough."""
+    logs = [number for number, mask in enumerate(split.training) if mask.any()]
+    nothing = tuple(np.zeros_like(mask) for mask in split.training)
+    parts = []
+    for fold in range(FOLDS):
+        test = list(nothing)
+        for place, number in enumerate(logs):
+            if len(logs) >= FOLDS:
+                test[number] = split.training[number] if place % FOLDS == fold else nothing[number]
+            else:
+                test[number] = _part(split.training[number], fold)
+        train = tuple(mask & ~held for mask, held in zip(split.training, test, strict=True))
+        parts.append(Split("folds", train, tuple(test), split.purge_s))
+    return parts
+
+
+def _part(mask: Flags, fold: int) -> Flags:
+    rows = np.array_split(np.flatnonzero(mask), FOLDS)[fold]
+    part = np.zeros_like(mask)
+    part[rows] = True
+    return part
+
+
+def choose_estimator(
+    derivative: LogData, weak: WeakData, components: dict[str, int]
+) -> tuple[LogData, tuple[EstimatorScore, ...]]:
+    """Return the data of the estimator of less error on folds of the training rows, and the scores of both.
+
+    Parameters
+    ----------
+    derivative, weak
+        The same logs for either.
+    components
+        Number of SIMPLS components of either, by its name.
+    """
+    both: dict[str, LogData] = {"weak": weak, "derivative": derivative}
+    errors = {name: fold_error(data, components[name]) for name, data in both.items()}
+    name = "derivative" if errors["derivative"] < errors["weak"] else "weak"
+    scores = tuple(
+        EstimatorScore(each, errors[each], held_out_error(data, components[each]), each == name)
+        for each, data in both.items()
+    )
+    return both[name], scores

@@ -1,0 +1,278 @@
+"""Physics in an estimate: inertia that is symmetric and possible, damping that takes energy.
+
+The gains of the weak form (`ferryid.identify.weak_rows`) are moved as little as their information allows to where the mass
+matrix is symmetric and lies between bounds of the rigid body's, and the damping dissipates in surge alone and in sway and yaw
+together, within the velocities that were visited and a margin beyond.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ferryid.identify.inertia import rigid_body
+from ferryid.identify.thresholds import IDENTIFY
+from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force
+from ferryid.regression.bases import Basis
+from ferryid.types import AXES, Flags, Floats
+from ferryid.vessel.profile import Profile
+
+_ROUNDS = 6
+_SHARES = (0.01, 0.1, 0.3, 0.6, 1.0)
+_DIRECTIONS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Feasible:
+    """Gains that physics allows.
+
+    Attributes
+    ----------
+    gains
+        Shape (K, 3).
+    notes
+        What the data contradicted, as sentences.
+    projection
+        Takes other gains, flat, to the bounds that are met here: ``b + lift @ (level - normal @ b)``; empty where none is.
+    places
+        Which gains the flat ones are, as (function, axis) rows.
+    """
+
+    gains: Floats
+    notes: tuple[str, ...]
+    projection: tuple[Floats, Floats, Floats]
+    places: tuple[tuple[int, int], ...]
+
+    def moved(self, gains: Floats) -> Floats:
+        """Return other gains, shape (n, K, 3), moved to the same bounds."""
+        lift, normal, level = self.projection
+        if not len(level):
+            return gains
+        rows, axes = (np.array(part) for part in zip(*self.places, strict=True))
+        flat = gains[:, rows, axes]
+        out = gains.copy()
+        out[:, rows, axes] = flat + (level - flat @ normal.T) @ lift.T
+        return out
+
+
+def feasible_gains(
+    profile: Profile,
+    scale: Mapping[str, float],
+    functions: Basis,
+    mask: Flags,
+    gains: Floats,
+    information: Floats,
+    nu: Floats,
+) -> Feasible:
+    """Return the gains nearest to `gains` that physics allows.
+
+    Parameters
+    ----------
+    profile, scale, functions
+        Base model, factors on it, and basis.
+    mask
+        Which gains may be other than zero, shape (K, 3).
+    gains
+        Shape (K, 3).
+    information
+        What moving them costs, shape (3, K, K).
+    nu
+        Velocities visited, shape (n, 3).
+    """
+    problem = _Problem(profile, scale, functions, mask, information)
+    wanted = problem.flat(gains)
+    cuts: list[tuple[Floats, float, str]] = []
+    symmetry = problem.symmetry()
+    points = _points(nu)
+    current = wanted
+    active = np.zeros(0, dtype=np.int64)
+    rows: list[tuple[Floats, float, str]] = []
+    for _ in range(_ROUNDS):
+        mass = problem.mass(current)
+        cuts += problem.mass_cuts(mass)
+        rows = symmetry + cuts + problem.dissipation(current, points)
+        found, active = _nearest(
+            problem.cost, wanted, np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+        )
+        settled = np.allclose(found, current, rtol=1e-9, atol=1e-12)
+        current = found
+        if settled and not problem.mass_cuts(problem.mass(current)):
+            break
+    told = tuple(dict.fromkeys(rows[k][2] for k in active.tolist() if rows[k][2]))
+    return Feasible(problem.gains(current), told, problem.projection(rows, active), tuple(problem.places))
+
+
+class _Problem:
+    """The gains as one vector, and what it must satisfy as ``normal @ b >= level``."""
+
+    def __init__(
+        self, profile: Profile, scale: Mapping[str, float], functions: Basis, mask: Flags, information: Floats
+    ) -> None:
+        self.profile, self.scale, self.functions = profile, scale, functions
+        self.places = [(k, axis) for axis in range(3) for k in range(len(functions.terms)) if mask[k, axis]]
+        self.index = {place: number for number, place in enumerate(self.places)}
+        self.mass0 = effective_mass(profile, scale, (), np.zeros((0, 3)))
+        self.acceleration = {
+            column: functions.terms.index(name) for column, name in enumerate(ACCELERATIONS) if name in functions.terms
+        }
+        size = len(self.places)
+        self.cost = np.zeros((size, size))
+        for axis in range(3):
+            own = [self.index[place] for place in self.places if place[1] == axis]
+            terms = [self.places[number][0] for number in own]
+            self.cost[np.ix_(own, own)] = information[axis][np.ix_(terms, terms)]
+
+    def flat(self, gains: Floats) -> Floats:
+        return np.array([gains[place] for place in self.places])
+
+    def gains(self, flat: Floats) -> Floats:
+        out = np.zeros((len(self.functions.terms), 3))
+        for place, value in zip(self.places, flat, strict=True):
+            out[place] = value
+        return out
+
+    def G(self, flat: Floats) -> Floats:
+        G = np.eye(3)
+        for column, k in self.acceleration.items():
+            for axis in range(3):
+                if (k, axis) in self.index:
+                    G[axis, column] -= flat[self.index[k, axis]]
+        return G
+
+    def mass(self, flat: Floats) -> Floats:
+        return np.asarray(np.linalg.solve(self.G(flat), self.mass0))
+
+    def _inverse_mass(self, x: Floats, y: Floats) -> tuple[Floats, float]:
+        """Return ``x' M^-1 y`` as a function of the gains: ``M^-1 = M0^-1 G``, slope and constant."""
+        left = np.linalg.solve(self.mass0.T, x)
+        slope = np.zeros(len(self.places))
+        for column, k in self.acceleration.items():
+            for axis in range(3):
+                if (k, axis) in self.index:
+                    slope[self.index[k, axis]] -= left[axis] * y[column]
+        return slope, float(left @ y)
+
+    def symmetry(self) -> list[tuple[Floats, float, str]]:
+        rows = []
+        unit = np.eye(3)
+        for i, j in ((0, 1), (0, 2), (1, 2)):
+            (upper, first), (lower, second) = self._inverse_mass(unit[i], unit[j]), self._inverse_mass(unit[j], unit[i])
+            if np.any(upper != lower):
+                rows += [(upper - lower, second - first, ""), (lower - upper, first - second, "")]
+        return rows
+
+    def mass_cuts(self, mass: Floats) -> list[tuple[Floats, float, str]]:
+        """Return half-spaces that a mass matrix outside its bounds violates: one for each direction in which it does."""
+        rigid = rigid_body(self.profile.hull)
+        root = np.linalg.cholesky(rigid)
+        inverse = np.linalg.inv(mass)
+        values, vectors = np.linalg.eigh(root.T @ ((inverse + inverse.T) / 2.0) @ root)
+        cuts = []
+        low, high = 1.0 / IDENTIFY.most_inertia, 1.0 / IDENTIFY.least_inertia
+        for value, vector in zip(values, vectors.T, strict=True):
+            if low * (1.0 - 1e-6) <= value <= high * (1.0 + 1e-6):
+                continue
+            x = root @ vector
+            slope, constant = self._inverse_mass(x, x)
+            if not np.any(slope):
+                continue
+            axis = AXES[int(np.argmax(np.abs(vector)))]
+            if value > high:
+                cuts.append(
+                    (
+                        -slope,
+                        constant - high,
+                        f"The data want less inertia in {axis} than the rigid body's: it is held there.",
+                    )
+                )
+            else:
+                cuts.append(
+                    (
+                        slope,
+                        low - constant,
+                        f"The data want an inertia in {axis} that no hull has: it is held at the bound.",
+                    )
+                )
+        return cuts
+
+    def dissipation(self, flat: Floats, points: Floats) -> list[tuple[Floats, float, str]]:
+        still = np.zeros_like(points)
+        across = np.zeros((len(points), 2))
+        functions = self.functions
+        phi = functions.evaluate(
+            points,
+            still,
+            points[:, :2] if functions.needs_wind else None,
+            points[:, :2] if functions.needs_current else None,
+        )
+        motion = np.array([not term.endswith("_dot") and "_r" not in term for term in functions.terms])
+        phi = np.where(motion, phi, 0.0)
+        base = motion_force(self.profile, self.scale, still, points, across[:, 0])
+        G = self.G(flat)
+        rows = []
+        for nu, values, force in zip(points, phi, base, strict=True):
+            power = np.linalg.solve(G.T, nu)
+            slope = np.array(
+                [power[axis] * values[k] if k not in self.acceleration.values() else 0.0 for k, axis in self.places]
+            )
+            if np.any(slope):
+                which = "surge" if nu[0] else "sway and yaw"
+                rows.append(
+                    (
+                        slope,
+                        -float(nu @ force),
+                        f"The data want damping in {which} that feeds the motion: it is held at none.",
+                    )
+                )
+        return rows
+
+    def projection(self, rows: list[tuple[Floats, float, str]], active: np.ndarray) -> tuple[Floats, Floats, Floats]:
+        size = len(self.places)
+        if not len(active):
+            return np.zeros((size, 0)), np.zeros((0, size)), np.zeros(0)
+        normal, level = np.array([rows[k][0] for k in active]), np.array([rows[k][1] for k in active])
+        unit = np.linalg.norm(normal, axis=1)
+        normal, level = normal / unit[:, None], level / unit
+        spread = np.linalg.pinv(self.cost, hermitian=True) @ normal.T
+        return spread @ np.linalg.pinv(normal @ spread, rcond=1e-9), normal, level
+
+
+def _points(nu: Floats) -> Floats:
+    """Return velocities ahead, astern, and across with turning, up to a margin beyond those visited, shape (p, 3)."""
+    reach = np.quantile(np.abs(nu), IDENTIFY.visited_quantile, axis=0) * IDENTIFY.damping_margin
+    angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    points = []
+    for share in _SHARES:
+        points += [(share * reach[0], 0.0, 0.0), (-share * reach[0], 0.0, 0.0)]
+        points += [(0.0, share * reach[1] * np.cos(a), share * reach[2] * np.sin(a)) for a in angles]
+    return np.array(points)
+
+
+def _nearest(cost: Floats, wanted: Floats, normal: Floats, level: Floats) -> tuple[Floats, np.ndarray]:
+    """Return b of least ``(b - wanted)' cost (b - wanted)`` with ``normal @ b >= level``, and which of them are met exactly.
+
+    As least distance by non-negative least squares: Lawson and Hanson (1974), Solving Least Squares Problems, chapter 23.
+    """
+    from scipy.optimize import nnls
+
+    unit = np.sqrt(np.maximum(np.diag(cost), 1e-300))
+    scaled = cost / np.outer(unit, unit)
+    root = np.linalg.cholesky(scaled + 1e-9 * np.eye(len(scaled)))
+    A = np.linalg.solve(root, (normal / unit).T).T
+    b = level - normal @ wanted
+    size = np.linalg.norm(A, axis=1)
+    A, b = A / size[:, None], b / size
+    if np.all(b <= 1e-12):
+        return wanted, np.zeros(0, dtype=np.int64)
+    # The distance in units of one: what is far off is brought near before it is solved for.
+    far = max(float(np.max(b)), 1e-12)
+    table, target = np.vstack([A.T, b / far]), np.zeros(A.shape[1] + 1)
+    target[-1] = 1.0
+    weights, _ = nnls(table, target, maxiter=50 * len(A))
+    left = table @ weights - target
+    if abs(left[-1]) < 1e-12:  # no gains satisfy all of it: a base model that is itself not possible
+        return wanted, np.zeros(0, dtype=np.int64)
+    step = -left[:-1] / left[-1] * far
+    return wanted + np.linalg.solve(root.T, step) / unit, np.flatnonzero(weights > 0.0)

@@ -1,0 +1,101 @@
+"""Windows in which models are judged: how well they predict the acceleration, averaged over seconds.
+
+The error of a force that is estimated from a differentiated velocity is noise for the most part, and an inertia near zero,
+which leaves hardly any force, is not punished by it. Here a model predicts the acceleration from force and velocity; its error
+is given as the force that it means on the base model's mass, for which it is the base model's force error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ferryid.identify.fit_data import Coefficients
+from ferryid.identify.settings import FitSettings
+from ferryid.identify.split import Split
+from ferryid.identify.weak_rows import WeakRows, average_over_windows
+from ferryid.models import ForceScores, ModelScores, force_scores
+from ferryid.models.forces import effective_mass
+from ferryid.regression.bases import Basis
+from ferryid.signals.track import Motion
+from ferryid.types import Flags, Floats
+from ferryid.vessel.dimensions import window_seconds
+from ferryid.vessel.profile import Profile
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionWindows:
+    """Windows of logs, of which some train and others validate."""
+
+    profile: Profile
+    settings: FitSettings
+    functions: Basis
+    motions: tuple[Motion, ...]
+    split: Split
+
+    @cached_property
+    def length_s(self) -> float:
+        """Length of a window [s]."""
+        return self.settings.weak_window_s or window_seconds(self.profile)
+
+    @cached_property
+    def training(self) -> tuple[WeakRows, ...]:
+        """Windows within training rows, one a log."""
+        return self._within(self.split.training)
+
+    @cached_property
+    def validation(self) -> tuple[WeakRows, ...]:
+        """Windows within validation rows, one a log."""
+        return self._within(self.split.validation)
+
+    def _within(self, masks: Sequence[Flags]) -> tuple[WeakRows, ...]:
+        return tuple(
+            average_over_windows(motion, mask, self.profile, self.settings.scale, self.functions, self.length_s)
+            for motion, mask in zip(self.motions, masks, strict=True)
+        )
+
+    @cached_property
+    def base_mass(self) -> Floats:
+        """The base model's mass matrix, shape (3, 3)."""
+        return effective_mass(self.profile, self.settings.scale, (), np.zeros((0, 3)))
+
+    def errors(self, found: Coefficients) -> ForceScores:
+        """Return the errors of base model and new model on validation windows, on training windows where there are none.
+
+        Infinite for a model whose mass matrix cannot be inverted.
+        """
+        windows = self.validation if self.split.kind != "none" else self.training
+        terms = self.functions.terms
+        added = effective_mass(self.profile, self.settings.scale, terms, found.theta) - self.base_mass
+        tau, base, model = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros((0, 3))]
+        for one in windows:
+            estimate = one.base(one.by_velocity) + one.basis(terms, one.by_velocity) @ found.theta + found.intercept
+            tau.append(one.force)
+            base.append(one.base(one.by_velocity))
+            model.append(one.force - _on_mass(one.inertia, one.inertia + added, one.force - estimate))
+        every = np.concatenate(tau)
+        return force_scores(every, np.concatenate(base), np.concatenate(model), np.ones(len(every), dtype=bool))
+
+    def scores(self, found: Coefficients) -> ModelScores:
+        """Return the errors of a model as a model file has them."""
+        held_out = self.split.kind != "none"
+        masks = self.split.validation if held_out else self.split.training
+        windows = self.validation if held_out else self.training
+        return ModelScores(
+            self.errors(found),
+            rows=sum(len(one) for one in windows),
+            seconds=sum(float(mask.sum()) / m.rate_hz for m, mask in zip(self.motions, masks, strict=True)),
+            split=self.split.kind,
+            split_notes=self.split.notes,
+            measure="prediction",
+        )
+
+
+def _on_mass(inertia: Floats, mass: Floats, force: Floats) -> Floats:
+    """Return the force that gives `inertia` the acceleration that `force` gives `mass`, shape (J, 3)."""
+    if np.any(np.linalg.det(mass) <= 0.0):
+        return np.full_like(force, np.inf)
+    return np.asarray(np.einsum("jab,jb->ja", inertia @ np.linalg.inv(mass), force))

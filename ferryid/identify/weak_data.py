@@ -1,0 +1,396 @@
+"""Data of a fit in the weak form: windows of the training rows, whitened, with the base model as a prior."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ferryid.effects.force_model import COEFFICIENTS, hull_of
+from ferryid.effects.hull_spread import default_hull_spread
+from ferryid.errors import FerryIdError
+from ferryid.identify.contradictions import response_of, wrong_way
+from ferryid.identify.feasible import Feasible, feasible_gains
+from ferryid.identify.fit_data import Estimate
+from ferryid.identify.inertia import without_inertia
+from ferryid.identify.motion_data import LogData
+from ferryid.identify.outcome import Excitation
+from ferryid.identify.settings import FOLDS
+from ferryid.identify.thresholds import IDENTIFY
+from ferryid.identify.weak_rows import STRIDES, WeakRows, to_force
+from ferryid.models.forces import ACCELERATIONS, MAPPED
+from ferryid.regression import CrossProducts, QrFactor, Rows, Simpls, fit_simpls
+from ferryid.regression.cross_validation import Folds
+from ferryid.regression.resampling import Blocks, block_seconds
+from ferryid.types import Flags, Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """What makes the windows of all logs alike and independent.
+
+    Attributes
+    ----------
+    posed
+        Axes on which the acceleration comes from position and heading, shape (3,).
+    autocorrelation
+        Of one window's residual with the next one's.
+    condition
+        Standard deviation of a log's own steady force over that of the residual.
+    sigma
+        Standard deviation of the residual [N, N, N·m], shape (3,).
+    """
+
+    posed: Flags
+    autocorrelation: float
+    condition: float
+    sigma: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """Whitened windows of every log.
+
+    Attributes
+    ----------
+    rows
+        Functions and target, without what the intercept explains, one a log.
+    mean
+        Functions and target that the intercept explains, shape (K + 3,).
+    unit
+        Mean of the column of ones, whitened.
+    """
+
+    rows: tuple[Rows, ...]
+    mean: Floats
+    unit: float
+
+
+@dataclass(frozen=True, eq=False)
+class WeakData(LogData):
+    """Motions of logs as windows of the weak form, of which some train and others validate."""
+
+    def model_settings(self, estimate: Estimate) -> dict[str, Any]:
+        """Return grid rates, window lengths, and the estimator."""
+        return {
+            **super().model_settings(estimate),
+            "estimator": "weak",
+            "weak_window_s": self.windows.length_s,
+        }
+
+    @cached_property
+    def training_windows(self) -> tuple[WeakRows, ...]:
+        """Windows within training rows, one a log.
+
+        Raises
+        ------
+        FerryIdError
+            For fewer windows than a fit needs.
+        """
+        if why := self.impossible:
+            raise FerryIdError(f"{self.where}: {why}. Fix: give more or longer logs, or use --estimator derivative")
+        return self.windows.training
+
+    @property
+    def impossible(self) -> str:
+        """Why the weak form cannot be used; empty where it can."""
+        if self.settings.residual != "measured":
+            return f"the weak form explains the measured force, found --residual {self.settings.residual}"
+        found, length_s = sum(len(one) for one in self.windows.training), self.windows.length_s
+        if found < IDENTIFY.fewest_windows:
+            return (
+                f"the weak form needs {IDENTIFY.fewest_windows} windows of {length_s:.3g} s to train on, found {found}"
+            )
+        return ""
+
+    @cached_property
+    def whitening(self) -> Whitening:
+        """How the windows are made alike and independent, from what a first fit leaves."""
+        candidates = [np.zeros(3, dtype=bool)]
+        if self._poses_agree():
+            candidates.append(np.ones(3, dtype=bool))
+        tried = [(posed, self._first_residuals(posed)) for posed in candidates]
+        spread = np.array([np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)) for _, left in tried])
+        # Surge and sway share a sensor; the one that leaves less is the one with less noise.
+        best = int(np.argmin(spread[:, :2].prod(axis=1))), int(np.argmin(spread[:, 2]))
+        posed = np.array([best[0], best[0], best[1]], dtype=bool)
+        left = [
+            np.column_stack([tried[best[0]][1][k][:, :2], tried[best[1]][1][k][:, 2]]) for k in range(len(self.motions))
+        ]
+        sigma = np.maximum(np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)), IDENTIFY.no_force)
+        autocorrelation = self._autocorrelation([one / sigma for one in left])
+        condition = self._condition_spread([one / sigma for one in left], autocorrelation)
+        return Whitening(posed, autocorrelation, condition, sigma)
+
+    def _poses_agree(self) -> bool:
+        """Return whether acceleration from poses is known and goes with that from velocities; of a stuck pose it does not."""
+        pose, velocity = (
+            np.concatenate([getattr(one, name) for one in self.training_windows]) for name in ("by_pose", "by_velocity")
+        )
+        if not np.isfinite(pose).all() or np.any(np.std(pose, axis=0) == 0.0):
+            return False
+        agreement = [np.corrcoef(pose[:, axis], velocity[:, axis])[0, 1] for axis in range(3)]
+        return bool(min(agreement) >= IDENTIFY.pose_agreement)
+
+    def _first_residuals(self, posed: Flags) -> list[Floats]:
+        """Return what a fit without whitening leaves of every log, shape (J, 3) each."""
+        rows = [self._rows_of(one, posed) for one in self.training_windows]
+        plain = CrossProducts.of(*rows, names=self.functions.terms, where=self.where)
+        spread = np.maximum(np.sqrt(plain.moments()[1][plain.K :] / max(plain.n, 1)), IDENTIFY.no_force)
+        fit = fit_simpls(plain + self._prior(spread), len(self.functions.terms), allowed=self.functions.mask)
+        return [one.Y - one.chunk(0, len(one.Y))[0] @ fit.coefficients[-1] - fit.intercepts[-1] for one in rows]
+
+    def _rows_of(self, windows: WeakRows, posed: Flags) -> Rows:
+        target = windows.force - windows.base(windows.acceleration(posed))
+        return Rows.of(windows.regressors(self.functions.terms), target)
+
+    def _autocorrelation(self, left: Sequence[Floats]) -> float:
+        squares = sum(float(np.sum(one**2)) for one in left)
+        products = 0.0
+        for one, windows in zip(left, self.training_windows, strict=True):
+            follows = np.diff(windows.run) == 0
+            products += float(np.sum((one[1:] * one[:-1])[follows]))
+        return float(np.clip(products / squares, 0.0, IDENTIFY.most_autocorrelation)) if squares > 0.0 else 0.0
+
+    def _condition_spread(self, left: Sequence[Floats], autocorrelation: float) -> float:
+        """Return the spread of the logs' own steady forces over the residual's, by expectation and maximisation."""
+        noise = (1.0 + autocorrelation) / (1.0 - autocorrelation)
+        variance = 0.1
+        some = [(one, _steady(windows)) for one, windows in zip(left, self.training_windows, strict=True) if len(one)]
+        for _ in range(IDENTIFY.expectation_steps):
+            sizes = []
+            for one, Z in some:
+                inverse = np.linalg.inv(Z.T @ Z / noise + np.eye(3) / variance)
+                mean = inverse @ (Z.T @ one / noise)
+                sizes.append(np.mean(mean**2) + np.trace(inverse) / 3.0)
+            variance = max(float(np.mean(sizes)), 1e-8)
+        return float(np.sqrt(variance))
+
+    @cached_property
+    def whitened(self) -> Whitened:
+        """Whitened training windows."""
+        return self._whiten(self.training_windows)
+
+    def _whiten(self, windows: Sequence[WeakRows]) -> Whitened:
+        parts, ones = [], []
+        for one in windows:
+            rows = self._rows_of(one, self.whitening.posed)
+            table = np.column_stack([rows.chunk(0, len(one))[0], rows.Y, np.ones(len(one))])
+            table = _decorrelate(
+                table, _steady(one) * self.whitening.condition, one.run, self.whitening.autocorrelation
+            )
+            parts.append(table[:, :-1])
+            ones.append(table[:, -1])
+        weight = sum(float(one @ one) for one in ones)
+        explained = sum(part.T @ one for part, one in zip(parts, ones, strict=True)) / max(weight, 1e-12)
+        K = len(self.functions.terms)
+        cleared = [part - np.outer(one, explained) for part, one in zip(parts, ones, strict=True)]
+        unit = float(np.mean(np.concatenate(ones)))
+        return Whitened(
+            tuple(Rows.of(one[:, :K], one[:, K:]) for one in cleared), np.asarray(explained), max(unit, 1e-3)
+        )
+
+    @cached_property
+    def training(self) -> QrFactor | CrossProducts:
+        """Whitened functions and target of the training windows, and the prior."""
+        rows = CrossProducts.of(*self.whitened.rows, names=self.functions.terms, where=self.where)
+        return rows + self._prior(self.whitening.sigma, factor=self.prior_factor)
+
+    @cached_property
+    def validation(self) -> QrFactor | CrossProducts:
+        """Functions and target of the validation windows."""
+        return CrossProducts.of(*(self._rows_of(one, self.whitening.posed) for one in self.windows.validation))
+
+    @cached_property
+    def prior_spread(self) -> Floats:
+        """Standard deviations of the prior of each gain, shape (K, 3); infinite where nothing is known."""
+        spread = np.full((len(self.functions.terms), 3), np.inf)
+        nu = np.concatenate([m.nu[mask] for m, mask in zip(self.motions, self.split.training, strict=True)])
+        known = default_hull_spread(self.profile, nu)
+        if self.profile.hull.has_model:
+            known = IDENTIFY.hull_spread * np.abs(hull_of(self.profile)) + IDENTIFY.unmodelled_share * known
+        for name, places in MAPPED.items():
+            for term, axis in places:
+                if term in self.functions.terms and not name.startswith("m"):
+                    spread[self.functions.terms.index(term), axis] = known[COEFFICIENTS.index(name)]
+        share = IDENTIFY.mass_spread if self.profile.hull.has_model else IDENTIFY.unknown_mass_spread
+        mass = self.windows.base_mass
+        for column, name in enumerate(ACCELERATIONS):
+            if name in self.functions.terms:
+                ratio = np.sqrt(np.diag(mass) / mass[column, column])
+                spread[self.functions.terms.index(name)] = share * np.where(np.arange(3) == column, 1.0, 0.3) * ratio
+        return spread
+
+    @cached_property
+    def prior_factor(self) -> float:
+        """How much wider the prior has to be than stated for what the data say, one at least: empirical Bayes."""
+        sums, sigma = CrossProducts.of(*self.whitened.rows), self.whitening.sigma
+        Sxx, Sxy = sums.centred()[:2]
+        factor = 1.0
+        for _ in range(IDENTIFY.expectation_steps):
+            sizes = []
+            for axis in range(3):
+                some = self.functions.mask[:, axis] & np.isfinite(self.prior_spread[:, axis])
+                spread = factor * self.prior_spread[some, axis]
+                unit = np.outer(spread, spread)
+                inverse = np.linalg.inv(Sxx[np.ix_(some, some)] / sigma[axis] ** 2 * unit + np.eye(len(spread)))
+                found = inverse @ (Sxy[some, axis] / sigma[axis] ** 2 * spread)
+                sizes.append(found**2 + np.diag(inverse))
+            factor *= float(np.sqrt(np.mean(np.concatenate(sizes))))
+        return float(np.clip(factor, 1.0, IDENTIFY.widest_prior))
+
+    def _prior(self, sigma: Floats, share: float = 1.0, factor: float = 1.0) -> CrossProducts:
+        """Return the prior as observations of zero: a pair a function, whose mean is none, and of which no intercept comes."""
+        terms, mask = self.functions.terms, self.functions.mask
+        with np.errstate(divide="ignore"):
+            weights = np.where(mask & np.isfinite(self.prior_spread), sigma / (factor * self.prior_spread), np.nan)
+        # Axes share their factors: one weight a function.
+        some = np.isfinite(weights).any(axis=1)
+        logs = np.where(np.isfinite(weights), np.log(np.where(weights > 0.0, weights, 1.0)), 0.0).sum(axis=1)
+        weight = np.where(some, np.exp(logs / np.maximum(np.isfinite(weights).sum(axis=1), 1)), 0.0)
+        X = np.diag(weight * np.sqrt(share / 2.0))
+        X = np.vstack([X[some], -X[some]])
+        if not len(X):
+            X = np.zeros((0, len(terms)))
+        return CrossProducts.of(Rows.of(X, np.zeros((len(X), 3))))
+
+    def components(self) -> int:
+        """Return the number of SIMPLS components of the settings, or the one that cross-validation supports."""
+        if self.settings.components != "auto":
+            return int(self.settings.components)
+        curves = self.folds().curves(self.functions.mask, len(self.functions.terms), self.where)
+        return curves.most_supported()
+
+    def folds(self) -> Folds:
+        """Return contiguous parts of the training windows for cross-validation, whitened as the whole is."""
+        parts: list[list[Rows]] = [[] for _ in range(FOLDS)]
+        whole = [one for one in self.whitened.rows if len(one.Y)]
+        if len(whole) >= FOLDS:
+            for number, one in enumerate(whole):
+                parts[number % FOLDS].append(one)
+        else:
+            for one in whole:
+                X = one.chunk(0, len(one.Y))[0]
+                for number, place in enumerate(np.array_split(np.arange(len(one.Y)), FOLDS)):
+                    # A window shares half its rows with the last of the part before.
+                    place = place[1:] if number else place
+                    parts[number].append(Rows.of(X[place], one.Y[place]))
+        sums = [CrossProducts.of(*part) for part in parts if part]
+        prior = self._prior(self.whitening.sigma, 1.0 / max(len(sums) - 1, 1), self.prior_factor)
+        return Folds((tuple(one + prior for one in sums),), tuple(sums))
+
+    def resampling_blocks(
+        self, theta: Floats, intercept: Floats
+    ) -> tuple[Sequence[CrossProducts], float, tuple[str, ...]]:
+        """Return blocks of training windows as long as the whitened residual is correlated, each with its part of the prior."""
+        stride_s = self.windows.length_s / STRIDES
+        rates = [1.0 / stride_s] * len(self.motions)
+        rows = [one for one in self.whitened.rows if len(one.Y)]
+        block_s, notes = block_seconds(rows, rates[: len(rows)], theta, intercept)
+        stacked = Blocks.of(rows, rates[: len(rows)], block_s)
+        prior = self._prior(self.whitening.sigma, 1.0 / len(stacked.n), self.prior_factor)
+        blocks = [
+            CrossProducts(int(n), stacked.K, stacked.m, stacked.shift, products) + prior
+            for n, products in zip(stacked.n, stacked.products, strict=True)
+        ]
+        return blocks, block_s, notes
+
+    def scattered(self, gains: Floats) -> Floats:
+        """Return drawn gains, (draws, K, 3), with the scatter of the prior: the truth is as far from its mean as it states.
+
+        Drawing windows again leaves the prior where it is, so that what only the prior determines would have no interval.
+        """
+        rng = np.random.default_rng(self.settings.seed)
+        information, out = self._information(), gains.copy()
+        for axis in range(3):
+            own = np.flatnonzero(self.functions.mask[:, axis] & np.isfinite(self.prior_spread[:, axis]))
+            every = np.flatnonzero(self.functions.mask[:, axis])
+            spread = self.prior_factor * self.prior_spread[own, axis]
+            covariance = np.linalg.pinv(information[axis][np.ix_(every, every)], hermitian=True)
+            pulls = rng.standard_normal((len(gains), len(own))) / spread
+            out[:, every, axis] += pulls @ covariance[np.searchsorted(every, own)]
+        return out
+
+    def refuse_wrong_way(self) -> None:
+        """Refuse logs in which the vessel accelerates against the applied force.
+
+        Raises
+        ------
+        FerryIdError
+            With what explains it and the line of the profile to change.
+        """
+        terms = self.functions.terms
+        if not all(name in terms for name in ACCELERATIONS):
+            return
+        mask = without_inertia(self.functions.mask, terms, self.without_force)
+        gains = fit_simpls(self.training, len(terms), allowed=mask).coefficients[-1]
+        places = (terms.index("u_dot"), terms.index("v_dot"), terms.index("r_dot"))
+        response, spread = response_of(gains, self._information(), mask, places)
+        if told := wrong_way(response, spread, f"the profile {self.profile.name}"):
+            raise FerryIdError(f"{self.where}: {told}")
+
+    def feasible(self, gains: Floats, mask: Flags) -> Feasible:
+        """Return the gains nearest to given ones that physics allows, (K, 3), nearest as the training windows measure it."""
+        nu = np.concatenate([m.nu[rows] for m, rows in zip(self.motions, self.split.training, strict=True)])
+        return feasible_gains(self.profile, self.settings.scale, self.functions, mask, gains, self._information(), nu)
+
+    def _information(self) -> Floats:
+        """Return the second derivative of half the squared error over the gains, shape (3, K, K)."""
+        Sxx = CrossProducts.of(*self.whitened.rows).centred()[0]
+        with np.errstate(divide="ignore"):
+            prior = np.where(np.isfinite(self.prior_spread), (self.prior_factor * self.prior_spread) ** -2.0, 0.0)
+        return np.array([Sxx / self.whitening.sigma[a] ** 2 + np.diag(prior[:, a]) for a in range(3)])
+
+    def intercepts(self, gains: Floats, offsets: Floats) -> Floats:
+        """Return intercepts, (..., 3), from gains (..., K, 3) and what whitened rows leave on average (..., 3)."""
+        K = len(self.functions.terms)
+        found = self.whitened.mean[K:] - np.einsum("k,...ka->...a", self.whitened.mean[:K], gains)
+        return np.asarray(found + offsets / self.whitened.unit)
+
+    def fitted(self, regression: Simpls) -> tuple[Floats, Floats]:
+        """Return gains and intercepts for every number of components, shape (A, K, 3) and (A, 3)."""
+        return regression.coefficients, self.intercepts(regression.coefficients, regression.intercepts)
+
+    def force_form(self, gains: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+        """Return coefficients and intercepts of the applied force; see `to_force`."""
+        return to_force(gains, self.intercepts(gains, offsets), self.functions.terms, self.windows.base_mass)
+
+    def excitation(self, estimate: Estimate) -> Excitation:
+        """Return what the training windows determine by themselves, without the prior."""
+        from ferryid.identify.excitation import assess_excitation
+
+        return assess_excitation(
+            CrossProducts.of(*self.whitened.rows),
+            self.functions.terms,
+            estimate.regression.vip(estimate.components),
+            self.motions,
+            self.split.training,
+            estimate.functions.mask,
+        )
+
+
+def weak_data(data: LogData) -> WeakData:
+    """Return the same logs as windows of the weak form."""
+    return WeakData(**{one.name: getattr(data, one.name) for one in fields(data)})
+
+
+def _steady(windows: WeakRows) -> Floats:
+    """Return the ways in which a steady force of a log's own acts: along the hull, and along north and east, shape (J, 3)."""
+    return np.column_stack([np.ones(len(windows)), windows.heading])
+
+
+def _decorrelate(table: Floats, conditions: Floats, run: np.ndarray, autocorrelation: float) -> Floats:
+    """Return columns whose rows are alike and independent, shape (J, c), if conditions of unit variance act on them, (J, 3)."""
+    if not len(table):
+        return table
+    whole = np.column_stack([table, conditions])
+    kept = np.sqrt(1.0 - autocorrelation**2)
+    out = whole * kept
+    follows = np.concatenate([[False], np.diff(run) == 0])
+    out[follows] = whole[follows] - autocorrelation * whole[np.flatnonzero(follows) - 1]
+    table, Z = out[:, : table.shape[1]] / kept, out[:, table.shape[1] :] / kept
+    left, singular, _ = np.linalg.svd(Z, full_matrices=False)
+    return np.asarray(table - left @ ((1.0 - 1.0 / np.sqrt(1.0 + singular**2))[:, None] * (left.T @ table)))
