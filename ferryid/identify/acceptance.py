@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,41 @@ from ferryid.types import AXES, Flags, Floats
 
 
 @dataclass(frozen=True)
+class Check:
+    """One condition of acceptance.
+
+    Attributes
+    ----------
+    name
+        Its name, the same in every fit.
+    passed
+        Whether it holds; None where these data cannot show it, which does not stand in the way.
+    value, limit, unit
+        What was found, and the bound of it that the reason names.
+    reason
+        Value, limit and what they mean, in a sentence.
+    """
+
+    name: str
+    passed: bool | None
+    value: float
+    limit: float
+    unit: str
+    reason: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the check as plain values."""
+        return {
+            "name": self.name,
+            "passed": self.passed,
+            "value": self.value,
+            "limit": self.limit,
+            "unit": self.unit,
+            "reason": self.reason,
+        }
+
+
+@dataclass(frozen=True)
 class Acceptance:
     """Whether a model is accepted and why, in sentences that a person can act on."""
 
@@ -25,6 +61,33 @@ class Acceptance:
     per_axis: Mapping[str, float]
     """The same per axis."""
     reasons: tuple[str, ...]
+    """What stands in the way, then what else explains the verdict."""
+    checks: tuple[Check, ...] = ()
+    """Every condition, whether it holds or not."""
+    criterion: str = "thesis"
+    """``"full"``, or ``"thesis"``: the force error alone."""
+
+    def with_checks(self, checks: Sequence[Check]) -> Acceptance:
+        """Return the verdict under the full criterion: that of the force error and of all these checks."""
+        failed = [f"Rejected: {_lower(check.reason)}" for check in checks if check.passed is False]
+        obstacles = sum(reason.startswith("Rejected:") for reason in self.reasons)
+        notes = [check.reason for check in checks if check.passed is None]
+        return Acceptance(
+            self.accepted and not failed,
+            self.normalised_mse,
+            self.per_axis,
+            (*self.reasons[:obstacles], *failed, *self.reasons[obstacles:], *notes),
+            (*self.checks, *checks),
+            "full",
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the verdict as plain values."""
+        return {
+            "criterion": self.criterion,
+            "accepted": self.accepted,
+            "checks": [check.to_json() for check in self.checks],
+        }
 
 
 _ROUNDING = 1e-12
@@ -53,37 +116,13 @@ def accept(base_mse: Floats, model_mse: Floats) -> Acceptance:
         With one sentence for the mean and one for every axis that stands in the way or needs an explanation.
     """
     base, model = np.asarray(base_mse, dtype=float), np.asarray(model_mse, dtype=float)
-    ratios = np.full(3, np.nan)
-    reasons: list[str] = []
-    obstacles: list[str] = []
-    for i, axis in enumerate(AXES):
-        unit = "N·m" if axis == "yaw" else "N"
-        if not np.isfinite(base[i]) or not np.isfinite(model[i]):
-            which = "base" if not np.isfinite(base[i]) else "new"
-            obstacles.append(
-                f"Rejected: the {which} model's validation error in {axis} is not a finite number; "
-                "are there validation rows on which everything was measured?"
-            )
-            continue
-        if base[i] <= _NOTHING**2:
-            spotless = model[i] <= _NOTHING**2
-            ratios[i] = 1.0 if spotless else np.inf
-            if spotless:
-                reasons.append(f"In {axis} both models are without error, so that axis decides nothing.")
-            else:
-                obstacles.append(
-                    f"Rejected: in {axis} the base model makes no error and the new one "
-                    f"{np.sqrt(model[i]):.3g} {unit} RMS."
-                )
-            continue
-        ratios[i] = model[i] / base[i]
-        if ratios[i] > 1.0 + IDENTIFY.worsening:
-            obstacles.append(
-                f"Rejected: {axis} gets worse, {_change(ratios[i])} in MSE "
-                f"({np.sqrt(base[i]):.3g} to {np.sqrt(model[i]):.3g} {unit} RMS); "
-                f"{100 * IDENTIFY.worsening:.0f} % is allowed."
-            )
+    axes = [_force_on_axis(axis, float(base[i]), float(model[i])) for i, axis in enumerate(AXES)]
+    ratios = [check.value for check in axes]
+    obstacles = [f"Rejected: {check.reason}" for check in axes if check.passed is False]
+    reasons = [check.reason for check, mse in zip(axes, base, strict=True) if check.passed and mse <= _NOTHING**2]
     mean = float(np.mean(ratios))
+    sentence = "the force error could not be compared."
+    enough = False
     if np.isfinite(mean):
         enough = mean <= 1.0 - IDENTIFY.improvement + _ROUNDING
         sentence = (
@@ -94,13 +133,50 @@ def accept(base_mse: Floats, model_mse: Floats) -> Acceptance:
             obstacles.insert(0, f"Rejected: a fall of {100 * IDENTIFY.improvement:.0f} % or more is needed. {sentence}")
         else:
             reasons.insert(0, sentence)
-    per_axis = {axis: float(ratio) for axis, ratio in zip(AXES, ratios, strict=True)}
-    return Acceptance(not obstacles, mean, per_axis, (*obstacles, *reasons))
+    mean_check = Check("force_error", enough, mean, 1.0 - IDENTIFY.improvement, "of the base model's MSE", sentence)
+    per_axis = dict(zip(AXES, ratios, strict=True))
+    return Acceptance(not obstacles, mean, per_axis, (*obstacles, *reasons), (mean_check, *axes))
+
+
+def _force_on_axis(axis: str, base: float, model: float) -> Check:
+    """Return whether the force error of an axis does not get worse; the value is the ratio of MSE."""
+    unit = "N·m" if axis == "yaw" else "N"
+    name, limit = f"force_error_{axis}", 1.0 + IDENTIFY.worsening
+
+    def check(passed: bool, value: float, reason: str) -> Check:
+        return Check(name, passed, value, limit, "of the base model's MSE", reason)
+
+    if not np.isfinite(base) or not np.isfinite(model):
+        which = "base" if not np.isfinite(base) else "new"
+        return check(
+            False,
+            float("nan"),
+            f"the {which} model's validation error in {axis} is not a finite number; "
+            "are there validation rows on which everything was measured?",
+        )
+    if base <= _NOTHING**2:
+        if model <= _NOTHING**2:
+            return check(True, 1.0, f"In {axis} both models are without error, so that axis decides nothing.")
+        return check(
+            False,
+            float("inf"),
+            f"in {axis} the base model makes no error and the new one {np.sqrt(model):.3g} {unit} RMS.",
+        )
+    ratio = model / base
+    size = f"{_change(ratio)} in MSE ({np.sqrt(base):.3g} to {np.sqrt(model):.3g} {unit} RMS)"
+    if ratio > limit:
+        return check(False, ratio, f"{axis} gets worse, {size}; {100 * IDENTIFY.worsening:.0f} % is allowed.")
+    return check(True, ratio, f"In {axis} the force error changes by {size}.")
 
 
 def _change(ratio: float) -> str:
     """Return a ratio as a signed change in per cent."""
     return f"{100.0 * (ratio - 1.0):+.1f} %"
+
+
+def _lower(sentence: str) -> str:
+    """Return a sentence as it goes on after a colon."""
+    return sentence[:1].lower() + sentence[1:]
 
 
 def force_mse(

@@ -22,7 +22,7 @@ from ferryid.identify.excitation import SECTORS, sector_coverage
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import general_warnings, log_warnings
 from ferryid.identify.inertia import axes_without_force
-from ferryid.identify.log_sums import pooled_deviation
+from ferryid.identify.log_sums import pooled_deviation, pooled_mean_square
 from ferryid.identify.model_selection import select_model
 from ferryid.identify.outcome import ArchivedLog, Excitation, FitOutcome, LogFit
 from ferryid.identify.pipeline import accept_estimate
@@ -46,7 +46,10 @@ _NOT_RUN = FreeRun.not_run(
 
 @dataclass(frozen=True, eq=False)
 class _Log:
-    """One log after its pieces were added up: what is told of it, and the sums of its validation rows."""
+    """One log after its pieces were added up: what is told of it, and the sums of its validation rows.
+
+    `reference` are the moments of the error of the model that others are judged against on these rows, shape (blocks, 3, 3).
+    """
 
     name: str
     sha256: str
@@ -55,6 +58,8 @@ class _Log:
     rows: int
     training_rows: int
     validation: CrossProducts
+    reference: Floats
+    blocks: int
     warnings: tuple[str, ...]
 
 
@@ -81,6 +86,7 @@ class _Sums:
         self.force: list[Floats] = []
         self.base: list[Floats] = []
         self.validation_force: list[Floats] = []
+        self.visited: list[Floats] = []
         self._apiece = max(1, MOST_DRAWN // logs)
         self._short = 0
         self._whole = validation_blocks(logs) if by_logs else None
@@ -104,10 +110,23 @@ class _Sums:
         self.validation_force.append(one.force[validates])
         self.ranges.append(log.ranges)
         self.sectors += log.sectors
+        self.visited.append(log.visited)
         validation = one.test.summed(validates[:, None])
         rows = int(one.test.n.sum())
+        held_out = int(np.count_nonzero(validates & (one.test.n.sum(axis=1) > 0)))
         self.logs.append(
-            _Log(log.name, log.sha256, log.files, log.rate_hz, rows, training_rows, validation, log.warnings)
+            _Log(
+                log.name,
+                log.sha256,
+                log.files,
+                log.rate_hz,
+                rows,
+                training_rows,
+                validation,
+                one.reference[validates],
+                held_out,
+                log.warnings,
+            )
         )
 
     def _validates(self, blocks: int) -> Flags:
@@ -185,15 +204,20 @@ class ArchiveData(FitData):
         note = f"{counted(len(logged), 'log')}: {trained:.0f} s train, {validated:.0f} s validate, " + (
             "whole logs, one of every three in a row." if by_logs else "in blocks of every log."
         )
+        reference = np.concatenate([log.reference for log in logged])
         return ModelScores(
-            ForceScores.of(*_errors(validation, found), variance), validation.n, validated, self.settings.split, (note,)
+            ForceScores.of(*_errors(validation, reference, found), variance),
+            validation.n,
+            validated,
+            self.settings.split,
+            (note,),
         )
 
     def archived_logs(self, found: Coefficients) -> tuple[ArchivedLog, ...]:
         """Return how well the model fits each log: the ratio of MSE on its validation rows, NaN where it has none."""
         logs = []
         for log in self.sums.logs:
-            base, new = _errors(log.validation, found)
+            base, new = _errors(log.validation, log.reference, found)
             with np.errstate(divide="ignore", invalid="ignore"):
                 ratio = np.where(base > 0.0, new / base, np.nan)
             logs.append(ArchivedLog(log.name, log.files, log.sha256, log.rows, log.validation.n, ratio, log.warnings))
@@ -208,6 +232,16 @@ class ArchiveData(FitData):
             undetermined=undetermined_terms(self.training, self.functions.terms, estimate.functions.mask),
             vip=estimate.regression.vip(estimate.components),
         )
+
+    @property
+    def held_out_blocks(self) -> int:
+        """Number of blocks that the validation rows come in."""
+        return sum(log.blocks for log in self.sums.logs)
+
+    @property
+    def visited(self) -> Floats:
+        """Velocities of evenly spaced rows of every log, shape (n, 3)."""
+        return np.concatenate(self.sums.visited)
 
     def free_runs(self, found: Coefficients, progress: Callable[[str], None]) -> tuple[FreeRun, FreeRun]:
         """Return no free runs, as there is no motion."""
@@ -346,8 +380,7 @@ def _add_logs(
     return make_basis(first.basis, structure=settings.structure)
 
 
-def _errors(rows: CrossProducts, found: Coefficients) -> tuple[Floats, Floats]:
-    """Return the mean square error of base and new model per axis, shape (3,)."""
-    theta, intercept = found.theta, found.intercept
-    both = rows.sse(np.array([np.zeros_like(theta), theta]), np.array([np.zeros_like(intercept), intercept]))
-    return both[0] / max(rows.n, 1), both[1] / max(rows.n, 1)
+def _errors(rows: CrossProducts, reference: Floats, found: Coefficients) -> tuple[Floats, Floats]:
+    """Return the mean square error of the model to judge against and of the new model per axis, shape (3,)."""
+    errors = rows.sse(found.theta[None], found.intercept[None])[0]
+    return pooled_mean_square(reference), errors / max(rows.n, 1)

@@ -26,9 +26,12 @@ from ferryid.signals.cache import folder_of, load
 from ferryid.signals.parquet import read_table, write_table
 from ferryid.signals.prepare import track_of
 from ferryid.signals.smooth import smooth_measured
+from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
-SCHEMA = "ferryid.pieces/3"
+SCHEMA = "ferryid.pieces/4"
+_VELOCITIES = 128
+"""Rows whose velocities are kept of a log, evenly spaced: damping is judged at them."""
 _MATTERS = ("basis", "smoother", "residual", "rate_hz", "delta", "sigma", "zeta")
 """Settings that change the pieces; all others are chosen when they are added up."""
 
@@ -51,6 +54,8 @@ class StoredSums:
         Rows in each of twelve sectors of heading.
     sums
         Its block sums at every window.
+    visited
+        Velocities of evenly spaced rows, shape (n, 3).
     warnings
         Signals that contradict each other, and which rows are not used and why, as sentences.
     """
@@ -63,6 +68,7 @@ class StoredSums:
     ranges: Mapping[str, tuple[float, float]]
     sectors: Sequence[int]
     sums: LogSums
+    visited: Floats
     warnings: tuple[str, ...] = ()
 
 
@@ -129,6 +135,7 @@ def _compute(folder: Path, profile: Profile, settings: FitSettings, windows_s: S
             windows_s,
             blocks=blocks if blocks >= 3 else 1,
         ),
+        visited=motion.nu[used][:: max(1, -(-int(used.sum()) // _VELOCITIES))],
         warnings=(*opened.doubts, *opened.left_out),
     )
 
@@ -160,6 +167,8 @@ def write_block_sums(path: Path, key: Mapping[str, Any], log: StoredSums) -> Non
         "test": same[0] if same else len(stored) - 1,
         "force": one.force.tolist(),
         "base": one.base.tolist(),
+        "reference": one.reference.tolist(),
+        "visited": log.visited.tolist(),
         "warnings": log.warnings,
     }
     with replacing(path) as draft:
@@ -179,9 +188,12 @@ def _read(path: Path, key: Mapping[str, Any]) -> StoredSums:
     packed = columns["sums"].reshape(*counts.shape, -1)
     products[..., *upper] = packed
     products[..., upper[1], upper[0]] = packed
-    shifts, force, base = (np.array(told[name], dtype=np.float64) for name in ("shift", "force", "base"))
+    shifts, force, base, reference, visited = (
+        np.array(told[name], dtype=np.float64) for name in ("shift", "force", "base", "reference", "visited")
+    )
     whole = np.array_equal(products[..., -1, -1], counts) and np.isfinite(packed).all()
-    if not whole or shifts.shape != (len(counts), K + m) or not force.shape == base.shape == (counts.shape[1], 3, 3):
+    moments = force.shape == base.shape == reference.shape == (counts.shape[1], 3, 3)
+    if not whole or not moments or shifts.shape != (len(counts), K + m) or visited.shape != (len(visited), 3):
         raise FerryIdError(f"{path}: damaged. Fix: delete it, it will be computed again")
     pieces = [BlockSums(n, K, m, shift, one) for n, shift, one in zip(counts, shifts, products, strict=True)]
     windows = len(key["windows_s"])
@@ -199,6 +211,8 @@ def _read(path: Path, key: Mapping[str, Any]) -> StoredSums:
             pieces[told["test"]],
             force,
             base,
+            reference,
         ),
+        visited=visited,
         warnings=tuple(told["warnings"]),
     )

@@ -148,6 +148,16 @@ class FitData(ABC):
     def excitation(self, estimate: Estimate) -> Excitation:
         """Return what the training rows determine."""
 
+    @property
+    @abstractmethod
+    def held_out_blocks(self) -> int:
+        """Number of blocks that the validation rows come in."""
+
+    @property
+    @abstractmethod
+    def visited(self) -> Floats:
+        """Velocities of training and validation rows, or of evenly spaced ones of them, shape (n, 3)."""
+
     @abstractmethod
     def free_runs(self, found: Coefficients, progress: Callable[[str], None]) -> tuple[FreeRun, FreeRun]:
         """Return free runs of the base model and of the new one on validation rows."""

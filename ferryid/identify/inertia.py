@@ -25,10 +25,23 @@ def axes_without_force(tau: Floats, base: Floats) -> Flags:
 
 def implausible_inertia(profile: Profile, mass: Floats) -> Flags:
     """Return the axes whose effective inertia cannot be right, shape (3,); all of them where the matrix as a whole is."""
-    share = np.diag(mass) / np.diag(rigid_body(profile.hull))
+    share = relative_inertia(profile, mass)
     wrong = (share < IDENTIFY.least_inertia) | (share > IDENTIFY.most_inertia)
-    positive = bool(np.all(np.linalg.eigvalsh((mass + mass.T) / 2) > 0.0))
-    return wrong if wrong.any() or positive else np.ones(3, dtype=bool)
+    return wrong if wrong.any() or scaled_eigenvalue(profile, mass) > 0.0 else np.ones(3, dtype=bool)
+
+
+def relative_inertia(profile: Profile, mass: Floats) -> Floats:
+    """Return the diagonal of an effective mass matrix over the rigid body's, shape (3,)."""
+    return np.asarray(np.diag(mass) / np.diag(rigid_body(profile.hull)))
+
+
+def scaled_eigenvalue(profile: Profile, mass: Floats) -> float:
+    """Return the smallest eigenvalue of the symmetric part of a mass matrix in units of the rigid body's diagonal.
+
+    So scaled, masses and moments of inertia compare; its sign is that of the matrix itself.
+    """
+    root = np.sqrt(np.diag(rigid_body(profile.hull)))
+    return float(np.linalg.eigvalsh((mass + mass.T) / 2 / np.outer(root, root))[0])
 
 
 def without_inertia(mask: Flags, terms: Sequence[str], axes: Flags) -> Flags:

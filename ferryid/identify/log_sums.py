@@ -12,7 +12,7 @@ from ferryid.identify.inertia import axes_without_force
 from ferryid.identify.rows import known_rows, rows_of
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings
 from ferryid.identify.split import purge_seconds
-from ferryid.models.forces import compute_residual
+from ferryid.models.forces import compute_residual, without_inputs
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import BlockSums, Folds, FoldSums, block_edges
 from ferryid.signals.smooth import Measured, smooth_measured
@@ -36,6 +36,9 @@ class LogSums:
     force, base
         Count, mean and sum of squares about the mean, of the measured force and of the base model's on the test rows of each
         block, shape (B, 3, 3): they say on which axes no actuator acts, and what R² compares with.
+    reference
+        The same of the error of the base model without measured wind, current and payload, which models are judged
+        against.
     """
 
     log: str
@@ -43,6 +46,7 @@ class LogSums:
     test: BlockSums
     force: Floats
     base: Floats
+    reference: Floats
 
 
 def sum_log(
@@ -71,6 +75,7 @@ def sum_log(
         Rows to use, shape (n,); all where None.
     """
     test = smooth_measured(measured, TEST_WINDOW_S)
+    bare = without_inputs(test)
     motions = (smooth_measured(measured, window_s, settings.smoother) for window_s in windows_s)
     return sum_motions(
         functions,
@@ -79,6 +84,7 @@ def sum_log(
         max(TEST_WINDOW_S, *windows_s),
         blocks=blocks,
         wanted=wanted,
+        reference=compute_residual(profile, bare, settings.scale),
     )
 
 
@@ -90,6 +96,7 @@ def sum_motions(
     *,
     blocks: int = FOLDS,
     wanted: Flags | None = None,
+    reference: Floats | None = None,
 ) -> LogSums:
     """Return the pieces of one log from smoothed motions.
 
@@ -103,6 +110,8 @@ def sum_motions(
         Longest smoothing window of all [s].
     blocks, wanted
         As in `sum_log`.
+    reference
+        Error of the model that others are judged against, shape (n, 3).
     """
     motion, error = test
     every = np.ones(len(motion.t), dtype=bool) if wanted is None else wanted
@@ -118,10 +127,11 @@ def sum_motions(
 
     at_windows = [pieces(one, target, known_rows(one, functions, target, target) & every) for one, target in training]
     spans = [slice(low, high) for low, high in pairwise(edges[::3])]
-    force, base = (
-        np.array([_moments(values[span][used[span]]) for span in spans]) for values in (motion.tau, motion.tau - error)
+    force, base, judged = (
+        np.array([_moments(values[span][used[span]]) for span in spans])
+        for values in (motion.tau, motion.tau - error, error if reference is None else reference)
     )
-    return LogSums(motion.log, tuple(at_windows), pieces(motion, error, used), force, base)
+    return LogSums(motion.log, tuple(at_windows), pieces(motion, error, used), force, base, judged)
 
 
 def force_free_axes(logs: Sequence[LogSums]) -> Flags:
@@ -135,6 +145,12 @@ def _moments(values: Floats) -> Floats:
         return np.zeros((3, 3))
     mean = values.mean(axis=0)
     return np.array([np.full(3, float(len(values))), mean, ((values - mean) ** 2).sum(axis=0)])
+
+
+def pooled_mean_square(moments: Floats) -> Floats:
+    """Return the mean square of all rows of several blocks, shape (3,), from the moments of each, shape (B, 3, 3)."""
+    count, mean, squares = moments.transpose(1, 0, 2)
+    return np.asarray((squares + count * mean**2).sum(axis=0) / np.maximum(count.sum(axis=0), 1.0))
 
 
 def pooled_deviation(moments: Floats) -> Floats:

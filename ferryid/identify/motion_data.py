@@ -21,7 +21,7 @@ from ferryid.identify.settings import FitSettings, check_components
 from ferryid.identify.split import Split
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import ModelScores, force_scores
-from ferryid.models.forces import Estimator, compute_residual
+from ferryid.models.forces import Estimator, compute_residual, without_inputs
 from ferryid.models.prediction import FreeRun, run_free
 from ferryid.regression import CrossProducts, QrFactor, Rows, factorise
 from ferryid.regression.resampling import Blocks, block_seconds
@@ -60,6 +60,17 @@ class MotionData(FitData):
         return self.split.kind != "none"
 
     @property
+    def held_out_blocks(self) -> int:
+        """Number of blocks that the validation rows come in."""
+        return self.split.held_out_blocks
+
+    @property
+    def visited(self) -> Floats:
+        """Velocities of training and validation rows, shape (n, 3)."""
+        masks = [one | other for one, other in zip(self.split.training, self.split.validation, strict=True)]
+        return stacked([motion.nu for motion in self.motions], masks)
+
+    @property
     def where(self) -> str:
         """Name of the first log, for messages."""
         return self.motions[0].log
@@ -88,6 +99,10 @@ class MotionData(FitData):
         """Return the estimator that the correction comes on top of."""
         return Estimator(self.profile, self.settings.scale)
 
+    def reference(self) -> tuple[Estimator, tuple[Motion, ...]]:
+        """Return the estimator that the new model is judged against, and the motions as it sees them."""
+        return self.base(), tuple(without_inputs(motion) for motion in self.motions)
+
     def estimator(self, found: Coefficients) -> Estimator:
         """Return the estimator of the new model."""
         return Estimator(self.profile, self.settings.scale, self.functions, found.theta, found.intercept)
@@ -105,11 +120,11 @@ class MotionData(FitData):
 
     def log_fits(self, found: Coefficients) -> tuple[LogFit, ...]:
         """Return the logs with the forces that both models estimate."""
-        old, new = self.base(), self.estimator(found)
+        (old, seen), new = self.reference(), self.estimator(found)
         return tuple(
-            LogFit(motion, training, validation, old.of(motion), new.of(motion), quality)
-            for motion, training, validation, quality in zip(
-                self.motions, self.split.training, self.split.validation, self.qualities, strict=True
+            LogFit(motion, training, validation, old.of(bare), new.of(motion), quality)
+            for motion, bare, training, validation, quality in zip(
+                self.motions, seen, self.split.training, self.split.validation, self.qualities, strict=True
             )
         )
 
@@ -171,7 +186,8 @@ class LogData(MotionData):
         """Return free runs of the base model and of the new one on validation rows."""
         progress("running free")
         rows = self.split.validation
-        return run_free(self.base(), self.motions, rows), run_free(self.estimator(found), self.motions, rows)
+        base, seen = self.reference()
+        return run_free(base, seen, rows), run_free(self.estimator(found), self.motions, rows)
 
     def training_logs(self) -> tuple[Mapping[str, Any], ...]:
         """Return the training logs as a model file lists them."""

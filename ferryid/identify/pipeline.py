@@ -13,21 +13,26 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ferryid import __version__
-from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, accept
+from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, Check, accept
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.estimators import choose_estimator
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import free_run_warnings
+from ferryid.identify.free_run_checks import free_run_checks
+from ferryid.identify.held_out_checks import held_out_checks
 from ferryid.identify.inputs import read_logs
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.motion_data import LogData, compute_residuals, numbered_names
 from ferryid.identify.outcome import ComponentCurve, EstimatorScore, Excitation, FitOutcome
+from ferryid.identify.physical_checks import damping_checks, inertia_checks
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import TEST_WINDOW_S, FitSettings, check_components
 from ferryid.identify.split import Split, split_rows
 from ferryid.identify.weak_data import WeakData, weak_data
 from ferryid.models import Model, ModelScores
+from ferryid.models.forces import Estimator, effective_mass
+from ferryid.models.prediction import FreeRun
 from ferryid.models.store import check_name
 from ferryid.regression.bases import Basis
 from ferryid.signals.prepare import Opened, smoothed
@@ -106,9 +111,13 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
     found = data.combined(estimate.coefficients)
     logs = data.log_fits(found)
     scores = data.scores(found, logs)
-    acceptance = accept(scores.force.mse_base, scores.force.mse_model) if data.held_out else NOT_JUDGED
     excitation = data.excitation(estimate)
     free_base, free_new = data.free_runs(found, run.progress)
+    acceptance = NOT_JUDGED
+    if data.held_out:
+        acceptance = accept(scores.force.mse_base, scores.force.mse_model)
+    if data.held_out and data.settings.accept == "full":
+        acceptance = acceptance.with_checks(_checks(data, found, scores, free_base, free_new))
     return FitOutcome(
         model=_model(data, estimate, found, name, scores, acceptance, excitation),
         acceptance=acceptance,
@@ -125,6 +134,20 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
         ),
         logs=logs,
         archive=data.archived_logs(found),
+    )
+
+
+def _checks(
+    data: FitData, found: Coefficients, scores: ModelScores, free_base: FreeRun, free_new: FreeRun
+) -> tuple[Check, ...]:
+    """Return what the full criterion asks for besides the force error."""
+    profile, scale, functions = data.profile, data.settings.scale, data.functions
+    law = Estimator(profile, scale, functions, found.theta, found.intercept)
+    return (
+        *inertia_checks(profile, effective_mass(profile, scale, functions.terms, found.theta)),
+        *damping_checks(law.at_constant_velocity, data.visited),
+        *free_run_checks(free_base, free_new),
+        *held_out_checks(scores.seconds, data.held_out_blocks, scores.split),
     )
 
 

@@ -16,6 +16,7 @@ CHOICES = {
     "split": ("blocks", "logs", "every-kth"),
     "inertia": ("auto", "fitted"),
     "estimator": ("auto", "derivative", "weak"),
+    "accept": ("full", "thesis"),
 }
 
 
@@ -38,6 +39,9 @@ class FitSettings:
         where the name lacks it.
     smoother, residual, split, inertia, estimator
         One of `CHOICES`; inertia ``"auto"`` holds it at the base model's on axes where the fitted one cannot be right.
+    accept
+        ``"full"``: besides the force error, inertia, damping, free runs and the amount of held-out data have to be right;
+        ``"thesis"``: the force error alone.
     components
         Number of SIMPLS components, or ``"auto"`` for cross-validation within the training rows.
     window_s
@@ -74,6 +78,7 @@ class FitSettings:
     residual: str = "measured"
     split: str = "blocks"
     inertia: str = "auto"
+    accept: str = "full"
     rate_hz: float | None = None
     delta: float = 1.0
     sigma: float = 1.0

@@ -47,7 +47,12 @@ class IdentifyThresholds:
         "usual block of the split into training and validation",
         "tuned on real recordings: a manoeuvre or two, so that both see all kinds",
     )
-    fewest_blocks: int = threshold(9, "blocks", "in a short log", "derived: three validation blocks")
+    fewest_blocks: int = threshold(
+        30, "blocks", "in all logs of a fit, where they are long enough", "derived: `held_out_blocks` of them validate"
+    )
+    fewest_log_blocks: int = threshold(
+        9, "blocks", "in each of several logs, where it is long enough", "derived: three validation blocks"
+    )
     most_blocks: int = threshold(
         36, "blocks", "in a long log", "convention: slow vessels make long logs, and their manoeuvres last"
     )
@@ -73,7 +78,36 @@ class IdentifyThresholds:
     sector_share: float = threshold(
         0.01, "of the rows", "rows in a heading sector for which it is covered", "convention: one per cent"
     )
-    validation_s: float = threshold(60.0, "s", "shorter validation data give a warning", "convention: some manoeuvres")
+    validation_s: float = threshold(
+        60.0, "s", "validation data that acceptance needs; shorter ones give a warning", "convention: some manoeuvres"
+    )
+    held_out_blocks: int = threshold(
+        10, "blocks", "of validation data that acceptance needs", "convention: fewer have no scatter to judge by"
+    )
+    damping_power: float = threshold(
+        0.01,
+        "of the mean power",
+        "power of the damping force that feeds the motion, above which a row counts as feeding",
+        "convention: less is rounding of a coefficient near zero",
+    )
+    damping_rows: float = threshold(
+        0.05,
+        "of the rows",
+        "rows on which the damping force may feed the motion in an accepted model",
+        "convention: as the level of a test",
+    )
+    damping_margin: float = threshold(
+        1.25,
+        "-",
+        "factor on the visited velocities at which damping is evaluated as well",
+        "convention: a quarter beyond what was sailed",
+    )
+    free_run_level: float = threshold(
+        0.95,
+        "-",
+        "level of the interval of the paired differences between free runs of two models",
+        "convention: 95 %",
+    )
     moved_rows: int = threshold(
         20,
         "rows",

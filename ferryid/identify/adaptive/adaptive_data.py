@@ -64,6 +64,10 @@ class AdaptiveData(MotionData):
         """Return the estimator of the earlier model."""
         return super().base() if self.model is None else model_estimator(self.model)
 
+    def reference(self) -> tuple[Estimator, tuple[Motion, ...]]:
+        """Return the earlier model's estimator with the motions themselves, as its basis may need what they measure."""
+        return super().reference() if self.model is None else (self.base(), self.motions)
+
     def combined(self, found: Coefficients) -> Coefficients:
         """Return the sum of earlier model and correction; locked coefficients are the earlier model's to the last digit."""
         model = self.model

@@ -10,7 +10,7 @@ from ferryid.models.forces.estimator import (
 )
 from ferryid.models.forces.hull_terms import MAPPED, hull_contribution, unmapped_terms
 from ferryid.models.forces.model_forces import ModelForces, acting_estimator, force_law
-from ferryid.models.forces.residual import FORMS, base_force, compute_residual, motion_force, scale_hull
+from ferryid.models.forces.residual import FORMS, base_force, compute_residual, motion_force, scale_hull, without_inputs
 
 __all__ = [
     "ACCELERATIONS",
@@ -30,4 +30,5 @@ __all__ = [
     "replace_hull_coefficients",
     "scale_hull",
     "unmapped_terms",
+    "without_inputs",
 ]

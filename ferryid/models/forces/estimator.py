@@ -52,6 +52,13 @@ class Estimator:
             tau[rows] += self.basis.of(motion, rows) @ self.theta + self.intercept
         return tau
 
+    def at_constant_velocity(self, nu: Floats) -> Floats:
+        """Return the force that constant velocities, shape (n, 3), take in still water and still air, shape (n, 3)."""
+        still = np.zeros((len(nu), 2))
+        wind = still if self.basis is not None and self.basis.needs_wind else None
+        current = still if self.basis is not None and self.basis.needs_current else None
+        return self(np.zeros_like(nu), nu, np.zeros(len(nu)), wind, current)
+
     def __call__(
         self,
         nu_dot: Floats,

@@ -39,6 +39,15 @@ def base_force(profile: Profile, motion: Motion, scale: Mapping[str, float]) -> 
     )
 
 
+def without_inputs(motion: Motion) -> Motion:
+    """Return a motion without measured wind, current and payload: what a hull alone sees of it.
+
+    The base model that models are judged against sees no more, so that figures of two fits to one log compare, whatever
+    either of their profiles maps.
+    """
+    return replace(motion, wind=None, current=None, payload=None)
+
+
 def motion_force(
     profile: Profile,
     scale: Mapping[str, float],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,30 @@ HORIZONS_S = (5.0, 10.0, 20.0, 30.0, 60.0)
 MAX_STARTS = 60
 STEP_S = 0.2
 NO_MASS = "the model's effective mass matrix is not positive definite: it cannot be run free"
+
+
+@dataclass(frozen=True, eq=False)
+class SingleRuns:
+    """Every free run by itself, so that two models can be compared in pairs.
+
+    Attributes
+    ----------
+    rate_hz
+        Rows per second of the log of each run, shape (N,).
+    log, start, end
+        Log of each run, its first row, and the end of the unbroken stretch in it, shape (N,).
+    errors
+        As of `single_runs`, shape (N, H, 4).
+    reached
+        Horizons that lie within the stretch, shape (N, H); where the error is NaN nevertheless the run diverged.
+    """
+
+    rate_hz: Floats
+    log: Ints
+    start: Ints
+    end: Ints
+    errors: Floats
+    reached: Flags
 
 
 @dataclass(frozen=True)
@@ -38,6 +62,8 @@ class FreeRun:
         Why there is no prediction, or an empty string.
     diverged
         Number of runs that diverged, which the means leave out.
+    single
+        The runs one by one; None where there are none.
     """
 
     horizons_s: Floats
@@ -49,6 +75,7 @@ class FreeRun:
     example: Mapping[str, Floats]
     note: str = ""
     diverged: int = 0
+    single: SingleRuns | None = None
 
     @classmethod
     def not_run(cls, note: str) -> FreeRun:
@@ -96,27 +123,29 @@ def run_free(
         Root-mean-square errors over all starts; NaN at horizons that no stretch is long enough for.
     """
     horizons = np.asarray(horizons_s, dtype=float)
-    errors: list[Floats] = []
+    runs: list[SingleRuns] = []
     longest: tuple[int, dict[str, Floats]] = (0, {})
     diverged = 0
     if not runs_free(force, motions[0]):
         return _without(horizons, NO_MASS)
-    for motion, allowed in zip(motions, rows, strict=True):
+    for number, (motion, allowed) in enumerate(zip(motions, rows, strict=True)):
         starts, ends = starting_points(motion, allowed, float(horizons[0]), float(horizons[-1]))
         if starts.size == 0:
             continue
         path, stride = _integrate(force, motion, starts, float(horizons[-1]))
         error = _errors(path, stride, motion, starts, ends, horizons)
-        reached = (starts + np.round(horizons[:, None] * motion.rate_hz).astype(int)) < ends
-        diverged += int(np.any(reached.T & np.isnan(error[:, :, 2]), axis=1).sum())
-        errors.append(error)
+        reached = _rows_at(starts, stride, motion.rate_hz, horizons) < ends[:, None]
+        diverged += int(np.any(reached & np.isnan(error[:, :, 2]), axis=1).sum())
+        rates, logs = np.full(starts.size, motion.rate_hz), np.full(starts.size, number)
+        runs.append(SingleRuns(rates, logs, starts, ends, error, reached))
         length = min(int(horizons[-1] * motion.rate_hz), int((ends - starts).max()) - 1)
         if length > longest[0]:
             best = int(np.argmax(ends - starts))
             longest = (length, _example(path[best], stride, motion, int(starts[best]), length))
-    if not errors:
+    if not runs:
         return _without(horizons, f"no unbroken held-out stretch of {horizons[0]:g} s")
-    every = np.concatenate(errors)
+    single = _joined(runs)
+    every = single.errors
     counts = np.sum(np.isfinite(every[:, :, 2]), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         rms = np.sqrt(np.nansum(every**2, axis=0) / counts[:, None])
@@ -127,7 +156,11 @@ def run_free(
         if diverged
         else ""
     )
-    return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note, diverged)
+    return FreeRun(horizons, rms[:, 0], rms[:, 1], rms[:, 2], rms[:, 3], len(every), longest[1], note, diverged, single)
+
+
+def _joined(runs: Sequence[SingleRuns]) -> SingleRuns:
+    return SingleRuns(*(np.concatenate([getattr(one, each.name) for one in runs]) for each in fields(SingleRuns)))
 
 
 def runs_free(force: ForceLaw, motion: Motion) -> bool:
@@ -254,17 +287,23 @@ def _between(values: Floats, rows: Ints, following: Ints, part: float) -> Floats
 def _errors(path: Floats, stride: int, motion: Motion, starts: Ints, ends: Ints, horizons: Floats) -> Floats:
     """Return |error| of position, heading, speed and yaw rate, shape (starts, horizons, 4)."""
     error = np.full((len(starts), len(horizons), 4), np.nan)
-    for h, horizon in enumerate(horizons):
-        step = round(horizon * motion.rate_hz / stride)
-        rows = starts + step * stride
+    every = _rows_at(starts, stride, motion.rate_hz, horizons)
+    for h, rows in enumerate(every.T):
         inside = rows < ends
-        at, now = rows[inside], path[inside, step]
+        at = rows[inside]
+        now = path[inside, (at - starts[inside]) // stride]
         error[inside, h, 0] = np.hypot(*(now[:, :2] - motion.eta[at, :2]).T)
         turned = now[:, 2] - motion.eta[at, 2]
         error[inside, h, 1] = np.abs((turned + np.pi) % (2 * np.pi) - np.pi)
         error[inside, h, 2] = np.hypot(*(now[:, 3:5] - motion.nu[at, :2]).T)
         error[inside, h, 3] = np.abs(now[:, 5] - motion.nu[at, 2])
     return error
+
+
+def _rows_at(starts: Ints, stride: int, rate_hz: float, horizons: Floats) -> Ints:
+    """Return the row at which each run is compared at each horizon, shape (starts, horizons)."""
+    steps = np.array([round(horizon * rate_hz / stride) for horizon in horizons.tolist()], dtype=np.int64)
+    return starts[:, None] + steps * stride
 
 
 def _example(path: Floats, stride: int, motion: Motion, start: int, length: int) -> dict[str, Floats]:

@@ -1,0 +1,124 @@
+"""Whether free runs of a model are worse than those of another one from the same starts: divergence, and paired errors."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import stdtrit
+
+from ferryid.counts import counted
+from ferryid.identify.acceptance import Check
+from ferryid.identify.thresholds import IDENTIFY
+from ferryid.models.prediction import FreeRun, SingleRuns
+from ferryid.types import Flags, Floats, Ints
+
+JUDGED_S = (10.0, 30.0, 60.0)
+"""Horizons of the comparison [s]."""
+_DEGREES = 180.0 / np.pi
+_QUANTITIES = (("position", 0, "m", 1.0), ("heading", 1, "deg", _DEGREES), ("yaw rate", 3, "deg/s", _DEGREES))
+"""Name, column of the errors, unit, and factor on SI."""
+
+
+def free_run_checks(old: FreeRun, new: FreeRun, reference: str = "base model") -> tuple[Check, ...]:
+    """Return whether a model runs free no worse than another one, on the same rows.
+
+    At each of `JUDGED_S` the absolute errors of position, heading and yaw rate are compared run by run. The interval of
+    their mean difference is Student's, from the scatter between clusters of runs: the unbroken held-out stretches, cut
+    into blocks of `IDENTIFY.block_s`, or of the horizon where that is longer. Only an interval wholly above zero is worse.
+
+    Parameters
+    ----------
+    old, new
+        Free runs of both models.
+    reference
+        What the old model is called in the reasons.
+    """
+    if old.single is None:
+        return (_not_compared("free_run", f"Free runs are not compared: {old.note}."),)
+    if new.single is None:
+        reason = f"The new model cannot be run free, the {reference} can: {new.note}."
+        return (Check("free_run", False, 0.0, float(old.starts), "runs", reason),)
+    checks = [_divergence(old.single, new.single, reference)]
+    missing = []
+    for horizon_s in JUDGED_S:
+        (found,) = np.flatnonzero(np.isclose(old.horizons_s, horizon_s))[:1].tolist() or [-1]
+        reached = old.single.reached[:, found] & new.single.reached[:, found] if found >= 0 else np.zeros(0, dtype=bool)
+        if not reached.any():
+            missing.append(f"{horizon_s:g} s")
+            continue
+        checks += _at_horizon(old.single, new.single, found, horizon_s, reached, reference)
+    if missing:
+        reason = (
+            f"No unbroken held-out stretch is long enough for free runs of {' or '.join(missing)}: not compared there."
+        )
+        checks.append(_not_compared("free_run_horizons", reason))
+    return tuple(checks)
+
+
+def _not_compared(name: str, reason: str) -> Check:
+    return Check(name, None, float("nan"), float("nan"), "runs", reason)
+
+
+def _divergence(old: SingleRuns, new: SingleRuns, reference: str) -> Check:
+    """Return whether no run of the new model diverges where the old one's does not."""
+    lost = np.any(new.reached & np.isnan(new.errors[:, :, 2]) & ~np.isnan(old.errors[:, :, 2]), axis=1)
+    count = int(lost.sum())
+    reason = f"{count} of {counted(len(lost), 'free run')} of the new model diverged where the {reference} did not" + (
+        ", and none may: do not simulate with it." if count else "."
+    )
+    return Check("divergence", count == 0, float(count), 0.0, "runs", reason)
+
+
+def _at_horizon(
+    old: SingleRuns, new: SingleRuns, column: int, horizon_s: float, reached: Flags, reference: str
+) -> list[Check]:
+    checks = []
+    clusters = _clusters(old, max(IDENTIFY.block_s, horizon_s))
+    for label, which, unit, factor in _QUANTITIES:
+        before, after = (one.errors[:, column, which] * factor for one in (old, new))
+        pairs = reached & np.isfinite(before) & np.isfinite(after)
+        if not pairs.any():
+            continue
+        name = f"free_run_{label.replace(' ', '_')}_{horizon_s:g}s"
+        stretches = np.unique(clusters[pairs]).size
+        found = (
+            f"After {horizon_s:g} s of free run the mean {label} error is {after[pairs].mean():.3g} {unit}, "
+            f"the {reference}'s {before[pairs].mean():.3g} {unit}"
+        )
+        if stretches < 2:
+            where = counted(int(pairs.sum()), "run")
+            reason = f"{found} ({where} in one held-out block): no interval without a second block."
+            checks.append(Check(name, None, float((after - before)[pairs].mean()), 0.0, unit, reason))
+            continue
+        mean, low, high = paired_interval((after - before)[pairs], clusters[pairs])
+        passed = not low > 0.0
+        reason = (
+            f"{found}: a difference of {mean:+.3g} {unit} ({IDENTIFY.free_run_level:.0%} interval {low:+.3g} to {high:+.3g}, "
+            f"{counted(int(pairs.sum()), 'run')} in {stretches} held-out blocks)"
+            + (". The interval must reach below zero: the model predicts motion worse there." if low > 0.0 else ".")
+        )
+        checks.append(Check(name, passed, low, 0.0, unit, reason))
+    return checks
+
+
+def _clusters(runs: SingleRuns, block_s: float) -> Ints:
+    """Return the cluster of each run, shape (N,): its unbroken stretch, cut into blocks of so many seconds by its start."""
+    stretch = np.unique(np.column_stack([runs.log, runs.end]), axis=0, return_inverse=True)[1].reshape(-1)
+    first = np.full(stretch.max() + 1, np.iinfo(np.int64).max)
+    np.minimum.at(first, stretch, runs.start)
+    block = ((runs.start - first[stretch]) / runs.rate_hz / block_s + 1e-9).astype(np.int64)
+    return np.unique(np.column_stack([stretch, block]), axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def paired_interval(difference: Floats, clusters: Ints) -> tuple[float, float, float]:
+    """Return the mean of paired differences and the ends of its interval, from the scatter between two or more clusters.
+
+    The variance is that of a mean of clusters of unequal size (Liang and Zeger 1986) with the factor G/(G - 1), the
+    quantile Student's with G - 1 degrees of freedom.
+    """
+    mean = float(difference.mean())
+    which = np.unique(clusters, return_inverse=True)[1].reshape(-1)
+    sums = np.bincount(which, weights=difference - mean)
+    count = len(sums)
+    error = float(np.sqrt(count / (count - 1) * np.sum(sums**2)) / len(difference))
+    reach = float(stdtrit(count - 1, 0.5 + IDENTIFY.free_run_level / 2)) * error
+    return mean, mean - reach, mean + reach

@@ -1,0 +1,116 @@
+"""Whether a model is physically possible: its mass matrix can be one, and its damping dissipates where the vessel went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ferryid.identify.acceptance import Check
+from ferryid.identify.inertia import relative_inertia, scaled_eigenvalue
+from ferryid.identify.thresholds import IDENTIFY
+from ferryid.types import AXES, Floats
+from ferryid.vessel.profile import Profile
+
+MOST_ROWS = 10_000
+"""Rows at which damping is evaluated; of more, evenly spaced ones."""
+_ALONE = ("u", "v", "r")
+
+
+def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
+    """Return whether an effective mass matrix, shape (3, 3), is one that a hull can have."""
+    smallest = scaled_eigenvalue(profile, mass)
+    says = f"The smallest eigenvalue of the effective mass matrix is {smallest:.3g} of the rigid body's and must be above 0"
+    checks = [
+        Check(
+            "mass_matrix",
+            smallest > 0.0,
+            smallest,
+            0.0,
+            "of the rigid body's",
+            f"{says}: the matrix is positive definite."
+            if smallest > 0.0
+            else f"{says}: a force in some direction would accelerate the model backwards, and it cannot be simulated.",
+        )
+    ]
+    for axis, share in zip(AXES, relative_inertia(profile, mass).tolist(), strict=True):
+        low, high = IDENTIFY.least_inertia, IDENTIFY.most_inertia
+        possible = low <= share <= high
+        if possible:
+            meaning = "it is possible"
+        elif share < low:
+            meaning = "added mass only adds, so that the model is too light there"
+        else:
+            meaning = "no hull carries that much added mass"
+        checks.append(
+            Check(
+                f"inertia_{axis}",
+                possible,
+                share,
+                high if share > high else low,
+                "of the rigid body's",
+                f"The effective inertia in {axis} is {share:.2f} times the rigid body's, and {low:g} to {high:g} is possible: "
+                f"{meaning}.",
+            )
+        )
+    return tuple(checks)
+
+
+def damping_checks(force: Callable[[Floats], Floats], visited: Floats) -> tuple[Check, ...]:
+    """Return whether the damping of a model dissipates at the velocities that the vessel had, and somewhat beyond.
+
+    All of the force that depends on velocity counts, but for the Coriolis force, which does no work: with the force F at
+    constant velocity, the power is ``nu' (F(nu) - F(0))``. Each axis is also judged alone, the other velocities zero.
+
+    Parameters
+    ----------
+    force
+        Force that a constant velocity takes in still water and air, of velocities (n, 3) to (n, 3).
+    visited
+        Velocities of the motions, shape (n, 3).
+    """
+    nu = visited[np.isfinite(visited).all(axis=1)]
+    nu = nu[:: max(1, -(-len(nu) // MOST_ROWS))]
+    alone = [np.where(np.arange(3) == axis, nu, 0.0) for axis in range(3)]
+    checks = []
+    for name, where, several in (
+        ("damping", "The damping force, all axes together,", nu),
+        *(
+            (f"damping_{axis}", f"The damping force in pure {axis} (only {_ALONE[i]} is not zero)", alone[i])
+            for i, axis in enumerate(AXES)
+        ),
+    ):
+        shares = [_feeding_share(force, scale * several) for scale in (1.0, IDENTIFY.damping_margin)]
+        share = max(shares)
+        passed = share <= IDENTIFY.damping_rows
+        at = (
+            "at the visited velocities"
+            if shares[0] >= share
+            else f"at {IDENTIFY.damping_margin:g} times the visited velocities"
+        )
+        meaning = (
+            "it dissipates."
+            if passed
+            else "there it drives the vessel instead of damping it, and a simulation may gain speed without thrust. "
+            "Do the logs excite that motion? Fix: record more of it, or take fewer terms (--components, --basis)."
+        )
+        checks.append(
+            Check(
+                name,
+                passed,
+                share,
+                IDENTIFY.damping_rows,
+                "of the rows",
+                f"{where} adds energy on {share:.1%} of the rows {at}, and {IDENTIFY.damping_rows:.0%} is allowed: {meaning}",
+            )
+        )
+    return tuple(checks)
+
+
+def _feeding_share(force: Callable[[Floats], Floats], nu: Floats) -> float:
+    """Return the share of velocities at which the damping force adds energy to the motion."""
+    if not len(nu):
+        return 0.0
+    damping = force(nu) - force(np.zeros((1, 3)))
+    power = np.sum(nu * damping, axis=1)
+    return float(np.mean(power < -IDENTIFY.damping_power * np.mean(np.abs(power))))
