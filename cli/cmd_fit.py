@@ -8,6 +8,7 @@ import typer
 
 from ferryid.cli.options import (
     OUT,
+    Accept,
     Basis,
     Delta,
     Estimator,
@@ -45,6 +46,7 @@ def command(
     rate: Rate = None,
     inertia: Inertia = "auto",
     estimator: Estimator = "auto",
+    accept: Accept = "full",
     delta: Delta = 1.0,
     sigma: Sigma = 1.0,
     zeta: Zeta = 1.0,
@@ -68,7 +70,8 @@ def command(
 
     settings = FitSettings(
         basis=basis, structure=structure, components=components, **parse_window(window), smoother=smoother, residual=residual,
-        split=split, inertia=inertia, estimator=estimator, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, seed=seed,
+        split=split, inertia=inertia, estimator=estimator, accept=accept, rate_hz=rate, delta=delta, sigma=sigma,
+        zeta=zeta, seed=seed,
     )  # fmt: skip
     chosen = logs or () if archive else given(logs)
     outcome = api.fit(chosen, vessel, settings, out, name=name, archive=archive, verify=verify, progress=progress)

@@ -50,6 +50,14 @@ Estimator = Annotated[
         "windows, nothing is differentiated; auto: the one of less error on folds of the training rows.",
     ),
 ]
+Accept = Annotated[
+    str,
+    typer.Option(
+        "--accept",
+        help="full: held-out error, inertia, damping, free runs and the amount of held-out data decide; thesis: the "
+        "held-out error alone.",
+    ),
+]
 Delta = Annotated[float, typer.Option("--delta", help="Factor on the base model's M and C.")]
 Sigma = Annotated[float, typer.Option("--sigma", help="Factor on the base model's D.")]
 Zeta = Annotated[float, typer.Option("--zeta", help="Factor on the base model's force.")]

@@ -65,10 +65,10 @@ class Acceptance:
     checks: tuple[Check, ...] = ()
     """Every condition, whether it holds or not."""
     criterion: str = "thesis"
-    """``"full"``, or ``"thesis"``: the force error alone."""
+    """``"full"``, or ``"thesis"``: the held-out error alone."""
 
     def with_checks(self, checks: Sequence[Check]) -> Acceptance:
-        """Return the verdict under the full criterion: that of the force error and of all these checks."""
+        """Return the verdict under the full criterion: that of the held-out error and of all these checks."""
         failed = [f"Rejected: {_lower(check.reason)}" for check in checks if check.passed is False]
         obstacles = sum(reason.startswith("Rejected:") for reason in self.reasons)
         notes = [check.reason for check in checks if check.passed is None]
@@ -97,18 +97,20 @@ NOT_JUDGED = Acceptance(False, float("nan"), dict.fromkeys(AXES, float("nan")), 
 """Acceptance of a model that was fitted to all rows there are."""
 
 
-def accept(base_mse: Floats, model_mse: Floats) -> Acceptance:
-    """Judge a model by its force error on validation rows against the base model's.
+def accept(base_mse: Floats, model_mse: Floats, measure: str = "force") -> Acceptance:
+    """Judge a model by its error on validation rows against the base model's.
 
-    Accepted when the MSE of the estimated applied force, normalised per axis by the base model's and averaged over the
-    three axes, falls by 5 % or more, and no axis gets worse by more than 5 % (thesis 3.2.4). An axis on which
-    the base model makes no error at all has nothing to divide by: its ratio is 1 where the new model makes none
-    either, and infinite otherwise. An error that is not a finite number rejects the model.
+    Accepted when the MSE (in the thesis that of the estimated applied force), normalised per axis by the base
+    model's and averaged over the three axes, falls by 5 % or more, and no axis gets worse by more than 5 % (thesis
+    3.2.4). An axis on which the base model makes no error at all has nothing to divide by: its ratio is 1 where the new
+    model makes none either, and infinite otherwise. An error that is not a finite number rejects the model.
 
     Parameters
     ----------
     base_mse, model_mse
         Validation MSE in surge, sway [N²] and yaw [N²·m²], shape (3,).
+    measure
+        What the error is of, in the sentences: ``"force"`` or ``"prediction"``.
 
     Returns
     -------
@@ -116,32 +118,32 @@ def accept(base_mse: Floats, model_mse: Floats) -> Acceptance:
         With one sentence for the mean and one for every axis that stands in the way or needs an explanation.
     """
     base, model = np.asarray(base_mse, dtype=float), np.asarray(model_mse, dtype=float)
-    axes = [_force_on_axis(axis, float(base[i]), float(model[i])) for i, axis in enumerate(AXES)]
+    axes = [_error_on_axis(axis, float(base[i]), float(model[i]), measure) for i, axis in enumerate(AXES)]
     ratios = [check.value for check in axes]
     obstacles = [f"Rejected: {check.reason}" for check in axes if check.passed is False]
     reasons = [check.reason for check, mse in zip(axes, base, strict=True) if check.passed and mse <= _NOTHING**2]
     mean = float(np.mean(ratios))
-    sentence = "the force error could not be compared."
+    sentence = f"the {measure} errors could not be compared."
     enough = False
     if np.isfinite(mean):
         enough = mean <= 1.0 - IDENTIFY.improvement + _ROUNDING
         sentence = (
-            f"On held-out data the force error (MSE relative to the base model, mean of three axes) "
+            f"On held-out data the {measure} error (MSE relative to the base model, mean of three axes) "
             f"changes by {_change(mean)}: surge {_change(ratios[0])}, sway {_change(ratios[1])}, yaw {_change(ratios[2])}."
         )
         if not enough:
             obstacles.insert(0, f"Rejected: a fall of {100 * IDENTIFY.improvement:.0f} % or more is needed. {sentence}")
         else:
             reasons.insert(0, sentence)
-    mean_check = Check("force_error", enough, mean, 1.0 - IDENTIFY.improvement, "of the base model's MSE", sentence)
+    mean_check = Check("held_out_error", enough, mean, 1.0 - IDENTIFY.improvement, "of the base model's MSE", sentence)
     per_axis = dict(zip(AXES, ratios, strict=True))
     return Acceptance(not obstacles, mean, per_axis, (*obstacles, *reasons), (mean_check, *axes))
 
 
-def _force_on_axis(axis: str, base: float, model: float) -> Check:
-    """Return whether the force error of an axis does not get worse; the value is the ratio of MSE."""
+def _error_on_axis(axis: str, base: float, model: float, measure: str) -> Check:
+    """Return whether the error of an axis does not get worse; the value is the ratio of MSE."""
     unit = "N·m" if axis == "yaw" else "N"
-    name, limit = f"force_error_{axis}", 1.0 + IDENTIFY.worsening
+    name, limit = f"held_out_error_{axis}", 1.0 + IDENTIFY.worsening
 
     def check(passed: bool, value: float, reason: str) -> Check:
         return Check(name, passed, value, limit, "of the base model's MSE", reason)
@@ -166,7 +168,7 @@ def _force_on_axis(axis: str, base: float, model: float) -> Check:
     size = f"{_change(ratio)} in MSE ({np.sqrt(base):.3g} to {np.sqrt(model):.3g} {unit} RMS)"
     if ratio > limit:
         return check(False, ratio, f"{axis} gets worse, {size}; {100 * IDENTIFY.worsening:.0f} % is allowed.")
-    return check(True, ratio, f"In {axis} the force error changes by {size}.")
+    return check(True, ratio, f"In {axis} the {measure} error changes by {size}.")
 
 
 def _change(ratio: float) -> str:

@@ -20,7 +20,7 @@ from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.profile import Profile
 
 _ROUNDS = 6
-_SHARES = (0.01, 0.1, 0.3, 0.6, 1.0)
+_SHARES = (0.01, 0.05, *(tenth / 10.0 for tenth in range(1, 11)))
 _DIRECTIONS = 16
 
 

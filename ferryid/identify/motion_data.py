@@ -26,8 +26,9 @@ from ferryid.models.prediction import FreeRun, run_free
 from ferryid.regression import CrossProducts, QrFactor, Rows, factorise
 from ferryid.regression.resampling import Blocks, block_seconds
 from ferryid.signals.prepare import Prepared
-from ferryid.signals.track import Motion
+from ferryid.signals.track import Motion, segments
 from ferryid.types import Flags, Floats
+from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
 
 
@@ -61,8 +62,13 @@ class MotionData(FitData):
 
     @property
     def held_out_blocks(self) -> int:
-        """Number of blocks that the validation rows come in."""
-        return self.split.held_out_blocks
+        """Number of blocks as long as a prediction window that the unbroken stretches of the validation rows hold."""
+        length_s = self.settings.weak_window_s or window_seconds(self.profile)
+        return sum(
+            int((stretch.stop - stretch.start) / motion.rate_hz / length_s + 1e-9)
+            for motion, mask in zip(self.motions, self.split.validation, strict=True)
+            for stretch in segments(mask)
+        )
 
     @property
     def visited(self) -> Floats:

@@ -15,6 +15,8 @@ from ferryid.vessel.profile import Profile
 MOST_ROWS = 10_000
 """Rows at which damping is evaluated; of more, evenly spaced ones."""
 _ALONE = ("u", "v", "r")
+_AT_BOUND = 1e-3
+"""Part of a bound within which an inertia is at it."""
 
 
 def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
@@ -35,9 +37,12 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
     ]
     for axis, share in zip(AXES, relative_inertia(profile, mass).tolist(), strict=True):
         low, high = IDENTIFY.least_inertia, IDENTIFY.most_inertia
-        possible = low <= share <= high
+        lowest, highest = low * (1.0 + _AT_BOUND), high * (1.0 - _AT_BOUND)
+        possible = lowest <= share <= highest
         if possible:
             meaning = "it is possible"
+        elif abs(share - low) <= low * _AT_BOUND or abs(share - high) <= high * _AT_BOUND:
+            meaning = "it is held at that bound, beyond which the data would have it"
         elif share < low:
             meaning = "added mass only adds, so that the model is too light there"
         else:
@@ -47,7 +52,7 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
                 f"inertia_{axis}",
                 possible,
                 share,
-                high if share > high else low,
+                high if share > highest else low,
                 "of the rigid body's",
                 f"The effective inertia in {axis} is {share:.2f} times the rigid body's, and {low:g} to {high:g} is possible: "
                 f"{meaning}.",

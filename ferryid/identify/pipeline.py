@@ -115,7 +115,7 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
     free_base, free_new = data.free_runs(found, run.progress)
     acceptance = NOT_JUDGED
     if data.held_out:
-        acceptance = accept(scores.force.mse_base, scores.force.mse_model)
+        acceptance = accept(scores.force.mse_base, scores.force.mse_model, scores.measure)
     if data.held_out and data.settings.accept == "full":
         acceptance = acceptance.with_checks(_checks(data, found, scores, free_base, free_new))
     return FitOutcome(
@@ -140,7 +140,7 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
 def _checks(
     data: FitData, found: Coefficients, scores: ModelScores, free_base: FreeRun, free_new: FreeRun
 ) -> tuple[Check, ...]:
-    """Return what the full criterion asks for besides the force error."""
+    """Return what the full criterion asks for besides the held-out error."""
     profile, scale, functions = data.profile, data.settings.scale, data.functions
     law = Estimator(profile, scale, functions, found.theta, found.intercept)
     return (

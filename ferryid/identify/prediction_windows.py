@@ -2,7 +2,8 @@
 
 The error of a force that is estimated from a differentiated velocity is noise for the most part, and an inertia near zero,
 which leaves hardly any force, is not punished by it. Here a model predicts the acceleration from force and velocity; its error
-is given as the force that it means on the base model's mass, for which it is the base model's force error.
+is given as the force that it means on the base model's mass, for which it is the base model's force error. The base model that
+models are judged against knows no measured wind, current or payload, so that two fits compare.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class PredictionWindows:
         for one in windows:
             estimate = one.base(one.by_velocity) + one.basis(terms, one.by_velocity) @ found.theta + found.intercept
             tau.append(one.force)
-            base.append(one.base(one.by_velocity))
+            base.append(one.reference(self.base_mass))
             model.append(one.force - _on_mass(one.inertia, one.inertia + added, one.force - estimate))
         every = np.concatenate(tau)
         return force_scores(every, np.concatenate(base), np.concatenate(model), np.ones(len(every), dtype=bool))

@@ -40,8 +40,8 @@ class FitSettings:
     smoother, residual, split, inertia, estimator
         One of `CHOICES`; inertia ``"auto"`` holds it at the base model's on axes where the fitted one cannot be right.
     accept
-        ``"full"``: besides the force error, inertia, damping, free runs and the amount of held-out data have to be right;
-        ``"thesis"``: the force error alone.
+        ``"full"``: besides the held-out error, inertia, damping, free runs and the amount of held-out data have to be right;
+        ``"thesis"``: the held-out error alone.
     components
         Number of SIMPLS components, or ``"auto"`` for cross-validation within the training rows.
     window_s

@@ -12,7 +12,7 @@ from ferryid.counts import counted
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.signals.track import Motion
-from ferryid.types import Flags, Floats, Ints
+from ferryid.types import Flags, Floats
 
 KINDS = ("blocks", "logs", "every-kth")
 EVERY = 4
@@ -34,8 +34,6 @@ class Split:
         Least time between a training row and a validation row [s]; 0 where none is kept.
     notes
         What a reader of the scores must know, as sentences with numbers.
-    numbers
-        Which block of its log each row lies in, one array a log, shape (n,); none where rows are not held out in blocks.
     """
 
     kind: str
@@ -43,12 +41,6 @@ class Split:
     validation: tuple[Flags, ...]
     purge_s: float
     notes: tuple[str, ...] = ()
-    numbers: tuple[Ints, ...] = ()
-
-    @property
-    def held_out_blocks(self) -> int:
-        """Number of blocks that hold validation rows; of a log that validates as a whole, as many as it would be cut into."""
-        return sum(np.unique(number[mask]).size for number, mask in zip(self.numbers, self.validation, strict=False))
 
     @classmethod
     def nothing(cls, motions: Sequence[Motion]) -> Split:
@@ -90,9 +82,9 @@ def split_rows(
     guard_s
         Time [s] purged in addition to one window.
     blocks
-        Number of blocks a log; None takes as many as are `IDENTIFY.block_s` long, 30 to 36 of them, or among several
-        logs at least a log's share of 30, and 9. Fewer where blocks would be shorter than four purge gaps. Among several
-        logs, one too short for three blocks is a block itself, and of such logs the second, fifth ... validate.
+        Number of blocks a log; None takes as many as are `IDENTIFY.block_s` long, 9 to 36 of them. Fewer where
+        blocks would be shorter than four purge gaps. Among several logs, one too short for three blocks is a block
+        itself, and of such logs the second, fifth ... validate.
     every
         k of ``"every-kth"``, 2 or more.
     validate
@@ -108,7 +100,7 @@ def split_rows(
     if kind == "blocks":
         return _blocks(motions, window_s, guard_s, blocks)
     if kind == "logs":
-        return _logs(motions, validate, window_s, guard_s)
+        return _logs(motions, validate)
     if kind == "every-kth":
         return _every_kth(motions, every)
     raise FerryIdError(
@@ -177,12 +169,12 @@ def _purge(used: Flags, validates: Flags, purge: int) -> tuple[Flags, Flags]:
 
 
 def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: int | None) -> Split:
-    training, validation, notes, purges, numbers = [], [], [], [], []
+    training, validation, notes, purges = [], [], [], []
     short = 0
-    lengths_s = [np.count_nonzero(motion.valid) / motion.rate_hz for motion in motions]
-    for motion, seconds, fewest in zip(motions, lengths_s, _fewest_blocks(lengths_s), strict=True):
+    for motion in motions:
         purge_s = purge_seconds(motion.rate_hz, window_s, guard_s)
-        number = block_number(seconds, purge_s, blocks, fewest)
+        seconds = np.count_nonzero(motion.valid) / motion.rate_hz
+        number = block_number(seconds, purge_s, blocks)
         if number < 3 and len(motions) == 1:
             raise _too_short(
                 motion, motion.valid, 3 * IDENTIFY.block_purges * purge_s, "three blocks and the gaps between them"
@@ -193,7 +185,6 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
             number, short = 1, short + 1
         else:
             validates = validation_blocks(number)[_number(motion.valid, number)]
-        numbers.append(_number(motion.valid, number))
         train, check = _purge(motion.valid, validates, round(purge_s * motion.rate_hz))
         training.append(train)
         validation.append(check)
@@ -205,23 +196,12 @@ def _blocks(motions: Sequence[Motion], window_s: float, guard_s: float, blocks: 
             f"{np.count_nonzero(check) / motion.rate_hz:.0f} s validate, "
             f"{lost:.0f} s purged in gaps of {purge_s:.1f} s."
         )
-    return Split("blocks", tuple(training), tuple(validation), min(purges), tuple(notes), tuple(numbers))
+    return Split("blocks", tuple(training), tuple(validation), min(purges), tuple(notes))
 
 
-def _fewest_blocks(lengths_s: Sequence[float]) -> list[int]:
-    """Return the least number of blocks of each log of a fit, where it is long enough: its share of what all need."""
-    if len(lengths_s) == 1:
-        return [IDENTIFY.fewest_blocks]
-    whole = max(sum(lengths_s), 1e-9)
-    shares = [int(np.ceil(IDENTIFY.fewest_blocks * seconds / whole)) for seconds in lengths_s]
-    return [max(share, IDENTIFY.fewest_log_blocks) for share in shares]
-
-
-def block_number(
-    seconds: float, purge_s: float, wanted: int | None = None, fewest: int = IDENTIFY.fewest_blocks
-) -> int:
+def block_number(seconds: float, purge_s: float, wanted: int | None = None) -> int:
     """Return the number of blocks of a log of `seconds`, none shorter than four purge gaps; see `split_rows`."""
-    usual = wanted or min(max(round(seconds / IDENTIFY.block_s), fewest), IDENTIFY.most_blocks)
+    usual = wanted or min(max(round(seconds / IDENTIFY.block_s), IDENTIFY.fewest_blocks), IDENTIFY.most_blocks)
     return min(usual, int(seconds / (IDENTIFY.block_purges * purge_s)))
 
 
@@ -238,7 +218,7 @@ def validation_blocks(number: int) -> Flags:
     return chosen
 
 
-def _logs(motions: Sequence[Motion], validate: Sequence[str], window_s: float, guard_s: float) -> Split:
+def _logs(motions: Sequence[Motion], validate: Sequence[str]) -> Split:
     names = [motion.log for motion in motions]
     if len(motions) < 2:
         raise FerryIdError(
@@ -259,14 +239,7 @@ def _logs(motions: Sequence[Motion], validate: Sequence[str], window_s: float, g
     training = [none if motion.log in chosen else motion.valid for motion, none in zip(motions, nothing, strict=True)]
     validation = [motion.valid if motion.log in chosen else none for motion, none in zip(motions, nothing, strict=True)]
     note = f"Whole logs validate: {', '.join(sorted(chosen))}."
-    numbers = tuple(_whole_log_blocks(motion, window_s, guard_s) for motion in motions)
-    return Split("logs", tuple(training), tuple(validation), 0.0, (note,), numbers)
-
-
-def _whole_log_blocks(motion: Motion, window_s: float, guard_s: float) -> Ints:
-    """Return the blocks that a log which trains or validates as a whole counts as, by row, shape (n,)."""
-    seconds = np.count_nonzero(motion.valid) / motion.rate_hz
-    return _number(motion.valid, max(1, block_number(seconds, purge_seconds(motion.rate_hz, window_s, guard_s))))
+    return Split("logs", tuple(training), tuple(validation), 0.0, (note,))
 
 
 def _every_kth(motions: Sequence[Motion], every: int) -> Split:

@@ -47,12 +47,7 @@ class IdentifyThresholds:
         "usual block of the split into training and validation",
         "tuned on real recordings: a manoeuvre or two, so that both see all kinds",
     )
-    fewest_blocks: int = threshold(
-        30, "blocks", "in all logs of a fit, where they are long enough", "derived: `held_out_blocks` of them validate"
-    )
-    fewest_log_blocks: int = threshold(
-        9, "blocks", "in each of several logs, where it is long enough", "derived: three validation blocks"
-    )
+    fewest_blocks: int = threshold(9, "blocks", "in a short log", "derived: three validation blocks")
     most_blocks: int = threshold(
         36, "blocks", "in a long log", "convention: slow vessels make long logs, and their manoeuvres last"
     )
@@ -82,7 +77,10 @@ class IdentifyThresholds:
         60.0, "s", "validation data that acceptance needs; shorter ones give a warning", "convention: some manoeuvres"
     )
     held_out_blocks: int = threshold(
-        10, "blocks", "of validation data that acceptance needs", "convention: fewer have no scatter to judge by"
+        10,
+        "blocks",
+        "as long as a prediction window, of validation data that acceptance needs",
+        "convention: fewer have no scatter to judge by",
     )
     damping_power: float = threshold(
         0.01,
@@ -95,12 +93,6 @@ class IdentifyThresholds:
         "of the rows",
         "rows on which the damping force may feed the motion in an accepted model",
         "convention: as the level of a test",
-    )
-    damping_margin: float = threshold(
-        1.25,
-        "-",
-        "factor on the visited velocities at which damping is evaluated as well",
-        "convention: a quarter beyond what was sailed",
     )
     free_run_level: float = threshold(
         0.95,
@@ -191,7 +183,7 @@ class IdentifyThresholds:
         0.99, "-", "quantile of the velocities up to which damping has to dissipate", "convention: beyond single errors"
     )
     damping_margin: float = threshold(
-        1.25, "-", "factor on these velocities", "convention: a free run leaves the training velocities a little"
+        1.25, "-", "factor on the visited velocities", "convention: a free run leaves the training velocities a little"
     )
     structure_level: float = threshold(
         0.95, "-", "confidence level of the set of structures that the data support", "convention: 95 %"

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ferryid.models.forces import ACCELERATIONS, base_force
+from ferryid.models.forces import ACCELERATIONS, base_force, without_inputs
 from ferryid.regression import window_weights
 from ferryid.regression.bases import Basis
 from ferryid.signals.track import Motion, segments
@@ -43,6 +43,8 @@ class WeakRows:
         Applied force [N, N, N·m], shape (J, 3).
     steady
         What the base model needs of it without acceleration, shape (J, 3).
+    bare
+        The same of the base model without measured wind, current and payload, which models are judged against.
     inertia
         The base model's mass matrix in every window, payload included, shape (J, 3, 3).
     by_velocity, by_pose
@@ -59,6 +61,7 @@ class WeakRows:
     functions: Floats
     force: Floats
     steady: Floats
+    bare: Floats
     inertia: Floats
     by_velocity: Floats
     by_pose: Floats
@@ -77,6 +80,10 @@ class WeakRows:
     def base(self, acceleration: Floats) -> Floats:
         """Return the applied force as the base model estimates it, shape (J, 3)."""
         return np.asarray(self.steady + np.einsum("jab,jb->ja", self.inertia, acceleration))
+
+    def reference(self, mass: Floats) -> Floats:
+        """Return the applied force as the base model of this mass (3, 3) estimates it without measured inputs, (J, 3)."""
+        return np.asarray(self.bare + self.by_velocity @ mass.T)
 
     def regressors(self, terms: tuple[str, ...]) -> Floats:
         """Return the functions with the force that is left to accelerate in the place of the accelerations, shape (J, K)."""
@@ -124,6 +131,7 @@ def average_over_windows(
     heading = motion.eta[:, 2]
     columns = {
         "steady": base_force(profile, still, scale),
+        "bare": base_force(profile, without_inputs(still), scale),
         "force": motion.tau,
         "functions": functions.of(still),
         "heading": np.column_stack([np.cos(heading), np.sin(heading)]),
@@ -137,6 +145,7 @@ def average_over_windows(
         functions=means["functions"],
         force=means["force"],
         steady=means["steady"],
+        bare=means["bare"],
         inertia=inertia / scale.get("zeta", 1.0),
         by_velocity=-_sums(motion.nu, slope, start),
         by_pose=_by_pose(motion, slope, bend, start),

@@ -61,6 +61,9 @@ def headline(result: FitOutcome) -> str:
     return f"Not accepted: {told}."
 
 
+_HOLDS = {True: "yes", False: "no", None: "not known"}
+
+
 def _context(result: FitOutcome) -> dict[str, Any]:
     model, verdict = result.model, result.acceptance
     drawn = result.logs[:MAX_LOGS]
@@ -73,6 +76,19 @@ def _context(result: FitOutcome) -> dict[str, Any]:
         "verdict_word": "accepted" if verdict.accepted else "not accepted",
         "headline": headline(result),
         "reasons": verdict.reasons,
+        "estimators": [
+            {
+                "name": one.name + (", used" if one.chosen else ""),
+                "folds": f"{one.folds:.3f}",
+                "held_out": f"{one.held_out:.3f}",
+            }
+            for one in result.estimators
+        ],
+        "checks": [
+            {"name": check.name.replace("_", " "), "holds": _HOLDS[check.passed], "reason": check.reason}
+            for check in verdict.checks
+        ],
+        "checks_held": f"{sum(check.passed is True for check in verdict.checks)} of {len(verdict.checks)} hold",
         "warnings": result.warnings,
         "axes": AXES,
         "score_rows": _score_rows(result.scores.force),

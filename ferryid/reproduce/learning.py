@@ -26,6 +26,7 @@ THESIS = FitSettings(
     window_s=1.0,
     inertia="fitted",
     estimator="derivative",
+    accept="thesis",
     delta=0.4,
     sigma=0.4,
 )
