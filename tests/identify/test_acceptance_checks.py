@@ -1,0 +1,161 @@
+"""Conditions of acceptance besides the held-out error: inertia, damping, free runs, and how much was held out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ferryid.identify import inputs
+from ferryid.identify.acceptance import Check
+from ferryid.identify.free_run_checks import free_run_checks, paired_interval
+from ferryid.identify.held_out_checks import held_out_checks
+from ferryid.identify.inertia import rigid_body
+from ferryid.identify.physical_checks import damping_checks, inertia_checks
+from ferryid.identify.pipeline import fit_logs
+from ferryid.identify.settings import FitSettings
+from ferryid.models.prediction import FreeRun, SingleRuns
+from ferryid.signals.prepare import open_track
+from ferryid.types import RunContext
+from tests.identify.rounds import PROFILE
+
+Floats = NDArray[np.float64]
+RIGID = rigid_body(PROFILE.hull)
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
+HORIZONS = np.array([10.0, 30.0, 60.0])
+
+
+def failed(checks: tuple[Check, ...]) -> set[str]:
+    return {check.name for check in checks if check.passed is False}
+
+
+def test_an_inertia_is_possible_between_its_bounds_and_not_at_them() -> None:
+    assert not failed(inertia_checks(PROFILE, 1.5 * RIGID))
+    assert failed(inertia_checks(PROFILE, RIGID @ np.diag([0.5, 1.5, 1.5]))) >= {"inertia_surge"}
+    assert failed(inertia_checks(PROFILE, np.diag([1.5, 6.0, 1.5]) @ np.diag(np.diag(RIGID)))) == {"inertia_sway"}
+    at_bound = inertia_checks(PROFILE, np.diag([5.0, 1.5, 1.5]) @ np.diag(np.diag(RIGID)))
+    assert failed(at_bound) == {"inertia_surge"}
+    assert "held at that bound" in next(check.reason for check in at_bound if check.name == "inertia_surge")
+
+
+def test_a_mass_matrix_has_to_be_positive_definite_however_large_its_diagonal() -> None:
+    mass = np.diag(np.diag(RIGID)) * 1.5
+    mass[1, 2] = mass[2, 1] = 1.01 * np.sqrt(mass[1, 1] * mass[2, 2])
+    assert failed(inertia_checks(PROFILE, mass)) == {"mass_matrix"}
+    mass[1, 2] = mass[2, 1] = 0.99 * np.sqrt(mass[1, 1] * mass[2, 2])
+    assert not failed(inertia_checks(PROFILE, mass))
+
+
+def test_damping_dissipates_where_the_vessel_went_and_a_quarter_beyond() -> None:
+    visited = np.random.default_rng(1).uniform(-1.0, 1.0, (2000, 3))
+    assert not failed(damping_checks(lambda nu: 50.0 * nu, visited))
+    assert failed(damping_checks(lambda nu: nu * [50.0, -1.0, 50.0], visited)) >= {"damping_sway"}
+    # Damped below a speed of 1.1 and driven above it: only the margin shows it.
+    assert failed(damping_checks(lambda nu: nu * (1.21 - nu**2), visited)) >= {"damping_surge", "damping_yaw"}
+    assert not failed(damping_checks(lambda nu: nu * (1.6 - nu**2), visited))
+    # A Coriolis force does no work, and a steady force is no damping.
+    assert not failed(damping_checks(lambda nu: np.add(nu, (300.0, 0.0, 0.0)), visited))
+    assert not failed(
+        damping_checks(lambda nu: nu + np.column_stack([-nu[:, 1], nu[:, 0], np.zeros(len(nu))]) * 99.0, visited)
+    )
+
+
+def test_a_paired_interval_is_students_over_clusters() -> None:
+    # Two clusters of two: sums of deviations -2 and 2, standard error sqrt(2/1 (4 + 4))/4 = 1, and t(1, 97.5 %) = 12.7062.
+    mean, low, high = paired_interval(np.array([1.0, 1.0, 3.0, 3.0]), np.array([0, 0, 7, 7]))
+    assert (mean, low, high) == pytest.approx((2.0, 2.0 - 12.7062, 2.0 + 12.7062), rel=1e-5)
+
+
+def test_a_paired_interval_holds_the_truth_as_often_as_it_claims() -> None:
+    rng = np.random.default_rng(5)
+    clusters = np.repeat(np.arange(12), 3)
+    held = 0
+    for _ in range(2000):
+        _, low, high = paired_interval(rng.normal(size=12)[clusters] + 0.5 * rng.normal(size=36), clusters)
+        held += low <= 0.0 <= high
+    assert held / 2000 == pytest.approx(0.95, abs=0.015)
+
+
+def runs(errors: Floats, stretch_rows: int = 1000) -> FreeRun:
+    """Return free runs of one log at 10 Hz, each in a stretch of its own, with errors (N, H) of position."""
+    count, wide = errors.shape
+    every = np.repeat(errors[:, :, None], 4, axis=2)
+    start = np.arange(count) * stretch_rows
+    single = SingleRuns(
+        rate_hz=np.full(count, 10.0),
+        log=np.zeros(count, dtype=np.int64),
+        start=start,
+        end=start + stretch_rows,
+        errors=every,
+        reached=np.ones((count, wide), dtype=bool),
+    )
+    nothing = np.zeros(wide)
+    return FreeRun(HORIZONS[:wide], nothing, nothing, nothing, nothing, count, {}, single=single)
+
+
+def test_free_runs_are_worse_only_beyond_their_interval() -> None:
+    rng = np.random.default_rng(3)
+    old = 1.0 + rng.random((12, 3))
+    assert not failed(free_run_checks(runs(old), runs(old)))
+    assert not failed(free_run_checks(runs(old), runs(0.5 * old)))
+    worse = failed(free_run_checks(runs(old), runs(1.5 * old)))
+    assert {"free_run_position_10s", "free_run_heading_30s", "free_run_yaw_rate_60s"} <= worse
+    by_chance = old + rng.normal(0.0, 1.0, old.shape) * 0.3
+    assert not failed(free_run_checks(runs(old), runs(by_chance)))
+
+
+def test_a_free_run_that_diverges_rejects_where_the_base_model_does_not() -> None:
+    old = np.ones((12, 3))
+    lost = old.copy()
+    lost[4, 1:] = np.nan
+    assert "divergence" in failed(free_run_checks(runs(old), runs(lost)))
+    assert "divergence" not in failed(free_run_checks(runs(lost), runs(lost)))
+    impossible = FreeRun.not_run("no inertia")
+    assert failed(free_run_checks(runs(old), impossible)) == {"free_run"}
+    assert not failed(free_run_checks(impossible, runs(old)))
+
+
+def test_what_cannot_be_compared_is_told_and_decides_nothing() -> None:
+    one = runs(np.ones((1, 3)))
+    checks = free_run_checks(one, runs(np.full((1, 3), 9.0)))
+    assert not failed(checks)
+    assert [check.name for check in checks if check.passed is None] == [f"free_run_{h:g}s" for h in HORIZONS]
+    short = runs(np.ones((12, 1)))
+    (missing,) = (check for check in free_run_checks(short, short) if check.passed is None)
+    assert "30 s or 60 s" in missing.reason
+
+
+def test_runs_of_one_stretch_count_as_one() -> None:
+    """Twelve runs that overlap within a minute are one cluster: their number is no evidence."""
+    old, new = runs(np.ones((12, 3)), stretch_rows=30), runs(np.full((12, 3), 2.0), stretch_rows=30)
+    one = [replace(each, single=replace(each.single, end=np.full(12, 400))) for each in (old, new) if each.single]
+    assert not failed(free_run_checks(one[0], one[1]))
+
+
+def test_a_minute_and_ten_blocks_are_held_out() -> None:
+    assert not failed(held_out_checks(60.0, 10, "blocks"))
+    assert failed(held_out_checks(59.0, 10, "blocks")) == {"held_out_time"}
+    assert failed(held_out_checks(600.0, 9, "blocks")) == {"held_out_blocks"}
+    (no_blocks,) = (check for check in held_out_checks(600.0, 0, "every-kth") if check.passed is False)
+    assert "--split blocks" in no_blocks.reason
+
+
+def test_a_short_log_is_accepted_by_the_thesis_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = open_track(str(FIXTURES / "short.mcap"), PROFILE, tmp_path)
+    monkeypatch.setattr(inputs, "open_track", lambda *_, **__: opened)
+    told = {}
+    for criterion in ("thesis", "full"):
+        settings = FitSettings(components=8, draws=100, delta=0.4, sigma=0.4, estimator="derivative", accept=criterion)
+        told[criterion] = fit_logs(["short.mcap"], PROFILE, settings, RunContext(tmp_path)).acceptance
+    assert told["thesis"].accepted
+    assert not told["full"].accepted
+    assert any(reason.startswith("Rejected: held-out data are") for reason in told["full"].reasons)
+    names = [check.name for check in told["full"].checks]
+    assert len(names) == len(set(names))
+    # Every reason against comes before what else is told.
+    against = [reason.startswith("Rejected:") for reason in told["full"].reasons]
+    assert all(first >= second for first, second in pairwise(against))
