@@ -67,7 +67,7 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
         named = ", ".join(terms[:6]) + (f" and {len(terms) - 6} more" if len(terms) > 6 else "")
         which = "These logs" if logs > 1 else "This log"
         warnings.append(f"{which} cannot determine {len(terms)} of the terms: {named}.")
-    if scores.seconds < IDENTIFY.validation_s:
+    if scores.seconds < IDENTIFY.validation_s and settings.accept == "thesis":
         warnings.append(f"Only {scores.seconds:.0f} s validate: the verdict rests on little data.")
     if settings.residual == "commanded":
         warnings.append("The correction was fitted to commanded forces; its error is judged against measured ones.")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
@@ -101,9 +102,8 @@ class WeakData(LogData):
             return f"the weak form explains the measured force, found --residual {self.settings.residual}"
         found, length_s = sum(len(one) for one in self.windows.training), self.windows.length_s
         if found < IDENTIFY.fewest_windows:
-            return (
-                f"the weak form needs {IDENTIFY.fewest_windows} windows of {length_s:.3g} s to train on, found {found}"
-            )
+            needed = counted(IDENTIFY.fewest_windows, "window")
+            return f"the weak form needs {needed} of {length_s:.3g} s to train on, found {found}"
         return ""
 
     @cached_property

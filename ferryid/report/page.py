@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.counts import counted
+from ferryid.counts import counted, verb
 from ferryid.identify import FitOutcome, LogFit
 from ferryid.models import RANGE_UNITS, ForceScores
 from ferryid.models.forces import effective_mass
@@ -58,7 +58,9 @@ def headline(result: FitOutcome) -> str:
     )
     if result.acceptance.accepted:
         return f"Accepted: {told}.{trust}"
-    return f"Not accepted: {told}."
+    failed = [check for check in result.acceptance.checks if check.passed is False]
+    why = f", but {counted(len(failed), 'condition')} {verb(len(failed), 'fails')}" if failed and change < 0 else ""
+    return f"Not accepted: {told}{why}."
 
 
 _HOLDS = {True: "yes", False: "no", None: "not known"}

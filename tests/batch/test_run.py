@@ -75,7 +75,7 @@ def test_a_bad_log_is_a_row_and_the_rest_goes_on(tmp_path: Path) -> None:
 
 def test_every_step_of_one_log(tmp_path: Path) -> None:
     logs = archive(tmp_path, 1)
-    recipe(tmp_path, "[fit]\ndelta = 0.4\nsigma = 0.4\n")
+    recipe(tmp_path, '[fit]\ndelta = 0.4\nsigma = 0.4\naccept = "thesis"\n')
     result, _ = run(tmp_path, logs / "*.mcap")
     (row,) = result.rows
     assert row.status == "done", row.reason

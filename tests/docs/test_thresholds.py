@@ -24,6 +24,7 @@ NO_DECISION = {
         signals.kalman WINDOW_PER_TIME
         effects.payload WATER WATERPLANE
         identify.adaptive.averaging NORMAL_95
+        identify.free_run_checks _DEGREES
         identify.split _GOLDEN
     """,
     "indices, labels, exponents and neutral values": """
@@ -47,6 +48,7 @@ NO_DECISION = {
     "rounding, overflow and division by zero": """
         signals.grid EXACT_S
         identify.acceptance _ROUNDING _NOTHING
+        identify.physical_checks _AT_BOUND
         identify.adaptive.averaging _SUM
         regression.bases.crossflow_integrals LEAST_SPEED_MPS
         regression.cross_products LARGEST
@@ -68,6 +70,7 @@ NO_DECISION = {
         diagnose.inference.autoregression ORDER
         diagnose.inference.weak_form STEPS_A_WINDOW FORCES_HZ
         diagnose.inference.spectra WINDOW_RATIO BURST_HZ BURST_S BURST_PERIODS BANDS_HZ
+        identify.free_run_checks JUDGED_S
         identify.settings TEST_WINDOW_S
         models.forces.residual HORIZON_S
         models.prediction.free_run HORIZONS_S STEP_S
@@ -112,8 +115,10 @@ NO_DECISION = {
         diagnose.judging.findings SHOWN_RIVALS
         diagnose.judging.unexplained SPANS
         identify.archive MOST_DRAWN
+        identify.block_sum_store _VELOCITIES
         identify.excitation SECTORS
         identify.fit_warnings MOST_LOGS_SAID
+        identify.physical_checks MOST_ROWS
         identify.settings FOLDS
         identify.split EVERY
         identify.sweeps.structure_sweep DRAWS

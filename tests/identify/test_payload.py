@@ -283,7 +283,7 @@ def logs(tmp_path_factory: pytest.TempPathFactory, boarded: Trial, drifted: Tria
     }
 
 
-SETTINGS = FitSettings(delta=0.6, components=18, window_s=0.5, draws=20)
+SETTINGS = FitSettings(delta=0.6, components=18, window_s=0.5, draws=20, accept="thesis")
 
 
 def test_a_fit_recovers_the_bare_hull_only_where_the_payload_is_weighed(logs: dict[str, str], tmp_path: Path) -> None:

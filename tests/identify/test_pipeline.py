@@ -22,7 +22,7 @@ from ferryid.vessel import load_profile
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 PROFILE = load_profile("milliampere")
-SETTINGS = FitSettings(delta=0.4, sigma=0.4, draws=60)
+SETTINGS = FitSettings(delta=0.4, sigma=0.4, draws=60, accept="thesis")
 
 
 @pytest.fixture(scope="module")

@@ -35,6 +35,7 @@ def test_scenario_runs_and_is_fitted(name: str, tmp_path: Path) -> None:
         RunContext(tmp_path / "out"),
     )
     scores = result.scores
-    assert scores.rows > 0.1 * scenario.duration_s * scenario.sensors.navigation_rate_hz
+    assert scores.seconds > 0.1 * scenario.duration_s
+    assert scores.rows > 20
     assert np.isfinite(result.model.theta).all()
     assert np.isfinite([scores.force.mse_base, scores.force.mse_model]).all()

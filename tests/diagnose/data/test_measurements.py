@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
-from ferryid.diagnose.inference.prior import default_hull_spread, prior_force_model
+from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.effects.force_model import COEFFICIENTS, Measurements, acceleration
+from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
 from ferryid.models.forces.estimator import model_estimator
 from ferryid.models.model import Model
@@ -166,7 +167,7 @@ def test_windows_follow_froude() -> None:
 
 @pytest.mark.parametrize("vessel", ["milliampere-2025", "esso-osaka", "gunnerus", "kvlcc2-model", "vtec-usv"])
 def test_a_hull_without_a_model_may_have_any_damping(short: Measurements, vessel: str) -> None:
-    spread = default_hull_spread(short, load_profile(vessel))
+    spread = default_hull_spread(load_profile(vessel), short.nu)
     assert spread.shape == (len(COEFFICIENTS),)
     assert np.all(np.isfinite(spread) & (spread > 0.0))
 
@@ -176,7 +177,7 @@ def test_a_tanker_may_lift_as_tankers_do_and_a_known_hull_as_it_is_known(short: 
     tanker = load_profile("kvlcc2-model")
     L, T = tanker.hull.length_m, tanker.hull.draught_m
     plate = 0.5 * 1000.0 * L * T
-    spread = dict(zip(COEFFICIENTS, default_hull_spread(short, tanker), strict=True))
+    spread = dict(zip(COEFFICIENTS, default_hull_spread(tanker, short.nu), strict=True))
     usual = {"Y_uv": 0.4 * plate, "Y_ur": 0.08 * plate * L, "N_uv": 0.13 * plate * L, "N_ur": 0.05 * plate * L**2}
     for name, value in usual.items():
         assert 0.3 * value < spread[name] < 5.0 * value, name
@@ -185,7 +186,7 @@ def test_a_tanker_may_lift_as_tankers_do_and_a_known_hull_as_it_is_known(short: 
 
 def test_broad_beliefs_hold_what_was_measured_of_a_ferry(short: Measurements) -> None:
     # Table 4.1 was identified on the real vessel: nothing of it may lie far outside what its size alone lets one believe.
-    spread = default_hull_spread(short, FERRY)
+    spread = default_hull_spread(FERRY, short.nu)
     known = np.array([0.0, *([0.0] * 4), *(FERRY.hull.D.get(name, 0.0) for name in COEFFICIENTS[5:])])
     rigid = np.array([FERRY.hull.mass_kg, FERRY.hull.mass_kg, 0.0, 0.0, FERRY.hull.inertia_z])
     known[:5] = np.array([2389.657, 2533.911, 62.386, 28.141, 5068.91]) - rigid
