@@ -30,6 +30,7 @@ from ferryid.ingest.mcap_index import (
     Walks,
     index_entries,
     message_table,
+    record_header,
     stored_crc,
     walk,
 )
@@ -73,7 +74,7 @@ def load_carefully(
     crc = 0 if chunk.truncated else stored_crc(file, chunk.offset)
     try:
         data = content(file, whole_file, chunk, crc)
-        table, others, end = walk_table(data, chunk, walks)
+        table, others, end = walk_table(data, chunk, crc, walks)
     except DamagedRecord as error:
         return Loaded(whole_file[:0], {}, tuple(_lost(file, chunk, wanted, name, topics, str(error))))
     indexed = chunk.counts()
@@ -148,8 +149,11 @@ def check(data: Bytes, crc: int) -> None:
         raise DamagedRecord("the checksum of a chunk is wrong")
 
 
-def walk_table(data: Bytes, chunk: Chunk, walks: Walks) -> tuple[Messages, list[tuple[int, int, int]], int]:
+def walk_table(data: Bytes, chunk: Chunk, crc: int, walks: Walks) -> tuple[Messages, list[tuple[int, int, int]], int]:
     """Walk the records of a chunk; returns its messages, its other records and where the walk ended.
+
+    Without a checksum, a message behind which no record of a chunk stands is left out: bytes are missing or wrong from
+    somewhere on, perhaps from within it.
 
     Raises
     ------
@@ -162,7 +166,22 @@ def walk_table(data: Bytes, chunk: Chunk, walks: Walks) -> tuple[Messages, list[
     if end < len(data) and len(offsets) + len(others) >= limit:
         raise DamagedRecord("a chunk holds more records than it has bytes in the file, which no recorder writes")
     table, _ = message_table(data, np.array(offsets, np.int64))
+    if chunk.truncated or not (chunk.checksummed or crc):
+        odd = [start for kind, start, _ in others if kind not in (SCHEMA, CHANNEL)]
+        odd += [] if _may_follow(data, end, chunk) else [end]
+        table = table.take(~np.isin(table.starts + table.sizes, odd)) if odd else table
     return table, others, end
+
+
+def _may_follow(data: Bytes, end: int, chunk: Chunk) -> bool:
+    """Tell whether a record of the chunk may begin at `end`, whole or cut off with the data, or the chunk ends there."""
+    if end == len(data):
+        return True
+    if data[end] not in (SCHEMA, CHANNEL, MESSAGE):
+        return False
+    if len(data) - end < RECORD_HEADER:
+        return True
+    return end + RECORD_HEADER + record_header(data.data, end)[1] <= chunk.uncompressed_size
 
 
 def header_fields(buffer: Bytes, messages: Messages) -> NDArray[np.void]:
@@ -250,7 +269,7 @@ def walk_chunk(
     crc = 0 if chunk.truncated else stored_crc(file, chunk.offset)
     try:
         data = content(file, whole_file, chunk, crc)
-        table, others, end = walk_table(data, chunk, walks)
+        table, others, end = walk_table(data, chunk, crc, walks)
     except DamagedRecord as error:
         if chunk.indexed is not None:
             return chunk, [], None

@@ -222,6 +222,8 @@ class Index:
         In what the chunks that the summary lists and the file contradict each other, None where they agree.
     walks
         Bounds how many records of chunks are walked.
+    votes
+        How many records state each definition, by kind and id.
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -235,9 +237,10 @@ class Index:
     complete: bool = False
     contradiction: str | None = None
     walks: Walks = field(default_factory=Walks)
+    votes: dict[tuple[type, int], dict[tuple[Any, ...], int]] = field(default_factory=dict)
 
     def define(self, opcode: int, content: Bytes | memoryview) -> None:
-        """Take a Schema or Channel record; the first definition of an id stands.
+        """Take a Schema or Channel record; of several definitions of an id that of most records stands, or the first.
 
         Raises
         ------
@@ -248,13 +251,17 @@ class Index:
 
     def add(self, definition: Schema | Channel) -> None:
         """Take a definition; one that contradicts an earlier one of the same id is noted in `conflicts`."""
+        known: dict[int, Any] = self.schemas if isinstance(definition, Schema) else self.channels
+        votes = self.votes.setdefault((type(definition), definition.id), {})
+        stated = _stated(definition)
+        votes[stated] = votes.get(stated, 0) + 1
         conflict = self.conflict(definition)
         if conflict:
             self.conflicts.append(conflict)
-        elif isinstance(definition, Schema):
-            self.schemas.setdefault(definition.id, definition)
+        if conflict and votes[stated] > votes.get(_stated(known[definition.id]), 0):
+            known[definition.id] = definition
         else:
-            self.channels.setdefault(definition.id, definition)
+            known.setdefault(definition.id, definition)
             if len(self.channels) > MAX_CHANNELS:
                 raise ExcessError(f"it holds more than {MAX_CHANNELS} channels, which no vessel records")
 
@@ -262,17 +269,16 @@ class Index:
         """Say what in a definition contradicts the known one of the same id; an empty string where nothing does."""
         if isinstance(definition, Schema):
             schema = self.schemas.get(definition.id, definition)
-            if schema == definition:
+            if _stated(schema) == _stated(definition):
                 return ""
             known, new = repr(schema.name), repr(definition.name)
         else:
-            channel = self.channels.get(definition.id, definition)
-            stated = [(one.topic, one.schema_id, one.message_encoding) for one in (channel, definition)]
+            stated = [_stated(one) for one in (self.channels.get(definition.id, definition), definition)]
             if stated[0] == stated[1]:
                 return ""
             known, new = (f"{topic!r} with schema {schema} in {encoding!r}" for topic, schema, encoding in stated)
         kind = "schema" if isinstance(definition, Schema) else "channel"
-        return f"{kind} {definition.id} is defined as {known} and as {new}: the first stands, for all messages"
+        return f"{kind} {definition.id} is defined as {known} and as {new}: what more records state stands for all messages"
 
     def counts(self) -> dict[int, int]:
         """Return the number of messages per channel id that the chunks and the walk show."""
@@ -284,6 +290,13 @@ class Index:
             for key, count in self.loose.counts.items():
                 total[key] = total.get(key, 0) + count
         return total
+
+
+def _stated(definition: Schema | Channel) -> tuple[Any, ...]:
+    """Return what a definition says of its id."""
+    if isinstance(definition, Schema):
+        return definition.name, definition.encoding, definition.data
+    return definition.topic, definition.schema_id, definition.message_encoding
 
 
 def definition(opcode: int, content: Bytes | memoryview) -> Schema | Channel:

@@ -161,12 +161,12 @@ def _confirmed(index: Index) -> bool:
 
 
 def _merge(index: Index, summary: Index) -> None:
-    """Add what the summary has to the index found by walking; the definitions of the summary come first."""
+    """Add what the summary has to the index found by walking; of as many definitions, those of the summary stand."""
     index.statistics = summary.statistics
     index.losses[:0] = summary.losses
     index.conflicts += summary.conflicts
     walked: list[Schema | Channel] = [*index.schemas.values(), *index.channels.values()]
-    index.schemas, index.channels = dict(summary.schemas), dict(summary.channels)
+    index.schemas, index.channels, index.votes = dict(summary.schemas), dict(summary.channels), summary.votes
     for definition in walked:
         index.add(definition)
 

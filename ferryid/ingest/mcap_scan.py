@@ -9,8 +9,10 @@ from bisect import bisect_left
 from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
+from mcap.records import Channel
 
 from ferryid.counts import counted, verb
 from ferryid.ingest.log import Loss
@@ -32,6 +34,7 @@ from ferryid.ingest.mcap_index import (
     DamagedRecord,
     Index,
     chunk_at,
+    definition,
     lenient_chunk,
     message_table,
     record_header,
@@ -201,7 +204,8 @@ def _define(index: Index, file: memoryview, records: Sequence[Record]) -> None:
         if kind == CHANNEL:
             # A damaged one is noted when the segment is taken.
             with suppress(DamagedRecord):
-                index.define(kind, file[start + RECORD_HEADER : start + RECORD_HEADER + length])
+                found = definition(kind, file[start + RECORD_HEADER : start + RECORD_HEADER + length])
+                index.channels.setdefault(found.id, cast(Channel, found))
 
 
 def _sound_attachment(content: memoryview) -> bool:

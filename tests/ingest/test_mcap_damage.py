@@ -289,6 +289,40 @@ def test_a_channel_that_is_defined_twice_is_reported() -> None:
     assert "channel 1 is defined as '/b'" in loss.what
 
 
+@pytest.mark.parametrize("wrong_first", [True, False])
+def test_of_definitions_that_contradict_each_other_that_of_more_records_stands(wrong_first: bool) -> None:
+    right, wrong = channel(1, "/a"), channel(1, "/b")
+    assert right in HEAD
+    definitions = [wrong, right, right] if wrong_first else [right, right, wrong]
+    got, losses = read(HEAD.replace(right, b"".join(definitions)) + message(0) + DATA_END + footer(0))
+    assert got == [0.0]
+    assert any("is defined as" in loss.what for loss in losses)
+
+
+@pytest.mark.parametrize("wrong_first", [True, False])
+def test_a_summary_with_a_wrong_id_does_not_lend_messages_to_another_topic(wrong_first: bool) -> None:
+    """The summary has the id of another topic, beside the right definition, which the first chunk has as well."""
+    chunks = chunk_records("zstd")
+    first = channel(1, "/a") + b"".join(message(number) for number in range(PER_CHUNK))
+    chunks[0] = chunk(first, "zstd", start=T0), [(time, place + len(channel(1, "/a"))) for time, place in chunks[0][1]]
+    both = [channel(1, "/b"), channel(1, "/a")]
+    definitions = DEFINITIONS + b"".join(both if wrong_first else both[::-1])
+    got, losses = read(with_summary(chunks, definitions=definitions))
+    assert got == ALL
+    assert any("is defined as" in loss.what for loss in losses)
+
+
+@pytest.mark.parametrize("cut", [30, 50, 100])
+def test_a_message_made_of_the_ends_of_two_is_none(cut: int) -> None:
+    """Bytes are missing in a chunk that is not compressed, from within the value of its fourth message on."""
+    one = chunk(b"".join(message(number) for number in range(PER_CHUNK)), "", start=T0, crc=False)
+    place = one.index(message(4)) - 4
+    content = HEAD + one[:place] + one[place + cut :] + DATA_END + footer(0) + MAGIC
+    got, losses = read(content)
+    assert got == [0.0, 1.0, 2.0]
+    assert any(loss.messages is None for loss in losses)
+
+
 @pytest.mark.parametrize("opcode", [3, 4, 8, 9, 11, 12])
 @pytest.mark.parametrize("length", [0, 4, 2**31, 2**63, 2**64 - 1])
 def test_records_of_absurd_length_hide_nothing_behind_them(opcode: int, length: int) -> None:
