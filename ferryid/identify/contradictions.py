@@ -1,4 +1,4 @@
-"""Forces that accelerate a vessel the wrong way: what no coefficient can mend, and which line of a profile explains it."""
+"""Forces that accelerate a vessel the wrong way, or many times too little or too much: which line of a profile explains it."""
 
 from __future__ import annotations
 
@@ -38,9 +38,40 @@ def wrong_way(response: Floats, spread: Floats, profile: str) -> str:
         cause = "the actuators and the motion have y axes that point to opposite sides"
         remedy = 'set frame = "FLU" for velocity and yaw rate, or change the sign of y in position_m of the actuators'
     else:
-        cause = "port and starboard actuators are exchanged, or heading and yaw rate count anticlockwise"
-        remedy = "exchange the signals of the port and starboard actuators, or set the frames of heading and yaw rate"
+        cause = (
+            "actuators are exchanged (port and starboard, bow and stern), or heading and yaw rate count anticlockwise"
+        )
+        remedy = "exchange the signals of the actuators, or set the frames of heading and yaw rate"
     return f"{told}: {cause}. Fix: in {profile}, {remedy}"
+
+
+def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) -> str:
+    """Return what is wrong and how to mend it where the applied force is many times too large or too small; empty where not.
+
+    It is where the inertia that it means is impossible on every axis on which it is estimated, two of them at least, and by
+    more than chance: one wrong coefficient does not do that, a wrong unit does.
+
+    Parameters
+    ----------
+    response, spread, profile
+        As of `wrong_way`.
+    share
+        The base model's inertia over the rigid body's on each axis, shape (3,).
+    """
+    known = np.isfinite(response)
+    reach = IDENTIFY.wrong_way_sigmas * spread[known]
+    large = response[known] + reach < share[known] / IDENTIFY.most_inertia
+    small = response[known] - reach > share[known] / IDENTIFY.least_inertia
+    if np.count_nonzero(known) < 2 or not (large.all() or small.all()):
+        return ""
+    measured = ", ".join(f"{AXES[axis]} {response[axis]:.2g} ± {spread[axis]:.1g}" for axis in np.flatnonzero(known))
+    told = f"the applied forces accelerate the vessel by {measured} of what the base model expects: "
+    if small.all():
+        cause = "they are several times too small, or the profile's mass is too large"
+    else:
+        cause = "they are several times too large, the actuators were not engaged, or the profile's mass is too small"
+    remedy = "correct the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N), the thrust curve or mass_kg"
+    return f"{told}{cause}. Fix: in {profile}, {remedy}"
 
 
 def response_of(gains: Floats, information: Floats, mask: Flags, places: tuple[int, int, int]) -> tuple[Floats, Floats]:

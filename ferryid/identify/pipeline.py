@@ -91,7 +91,7 @@ def fit_logs(
             wanted = _select(profile, settings, data.functions, opened, windows_s, parts.training).components
         components["derivative"] = int(wanted)
     if kind != "derivative":
-        weak.refuse_wrong_way()
+        weak.refuse_contradictions()
         components["weak"] = weak.components()
     chosen: LogData = data if kind == "derivative" else weak
     compared: tuple[EstimatorScore, ...] = ()

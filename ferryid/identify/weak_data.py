@@ -13,10 +13,10 @@ from ferryid.counts import counted
 from ferryid.effects.force_model import COEFFICIENTS, hull_of
 from ferryid.effects.hull_spread import default_hull_spread
 from ferryid.errors import FerryIdError
-from ferryid.identify.contradictions import response_of, wrong_way
+from ferryid.identify.contradictions import response_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, feasible_gains
 from ferryid.identify.fit_data import Estimate
-from ferryid.identify.inertia import without_inertia
+from ferryid.identify.inertia import relative_inertia, without_inertia
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation
 from ferryid.identify.settings import FOLDS
@@ -314,8 +314,8 @@ class WeakData(LogData):
             out[:, every, axis] += pulls @ covariance[np.searchsorted(every, own)]
         return out
 
-    def refuse_wrong_way(self) -> None:
-        """Refuse logs in which the vessel accelerates against the applied force.
+    def refuse_contradictions(self) -> None:
+        """Refuse logs in which the vessel accelerates against the applied force, or not nearly as much as that would.
 
         Raises
         ------
@@ -329,7 +329,9 @@ class WeakData(LogData):
         gains = fit_simpls(self.training, len(terms), allowed=mask).coefficients[-1]
         places = (terms.index("u_dot"), terms.index("v_dot"), terms.index("r_dot"))
         response, spread = response_of(gains, self._information(), mask, places)
-        if told := wrong_way(response, spread, f"the profile {self.profile.name}"):
+        where = f"the profile {self.profile.name}"
+        share = relative_inertia(self.profile, self.windows.base_mass)
+        if told := wrong_way(response, spread, where) or wrong_size(response, spread, share, where):
             raise FerryIdError(f"{self.where}: {told}")
 
     def feasible(self, gains: Floats, mask: Flags) -> Feasible:

@@ -299,7 +299,7 @@ def test_the_weak_form_explains_the_measured_force_alone() -> None:
 @pytest.mark.parametrize(
     ("signs", "cause"),
     [
-        ((1.0, 1.0, -1.0), "port and starboard actuators are exchanged"),
+        ((1.0, 1.0, -1.0), r"actuators are exchanged \(port and starboard"),
         ((1.0, -1.0, -1.0), "y axes that point to opposite sides"),
         ((-1.0, 1.0, 1.0), "the thrust or the surge velocity has the wrong sign"),
     ],
@@ -308,13 +308,24 @@ def test_forces_that_act_the_wrong_way_are_refused_with_their_cause(
     signs: tuple[float, float, float], cause: str
 ) -> None:
     logs = [measured(seed, seconds=300.0, jitter=0.03) for seed in range(2)]
-    data_of(logs).refuse_wrong_way()
+    data_of(logs).refuse_contradictions()
     turned = [replace(one, tau=one.tau * signs) for one in logs]
     with pytest.raises(
         FerryIdError,
         match=rf"accelerates the vessel in .* of what the base model expects.*{cause}.* Fix: in the profile",
     ):
-        data_of(turned).refuse_wrong_way()
+        data_of(turned).refuse_contradictions()
+
+
+@pytest.mark.parametrize(
+    ("factor", "cause"), [(9.55**2, "several times too large"), (1.0 / 9.81, "several times too small")]
+)
+def test_forces_in_a_wrong_unit_are_refused(factor: float, cause: str) -> None:
+    logs = [measured(seed, seconds=300.0, jitter=0.03) for seed in range(2)]
+    with pytest.raises(FerryIdError, match=rf"{cause}.* Fix: in the profile .*rpm"):
+        data_of([replace(one, tau=one.tau * factor) for one in logs]).refuse_contradictions()
+    # One axis alone has a wrong coefficient, not a wrong unit.
+    data_of([replace(one, tau=one.tau * (1.0, 1.0, factor)) for one in logs]).refuse_contradictions()
 
 
 def test_what_only_the_prior_determines_has_its_spread() -> None:
