@@ -22,8 +22,8 @@ from tests.attack.check import Outcome, examine
 
 ADDRESS_SPACE = 3 * 10**9
 """What a worker may map beyond what it has at first [bytes]: more than what a case may use, which is measured."""
-WALL_FACTOR = 6
-"""A case may wait for the processors as long as it does not use them."""
+ASLEEP_S = 60.0
+"""Time that a case may sleep [s], waiting for something that does not come; waiting for a processor is no sleep."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ class _Worker:
     process: Any
     link: Connection
     number: int | None = None
-    since: float = 0.0
+    seen: float = 0.0
+    asleep_s: float = 0.0
     processor_s: float = 0.0
 
 
@@ -146,7 +147,7 @@ def _run(
 
 
 def _give(worker: _Worker, number: int) -> None:
-    worker.number, worker.since = number, time.monotonic()
+    worker.number, worker.seen, worker.asleep_s = number, time.monotonic(), 0.0
     worker.processor_s = _used(worker.process.pid)
     worker.link.send(number)
 
@@ -156,18 +157,29 @@ def _over_time(worker: _Worker) -> str:
     limit = check.SECONDS * (2 + 2 * (worker.number is not None and worker.number % COMMAND_EVERY == 0))
     if _used(worker.process.pid) - worker.processor_s > limit:
         return f"took more than {limit:.0f} s of processor time"
-    if time.monotonic() - worker.since > WALL_FACTOR * limit:
-        return f"took more than {WALL_FACTOR * limit:.0f} s"
-    return ""
+    now = time.monotonic()
+    worker.asleep_s = worker.asleep_s + now - worker.seen if _asleep(worker.process.pid) else 0.0
+    worker.seen = now
+    return f"slept for more than {ASLEEP_S:.0f} s" if worker.asleep_s > ASLEEP_S else ""
+
+
+def _asleep(pid: int) -> bool:
+    """Tell whether every thread of a process waits for something that is no processor."""
+    return all(_stat(thread)[:1] != ["R"] for thread in Path(f"/proc/{pid}/task").glob("*"))
 
 
 def _used(pid: int) -> float:
     """Processor time of a process [s], of all its threads."""
+    fields = _stat(Path(f"/proc/{pid}"))
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") if fields else 0.0
+
+
+def _stat(process: Path) -> list[str]:
+    """Return what the system tells of a process or thread, from its state on; nothing where it has ended."""
     try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return (process / "stat").read_text().rpartition(")")[2].split()
     except OSError:
-        return 0.0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        return []
 
 
 def _ending(code: int | None) -> str:
