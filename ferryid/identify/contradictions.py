@@ -70,7 +70,9 @@ def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) ->
         cause = "they are several times too small, or the profile's mass is too large"
     else:
         cause = "they are several times too large, the actuators were not engaged, or the profile's mass is too small"
-    remedy = "correct the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N), the thrust curve or mass_kg"
+    remedy = (
+        "correct the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N), the thrust curve or mass_kg"
+    )
     return f"{told}{cause}. Fix: in {profile}, {remedy}"
 
 

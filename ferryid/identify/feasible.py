@@ -35,7 +35,9 @@ class Feasible:
     notes
         What the data contradicted, as sentences.
     projection
-        Takes other gains, flat, to the bounds that are met here: ``b + lift @ (level - normal @ b)``; empty where none is.
+        Makes the mass matrix of other gains, flat, symmetric: ``b + lift @ (level - normal @ b)``; empty where it is.
+    shift
+        By how much the bounds moved the gains, flat.
     places
         Which gains the flat ones are, as (function, axis) rows.
     """
@@ -43,17 +45,19 @@ class Feasible:
     gains: Floats
     notes: tuple[str, ...]
     projection: tuple[Floats, Floats, Floats]
+    shift: Floats
     places: tuple[tuple[int, int], ...]
 
     def moved(self, gains: Floats) -> Floats:
-        """Return other gains, shape (n, K, 3), moved to the same bounds."""
+        """Return drawn gains, shape (n, K, 3), with a symmetric mass matrix and moved as far as the estimate was.
+
+        A bound that the estimate meets does not take the scatter of the draws: how far the truth is inside is not known.
+        """
         lift, normal, level = self.projection
-        if not len(level):
-            return gains
         rows, axes = (np.array(part) for part in zip(*self.places, strict=True))
         flat = gains[:, rows, axes]
         out = gains.copy()
-        out[:, rows, axes] = flat + (level - flat @ normal.T) @ lift.T
+        out[:, rows, axes] = flat + (level - flat @ normal.T) @ lift.T + self.shift
         return out
 
 
@@ -101,7 +105,9 @@ def feasible_gains(
         if settled and not problem.mass_cuts(problem.mass(current)):
             break
     told = tuple(dict.fromkeys(rows[k][2] for k in active.tolist() if rows[k][2]))
-    return Feasible(problem.gains(current), told, problem.projection(rows, active), tuple(problem.places))
+    lift, normal, level = problem.projection(symmetry)
+    shift = current - (wanted + lift @ (level - normal @ wanted))
+    return Feasible(problem.gains(current), told, (lift, normal, level), shift, tuple(problem.places))
 
 
 class _Problem:
@@ -228,11 +234,12 @@ class _Problem:
                 )
         return rows
 
-    def projection(self, rows: list[tuple[Floats, float, str]], active: np.ndarray) -> tuple[Floats, Floats, Floats]:
+    def projection(self, rows: list[tuple[Floats, float, str]]) -> tuple[Floats, Floats, Floats]:
+        """Return what leads other gains to where these rows hold exactly; see `Feasible`."""
         size = len(self.places)
-        if not len(active):
+        if not rows:
             return np.zeros((size, 0)), np.zeros((0, size)), np.zeros(0)
-        normal, level = np.array([rows[k][0] for k in active]), np.array([rows[k][1] for k in active])
+        normal, level = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
         unit = np.linalg.norm(normal, axis=1)
         normal, level = normal / unit[:, None], level / unit
         spread = np.linalg.pinv(self.cost, hermitian=True) @ normal.T

@@ -15,7 +15,7 @@ from ferryid.vessel.profile import Profile
 MOST_ROWS = 10_000
 """Rows at which damping is evaluated; of more, evenly spaced ones."""
 _ALONE = ("u", "v", "r")
-_AT_BOUND = 1e-3
+_ROUNDING = 1e-3
 """Part of a bound within which an inertia is at it."""
 
 
@@ -37,11 +37,11 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
     ]
     for axis, share in zip(AXES, relative_inertia(profile, mass).tolist(), strict=True):
         low, high = IDENTIFY.least_inertia, IDENTIFY.most_inertia
-        lowest, highest = low * (1.0 + _AT_BOUND), high * (1.0 - _AT_BOUND)
+        lowest, highest = low * (1.0 - _ROUNDING), high * (1.0 + _ROUNDING)
         possible = lowest <= share <= highest
-        if possible:
+        if low * (1.0 + _ROUNDING) < share < high * (1.0 - _ROUNDING):
             meaning = "it is possible"
-        elif abs(share - low) <= low * _AT_BOUND or abs(share - high) <= high * _AT_BOUND:
+        elif possible:
             meaning = "it is held at that bound, beyond which the data would have it"
         elif share < low:
             meaning = "added mass only adds, so that the model is too light there"
@@ -52,7 +52,7 @@ def inertia_checks(profile: Profile, mass: Floats) -> tuple[Check, ...]:
                 f"inertia_{axis}",
                 possible,
                 share,
-                high if share > highest else low,
+                high if share > high * (1.0 - _ROUNDING) else low,
                 "of the rigid body's",
                 f"The effective inertia in {axis} is {share:.2f} times the rigid body's, and {low:g} to {high:g} is possible: "
                 f"{meaning}.",

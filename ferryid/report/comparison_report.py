@@ -10,13 +10,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from ferryid import __version__
-from ferryid.compare import CommonErrors, Comparison, ComparisonResult
+from ferryid.compare import Coefficient, CommonErrors, Comparison, ComparisonResult
 from ferryid.files import dump_json, replacing
 from ferryid.report import comparison_words
 from ferryid.report.comparison_page import render
 from ferryid.report.comparison_words import render_effects
 from ferryid.report.outcome import Report
 
+NARROW = 3
+"""Columns of coefficients up to which their intervals are beside them."""
 NAMED = 2
 """Models and logs that the folder's name holds; a sum stands for the others."""
 
@@ -64,14 +66,30 @@ def as_text(result: ComparisonResult) -> str:
         lines += [f"  warning: {warning}" for warning in comparison_words.warnings_of(scope)]
     if result.logs:
         lines += ["", comparison_words.ABOUT_P]
-    columns = {label: max(12, len(label) + 2) for label in result.labels}
-    lines += ["", f"{'equations of motion':<18}" + "".join(f"{label:>{width}}" for label, width in columns.items())]
-    for row in result.coefficients.physical:
-        cells = "".join(f"{comparison_words.cell(row.values[label])[0]:>{width}}" for label, width in columns.items())
-        lines.append(f"  {row.coefficient:<16}{cells}  {row.unit}")
-    lines.append("Intervals, and terms that are no hull's, such as wind and the constant: in the report.")
+    lines += ["", *_coefficient_table(result)]
     effects = render_effects(result.effects)
     return "\n".join([*lines, *(["", *effects] if effects else [])])
+
+
+def _coefficient_table(result: ComparisonResult) -> list[str]:
+    """Return the coefficients of every model, with their intervals where there is room for them."""
+    narrow = len(result.labels) <= NARROW
+    cells = {
+        label: [_with_interval(row.values[label], narrow) for row in result.coefficients.physical]
+        for label in result.labels
+    }
+    columns = {label: max(12, 2 + max(map(len, (label, *column)))) for label, column in cells.items()}
+    lines = [f"{'equations of motion':<18}" + "".join(f"{label:>{width}}" for label, width in columns.items())]
+    for number, row in enumerate(result.coefficients.physical):
+        line = "".join(f"{cells[label][number]:>{width}}" for label, width in columns.items())
+        lines.append(f"  {row.coefficient:<16}{line}  {row.unit}")
+    also = "In parentheses: 95 % intervals. T" if narrow else "Intervals, and t"
+    return [*lines, f"{also}erms that are no hull's, such as wind and the constant: in the report."]
+
+
+def _with_interval(one: Coefficient | None, shown: bool) -> str:
+    value, interval = comparison_words.cell(one)
+    return f"{value} ({interval})" if shown and interval else value
 
 
 def _score_table(result: ComparisonResult, scope: CommonErrors, wide: int) -> list[str]:

@@ -48,7 +48,7 @@ NO_DECISION = {
     "rounding, overflow and division by zero": """
         signals.grid EXACT_S
         identify.acceptance _ROUNDING _NOTHING
-        identify.physical_checks _AT_BOUND
+        identify.physical_checks _ROUNDING
         identify.adaptive.averaging _SUM
         regression.bases.crossflow_integrals LEAST_SPEED_MPS
         regression.cross_products LARGEST

@@ -33,12 +33,12 @@ def failed(checks: tuple[Check, ...]) -> set[str]:
     return {check.name for check in checks if check.passed is False}
 
 
-def test_an_inertia_is_possible_between_its_bounds_and_not_at_them() -> None:
+def test_an_inertia_is_possible_between_its_bounds() -> None:
     assert not failed(inertia_checks(PROFILE, 1.5 * RIGID))
     assert failed(inertia_checks(PROFILE, RIGID @ np.diag([0.5, 1.5, 1.5]))) >= {"inertia_surge"}
     assert failed(inertia_checks(PROFILE, np.diag([1.5, 6.0, 1.5]) @ np.diag(np.diag(RIGID)))) == {"inertia_sway"}
     at_bound = inertia_checks(PROFILE, np.diag([5.0, 1.5, 1.5]) @ np.diag(np.diag(RIGID)))
-    assert failed(at_bound) == {"inertia_surge"}
+    assert not failed(at_bound)
     assert "held at that bound" in next(check.reason for check in at_bound if check.name == "inertia_surge")
 
 
