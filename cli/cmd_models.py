@@ -2,20 +2,60 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ferryid.cli.options import OUT, Json, Out
-from ferryid.cli.output import emit
+from ferryid.cli.output import emit, progress
+from ferryid.errors import FerryIdError
+
+if TYPE_CHECKING:
+    from ferryid.report.outcome import Outcome
 
 
 def command(
-    model: Annotated[str, typer.Argument(help="A name, name@version or path to show; none lists all.")] = "",
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[MODEL | promote NAME@V [LOG...] | rollback NAME]",
+            help="A name, name@version or path to show, and none to list all; or which version is to become current: "
+            "one that is replayed on logs against the present one, or the one before.",
+            show_default=False,
+        ),
+    ] = None,
+    vessel: Annotated[str, typer.Option(help="Vessel profile of the logs, in place of the models' own.")] = "",
+    force: Annotated[bool, typer.Option("--force", help="Promote also where the replay speaks against it.")] = False,
+    to: Annotated[int | None, typer.Option(help="Version to roll back to; the one before if left out.")] = None,
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """List the stored models and which is current, or show one."""
+    """List the stored models and which is current, show one, or change which is current."""
     from ferryid import api
 
-    emit(api.show_model(model, out) if model else api.models(out), json)
+    first, *others = words or [""]
+    if first == "promote" and others:
+        promoted = api.promote(others[0], others[1:], out, vessel=vessel or None, force=force, progress=progress)
+        emit(promoted, json)
+        if not promoted.json["promoted"]:
+            raise typer.Exit(3)
+    elif first == "rollback" and others:
+        emit(_rolled_back(others, out, to), json)
+    elif others:
+        raise FerryIdError(
+            f"models: {first!r} is followed by {len(others)} more. Fix: name one model, or write promote or rollback before it"
+        )
+    else:
+        emit(api.show_model(first, out) if first else api.models(out), json)
+
+
+def _rolled_back(names: list[str], out: Path, to: int | None) -> Outcome:
+    from ferryid import api
+
+    if len(names) > 1:
+        raise FerryIdError(f"models rollback: {len(names)} names were given. Fix: name one, and its version with --to")
+    name, _, version = names[0].partition("@")
+    if version and not version.isdigit():
+        raise FerryIdError(f"models rollback: {names[0]} has no version. Fix: write {name}@NUMBER, or {name} alone")
+    return api.roll_back(name, out, to=int(version) if version else to)

@@ -40,8 +40,10 @@ __all__ = [
     "ingest",
     "inspect",
     "models",
+    "promote",
     "prove",
     "reproduce",
+    "roll_back",
     "scenarios",
     "show_model",
     "simulate",
@@ -373,6 +375,46 @@ def show_model(model: str | Path | Model, out: str | Path = OUT) -> Outcome:
 
     loaded = _model(model, Path(out))
     return _outcome(model_to_json(loaded), render_model(loaded))
+
+
+def promote(
+    model: str,
+    on: Logs = (),
+    out: str | Path = OUT,
+    *,
+    vessel: str | Path | Profile | None = None,
+    force: bool = False,
+    progress: Progress = _quiet,
+) -> Outcome:
+    """Make a stored version the current one, after a replay of it and of the present one on logs; ``json["promoted"]`` tells.
+
+    Parameters
+    ----------
+    model
+        ``name@version``.
+    on
+        Logs: a version that runs free worse on them than the current one is not promoted, and a rejected one only where it is
+        better in something. Without logs an accepted one is.
+    out
+        Output folder.
+    vessel
+        In place of the models' own profile.
+    force
+        Promote whatever the verdict is; the history says so.
+    """
+    from ferryid.report.promotion import promote_version
+
+    run = _context(out, progress)
+    told = promote_version(model, _paths(on), run, None if vessel is None else _profile(vessel), force=force)
+    progress("")
+    return _outcome(*told)
+
+
+def roll_back(name: str, out: str | Path = OUT, *, to: int | None = None) -> Outcome:
+    """Make the version current that was it before, or an earlier one that was it once."""
+    from ferryid.report.promotion import roll_back_version
+
+    return _outcome(*roll_back_version(name, Path(out), to))
 
 
 def scenarios() -> Outcome:

@@ -14,6 +14,7 @@ from ferryid.compare.comparison_result import (
     Statement,
 )
 from ferryid.compare.evaluation import evaluate
+from ferryid.compare.replay import Replay, replay_versions
 from ferryid.compare.tracking import MEASURES, Tracking, cumulative_integral, signal_power, tracking_error
 
 __all__ = [
@@ -28,12 +29,14 @@ __all__ = [
     "EffectRow",
     "LogErrors",
     "ModelPair",
+    "Replay",
     "Statement",
     "Tracking",
     "compare",
     "cumulative_integral",
     "evaluate",
     "is_of_a_hull",
+    "replay_versions",
     "select_candidates",
     "signal_power",
     "tracking_error",

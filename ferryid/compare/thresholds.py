@@ -35,6 +35,12 @@ class CompareThresholds:
     outside: float = threshold(
         0.05, "of the rows", "outside a range of validity above which a warning is given", "convention: five per cent"
     )
+    replay_level: float = threshold(
+        0.05,
+        "-",
+        "probability by chance of a ratio between two versions, over the number of ratios, below which one counts as worse",
+        "convention: 5 % (Bonferroni)",
+    )
 
 
 COMPARE = CompareThresholds()

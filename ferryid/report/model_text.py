@@ -9,7 +9,11 @@ from typing import Any
 
 from ferryid.counts import counted
 from ferryid.models import Model, model_to_json
+from ferryid.models.store import Change
 from ferryid.types import AXES
+
+MOST_CHANGES = 10
+"""Changes of the current version that the list shows, the latest ones."""
 
 
 def render_listing(result: dict[str, Any], out: Path) -> str:
@@ -32,6 +36,9 @@ def render_listing(result: dict[str, Any], out: Path) -> str:
             lines += [f"      {_some([log])}: {told}" for told in shown]
     if any(model["current"] for model in result["models"]):
         lines.append("* current")
+    for name, changes in result.get("history", {}).items():
+        lines += ["", f"{name}, which version was current since when"]
+        lines += [f"  {Change(**change).sentence}" for change in changes[-MOST_CHANGES:]]
     lines += [
         f"{problem}. Fix: fit again, a model that is accepted becomes the current one"
         for problem in result.get("problems", ())

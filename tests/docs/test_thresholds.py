@@ -70,6 +70,7 @@ NO_DECISION = {
         diagnose.inference.autoregression ORDER
         diagnose.inference.weak_form STEPS_A_WINDOW FORCES_HZ
         diagnose.inference.spectra WINDOW_RATIO BURST_HZ BURST_S BURST_PERIODS BANDS_HZ
+        compare.replay JUDGED_S
         identify.free_run_checks JUDGED_S
         identify.settings TEST_WINDOW_S
         models.forces.residual HORIZON_S

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ferryid.effects import effects
 from ferryid.models.model import Model
+from ferryid.models.store.history import read_history
 from ferryid.models.store.versions import StoredModel, UnreadableModel, current_problems, list_models
 from ferryid.models.stored_effect import StoredEffect
 
@@ -18,7 +20,15 @@ def list_versions(out: Path) -> dict[str, Any]:
         "schema": "ferryid.models/1",
         "models": [_row(stored) for stored in list_models(out)],
         **({"problems": found} if found else {}),
+        **({"history": changes} if (changes := _changes(out)) else {}),
     }
+
+
+def _changes(out: Path) -> dict[str, Any]:
+    """Return the history of every name that has one."""
+    folders = sorted({stored.path.parent for stored in list_models(out)})
+    told = {folder.name: [asdict(change) for change in read_history(folder)] for folder in folders}
+    return {name: changes for name, changes in told.items() if changes}
 
 
 def _row(stored: StoredModel | UnreadableModel) -> dict[str, Any]:

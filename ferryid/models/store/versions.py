@@ -1,7 +1,7 @@
 """The model store: numbered versions of named models under one folder, and which one is current.
 
 ``<out>/models/<name>/<version>.json`` are the models, ``<out>/models/<name>/current`` holds the number of the accepted
-version in use. Versions are never overwritten.
+version in use, and ``history.jsonl`` what was current before. Versions are never overwritten.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.files import dump_json, remove_abandoned, write_text
 from ferryid.models.model import Model, model_from_json, model_to_json
+from ferryid.models.store.history import earlier_versions, make_current
 
 
 @dataclass(frozen=True)
@@ -93,8 +95,53 @@ def save(model: Model, out: Path) -> StoredModel:
     if not stored.path.exists():
         write_text(stored.path, dump_json(model_to_json(model)))
     if model.accepted:
-        write_text(stored.path.parent / "current", f"{model.version}\n")
+        action = "diagnose" if model.diagnosed else "fit"
+        make_current(stored.path.parent, stored.previous, model.version, action, "It was accepted.")
     return stored
+
+
+def current_version(name: str, out: Path) -> int | None:
+    """Return which version of a model is current, None where none is."""
+    return _current(_folder(out) / name)
+
+
+def promote(
+    model: Model, out: Path, reason: str, *, logs: Sequence[Mapping[str, str]] = (), forced: bool = False
+) -> None:
+    """Make a stored version the current one; see `Change` for the arguments."""
+    folder = _folder(out) / model.name
+    make_current(folder, _current(folder), model.version, "promote", reason, logs=logs, forced=forced)
+
+
+def roll_back(name: str, out: Path, to: int | None = None) -> tuple[int | None, int]:
+    """Make the version current that was it before, or one that was it earlier; returns the version left and the new one.
+
+    Raises
+    ------
+    FerryIdError
+        Where no such version was current, or its file is not there or damaged.
+    """
+    folder = _folder(out) / name
+    present = _versions(folder)
+    if not present:
+        find(name, out)
+    before = _current(folder)
+    earlier = [version for version in earlier_versions(folder, before) if version != before]
+    if to is None and not earlier:
+        raise FerryIdError(
+            f"{name}: no version that was current before is known. Fix: choose one with ferryid models promote {name}@VERSION"
+        )
+    target = earlier[-1] if to is None else to
+    if target not in earlier:
+        listed = ", ".join(str(version) for version in sorted(set(earlier))) or "none"
+        raise FerryIdError(
+            f"{name}@{target}: not current before, those that were: {listed}. Fix: choose one of them, or use "
+            f"ferryid models promote {name}@{target}"
+        )
+    load_file(folder / f"{target}.json")
+    reason = "Back to the version before." if to is None else "Back to a version that had been current."
+    make_current(folder, before, target, "rollback", reason)
+    return before, target
 
 
 def load(reference: str, out: Path) -> Model:
