@@ -26,7 +26,7 @@ def command(
         ),
     ] = None,
     vessel: Annotated[str, typer.Option(help="Vessel profile of the logs, in place of the models' own.")] = "",
-    force: Annotated[bool, typer.Option("--force", help="Promote also where the replay speaks against it.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Promote although the replay found it worse.")] = False,
     to: Annotated[int | None, typer.Option(help="Version to roll back to; the one before if left out.")] = None,
     out: Out = OUT,
     json: Json = None,

@@ -51,7 +51,7 @@ def _verdict(new: Model, current: int | None, found: Replay | None) -> tuple[boo
     """Return whether a version may become current, and why or why not."""
     if found is None:
         if not new.accepted:
-            return False, "It was rejected by its fit, and no log was replayed that speaks for it."
+            return False, "It was rejected by its fit, and it was not replayed on any log."
         if current is None:
             return True, "It was accepted, and no version was current."
         return True, "It was accepted; it was not compared with the version before on any log."
