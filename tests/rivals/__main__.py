@@ -1,0 +1,38 @@
+"""``python -m tests.rivals`` writes reports/rivals.md.
+
+Real recordings are left out, and the page says so, where they are absent.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from tests.evidence import stamp
+from tests.real.places import REPORTS
+from tests.rivals.page import HEAD, RECORDED_HEAD, better, recorded_section
+from tests.rivals.recorded import CASES, recorded
+
+
+def main() -> None:
+    """Run all comparisons and write the page."""
+    parser = argparse.ArgumentParser(prog="python -m tests.rivals")
+    parser.add_argument("--trials", type=int, default=3, help="simulated trials of each kind")
+    parser.parse_args()
+    lines, ahead, absent = [HEAD, RECORDED_HEAD], [], []
+    for case in CASES:
+        print(case.name, flush=True)
+        one = recorded(case)
+        if one is None:
+            absent.append(case.name)
+            continue
+        lines += recorded_section(one)
+        ahead += better(one)
+    if absent:
+        lines.append(f"\nNot at hand, and so left out: {', '.join(absent)}.\n")
+    lines += ["\n## Where a rival is better than ferryid weak\n", *(ahead or ["Nowhere."]), ""]
+    (REPORTS / "rivals.md").write_text("\n".join(lines), encoding="utf-8")
+    stamp(REPORTS / "rivals.md")
+
+
+if __name__ == "__main__":
+    main()
