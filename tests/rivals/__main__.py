@@ -6,19 +6,37 @@ Real recordings are left out, and the page says so, where they are absent.
 from __future__ import annotations
 
 import argparse
+import tempfile
+from pathlib import Path
 
 from tests.evidence import stamp
 from tests.real.places import REPORTS
-from tests.rivals.page import HEAD, RECORDED_HEAD, better, recorded_section
+from tests.rivals.page import (
+    HEAD,
+    RECORDED_HEAD,
+    SIMULATED_HEAD,
+    better,
+    better_simulated,
+    recorded_section,
+    simulated_section,
+)
 from tests.rivals.recorded import CASES, recorded
+from tests.rivals.simulated import KINDS, compared, trials
 
 
 def main() -> None:
     """Run all comparisons and write the page."""
     parser = argparse.ArgumentParser(prog="python -m tests.rivals")
     parser.add_argument("--trials", type=int, default=3, help="simulated trials of each kind")
-    parser.parse_args()
-    lines, ahead, absent = [HEAD, RECORDED_HEAD], [], []
+    count = parser.parse_args().trials
+    lines, ahead, absent = [HEAD, SIMULATED_HEAD], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in KINDS if count else ():
+            print(kind.name, flush=True)
+            found = [compared(trial) for trial in trials(kind, count, Path(folder))]
+            lines += simulated_section(kind.name, found)
+            ahead += better_simulated(kind.name, found)
+    lines.append(RECORDED_HEAD)
     for case in CASES:
         print(case.name, flush=True)
         one = recorded(case)

@@ -1,6 +1,6 @@
-"""The methods: base model, ferryid's two estimators, the thesis's pipeline, and three rivals. All give a correction of one form.
+"""The methods: base model, ferryid's two estimators, the thesis's pipeline, and three rivals.
 
-The form is ``tau = F_0 + theta' phi + intercept`` with the terms of `ferryid fit`, so that all are judged by the same code.
+All give a correction ``tau = F_0 + theta' phi + intercept`` with the terms of `ferryid fit`, and the same code judges them.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ def weak_sindy(task: Task, draws: int) -> Coefficients:
 
 
 def sparse(X: Floats, y: Floats, block: Ints) -> Floats:
-    """Return coefficients by sequentially thresholded least squares with the largest threshold within one standard error of the best.
+    """Return coefficients by sequentially thresholded least squares.
+
+    The threshold is the largest within one standard error of the best.
 
     Parameters
     ----------

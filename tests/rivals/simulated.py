@@ -1,4 +1,4 @@
-"""Simulated trials with a known truth: the simulator's own vessel, and a ferry in six degrees of freedom that shares no formula."""
+"""Simulated trials with a known truth: of the simulator, and of a plant in six degrees of freedom that shares no formula with it."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ KINDS = tuple(
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A log to learn from, one of the same vessel in calm to judge on, the profile, and the truth.
+    """A log to learn from, one of the same vessel in calm without noise to judge on, the profile, and the truth.
 
     `mass` is (3, 3); `damping` gives the true damping force of velocities (n, 3), shape (n, 3).
     """
@@ -90,7 +90,7 @@ class Found:
     inertia
         Relative errors of m11, m22 and m33, shape (3,).
     damping
-        Error of the damping force over the true one, each axis's root mean square over the velocities of the trial, mean of axes.
+        Root mean square error of the damping force at the trial's velocities over that of the true one, mean of the axes.
     covered
         Whether the 95 % intervals of the three inertias hold the truth; NaN where there is none, shape (3,).
     runs
@@ -133,8 +133,10 @@ def _simulator(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path
     blown = replace(
         calm, wind=Wind(north_mps=WIND_MPS[0], east_mps=WIND_MPS[1], gust_std_mps=GUST_MPS, gust_time_s=8.0)
     )
+    noise = replace(calm.sensors.noise, position_m=0.0, heading_deg=0.0, velocity_mps=0.0, yaw_rate_degps=0.0)
+    exact = replace(calm, sensors=replace(calm.sensors, noise=noise))
     logs = []
-    for name, scenario, number in (("learn", blown if kind.breeze else calm, seed), ("judge", calm, 1000 + seed)):
+    for name, scenario, number in (("learn", blown if kind.breeze else calm, seed), ("judge", exact, 1000 + seed)):
         path = folder / f"{name}.mcap"
         write_log(simulate(scenario, number), path)
         logs.append(open_track(str(path), profile, None))
@@ -146,8 +148,10 @@ def _independent(kind: Kind, seed: int, factors: Mapping[str, float], folder: Pa
     profile = parse_profile(profile_text(FERRY, factors, FERRY.thrusters), "ferry")
     logs = []
     for name, number in (("learn", seed), ("judge", 1000 + seed)):
-        wind = {"wind": WIND_MPS} if kind.breeze and name == "learn" else {}
-        trial = simulate_trial(FERRY, wind, "calibration", number)
+        conditions: dict[str, object] = {"noise": 0.0} if name == "judge" else {}
+        if kind.breeze and name == "learn":
+            conditions["wind"] = WIND_MPS
+        trial = simulate_trial(FERRY, conditions, "calibration", number)
         path = log_writer.write_log(log_writer.streams(trial, number), folder, name, "mcap")
         logs.append(open_track(str(path), profile, None))
     m = masses(FERRY)
@@ -193,7 +197,7 @@ def covered(task: Task, found: Coefficients, mass: Floats) -> Floats:
 
 
 def summary(every: Sequence[Found | str]) -> list[float]:
-    """Return median errors of inertias and damping [%], coverage [%], median position error at the last horizon, failures, time."""
+    """Return errors of three inertias and damping [%], coverage [%], position error [m], failures and time [s]; medians."""
     good = [one for one in every if not isinstance(one, str)]
     failed = len(every) - len(good)
     if not good:
