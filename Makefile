@@ -63,7 +63,7 @@ real: $(VENV)/installed
 
 # ferryid's estimators beside output error, sparse and stepwise regression: writes reports/rivals.md. TRIALS=N simulates that many
 # trials of each kind; the recordings are left out where they are absent.
-TRIALS ?= 3
+TRIALS ?= 5
 rivals: $(VENV)/installed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.rivals --trials $(TRIALS)
 

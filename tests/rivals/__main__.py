@@ -12,6 +12,7 @@ from pathlib import Path
 from tests.evidence import stamp
 from tests.real.places import REPORTS
 from tests.rivals.page import (
+    ELSEWHERE,
     HEAD,
     RECORDED_HEAD,
     SIMULATED_HEAD,
@@ -27,7 +28,7 @@ from tests.rivals.simulated import KINDS, compared, trials
 def main() -> None:
     """Run all comparisons and write the page."""
     parser = argparse.ArgumentParser(prog="python -m tests.rivals")
-    parser.add_argument("--trials", type=int, default=3, help="simulated trials of each kind")
+    parser.add_argument("--trials", type=int, default=5, help="simulated trials of each kind")
     count = parser.parse_args().trials
     lines, ahead, absent = [HEAD, SIMULATED_HEAD], [], []
     with tempfile.TemporaryDirectory() as folder:
@@ -47,7 +48,7 @@ def main() -> None:
         ahead += better(one)
     if absent:
         lines.append(f"\nNot at hand, and so left out: {', '.join(absent)}.\n")
-    lines += ["\n## Where a rival is better than ferryid weak\n", *(ahead or ["Nowhere."]), ""]
+    lines += [ELSEWHERE, *(ahead or ["Nowhere."]), ""]
     (REPORTS / "rivals.md").write_text("\n".join(lines), encoding="utf-8")
     stamp(REPORTS / "rivals.md")
 

@@ -13,6 +13,7 @@ import numpy as np
 from pysindy.optimizers import STLSQ
 
 from ferryid.identify.estimation import estimate_correction
+from ferryid.identify.estimators import fold_error
 from ferryid.identify.fit_data import Coefficients
 from ferryid.identify.log_sums import folds_by_blocks, force_free_axes, sum_log
 from ferryid.identify.model_selection import select_model
@@ -47,14 +48,24 @@ def weak(task: Task, draws: int) -> Coefficients:
 
 def derivative(task: Task, draws: int) -> Coefficients:
     """Return what ``ferryid fit --estimator derivative`` finds, the number of components by cross-validation."""
+    return estimate_correction(task.data, _derivative_components(task), draws, no_progress).coefficients
+
+
+def auto(task: Task, draws: int) -> Coefficients:
+    """Return what ``ferryid fit`` finds: by the one of its estimators that errs less on folds of the training rows."""
+    data = weak_data(task.data)
+    errors = fold_error(data, data.components()), fold_error(task.data, _derivative_components(task))
+    return (derivative if errors[1] < errors[0] else weak)(task, draws)
+
+
+def _derivative_components(task: Task) -> int:
     settings, data = task.settings, task.data
     logs = [
         sum_log(task.profile, settings, task.functions, one.measured, (settings.window_s,), wanted=rows)
         for one, rows in zip(task.logs, data.split.training, strict=True)
     ]
     folds, idle = folds_by_blocks(logs), force_free_axes(logs)
-    chosen = select_model(task.profile, settings, task.functions, (settings.window_s,), folds, idle)
-    return estimate_correction(data, chosen.components, draws, no_progress).coefficients
+    return select_model(task.profile, settings, task.functions, (settings.window_s,), folds, idle).components
 
 
 def thesis(task: Task, draws: int) -> Coefficients:
@@ -156,6 +167,7 @@ def _select_terms(
 
 METHODS: Mapping[str, Method] = {
     "base model": base,
+    "ferryid auto": auto,
     "ferryid weak": weak,
     "ferryid derivative": derivative,
     "thesis (12 components)": thesis,

@@ -257,17 +257,23 @@ def _shoot(
         for i in range(out.shape[1] - 1):
             row = start[s] + i * stride[s]
             after = row + stride[s]
+            # The rows beside the middle of the step; they are one where it has a row there.
+            low, high = row + stride[s] // 2, after - stride[s] // 2
             total[:] = 0.0
             at[:] = state
             for stage in range(4):
-                part = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
                 u, v, r = at[3], at[4], at[5]
                 phi[0], phi[1], phi[2], phi[3], phi[4], phi[5], phi[6] = u * v, u * r, v * r, r * r, u, v, r
                 phi[7], phi[8], phi[9] = u * u * u, v * v * v, r * r * r
                 phi[10], phi[11], phi[12] = abs(u) * u, abs(v) * v, abs(r) * r
                 phi[13], phi[14] = abs(v) * r, abs(r) * v
                 for a in range(3):
-                    force[a] = (1.0 - part) * tau[row, a] + part * tau[after, a]
+                    if stage == 0:
+                        force[a] = tau[row, a]
+                    elif stage == 3:
+                        force[a] = tau[after, a]
+                    else:
+                        force[a] = 0.5 * (tau[low, a] + tau[high, a])
                     for j in range(15):
                         force[a] -= phi[j] * need[j, a]
                 c, d = np.cos(at[2]), np.sin(at[2])

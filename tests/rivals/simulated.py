@@ -1,4 +1,4 @@
-"""Simulated trials with a known truth: of the simulator, and of a plant in six degrees of freedom that shares no formula with it."""
+"""Simulated trials with a known truth: of the simulator, and of an independent plant in six degrees of freedom."""
 
 from __future__ import annotations
 
