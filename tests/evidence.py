@@ -25,6 +25,7 @@ MAKERS: Mapping[str, tuple[str, ...]] = {
     "reports/proof.md": ("cli/cmd_prove.py",),
     "reports/real.md": ("tests/real",),
     "reports/real/diagnosis.md": ("tests/real",),
+    "reports/rivals.md": ("tests/rivals",),
     "reports/thesis.md": ("cli/cmd_reproduce.py",),
     "reports/waves.md": ("tests/wavy", *(f"cli/cmd_{name}.py" for name in ("simulate", "fit", "diagnose", "evaluate"))),
 }

@@ -1,0 +1,57 @@
+"""``python -m tests.rivals`` writes reports/rivals.md.
+
+Real recordings are left out, and the page says so, where they are absent.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from tests.evidence import stamp
+from tests.real.places import REPORTS
+from tests.rivals.page import (
+    ELSEWHERE,
+    HEAD,
+    RECORDED_HEAD,
+    SIMULATED_HEAD,
+    better,
+    better_simulated,
+    recorded_section,
+    simulated_section,
+)
+from tests.rivals.recorded import CASES, recorded
+from tests.rivals.simulated import KINDS, compared, trials
+
+
+def main() -> None:
+    """Run all comparisons and write the page."""
+    parser = argparse.ArgumentParser(prog="python -m tests.rivals")
+    parser.add_argument("--trials", type=int, default=5, help="simulated trials of each kind")
+    count = parser.parse_args().trials
+    lines, ahead, absent = [HEAD, SIMULATED_HEAD], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in KINDS if count else ():
+            print(kind.name, flush=True)
+            found = [compared(trial) for trial in trials(kind, count, Path(folder))]
+            lines += simulated_section(kind.name, found)
+            ahead += better_simulated(kind.name, found)
+    lines.append(RECORDED_HEAD)
+    for case in CASES:
+        print(case.name, flush=True)
+        one = recorded(case)
+        if one is None:
+            absent.append(case.name)
+            continue
+        lines += recorded_section(one)
+        ahead += better(one)
+    if absent:
+        lines.append(f"\nNot at hand, and so left out: {', '.join(absent)}.\n")
+    lines += [ELSEWHERE, *(ahead or ["Nowhere."]), ""]
+    (REPORTS / "rivals.md").write_text("\n".join(lines), encoding="utf-8")
+    stamp(REPORTS / "rivals.md")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,216 @@
+"""Simulated trials with a known truth: of the simulator, and of an independent plant in six degrees of freedom."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ferryid.errors import FerryIdError
+from ferryid.identify.fit_data import Coefficients
+from ferryid.models.forces import Estimator, effective_mass, motion_force
+from ferryid.signals.prepare import Opened, open_track
+from ferryid.simulate import load_scenario, simulate, write_log
+from ferryid.simulate.plant.hull import perturbed
+from ferryid.simulate.sections import Wind
+from ferryid.types import Floats
+from ferryid.validation import log_writer
+from ferryid.validation.plant.hull import drag, hull_constants
+from ferryid.validation.plant.trial import simulate_trial
+from ferryid.validation.plant.vessels import FERRY
+from ferryid.validation.prior_profile import masses, profile_text
+from ferryid.vessel import load_profile, parse_profile
+from ferryid.vessel.parse_hull import DAMPING_TERMS
+from ferryid.vessel.profile import Profile
+from tests.rivals.methods import METHODS
+from tests.rivals.scores import HORIZONS_S, free_runs
+from tests.rivals.task import Task
+
+DRAWS = 200
+"""Draws of the bootstrap of ferryid's intervals."""
+WIND_MPS, GUST_MPS = (-2.0, 2.0), 0.5
+"""The breeze, which nothing measures: where it goes to, north and east, and the standard deviation of its gusts."""
+INERTIAS = ("m11", "m22", "m33")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Kind of trial: its name, the plant, by how much each coefficient of the hull is off, and whether a breeze blows."""
+
+    plant: str
+    off: float
+    breeze: bool
+
+    @property
+    def name(self) -> str:
+        """Name on the page."""
+        return f"{self.plant}, hull {100 * self.off:.0f} % off, {'breeze' if self.breeze else 'calm'}"
+
+
+KINDS = tuple(
+    Kind(plant, off, breeze)
+    for plant in ("simulator", "independent plant")
+    for off in (0.1, 0.4)
+    for breeze in (False, True)
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A log to learn from, one of the same vessel in calm without noise to judge on, the profile, and the truth.
+
+    `mass` is (3, 3); `damping` gives the true damping force of velocities (n, 3), shape (n, 3).
+    """
+
+    profile: Profile
+    learn: Opened
+    judge: Opened
+    mass: Floats
+    hull: Profile | None
+
+    def damping(self, nu: Floats) -> Floats:
+        """Return the force against the water's damping, shape (n, 3)."""
+        if self.hull is not None:
+            return damping_force(Estimator(self.hull, {}), self.mass, nu)
+        hull, force = hull_constants(FERRY), np.zeros((len(nu), 6))
+        for row, (u, v, r) in enumerate(nu):
+            drag(hull, np.array([u, v, 0.0, 0.0, 0.0, r]), 0.0, 1.0, force[row])
+        return -force[:, [0, 1, 5]]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a method found in one trial.
+
+    Attributes
+    ----------
+    inertia
+        Relative errors of m11, m22 and m33, shape (3,).
+    damping
+        Root mean square error of the damping force at the trial's velocities over that of the true one, mean of the axes.
+    covered
+        Whether the 95 % intervals of the three inertias hold the truth; NaN where there is none, shape (3,).
+    runs
+        Errors of free runs in the other log, as of `tests.rivals.scores.Score`.
+    seconds
+        Time that the estimate took, its intervals included [s].
+    """
+
+    inertia: Floats
+    damping: float
+    covered: Floats
+    runs: Floats
+    seconds: float
+
+
+def damping_force(force: Estimator, mass: Floats, nu: Floats) -> Floats:
+    """Return a model's force for steady velocities without its intercept and the Coriolis force of a mass, shape (n, 3)."""
+    zero = np.zeros_like(nu)
+    whole = force(zero, nu, zero[:, 0], None, None)
+    if force.intercept is not None:
+        whole = whole - force.intercept
+    bare = replace(force.profile, hull=replace(force.profile.hull, M=mass, D={}))
+    return np.asarray(whole - motion_force(bare, {}, zero, nu, zero[:, 0]))
+
+
+def trials(kind: Kind, count: int, folder: Path) -> Iterator[Trial]:
+    """Yield trials of a kind."""
+    for seed in range(count):
+        rng = np.random.default_rng([seed, round(100 * kind.off)])
+        names = (*INERTIAS, *DAMPING_TERMS)
+        factors = dict(zip(names, (1.0 + kind.off * rng.choice([-1.0, 1.0], len(names))).tolist(), strict=True))
+        where = folder / f"{kind.plant.replace(' ', '-')}-{kind.off}-{kind.breeze}-{seed}"
+        where.mkdir(parents=True)
+        yield (_simulator if kind.plant == "simulator" else _independent)(kind, seed, factors, where)
+
+
+def _simulator(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path) -> Trial:
+    profile = load_profile("milliampere")
+    calm = replace(load_scenario("twelve-corner-calm"), true_hull=factors)
+    blown = replace(
+        calm, wind=Wind(north_mps=WIND_MPS[0], east_mps=WIND_MPS[1], gust_std_mps=GUST_MPS, gust_time_s=8.0)
+    )
+    noise = replace(calm.sensors.noise, position_m=0.0, heading_deg=0.0, velocity_mps=0.0, yaw_rate_degps=0.0)
+    exact = replace(calm, sensors=replace(calm.sensors, noise=noise))
+    logs = []
+    for name, scenario, number in (("learn", blown if kind.breeze else calm, seed), ("judge", exact, 1000 + seed)):
+        path = folder / f"{name}.mcap"
+        write_log(simulate(scenario, number), path)
+        logs.append(open_track(str(path), profile, None))
+    true = replace(profile, hull=perturbed(profile.hull, factors))
+    return Trial(profile, *logs, true.hull.M, true)
+
+
+def _independent(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path) -> Trial:
+    profile = parse_profile(profile_text(FERRY, factors, FERRY.thrusters), "ferry")
+    logs = []
+    for name, number in (("learn", seed), ("judge", 1000 + seed)):
+        conditions: dict[str, object] = {"noise": 0.0} if name == "judge" else {}
+        if kind.breeze and name == "learn":
+            conditions["wind"] = WIND_MPS
+        trial = simulate_trial(FERRY, conditions, "calibration", number)
+        path = log_writer.write_log(log_writer.streams(trial, number), folder, name, "mcap")
+        logs.append(open_track(str(path), profile, None))
+    m = masses(FERRY)
+    mass = np.array([[m["m11"], 0.0, 0.0], [0.0, m["m22"], m["m23"]], [0.0, m["m32"], m["m33"]]])
+    return Trial(profile, *logs, mass, None)
+
+
+def compared(trial: Trial) -> dict[str, Found | str]:
+    """Return what each method found in a trial, or why it found no model."""
+    task, test = Task.of(trial.profile, [trial.learn]), Task.of(trial.profile, [trial.judge])
+    nu = np.concatenate([m.nu[m.valid] for m in task.data.motions])[::10]
+    true = trial.damping(nu)
+    told: dict[str, Found | str] = {}
+    for name, method in METHODS.items():
+        began = time.perf_counter()
+        try:
+            found = method(task, DRAWS)
+        except FerryIdError as error:
+            told[name] = str(error)
+            continue
+        seconds = time.perf_counter() - began
+        mass = effective_mass(trial.profile, task.settings.scale, task.functions.terms, found.theta)
+        inertia = np.diag(mass) / np.diag(trial.mass) - 1.0
+        if np.linalg.eigvalsh((mass + mass.T) / 2).min() <= 0.0:
+            told[name] = "mass matrix not positive"
+            continue
+        error = np.sqrt(np.mean((damping_force(task.estimator(found), mass, nu) - true) ** 2, axis=0))
+        share = float(np.mean(error / np.sqrt(np.mean(true**2, axis=0))))
+        runs = free_runs(task, test, found)
+        told[name] = Found(inertia, share, covered(task, found, trial.mass), runs, seconds)
+    return told
+
+
+def covered(task: Task, found: Coefficients, mass: Floats) -> Floats:
+    """Return whether the intervals of the three inertias hold the truth, 1 or 0, NaN where there is none, shape (3,)."""
+    base, out = np.diag(task.windows.base_mass), np.full(3, np.nan)
+    for axis, name in enumerate(("u_dot", "v_dot", "r_dot")):
+        row = task.functions.terms.index(name)
+        low, high = base[axis] + found.low[row, axis], base[axis] + found.high[row, axis]
+        if np.isfinite(low + high):
+            out[axis] = float(low <= mass[axis, axis] <= high)
+    return out
+
+
+def summary(every: Sequence[Found | str]) -> list[float]:
+    """Return errors of three inertias and damping [%], coverage [%], position error [m], failures and time [s]; medians."""
+    good = [one for one in every if not isinstance(one, str)]
+    failed = len(every) - len(good)
+    if not good:
+        return [float("nan")] * 6 + [failed, float("nan")]
+    inertia = 100.0 * np.median(np.abs([one.inertia for one in good]), axis=0)
+    held = np.concatenate([one.covered for one in good])
+    held = held[np.isfinite(held)]
+    position = np.concatenate([one.runs[:, len(HORIZONS_S) - 1, 0] for one in good])
+    return [
+        *inertia.tolist(),
+        100.0 * float(np.median([one.damping for one in good])),
+        100.0 * float(np.mean(held)) if len(held) else float("nan"),
+        float(np.median(position[~np.isnan(position)])),
+        failed,
+        float(np.mean([one.seconds for one in good])),
+    ]
