@@ -20,7 +20,8 @@ from ferryid.types import AXES, Flags, Floats
 from ferryid.vessel.profile import Profile
 
 _ROUNDS = 6
-_SHARES = (0.01, 0.05, *(tenth / 10.0 for tenth in range(1, 11)))
+_SHARES = (0.01, 0.05, *(tenth / 10.0 for tenth in range(1, 11)), 2.0, 5.0, 100.0)
+"""Of the velocities visited and a margin. At the last ones the highest power decides: a hull dissipates at every speed."""
 _DIRECTIONS = 16
 
 
@@ -247,7 +248,7 @@ class _Problem:
 
 
 def _points(nu: Floats) -> Floats:
-    """Return velocities ahead, astern, and across with turning, up to a margin beyond those visited, shape (p, 3)."""
+    """Return velocities ahead, astern, and across with turning, those visited and far beyond, shape (p, 3)."""
     reach = np.quantile(np.abs(nu), IDENTIFY.visited_quantile, axis=0) * IDENTIFY.damping_margin
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     points = []

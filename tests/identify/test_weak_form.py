@@ -218,7 +218,15 @@ def test_damping_that_feeds_the_motion_is_brought_to_none() -> None:
     gains[BASIS.terms.index("r"), 2] = 6.0 * base["N_r"]
     found = feasible(gains)
     _, theta = law(found.gains)
-    for nu in ([0.4, 0.0, 0.0], [0.05, 0.0, 0.0], [0.0, 0.0, 0.1], [0.0, 0.2, -0.1], [0.0, 0.1, 0.1]):
+    for nu in (
+        [0.4, 0.0, 0.0],
+        [0.05, 0.0, 0.0],
+        [0.0, 0.0, 0.1],
+        [0.0, 0.2, -0.1],
+        [0.0, 0.1, 0.1],
+        [5.0, 0.0, 0.0],
+        [0.0, 0.0, 2.0],
+    ):
         point, still = np.array([nu]), np.zeros((1, 3))
         force = motion_force(PROFILE, SCALE, still, point, np.zeros(1))[0] + (BASIS.evaluate(point, still) @ theta)[0]
         assert float(force @ point[0]) >= -1e-6
@@ -232,6 +240,18 @@ def test_damping_that_feeds_the_motion_is_brought_to_none() -> None:
     np.testing.assert_allclose(moved[1:, *place] - moved[0, *place], [3.0, -3.0], rtol=1e-6)
     for one in moved:
         np.testing.assert_allclose(law(one)[0], law(one)[0].T, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_damping_dissipates_far_beyond_the_velocities_visited(sign: float) -> None:
+    """A cube of the wrong sign does no harm at the velocities of a log, and a free run that leaves them diverges."""
+    gains = np.zeros((K, 3))
+    gains[BASIS.terms.index("r^3"), 2] = sign * PROFILE.hull.D["N_|r|r"]
+    _, theta = law(feasible(gains).gains)
+    for yaw_rate in (0.1, 0.3, 1.0, 3.0):
+        point, still = np.array([[0.0, 0.0, yaw_rate]]), np.zeros((1, 3))
+        force = motion_force(PROFILE, SCALE, still, point, np.zeros(1))[0] + (BASIS.evaluate(point, still) @ theta)[0]
+        assert float(force @ point[0]) >= 0.0
 
 
 def test_the_nearest_point_is_that_of_another_solver() -> None:
