@@ -2,7 +2,7 @@
 
 The gains of the weak form (`ferryid.identify.weak_rows`) are moved as little as their information allows to where the mass
 matrix is symmetric and lies between bounds of the rigid body's, and the damping dissipates in surge alone and in sway and yaw
-together, within the velocities that were visited and a margin beyond.
+together, at every speed.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
 from ferryid.identify.inertia import rigid_body
 from ferryid.identify.thresholds import IDENTIFY
@@ -34,7 +35,7 @@ class Feasible:
     gains
         Shape (K, 3).
     notes
-        What the data contradicted, as sentences.
+        What the data contradicted by more than their scatter, as sentences.
     projection
         Makes the mass matrix of other gains, flat, symmetric: ``b + lift @ (level - normal @ b)``; empty where it is.
     shift
@@ -105,9 +106,12 @@ def feasible_gains(
         current = found
         if settled and not problem.mass_cuts(problem.mass(current)):
             break
-    told = tuple(dict.fromkeys(rows[k][2] for k in active.tolist() if rows[k][2]))
     lift, normal, level = problem.projection(symmetry)
     shift = current - (wanted + lift @ (level - normal @ wanted))
+    bounds = [rows[k][2] for k in active.tolist() if rows[k][2]]
+    # What scatter alone may bring to a bound is no contradiction.
+    contradicted = bool(bounds) and float(shift @ problem.cost @ shift) > chdtri(len(bounds), IDENTIFY.bound_level)
+    told = tuple(dict.fromkeys(bounds)) if contradicted else ()
     return Feasible(problem.gains(current), told, (lift, normal, level), shift, tuple(problem.places))
 
 

@@ -179,6 +179,12 @@ class IdentifyThresholds:
         "most by which a prior that the data contradict is widened",
         "convention: a wider prior has no effect",
     )
+    bound_level: float = threshold(
+        0.05,
+        "-",
+        "probability by chance that bounds move the estimate as far as they did, below which they are told",
+        "convention: 5 %",
+    )
     visited_quantile: float = threshold(
         0.99, "-", "quantile of the velocities up to which damping has to dissipate", "convention: beyond single errors"
     )

@@ -182,7 +182,7 @@ def test_whitened_rows_are_independent_by_hand() -> None:
 
 def feasible(gains: Floats, nu: Floats | None = None) -> Feasible:
     visited = np.random.default_rng(2).standard_normal((500, 3)) * [0.5, 0.2, 0.1] if nu is None else nu
-    return feasible_gains(PROFILE, SCALE, BASIS, BASIS.mask, gains, np.array([np.eye(K)] * 3), visited)
+    return feasible_gains(PROFILE, SCALE, BASIS, BASIS.mask, gains, np.array([1e4 * np.eye(K)] * 3), visited)
 
 
 def law(gains: Floats) -> tuple[Floats, Floats]:
