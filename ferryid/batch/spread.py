@@ -117,12 +117,16 @@ class _Here:
 
 
 class _Pool:
-    """Processes of this machine, started afresh: numba's and NumPy's threads do not survive a fork."""
+    """Processes of this machine, started afresh: numba's and NumPy's threads do not survive a fork.
+
+    Each is an executor of its own: the death of one loses its item and no other, and no executor starts a process while it
+    ends the others, which CPython 3.11 does not lock.
+    """
 
     def __init__(self, processes: int) -> None:
         self._processes = processes
-        self._pool: ProcessPoolExecutor | None = None
-        self._workers: set[multiprocessing.process.BaseProcess] = set()
+        self._idle: list[ProcessPoolExecutor] = []
+        self._workers: dict[ProcessPoolExecutor, set[multiprocessing.process.BaseProcess]] = {}
 
     def over(
         self,
@@ -133,56 +137,65 @@ class _Pool:
         lost: Callable[[T], R] | None = None,
     ) -> Iterator[tuple[int, R]]:
         waiting, losses = deque(range(len(items))), [0] * len(items)
-        # With a process that dies, all are lost that are at work: by itself, each shows which one it was.
+        # What lost its process is done again by itself: it may need the memory of all.
         suspects: deque[int] = deque()
         running: dict[Future[R], tuple[int, ProcessPoolExecutor]] = {}
-        while waiting or suspects or running:
-            # No more than are worked on, so that no others are lost.
-            while (waiting and len(running) < self._processes) or (suspects and not running):
-                number = (waiting or suspects).popleft()
-                future, pool = self._submit(function, items[number])
-                running[future] = number, pool
-                if begun is not None:
-                    begun(number)
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                number, pool = running.pop(future)
-                try:
-                    result = future.result()
-                except BrokenProcessPool as error:
-                    if pool is self._pool:
-                        self.end()
-                    losses[number] += 1
-                    if losses[number] < LOSSES:
-                        suspects.append(number)
-                        continue
-                    if lost is None:
-                        raise FerryIdError(
-                            f"the process that worked on item {number + 1} of {len(items)} died {LOSSES} times. "
-                            "Fix: give fewer --processes, which need less memory together"
-                        ) from error
-                    result = lost(items[number])
-                yield number, result
+        try:
+            while waiting or suspects or running:
+                # No more than are worked on, so that no others are lost.
+                while (waiting and len(running) < self._processes) or (suspects and not running):
+                    number = (waiting or suspects).popleft()
+                    future, executor = self._submit(function, items[number])
+                    running[future] = number, executor
+                    if begun is not None:
+                        begun(number)
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    number, executor = running.pop(future)
+                    try:
+                        result = future.result()
+                    except BrokenProcessPool as error:
+                        self._end([executor])
+                        losses[number] += 1
+                        if losses[number] < LOSSES:
+                            suspects.append(number)
+                            continue
+                        if lost is None:
+                            raise FerryIdError(
+                                f"the process that worked on item {number + 1} of {len(items)} died {LOSSES} times. "
+                                "Fix: give fewer --processes, which need less memory together"
+                            ) from error
+                        result = lost(items[number])
+                    else:
+                        self._idle.append(executor)
+                    yield number, result
+        finally:
+            self._end([executor for _, executor in running.values()])
 
     def _submit(self, function: Callable[[T], R], item: T) -> tuple[Future[R], ProcessPoolExecutor]:
         before = set(multiprocessing.active_children())
+        executor = (
+            self._idle.pop()
+            if self._idle
+            else ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
+        )
         try:
-            if self._pool is None:
-                context = multiprocessing.get_context("spawn")
-                self._pool = ProcessPoolExecutor(self._processes, mp_context=context, initializer=_begin)
-            return self._pool.submit(function, item), self._pool
-        except BrokenProcessPool:  # one died that had nothing to do
-            self.end()
+            return executor.submit(function, item), executor
+        except BrokenProcessPool:  # it died while it had nothing to do
+            self._end([executor])
             return self._submit(function, item)
         finally:
-            self._workers |= set(multiprocessing.active_children()) - before
+            if started := set(multiprocessing.active_children()) - before:
+                self._workers.setdefault(executor, set()).update(started)
 
     def end(self) -> None:
         """End all processes at once, whatever they are doing."""
-        pool, self._pool = self._pool, None
-        if pool is None:
-            return
-        pool.shutdown(wait=False, cancel_futures=True)
-        workers, self._workers = self._workers, set()
+        self._idle.clear()
+        self._end(list(self._workers))
+
+    def _end(self, executors: Sequence[ProcessPoolExecutor]) -> None:
+        workers = [worker for executor in executors for worker in self._workers.pop(executor, ())]
+        for executor in executors:
+            executor.shutdown(wait=False, cancel_futures=True)
         for worker in workers:
             worker.terminate()
         deadline = time.monotonic() + TERMINATE_S
@@ -190,7 +203,8 @@ class _Pool:
             time.sleep(0.01)
         for worker in left:
             worker.kill()
-        pool.shutdown(wait=True)
+        for executor in executors:
+            executor.shutdown(wait=True)
 
 
 def _begin() -> None:

@@ -182,7 +182,7 @@ class IdentifyThresholds:
     bound_level: float = threshold(
         0.05,
         "-",
-        "probability by chance that bounds move the estimate as far as they did, below which they are told",
+        "probability by chance of the distance that bounds move the estimate, below which they are reported",
         "convention: 5 %",
     )
     visited_quantile: float = threshold(
