@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ferryid.identify.feasible import Feasible
-from ferryid.identify.outcome import ArchivedLog, Excitation, LogFit
+from ferryid.identify.outcome import ArchivedLog, Excitation, LogFit, LogWind
 from ferryid.identify.settings import FitSettings
 from ferryid.models import ModelScores
 from ferryid.models.prediction import FreeRun
@@ -164,6 +164,11 @@ class FitData(ABC):
 
     def log_fits(self, found: Coefficients) -> tuple[LogFit, ...]:
         """Return the logs with the forces that both models estimate, where there are rows of them."""
+        return ()
+
+    @property
+    def winds(self) -> tuple[LogWind, ...]:
+        """Steady winds of the logs in which nobody measured them."""
         return ()
 
     def archived_logs(self, found: Coefficients) -> tuple[ArchivedLog, ...]:

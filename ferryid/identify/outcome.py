@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import atan2, degrees, hypot, sqrt
 from typing import Any
 
 import numpy as np
@@ -143,6 +144,48 @@ class EstimatorScore:
 
 
 @dataclass(frozen=True)
+class LogWind:
+    """Steady wind that acted in one log, estimated with the hull.
+
+    Attributes
+    ----------
+    log
+        Name of the log.
+    wind
+        North and east, where the air goes to [m/s].
+    standard_error
+        Of either, from the scatter within the logs; days differ by more.
+    """
+
+    log: str
+    wind: tuple[float, float]
+    standard_error: tuple[float, ...]
+
+    @property
+    def significant(self) -> bool:
+        """Whether it differs from no wind by two standard errors."""
+        return sum((value / error) ** 2 for value, error in zip(self.wind, self.standard_error, strict=True)) > 6.0
+
+    def __str__(self) -> str:
+        north, east = self.wind
+        speed, towards = hypot(north, east), degrees(atan2(east, north)) % 360.0
+        error = hypot(*self.standard_error) / sqrt(2.0)
+        if not self.significant:
+            return f"{self.log}: none that differs from zero ({speed:.1f} m/s, standard error {error:.1f} m/s)"
+        return f"{self.log}: {speed:.1f} m/s towards {towards:.0f}° (standard error {error:.1f} m/s)"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the wind as plain values."""
+        return {
+            "log": self.log,
+            "wind": {
+                axis: {"value": value, "standard_error": error, "unit": "m/s"}
+                for axis, value, error in zip(("north", "east"), self.wind, self.standard_error, strict=True)
+            },
+        }
+
+
+@dataclass(frozen=True)
 class FitOutcome:
     """Everything that one fit found out: a fit to logs, to an archive or to motions in memory.
 
@@ -164,6 +207,8 @@ class FitOutcome:
         The logs of a fit to rows.
     archive
         The logs of a fit to sums.
+    winds
+        Steady winds of single logs that nobody measured.
     estimators
         How well either estimator predicts, where a fit chose between them.
     """
@@ -179,3 +224,4 @@ class FitOutcome:
     logs: tuple[LogFit, ...] = ()
     archive: tuple[ArchivedLog, ...] = ()
     estimators: tuple[EstimatorScore, ...] = ()
+    winds: tuple[LogWind, ...] = ()

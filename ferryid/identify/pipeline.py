@@ -134,6 +134,7 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
         ),
         logs=logs,
         archive=data.archived_logs(found),
+        winds=data.winds,
     )
 
 

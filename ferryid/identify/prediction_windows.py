@@ -21,6 +21,7 @@ from ferryid.identify.weak_rows import WeakRows, average_over_windows
 from ferryid.models import ForceScores, ModelScores, force_scores
 from ferryid.models.forces import effective_mass
 from ferryid.regression.bases import Basis
+from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
 from ferryid.vessel.dimensions import window_seconds
@@ -53,10 +54,42 @@ class PredictionWindows:
         return self._within(self.split.validation)
 
     def _within(self, masks: Sequence[Flags]) -> tuple[WeakRows, ...]:
+        return self._averaged(masks, self.velocities)
+
+    def _averaged(self, masks: Sequence[Flags], velocities: Sequence[Floats]) -> tuple[WeakRows, ...]:
         return tuple(
-            average_over_windows(motion, mask, self.profile, self.settings.scale, self.functions, self.length_s)
-            for motion, mask in zip(self.motions, masks, strict=True)
+            average_over_windows(
+                motion, mask, self.profile, self.settings.scale, self.functions, self.length_s, velocity
+            )
+            for motion, mask, velocity in zip(self.motions, masks, velocities, strict=True)
         )
+
+    @cached_property
+    def velocities(self) -> tuple[Floats, ...]:
+        """Velocities that enter products, shape (n, 3) each: measured, or with slow errors replaced by the position's.
+
+        Noise of a velocity that lasts for seconds, multiplied into damping and Coriolis forces, biases their coefficients
+        towards zero (errors in variables). Whichever leaves less of the training windows to a regression has less of it.
+        """
+        measured = tuple(motion.nu for motion in self.motions)
+        if not any(mask.any() for mask in self.split.training):
+            return measured
+        steadied = tuple(complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in self.motions)
+        left = [self._left(self._averaged(self.split.training, each)) for each in (measured, steadied)]
+        return steadied if left[1] < left[0] else measured
+
+    def _left(self, windows: Sequence[WeakRows]) -> float:
+        """Return what least squares leave of the windows' force, as the sum of the logarithms over the axes."""
+        X = np.concatenate([one.regressors(self.functions.terms) for one in windows])
+        Y = np.concatenate([one.force - one.base(one.by_velocity) for one in windows])
+        total = 0.0
+        for axis, allowed in enumerate(self.functions.mask.T):
+            columns = np.column_stack([X[:, allowed], np.ones(len(X))])
+            size = np.linalg.norm(columns, axis=0)
+            columns = columns / np.where(size > 0.0, size, 1.0)
+            found = np.linalg.lstsq(columns, Y[:, axis], rcond=1e-10)[0]
+            total += float(np.log(np.linalg.norm(Y[:, axis] - columns @ found) + 1e-300))
+        return total
 
     @cached_property
     def base_mass(self) -> Floats:

@@ -149,6 +149,18 @@ class IdentifyThresholds:
     expectation_steps: int = threshold(
         20, "steps", "of the estimate of how much steady forces differ between logs", "derived: it no longer changes"
     )
+    condition_steps: int = threshold(
+        25, "steps", "of the joint estimate of hull and conditions of logs", "derived: it no longer changes"
+    )
+    fewest_condition_windows: int = threshold(
+        6, "windows", "of a log from which its wind is estimated", "convention: more than it has unknowns an axis"
+    )
+    wind_spread_mps: float = threshold(
+        3.0,
+        "m/s",
+        "usual standard deviation of a component of the wind, from which that between the logs starts",
+        "convention: a light to gentle breeze, in which trials are done",
+    )
     hull_spread: float = threshold(
         0.4,
         "of the coefficient",

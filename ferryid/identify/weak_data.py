@@ -17,8 +17,9 @@ from ferryid.identify.contradictions import response_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
+from ferryid.identify.log_conditions import Conditions, estimate_conditions
 from ferryid.identify.motion_data import LogData
-from ferryid.identify.outcome import Excitation
+from ferryid.identify.outcome import Excitation, LogWind
 from ferryid.identify.settings import FOLDS
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.identify.weak_rows import STRIDES, WeakRows, to_force
@@ -93,7 +94,28 @@ class WeakData(LogData):
         """
         if why := self.impossible:
             raise FerryIdError(f"{self.where}: {why}. Fix: give more or longer logs, or use --estimator derivative")
-        return self.windows.training
+        return self.conditions.applied(self.windows.training)
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """Steady wind of every log in which it was not measured."""
+        return estimate_conditions(
+            self.profile,
+            self.motions,
+            self.windows.velocities,
+            self.windows.training,
+            self.windows.length_s,
+            float(self.settings.scale.get("zeta", 1.0)),
+            self.functions.terms,
+            self.functions.mask,
+            self.prior_spread,
+            self._posed,
+        )
+
+    @property
+    def winds(self) -> tuple[LogWind, ...]:
+        """Steady winds of the logs in which nobody measured them."""
+        return self.conditions.listed([motion.log for motion in self.motions])
 
     @property
     def impossible(self) -> str:
@@ -109,35 +131,37 @@ class WeakData(LogData):
     @cached_property
     def whitening(self) -> Whitening:
         """How the windows are made alike and independent, from what a first fit leaves."""
-        candidates = [np.zeros(3, dtype=bool)]
-        if self._poses_agree():
-            candidates.append(np.ones(3, dtype=bool))
-        tried = [(posed, self._first_residuals(posed)) for posed in candidates]
-        spread = np.array([np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)) for _, left in tried])
-        # Surge and sway share a sensor; the one that leaves less is the one with less noise.
-        best = int(np.argmin(spread[:, :2].prod(axis=1))), int(np.argmin(spread[:, 2]))
-        posed = np.array([best[0], best[0], best[1]], dtype=bool)
-        left = [
-            np.column_stack([tried[best[0]][1][k][:, :2], tried[best[1]][1][k][:, 2]]) for k in range(len(self.motions))
-        ]
+        left = self._first_residuals(self.training_windows, self._posed)
         sigma = np.maximum(np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)), IDENTIFY.no_force)
         autocorrelation = self._autocorrelation([one / sigma for one in left])
         condition = self._condition_spread([one / sigma for one in left], autocorrelation)
-        return Whitening(posed, autocorrelation, condition, sigma)
+        return Whitening(self._posed, autocorrelation, condition, sigma)
+
+    @cached_property
+    def _posed(self) -> Flags:
+        """Axes on which the acceleration comes from poses, shape (3,)."""
+        candidates = [np.zeros(3, dtype=bool)]
+        if self._poses_agree():
+            candidates.append(np.ones(3, dtype=bool))
+        left = [np.concatenate(self._first_residuals(self.windows.training, posed)) for posed in candidates]
+        spread = np.array([np.sqrt(np.mean(one**2, axis=0)) for one in left])
+        # Surge and sway share a sensor; the one that leaves less is the one with less noise.
+        best = int(np.argmin(spread[:, :2].prod(axis=1))), int(np.argmin(spread[:, 2]))
+        return np.array([best[0], best[0], best[1]], dtype=bool)
 
     def _poses_agree(self) -> bool:
         """Return whether acceleration from poses is known and goes with that from velocities; of a stuck pose it does not."""
         pose, velocity = (
-            np.concatenate([getattr(one, name) for one in self.training_windows]) for name in ("by_pose", "by_velocity")
+            np.concatenate([getattr(one, name) for one in self.windows.training]) for name in ("by_pose", "by_velocity")
         )
         if not np.isfinite(pose).all() or np.any(np.std(pose, axis=0) == 0.0):
             return False
         agreement = [np.corrcoef(pose[:, axis], velocity[:, axis])[0, 1] for axis in range(3)]
         return bool(min(agreement) >= IDENTIFY.pose_agreement)
 
-    def _first_residuals(self, posed: Flags) -> list[Floats]:
+    def _first_residuals(self, windows: Sequence[WeakRows], posed: Flags) -> list[Floats]:
         """Return what a fit without whitening leaves of every log, shape (J, 3) each."""
-        rows = [self._rows_of(one, posed) for one in self.training_windows]
+        rows = [self._rows_of(one, posed) for one in windows]
         plain = CrossProducts.of(*rows, names=self.functions.terms, where=self.where)
         spread = np.maximum(np.sqrt(plain.moments()[1][plain.K :] / max(plain.n, 1)), IDENTIFY.no_force)
         fit = fit_simpls(plain + self._prior(spread), len(self.functions.terms), allowed=self.functions.mask)
@@ -222,6 +246,14 @@ class WeakData(LogData):
             if name in self.functions.terms:
                 ratio = np.sqrt(np.diag(mass) / mass[column, column])
                 spread[self.functions.terms.index(name)] = share * np.where(np.arange(3) == column, 1.0, 0.3) * ratio
+        # A mass that differs from the base model's has another Coriolis force: m22 - m11 turns the hull, m11 deflects it.
+        m11, m22 = (share * float(mass[axis, axis]) for axis in range(2))
+        beside = 0.3 * share * float(np.sqrt(mass[1, 1] * mass[2, 2]))
+        for term, axis, own in (("uv", 2, np.hypot(m11, m22)), ("ur", 1, m11), ("ur", 2, beside)):
+            if term in self.functions.terms:
+                spread[self.functions.terms.index(term), axis] = np.hypot(
+                    spread[self.functions.terms.index(term), axis], own
+                )
         return spread
 
     @cached_property

@@ -102,7 +102,13 @@ class WeakRows:
 
 
 def average_over_windows(
-    motion: Motion, rows: Flags, profile: Profile, scale: Mapping[str, float], functions: Basis, length_s: float
+    motion: Motion,
+    rows: Flags,
+    profile: Profile,
+    scale: Mapping[str, float],
+    functions: Basis,
+    length_s: float,
+    velocity: Floats | None = None,
 ) -> WeakRows:
     """Average the equations of motion over windows that lie wholly within marked rows.
 
@@ -116,6 +122,8 @@ def average_over_windows(
         Base model, factors on it, and basis.
     length_s
         Length of a window [s]; windows of 4 rows at least.
+    velocity
+        Velocity that enters products, shape (n, 3); the measured one where it is None.
     """
     step_s = 1.0 / motion.rate_hz
     m = max(4, round(length_s * motion.rate_hz))
@@ -127,7 +135,8 @@ def average_over_windows(
         runs.append(np.full(len(starts[-1]), number))
     start, run = np.concatenate(starts), np.concatenate(runs)
 
-    still = replace(motion, nu_dot=np.zeros_like(motion.nu))
+    nu = motion.nu if velocity is None else velocity
+    still = replace(motion, nu=nu, nu_dot=np.zeros_like(nu))
     heading = motion.eta[:, 2]
     columns = {
         "steady": base_force(profile, still, scale),
@@ -148,7 +157,7 @@ def average_over_windows(
         bare=means["bare"],
         inertia=inertia / scale.get("zeta", 1.0),
         by_velocity=-_sums(motion.nu, slope, start),
-        by_pose=_by_pose(motion, slope, bend, start),
+        by_pose=_by_pose(motion.eta, nu[:, 2], slope, bend, start),
         heading=means["heading"],
         run=run,
         start=start,
@@ -197,7 +206,7 @@ def _sums(values: Floats, weights: Floats, starts: Ints) -> Floats:
     return out
 
 
-def _by_pose(motion: Motion, slope: Floats, bend: Floats, starts: Ints) -> Floats:
+def _by_pose(eta: Floats, yaw_rate: Floats, slope: Floats, bend: Floats, starts: Ints) -> Floats:
     """Return ``∫ w nu'`` from position and heading, shape (J, 3).
 
     ``nu = R(psi)' p'`` for the position p, so that by parts ``∫ w nu' = ∫ (w' R')' p = ∫ (w'' R' + w' r dR'/dpsi) p``.
@@ -206,7 +215,7 @@ def _by_pose(motion: Motion, slope: Floats, bend: Floats, starts: Ints) -> Float
     if not len(starts):
         return out
     m = len(slope)
-    north, east, psi, r = (sliding_window_view(column, m) for column in (*motion.eta.T, motion.nu[:, 2]))
+    north, east, psi, r = (sliding_window_view(column, m) for column in (*eta.T, yaw_rate))
     for low in range(0, len(starts), _CHUNK_WINDOWS):
         chunk = starts[low : low + _CHUNK_WINDOWS]
         n, e = north[chunk], east[chunk]

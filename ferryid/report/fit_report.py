@@ -132,6 +132,7 @@ def as_json(result: FitOutcome, stored: StoredModel, report: Path) -> dict[str, 
         "logs": [{"name": log.motion.log, **log.data_quality} for log in result.logs],
         **({"archive": [log.to_json() for log in result.archive]} if result.archive else {}),
         **({"estimators": [one.to_json() for one in result.estimators]} if result.estimators else {}),
+        **({"conditions": [one.to_json() for one in result.winds]} if result.winds else {}),
         "report": str(report),
     }
 
@@ -158,7 +159,8 @@ def as_text(result: FitOutcome, stored: StoredModel, report: Path) -> str:
             f"estimator {one.name}: squared prediction error over the base model's {_number(one.folds)} on folds of the "
             f"training rows, {_number(one.held_out)} held out{'; chosen' if one.chosen else ''}"
         )
-    lines.extend([""] if result.estimators else [])
+    lines.extend(f"wind, estimated: {one}" for one in result.winds)
+    lines.extend([""] if result.estimators or result.winds else [])
     lines.extend(f"warning: {warning}" for warning in result.warnings)
     state = "current" if stored.current else ("stored" if model.accepted else "stored, marked as rejected")
     if stored.current and stored.previous not in (None, model.version):

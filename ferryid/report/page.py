@@ -86,6 +86,7 @@ def _context(result: FitOutcome) -> dict[str, Any]:
             }
             for one in result.estimators
         ],
+        "winds": [str(one) for one in result.winds],
         "checks": [
             {"name": check.name.replace("_", " "), "holds": _HOLDS[check.passed], "reason": check.reason}
             for check in verdict.checks

@@ -61,7 +61,7 @@ NO_DECISION = {
         signals.align RATE_LIMIT_HZ
         signals.kalman _LONGEST_S
         signals.smooth _POLYNOMIAL
-        diagnose.data.complementary_filter MEAN_S SLOW_S
+        signals.complementary_filter MEAN_S SLOW_S
         diagnose.data.measurements STRIDES
         identify.weak_rows STRIDES
         diagnose.data.path_comparison RATE_HZ

@@ -17,9 +17,9 @@ import numpy as np
 
 from ferryid.diagnose.checks.check import Check, SensorFinding
 from ferryid.diagnose.checks.contradiction import opposed
-from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
 from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
+from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
 from ferryid.signals.mirror import mirrored
 from ferryid.signals.smooth import odd_rows, steady_mean
 

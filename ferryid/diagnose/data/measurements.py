@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.diagnose.data.complementary_filter import MEAN_S, complementary_filter
 from ferryid.diagnose.data.thresholds import DATA
 from ferryid.effects.force_model import Measurements
 from ferryid.effects.measurements import actuator_forces, interpolate_gaps
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.align import align
+from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
 from ferryid.signals.data_quality import left_out_sentences
 from ferryid.signals.prepare import doubts_of
 from ferryid.signals.recording import Recording, data_quality, record

@@ -12,10 +12,10 @@ from math import sqrt
 
 import numpy as np
 
-from ferryid.diagnose.data.complementary_filter import velocity_from_pose
 from ferryid.diagnose.inference.estimation import EstimationProblem
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.force_model import acceleration
+from ferryid.signals.complementary_filter import velocity_from_pose
 from ferryid.signals.smooth import odd_rows, steady_mean
 from ferryid.types import AXES
 

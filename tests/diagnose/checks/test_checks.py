@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from ferryid.diagnose.checks import SensorFinding, checks, examine
-from ferryid.diagnose.data.complementary_filter import complementary_filter
 from ferryid.effects.force_model import Measurements
 from ferryid.errors import FerryIdError
+from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.signals.mirror import mirrored
 from ferryid.simulate import load_scenario
 from ferryid.simulate.sections import Navigation, Wind

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ferryid.diagnose.data.complementary_filter import complementary_filter
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
+from ferryid.signals.complementary_filter import complementary_filter
 from ferryid.simulate.plant.hull import hydrodynamics, required_force
 from ferryid.types import Floats
 from ferryid.vessel import load_profile

@@ -1,0 +1,320 @@
+"""Conditions of single logs: a steady wind that nobody measured, estimated together with the hull that all logs share.
+
+Without it a breeze ends up in the hull: its load changes with heading and speed as damping, Coriolis force and a steady moment
+do. Every log has its own wind and its own steady force along the hull, north and east, as random effects whose spread between
+logs is estimated (Laird and Ware 1982); hull and conditions are found together by Gauss-Newton steps, with the logs' part
+eliminated from the normal equations. What is estimated is then treated as if it had been measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ferryid.identify.outcome import LogWind
+from ferryid.identify.thresholds import IDENTIFY
+from ferryid.identify.weak_rows import WeakRows
+from ferryid.models.forces import ACCELERATIONS
+from ferryid.regression import window_weights
+from ferryid.signals.track import Motion
+from ferryid.types import Flags, Floats
+from ferryid.vessel.profile import Profile, WindAreas
+from ferryid.vessel.wind import wind_force
+
+_SAMPLES = 16
+"""Points of a window at which the wind load is evaluated: it changes with heading and speed, not faster."""
+_DIRECTIONS = 8
+_SPEEDS = (1.0, 3.0, 8.0)
+"""Starts of the search, times the spread that is expected; the load has no slope at rest in still air."""
+_STEP_MPS = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Steady conditions of L logs.
+
+    Attributes
+    ----------
+    wind
+        Mean wind north and east, where the air goes to [m/s], shape (L, 2); NaN where it is measured or cannot be estimated.
+    covariance
+        Of it, shape (L, 2, 2), with that of hull and steady forces in it.
+    spread_mps
+        Standard deviation of a component of the wind between logs.
+    load
+        Wind load averaged over the training windows [N, N, N·m], (J, 3) each.
+    """
+
+    wind: Floats
+    covariance: Floats
+    spread_mps: float
+    load: tuple[Floats, ...]
+
+    @classmethod
+    def none(cls, windows: Sequence[WeakRows]) -> Conditions:
+        """Return that no log has conditions to estimate."""
+        L = len(windows)
+        return cls(
+            np.full((L, 2), np.nan),
+            np.full((L, 2, 2), np.nan),
+            0.0,
+            tuple(np.zeros((len(one), 3)) for one in windows),
+        )
+
+    def listed(self, logs: Sequence[str]) -> tuple[LogWind, ...]:
+        """Return the winds that were estimated, by the names of the logs."""
+        return tuple(
+            LogWind(log, (float(wind[0]), float(wind[1])), tuple(np.sqrt(np.diag(covariance)).tolist()))
+            for log, wind, covariance in zip(logs, self.wind, self.covariance, strict=True)
+            if np.isfinite(wind).all()
+        )
+
+    def applied(self, windows: Sequence[WeakRows]) -> tuple[WeakRows, ...]:
+        """Return the training windows with the load, as if the wind had been measured."""
+        return tuple(
+            replace(one, steady=one.steady - load) if load.any() else one
+            for one, load in zip(windows, self.load, strict=True)
+        )
+
+
+class _Load:
+    """Wind load of one log, averaged over its windows, as a function of the wind."""
+
+    def __init__(self, areas: WindAreas, motion: Motion, velocity: Floats, windows: WeakRows, rows: int, zeta: float):
+        offsets = np.unique(np.linspace(0, rows - 1, _SAMPLES + 2).round().astype(np.int64)[1:-1])
+        weight = window_weights(rows, 1.0)[0][offsets]
+        self.areas, self.weight, self.zeta = areas, weight / weight.sum(), zeta
+        places = windows.start[:, None] + offsets
+        self.psi, self.nu = motion.eta[places, 2], velocity[places]
+        self.still = self._mean(np.zeros(2))
+
+    def _mean(self, wind: Floats) -> Floats:
+        load = wind_force(self.areas, np.broadcast_to(wind, (*self.psi.shape, 2)), self.psi, self.nu)
+        return np.asarray(np.einsum("jsa,s->ja", load, self.weight)) / self.zeta
+
+    def of(self, wind: Floats) -> Floats:
+        """Return the load beyond that of still air, shape (J, 3): a hull's damping holds that of still air."""
+        return self._mean(wind) - self.still
+
+    def slope(self, wind: Floats) -> Floats:
+        """Return its derivative with respect to the wind, shape (J, 3, 2)."""
+        steps = _STEP_MPS * np.eye(2)
+        return np.stack([(self._mean(wind + s) - self._mean(wind - s)) / (2.0 * _STEP_MPS) for s in steps], axis=2)
+
+
+def estimate_conditions(
+    profile: Profile,
+    motions: Sequence[Motion],
+    velocities: Sequence[Floats],
+    windows: Sequence[WeakRows],
+    length_s: float,
+    zeta: float,
+    terms: tuple[str, ...],
+    mask: Flags,
+    prior_spread: Floats,
+    posed: Flags,
+) -> Conditions:
+    """Estimate the steady wind of every log in which it was not measured.
+
+    Parameters
+    ----------
+    profile
+        The vessel; without wind areas there is nothing to estimate.
+    motions, velocities
+        Logs, and the velocities that enter products, shape (n, 3) each.
+    windows
+        Training windows of each log.
+    length_s
+        Length of a window [s].
+    zeta
+        Factor on the measured force.
+    terms, mask
+        Names of the basis functions, and where they act, shape (K, 3).
+    prior_spread
+        Standard deviations of the gains of the weak form, shape (K, 3); infinite where nothing is known.
+    posed
+        Axes whose acceleration comes from poses, shape (3,).
+    """
+    nothing = Conditions.none(windows)
+    some = [
+        k
+        for k, (one, motion) in enumerate(zip(windows, motions, strict=True))
+        if len(one) >= IDENTIFY.fewest_condition_windows and motion.wind is None and np.any(one.heading)
+    ]
+    if profile.wind is None or not some:
+        return nothing
+    problem = _Problem(windows, terms, mask, prior_spread, posed)
+    loads = {
+        k: _Load(
+            profile.wind, motions[k], velocities[k], windows[k], max(4, round(length_s * motions[k].rate_hz)), zeta
+        )
+        for k in some
+    }
+    wind, covariance = problem.solve(loads)
+    return Conditions(
+        wind,
+        covariance,
+        problem.wind_spread,
+        tuple(loads[k].of(wind[k]) if k in loads else np.zeros((len(one), 3)) for k, one in enumerate(windows)),
+    )
+
+
+class _Problem:
+    """Gains of the hull (P of them, with an intercept an axis) and of every log its wind and its steady forces."""
+
+    def __init__(
+        self, windows: Sequence[WeakRows], terms: tuple[str, ...], mask: Flags, spread: Floats, posed: Flags
+    ) -> None:
+        self.windows, self.terms, self.mask, self.spread, self.posed = windows, terms, mask, spread, posed
+        self.own = [np.flatnonzero(column) for column in mask.T]
+        self.low = np.cumsum([0, *(len(one) + 1 for one in self.own)])
+        self.P = int(self.low[-1])
+        self.steady = [np.column_stack([np.ones(len(one)), one.heading]) for one in windows]
+        self.wind_spread, self.force_spread = IDENTIFY.wind_spread_mps, 0.1
+        self.factor, self.noise = 1.0, 1.0
+        targets = [np.zeros((1, 3)), *(self._table(k, np.zeros((len(one), 3)))[1] for k, one in enumerate(windows))]
+        self.sigma = np.maximum(np.std(np.concatenate(targets), axis=0), IDENTIFY.no_force)
+        self.gains = np.zeros((len(terms), 3))
+        self.intercept = np.zeros(3)
+
+    def _table(self, k: int, load: Floats) -> tuple[Floats, Floats]:
+        """Return functions and target of a log under a wind load."""
+        one = replace(self.windows[k], steady=self.windows[k].steady - load)
+        return one.regressors(self.terms), one.force - one.base(one.acceleration(self.posed))
+
+    def _G(self) -> Floats:
+        G = np.eye(3)
+        for column, name in enumerate(ACCELERATIONS):
+            if name in self.terms:
+                G[:, column] -= self.gains[self.terms.index(name)]
+        return G
+
+    def solve(self, loads: Mapping[int, _Load]) -> tuple[Floats, Floats]:
+        L = len(self.windows)
+        wind, covariance = np.zeros((L, 2)), np.zeros((L, 2, 2))
+        self._step({}, wind)
+        for k, load in loads.items():
+            wind[k] = self._start(k, load)
+        for _ in range(IDENTIFY.condition_steps):
+            before = wind.copy()
+            covariance = self._step(loads, wind)
+            if np.abs(wind - before).max() < 1e-3:
+                break
+        missing = [k for k in range(L) if k not in loads]
+        wind[missing], covariance[missing] = np.nan, np.nan
+        return wind, covariance
+
+    def _start(self, k: int, load: _Load) -> Floats:
+        """Return the likeliest wind of a log for the hull found so far, of some directions and speeds."""
+        X, Y = self._table(k, np.zeros((len(self.windows[k]), 3)))
+        left, G = Y - X @ self.gains - self.intercept, self._G()
+        best, least = np.zeros(2), np.inf
+        angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+        for speed in _SPEEDS:
+            for angle in angles:
+                wind = speed * np.array([np.cos(angle), np.sin(angle)])
+                error = (left + load.of(wind) @ G.T) / self.sigma
+                error = error - error.mean(axis=0)
+                cost = float(np.sum(error**2)) / self.noise + float(wind @ wind) / self.wind_spread**2
+                if cost < least:
+                    best, least = wind, cost
+        return best
+
+    def _step(self, loads: Mapping[int, _Load], wind: Floats) -> Floats:
+        """Take a Gauss-Newton step for hull and conditions, update the spreads, and return the winds' covariances.
+
+        Logs without a load have steady forces only.
+        """
+        P, L, G = self.P, len(self.windows), self._G()
+        normal, right = np.zeros((P, P)), np.zeros(P)
+        logs = []
+        for k in range(L):
+            load = loads.get(k)
+            J = len(self.windows[k])
+            X, Y = self._table(k, np.zeros((J, 3)) if load is None else load.of(wind[k]))
+            slope = np.zeros((J, 3, 2)) if load is None else -np.einsum("ab,jbc->jac", G, load.slope(wind[k]))
+            Y = Y + np.einsum("jac,c->ja", slope, wind[k])
+            D = 2 + 9
+            own, across, b = np.zeros((D, D)), np.zeros((D, P)), np.zeros(D)
+            tables = []
+            for axis in range(3):
+                weight = 1.0 / (self.noise * self.sigma[axis] ** 2)
+                A = np.column_stack([X[:, self.own[axis]], np.ones(J)])
+                B = np.zeros((J, D))
+                B[:, :2] = slope[:, axis]
+                B[:, 2 + 3 * axis : 5 + 3 * axis] = self.steady[k] * self.sigma[axis]
+                part = slice(self.low[axis], self.low[axis + 1])
+                normal[part, part] += weight * A.T @ A
+                right[part] += weight * A.T @ Y[:, axis]
+                own += weight * B.T @ B
+                across[:, part] += weight * B.T @ A
+                b += weight * B.T @ Y[:, axis]
+                tables.append((A, B, Y[:, axis]))
+            own[np.arange(2), np.arange(2)] += self.wind_spread**-2.0
+            own[np.arange(2, D), np.arange(2, D)] += self.force_spread**-2.0
+            logs.append((own, across, b, tables))
+        prior = self._prior()
+        normal += np.diag(prior)
+        schur, rest = normal.copy(), right.copy()
+        for own, across, b, _ in logs:
+            gone = np.linalg.solve(own, np.column_stack([across, b]))
+            schur -= across.T @ gone[:, :P]
+            rest -= across.T @ gone[:, P]
+        inverse = np.linalg.pinv(schur, hermitian=True)
+        hull = inverse @ rest
+        covariance = np.zeros((L, 2, 2))
+        squares, counts = np.zeros(3), np.zeros(3)
+        winds, forces = list[float](), list[float]()
+        lagged = list[list[float]]()
+        for k, (own, across, b, tables) in enumerate(logs):
+            inner = np.linalg.inv(own)
+            q = inner @ (b - across @ hull)
+            spread = inner + inner @ across @ inverse @ across.T @ inner
+            left = [Y - A @ hull[self.low[a] : self.low[a + 1]] - B @ q for a, (A, B, Y) in enumerate(tables)]
+            squares += [float(e @ e) for e in left]
+            counts += len(left[0])
+            follows = np.diff(self.windows[k].run) == 0
+            lagged.append([float(np.sum((e[1:] * e[:-1])[follows])) for e in left])
+            if loads.get(k) is not None:
+                step = q[:2] - wind[k]
+                size = float(np.linalg.norm(step))
+                most = max(2.0, float(np.linalg.norm(wind[k])))
+                wind[k] = wind[k] + step * min(1.0, most / max(size, 1e-9))
+                covariance[k] = spread[:2, :2]
+                winds.append(float(q[:2] @ q[:2] + np.trace(spread[:2, :2])))
+            if len(left[0]):
+                forces.append(float(np.mean(q[2:] ** 2 + np.diag(spread)[2:])))
+        self._take(hull, np.diag(inverse))
+        freedom = np.maximum(counts - (np.diff(self.low)), 1.0)
+        self.sigma = np.maximum(np.sqrt(squares / freedom), IDENTIFY.no_force)
+        alike = np.sum(np.array(lagged), axis=0) / np.maximum(squares, np.finfo(np.float64).tiny)
+        correlation = float(np.clip(np.mean(alike), 0.0, IDENTIFY.most_autocorrelation))
+        self.noise = (1.0 + correlation) / (1.0 - correlation)
+        if forces:
+            self.force_spread = float(np.sqrt(max(np.mean(forces), 1e-6)))
+        if winds:
+            # Two logs' worth of what is usual keeps the spread of few logs apart from zero and from everything.
+            usual = IDENTIFY.wind_spread_mps
+            self.wind_spread = float(np.sqrt((sum(winds) + 4.0 * usual**2) / (2.0 * len(winds) + 4.0)))
+        return covariance
+
+    def _prior(self) -> Floats:
+        values = np.zeros(self.P)
+        for axis, own in enumerate(self.own):
+            spread = self.factor * self.spread[own, axis]
+            values[self.low[axis] : self.low[axis + 1] - 1] = np.where(np.isfinite(spread), spread**-2.0, 0.0)
+        return values
+
+    def _take(self, hull: Floats, variance: Floats) -> None:
+        sizes = []
+        for axis, own in enumerate(self.own):
+            part = slice(self.low[axis], self.low[axis + 1] - 1)
+            self.gains[own, axis] = hull[part]
+            self.intercept[axis] = hull[self.low[axis + 1] - 1]
+            some = np.isfinite(self.spread[own, axis])
+            sizes.append(((hull[part] ** 2 + variance[part]) / self.spread[own, axis] ** 2)[some])
+        every = np.concatenate(sizes)
+        if len(every):
+            self.factor = float(np.clip(np.sqrt(np.mean(every)), 1.0, IDENTIFY.widest_prior))
