@@ -161,6 +161,16 @@ class IdentifyThresholds:
         "usual standard deviation of a component of the wind, from which that between the logs starts",
         "convention: a light to gentle breeze, in which trials are done",
     )
+    gust_spread_mps: float = threshold(
+        0.3,
+        "m/s",
+        "standard deviation of a component of the gusts, from which its estimate starts",
+        "convention: a tenth of the wind",
+    )
+    least_gust_mps: float = threshold(0.01, "m/s", "below which gusts are none", "convention: moves no vessel")
+    gust_time_s: float = threshold(
+        20.0, "s", "time constant of gusts", "convention: longer than a vessel's windows, shorter than a trial"
+    )
     hull_spread: float = threshold(
         0.4,
         "of the coefficient",

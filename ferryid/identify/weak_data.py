@@ -333,7 +333,8 @@ class WeakData(LogData):
     def scattered(self, gains: Floats) -> Floats:
         """Return drawn gains, (draws, K, 3), with the scatter of the prior: the truth is as far from its mean as it states.
 
-        Drawing windows again leaves the prior where it is, so that what only the prior determines would have no interval.
+        Drawing windows again leaves the prior where it is, so that what only the prior determines would have no interval, and
+        it leaves the winds of the logs where they are.
         """
         rng = np.random.default_rng(self.settings.seed)
         information, out = self._information(), gains.copy()
@@ -344,6 +345,9 @@ class WeakData(LogData):
             covariance = np.linalg.pinv(information[axis][np.ix_(every, every)], hermitian=True)
             pulls = rng.standard_normal((len(gains), len(own))) / spread
             out[:, every, axis] += pulls @ covariance[np.searchsorted(every, own)]
+            out[:, every, axis] += rng.standard_normal((len(gains), len(every))) @ _root(
+                self.conditions.added[axis][np.ix_(every, every)]
+            )
         return out
 
     def refuse_contradictions(self) -> None:
@@ -414,6 +418,12 @@ def weak_data(data: LogData) -> WeakData:
 def _steady(windows: WeakRows) -> Floats:
     """Return the ways in which a steady force of a log's own acts: along the hull, and along north and east, shape (J, 3)."""
     return np.column_stack([np.ones(len(windows)), windows.heading])
+
+
+def _root(covariance: Floats) -> Floats:
+    """Return a symmetric square root of a matrix without what is negative in it, shape (k, k)."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
 def _decorrelate(table: Floats, conditions: Floats, run: np.ndarray, autocorrelation: float) -> Floats:

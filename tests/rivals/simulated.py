@@ -128,8 +128,9 @@ def trials(kind: Kind, count: int, folder: Path) -> Iterator[Trial]:
 
 
 def _simulator(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path) -> Trial:
-    profile = load_profile("milliampere")
-    calm = replace(load_scenario("twelve-corner-calm"), true_hull=factors)
+    true = load_profile("milliampere")
+    profile = replace(true, hull=perturbed(true.hull, factors))
+    calm = load_scenario("twelve-corner-calm")
     blown = replace(
         calm, wind=Wind(north_mps=WIND_MPS[0], east_mps=WIND_MPS[1], gust_std_mps=GUST_MPS, gust_time_s=8.0)
     )
@@ -140,7 +141,6 @@ def _simulator(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path
         path = folder / f"{name}.mcap"
         write_log(simulate(scenario, number), path)
         logs.append(open_track(str(path), profile, None))
-    true = replace(profile, hull=perturbed(profile.hull, factors))
     return Trial(profile, *logs, true.hull.M, true)
 
 
