@@ -50,7 +50,7 @@ class Conditions:
     load
         Wind load averaged over the training windows [N, N, N·m], (J, 3) each.
     added
-        What the conditions add to the covariance of the gains of the weak form, by axis and function, shape (3, K, K).
+        What the conditions add to the covariance of gains and intercept of the weak form, by axis, shape (3, K + 1, K + 1).
     """
 
     wind: Floats
@@ -70,7 +70,7 @@ class Conditions:
             0.0,
             0.0,
             tuple(np.zeros((len(one), 3)) for one in windows),
-            np.zeros((3, K, K)),
+            np.zeros((3, K + 1, K + 1)),
         )
 
     def listed(self, logs: Sequence[str]) -> tuple[LogWind, ...]:
@@ -242,8 +242,8 @@ class _Problem:
         self.steady = [np.column_stack([np.ones(len(one)), one.heading]) for one in windows]
         self.wind_spread, self.force_spread = IDENTIFY.wind_spread_mps, 0.1
         self.gusts = Gusts([one.run for one in windows], stride_s)
-        self.added = np.zeros((3, len(terms), len(terms)))
-        self.factor, self.noise = 1.0, 1.0
+        self.added = np.zeros((3, len(terms) + 1, len(terms) + 1))
+        self.factor, self.noise, self.offset_spread = 1.0, 1.0, 0.1
         targets = [np.zeros((1, 3)), *(self._table(k, np.zeros((len(one), 3)))[1] for k, one in enumerate(windows))]
         self.sigma = np.maximum(np.std(np.concatenate(targets), axis=0), IDENTIFY.no_force)
         self.slopes = [np.zeros((len(one), 3, 2)) for one in windows]
@@ -354,15 +354,15 @@ class _Problem:
         return _Equations.of(table, self.P, weight, prior, self.gusts.equations(k, slope, weight))
 
     def _add(self, covariance: Floats) -> None:
-        """Keep what the conditions add to the covariance of the gains."""
+        """Keep what the conditions add to the covariance of gains and intercepts."""
         for axis, own in enumerate(self.own):
-            part = slice(self.low[axis], self.low[axis + 1] - 1)
-            self.added[axis][np.ix_(own, own)] = covariance[part, part]
+            part, places = slice(self.low[axis], self.low[axis + 1]), [*own.tolist(), len(self.terms)]
+            self.added[axis][np.ix_(places, places)] = covariance[part, part]
 
     def _spreads(self, winds: Sequence[float], forces: Sequence[float]) -> None:
         """Update the spreads of winds and steady forces between logs."""
         if forces:
-            self.force_spread = float(np.sqrt(max(np.mean(forces), 1e-6)))
+            self.force_spread = float(np.sqrt(max(sum(forces) / len(forces), 1e-6)))
         if winds:
             # Two logs' worth of what is usual keeps the spread of few logs apart from zero and from everything.
             usual = IDENTIFY.wind_spread_mps
@@ -385,6 +385,8 @@ class _Problem:
         for axis, own in enumerate(self.own):
             spread = self.factor * self.spread[own, axis]
             values[self.low[axis] : self.low[axis + 1] - 1] = np.where(np.isfinite(spread), spread**-2.0, 0.0)
+            # A hull that port and starboard make alike feels no force at rest.
+            values[self.low[axis + 1] - 1] = (self.offset_spread * self.sigma[axis]) ** -2.0
         return values
 
     def _take(self, hull: Floats, variance: Floats) -> None:
@@ -395,6 +397,8 @@ class _Problem:
             self.intercept[axis] = hull[self.low[axis + 1] - 1]
             some = np.isfinite(self.spread[own, axis])
             sizes.append(((hull[part] ** 2 + variance[part]) / self.spread[own, axis] ** 2)[some])
+        offsets = np.array([hull[high - 1] ** 2 + variance[high - 1] for high in self.low[1:]])
+        self.offset_spread = float(np.sqrt(max(np.mean(offsets / self.sigma**2), 1e-6)))
         every = np.concatenate(sizes)
         if len(every):
             self.factor = float(np.clip(np.sqrt(np.mean(every)), 1.0, IDENTIFY.widest_prior))

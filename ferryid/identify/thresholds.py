@@ -171,6 +171,12 @@ class IdentifyThresholds:
     gust_time_s: float = threshold(
         20.0, "s", "time constant of gusts", "convention: longer than a vessel's windows, shorter than a trial"
     )
+    inertia_error: float = threshold(
+        0.01,
+        "of the inertia",
+        "standard deviation of what windows, time stamps and remaining errors in variables shift an estimated inertia by",
+        "tuned on simulated trials of the simulator: the error beyond the scatter",
+    )
     hull_spread: float = threshold(
         0.4,
         "of the coefficient",
