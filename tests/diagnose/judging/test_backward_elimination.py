@@ -85,13 +85,13 @@ def test_what_helps_no_held_out_stretch_falls_and_is_told(problem: EstimationPro
     told = eliminate_backward(problem.with_noise_of(right), breeze, [], lambda stage: None)
     assert {one.key for one in told.fit.candidates} == {LOSS, FIRST}
     (sentence,) = told.dropped
-    assert sentence == f"{negligible[0].effect.title} was suspected, but dropped: {PLACEBO}."
+    assert sentence == f"{negligible[0].effect.title} was considered, but dropped: {PLACEBO}."
 
 
 def test_what_fell_for_one_reason_is_one_sentence() -> None:
     assert _told({LAW: ["Wind", "Current", "Wind"], PLACEBO: ["Payload"]}) == (
-        f"Wind and Current were suspected, but dropped: {LAW}.",
-        f"Payload was suspected, but dropped: {PLACEBO}.",
+        f"Wind and Current were considered, but dropped: {LAW}.",
+        f"Payload was considered, but dropped: {PLACEBO}.",
     )
 
 
