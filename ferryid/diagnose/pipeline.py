@@ -47,7 +47,7 @@ class DiagnosisSettings:
         """Refuse two things to compare with at once."""
         if self.against is not None and self.model is not None:
             raise FerryIdError(
-                "diagnose: a recording is held against one thing at a time, found both --model and --against. "
+                "diagnose: a recording is compared with one thing at a time, found both --model and --against. "
                 "Fix: leave out one of the two"
             )
         if self.together and (self.against is not None or self.model is not None):

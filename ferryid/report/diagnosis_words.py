@@ -175,7 +175,9 @@ def _throughout(finding: Finding) -> bool:
 def trust(finding: Finding) -> str:
     """Return the probability, and what the finding removes of the squared force error."""
     no_name = finding.effect == UNKNOWN
-    of_what = " that it is no chance" if no_name else ", among the effects that were tried" if finding.rivals else ""
+    of_what = (
+        " that it is not due to chance" if no_name else ", among the effects that were tried" if finding.rivals else ""
+    )
     told = f"Probability {probability(finding.probability)}{of_what}."
     change = changed(finding.improvement)
     if not change:
@@ -263,10 +265,10 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
         unsteady = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect in UNSTEADY]
         absent = [
             *unsteady,
-            *(["what has no name"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []),
+            *(["unexplained forces"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []),
         ]
         if absent:
-            lines.append(f"{_upper(listed(absent))}: not subtracted from these errors, and left in both rows.")
+            lines.append(f"Not subtracted from these errors, and left in both rows: {listed(absent)}.")
     if diagnosis.moved is not None:
         one = diagnosis.moved
         lines.append(
