@@ -28,15 +28,18 @@ class GustEquations:
         Diagonal and the two above it, in the upper form of `scipy.linalg.solveh_banded`, shape (3, 2 J).
     slope
         Derivative of the target with respect to the wind, shape (J, 3, 2).
+    blow
+        Whether the log is long enough to tell gusts from the hull's forces, and has a wind at all.
     """
 
     bands: Floats
     slope: Floats
+    blow: bool
 
     def eliminated(self, table: Floats, weight: Floats) -> tuple[Floats, Floats]:
         """Return the gusts' side of the normal equations with columns (3, J, c), and its solution, shape (2 J, c) each."""
         response = np.einsum("jax,a,ajc->jxc", self.slope, weight, table, optimize=True).reshape(-1, table.shape[2])
-        if not self.slope.any():
+        if not self.blow:
             return response, np.zeros_like(response)
         return response, self.solve(response)
 
@@ -87,8 +90,8 @@ class Gusts:
             bands[2] = (np.einsum("jxx->jx", data) + diagonal[:, None]).reshape(-1)
             bands[1, 1::2] = data[:, 0, 1]
             bands[0, 2:] = np.repeat(beside, 2)
-        equations = GustEquations(bands, slope)
-        if slope.any():
+        equations = GustEquations(bands, slope, IDENTIFY.fewest_gust_windows <= J and bool(slope.any()))
+        if equations.blow:
             self._uncertain(k, equations)
         return equations
 

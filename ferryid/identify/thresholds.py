@@ -168,6 +168,12 @@ class IdentifyThresholds:
         "convention: a tenth of the wind",
     )
     least_gust_mps: float = threshold(0.01, "m/s", "below which gusts are none", "convention: moves no vessel")
+    fewest_gust_windows: int = threshold(
+        100,
+        "windows",
+        "of a log from which gusts are estimated",
+        "tuned on real recordings: in shorter ones gusts explain the hull's own forces",
+    )
     gust_time_s: float = threshold(
         20.0, "s", "time constant of gusts", "convention: longer than a vessel's windows, shorter than a trial"
     )
