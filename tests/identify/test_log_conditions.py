@@ -69,7 +69,7 @@ def test_the_wind_of_each_log_is_found_and_kept_out_of_the_hull() -> None:
 
 
 def test_gusts_do_not_end_up_in_the_hull() -> None:
-    data = data_of([measured(seed, seconds=400.0, jitter=0.01, noise=4.0, force=gusty) for seed in range(2)], sigma=0.8)
+    data = data_of([measured(seed, seconds=480.0, jitter=0.01, noise=4.0, force=gusty) for seed in range(2)], sigma=0.8)
     assert 0.3 < data.conditions.gust_mps < 1.5
     assert damping_error(data) < 0.6 * damping_error(without_wind(data))
     mass = effective_mass(
@@ -93,7 +93,7 @@ def test_a_measured_wind_is_not_estimated_and_without_areas_there_is_none() -> N
 
 
 def test_conditions_widen_the_intervals_of_the_hull() -> None:
-    data = data_of([measured(0, seconds=300.0, noise=4.0, force=gusty)], sigma=0.8)
+    data = data_of([measured(0, seconds=480.0, noise=4.0, force=gusty)], sigma=0.8)
     added = data.conditions.added
     for axis in range(3):
         own = [*np.flatnonzero(data.functions.mask[:, axis]), len(data.functions.terms)]
