@@ -106,7 +106,7 @@ def recorded_targets(every: Sequence[Recorded]) -> list[str]:
             continue
         better = sum(ratio < 1.0 for ratio in ratios)
         rows.append(
-            f"| position after {HORIZONS_S[-1]:g} s better than that of {name} | {better} of {len(ratios)} sets of recordings | "
+            f"| position after {HORIZONS_S[-1]:g} s better than that of {name} | {better} of {len(ratios)} sets | "
             f"median ratio {np.median(ratios):.2f} |"
         )
     lost = sum(one.scores[OURS].diverged for one in every)
