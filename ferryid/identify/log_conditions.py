@@ -19,7 +19,7 @@ from ferryid.identify.weak_rows import WeakRows
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import window_weights
 from ferryid.signals.track import Motion
-from ferryid.types import Flags, Floats
+from ferryid.types import Flags, Floats, Ints
 from ferryid.vessel.profile import Profile, WindAreas
 from ferryid.vessel.wind import wind_force
 
@@ -79,15 +79,62 @@ class Conditions:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class LoadSamples:
+    """Points of the J windows of a log at which the wind load is evaluated, S a window.
+
+    Attributes
+    ----------
+    psi
+        Heading [rad], shape (J, S).
+    nu
+        Velocity [m/s, m/s, rad/s], shape (J, S, 3).
+    weight
+        Weight of each point, shape (S,).
+    """
+
+    psi: Floats
+    nu: Floats
+    weight: Floats
+
+
+def sample_load(
+    profile: Profile, motion: Motion, velocity: Floats, windows: WeakRows, length_s: float
+) -> LoadSamples | None:
+    """Return where the wind load of a log's windows is evaluated; None where there is none to estimate.
+
+    Parameters
+    ----------
+    profile
+        The vessel; without wind areas there is nothing to estimate.
+    motion, velocity
+        The log, and the velocity that enters products, shape (n, 3).
+    windows
+        Its windows.
+    length_s
+        Their length [s].
+    """
+    if profile.wind is None or motion.wind is not None or not np.any(windows.heading):
+        return None
+    offsets, weight = sample_weights(length_s, motion.rate_hz)
+    places = windows.start[:, None] + offsets
+    return LoadSamples(motion.eta[places, 2], velocity[places], weight)
+
+
+def sample_weights(length_s: float, rate_hz: float) -> tuple[Ints, Floats]:
+    """Return the rows of a window at which the wind load is evaluated and their weights, shape (S,) each."""
+    rows = max(4, round(length_s * rate_hz))
+    offsets = np.unique(np.linspace(0, rows - 1, _SAMPLES + 2).round().astype(np.int64)[1:-1])
+    weight = window_weights(rows, 1.0)[0][offsets]
+    return offsets, weight / weight.sum()
+
+
 class _Load:
     """Wind load of one log, averaged over its windows, as a function of the wind."""
 
-    def __init__(self, areas: WindAreas, motion: Motion, velocity: Floats, windows: WeakRows, rows: int, zeta: float):
-        offsets = np.unique(np.linspace(0, rows - 1, _SAMPLES + 2).round().astype(np.int64)[1:-1])
-        weight = window_weights(rows, 1.0)[0][offsets]
-        self.areas, self.weight, self.zeta = areas, weight / weight.sum(), zeta
-        places = windows.start[:, None] + offsets
-        self.psi, self.nu = motion.eta[places, 2], velocity[places]
+    def __init__(self, areas: WindAreas, samples: LoadSamples, zeta: float) -> None:
+        self.areas, self.weight, self.zeta = areas, samples.weight, zeta
+        self.psi, self.nu = samples.psi, samples.nu
         self.still = self._mean(np.zeros(2))
 
     def _mean(self, wind: Floats) -> Floats:
@@ -106,10 +153,8 @@ class _Load:
 
 def estimate_conditions(
     profile: Profile,
-    motions: Sequence[Motion],
-    velocities: Sequence[Floats],
+    samples: Sequence[LoadSamples | None],
     windows: Sequence[WeakRows],
-    length_s: float,
     zeta: float,
     terms: tuple[str, ...],
     mask: Flags,
@@ -122,12 +167,10 @@ def estimate_conditions(
     ----------
     profile
         The vessel; without wind areas there is nothing to estimate.
-    motions, velocities
-        Logs, and the velocities that enter products, shape (n, 3) each.
+    samples
+        Where the wind load of each log is evaluated; None where there is none to estimate.
     windows
         Training windows of each log.
-    length_s
-        Length of a window [s].
     zeta
         Factor on the measured force.
     terms, mask
@@ -138,20 +181,17 @@ def estimate_conditions(
         Axes whose acceleration comes from poses, shape (3,).
     """
     nothing = Conditions.none(windows)
-    some = [
-        k
-        for k, (one, motion) in enumerate(zip(windows, motions, strict=True))
-        if len(one) >= IDENTIFY.fewest_condition_windows and motion.wind is None and np.any(one.heading)
-    ]
-    if profile.wind is None or not some:
+    areas = profile.wind
+    if areas is None:
+        return nothing
+    loads = {
+        k: _Load(areas, points, zeta)
+        for k, (one, points) in enumerate(zip(windows, samples, strict=True))
+        if points is not None and len(one) >= IDENTIFY.fewest_condition_windows
+    }
+    if not loads:
         return nothing
     problem = _Problem(windows, terms, mask, prior_spread, posed)
-    loads = {
-        k: _Load(
-            profile.wind, motions[k], velocities[k], windows[k], max(4, round(length_s * motions[k].rate_hz)), zeta
-        )
-        for k in some
-    }
     wind, covariance = problem.solve(loads)
     return Conditions(
         wind,
@@ -293,7 +333,7 @@ class _Problem:
         correlation = float(np.clip(np.mean(alike), 0.0, IDENTIFY.most_autocorrelation))
         self.noise = (1.0 + correlation) / (1.0 - correlation)
         if forces:
-            self.force_spread = float(np.sqrt(max(np.mean(forces), 1e-6)))
+            self.force_spread = float(np.sqrt(max(float(np.mean(forces)), 1e-6)))
         if winds:
             # Two logs' worth of what is usual keeps the spread of few logs apart from zero and from everything.
             usual = IDENTIFY.wind_spread_mps
