@@ -15,7 +15,7 @@ import numpy as np
 
 from ferryid.identify.outcome import LogWind
 from ferryid.identify.thresholds import IDENTIFY
-from ferryid.identify.weak_rows import WeakRows
+from ferryid.identify.weak_rows import WeakRows, window_rows
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import window_weights
 from ferryid.signals.track import Motion
@@ -123,7 +123,7 @@ def sample_load(
 
 def sample_weights(length_s: float, rate_hz: float) -> tuple[Ints, Floats]:
     """Return the rows of a window at which the wind load is evaluated and their weights, shape (S,) each."""
-    rows = max(4, round(length_s * rate_hz))
+    rows = window_rows(length_s, rate_hz)
     offsets = np.unique(np.linspace(0, rows - 1, _SAMPLES + 2).round().astype(np.int64)[1:-1])
     weight = window_weights(rows, 1.0)[0][offsets]
     return offsets, weight / weight.sum()
