@@ -267,7 +267,9 @@ class ArchiveData(FitData):
     def warnings(self, excitation: Excitation, scores: ModelScores) -> list[str]:
         """Return what to know before trusting the scores, as sentences."""
         logs = self.sums.logs
+        auto = "The derivative's estimator was used, as auto does for an archive; --estimator weak uses the weak form."
         return [
+            *([auto] if self.settings.estimator == "auto" else []),
             *general_warnings(self.settings, excitation, scores, len(logs)),
             *log_warnings([(log.name, log.warnings) for log in logs]),
         ]

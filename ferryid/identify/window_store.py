@@ -19,7 +19,7 @@ from ferryid.identify.weak_rows import WeakRows
 from ferryid.signals.cache import folder_of, load
 from ferryid.signals.parquet import read_table, write_table
 from ferryid.signals.prepare import smoothed, track_of
-from ferryid.types import Floats
+from ferryid.types import Floats, Ints
 from ferryid.vessel.dimensions import window_seconds
 from ferryid.vessel.profile import Profile
 
@@ -169,7 +169,7 @@ def _part(arrays: Mapping[str, Floats], told: Mapping[str, Any], weight: Floats)
     J = len(arrays["run"])
     shared: dict[str, Any] = {name: arrays[name] for name in _SHARED}
     shared["inertia"] = np.broadcast_to(arrays["inertia"], (J, 3, 3))
-    shared |= {name: arrays[name].astype(np.int64) for name in ("run", "start")}
+    shared |= {name: _rows(arrays[name]) for name in ("run", "start")}
     own: list[dict[str, Any]] = [
         {name: arrays[name] for name in _OWN},
         {name: arrays.get(f"steadied_{name}", arrays[name]) for name in _OWN},
@@ -184,7 +184,7 @@ def _part(arrays: Mapping[str, Floats], told: Mapping[str, Any], weight: Floats)
         steadied=steadied,
         load_measured=loads[0],
         load_steadied=loads[1],
-        second=arrays["second"].astype(np.int64),
+        second=_rows(arrays["second"]),
         nu=arrays["nu"],
         force=np.array(told["force"], dtype=np.float64),
         base=np.array(told["base"], dtype=np.float64),
@@ -193,6 +193,13 @@ def _part(arrays: Mapping[str, Floats], told: Mapping[str, Any], weight: Floats)
         rows=int(told["rows"]),
         blocks=int(told["blocks"]),
     )
+
+
+def _rows(values: Floats) -> Ints:
+    """Return numbers of rows, kept as floats (n,)."""
+    if not np.isfinite(values).all():
+        raise ValueError("a row without a number")
+    return values.astype(np.int64)
 
 
 def _is_whole(part: WindowPart) -> bool:

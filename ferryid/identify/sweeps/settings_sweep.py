@@ -67,6 +67,16 @@ class Sweep:
         return self.settings.estimator == "weak"
 
     @property
+    def tested(self) -> str:
+        """What a fold tests: a row, or a window."""
+        return "window" if self.weak else "row"
+
+    @property
+    def error(self) -> str:
+        """What is compared."""
+        return "squared prediction error" if self.weak else "force MSE"
+
+    @property
     def choice(self) -> Selection:
         """What to fit with: the choice by stretches, which every set of logs has."""
         return self.by["blocks"]
