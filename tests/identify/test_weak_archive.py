@@ -14,12 +14,13 @@ import pytest
 
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json
-from ferryid.identify import window_store
+from ferryid.identify import weak_archive, window_store
 from ferryid.identify.archive import fit_archive
 from ferryid.identify.archived_logs import archived_folders
 from ferryid.identify.log_windows import LogWindows, average_log
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FitSettings
+from ferryid.identify.split import split_rows
 from ferryid.identify.weak_rows import WeakRows
 from ferryid.models.model import model_to_json
 from ferryid.regression.bases import make_basis
@@ -85,6 +86,16 @@ def test_a_log_that_was_divided_has_no_window_in_both_parts() -> None:
         PROFILE, SETTINGS, make_basis("modulus"), smooth_measured(measured(1, seconds=30.0), 1.0), divided=True
     )
     assert short.whole is short.parts[0]
+
+
+def test_of_short_logs_the_second_and_fifth_validate_as_in_a_fit_to_the_logs() -> None:
+    made = [smooth_measured(measured(seed, seconds=30.0 if seed < 6 else 240.0), 1.0) for seed in range(1, 7)]
+    split = split_rows(made, window_s=1.0)
+    logs = [average_log(PROFILE, SETTINGS, make_basis("modulus"), one, divided=True) for one in made]
+    trained, validated = weak_archive._divided(logs, "blocks")
+    assert [part.rows > 0 for part in validated] == [False, True, False, False, True, True]
+    assert [part.rows for part in trained] == [int(rows.sum()) for rows in split.training]
+    assert [part.rows for part in validated] == [int(rows.sum()) for rows in split.validation]
 
 
 @pytest.mark.slow
@@ -213,6 +224,7 @@ def test_damaged_windows_and_those_of_another_log_are_made_anew(season: Path, tm
         write_table(path, {"values": np.where(np.arange(columns["values"].size) == 5, np.nan, columns["values"])}, told)
     again = window_store.load_windows(first, PROFILE, SETTINGS, divided=True)
     np.testing.assert_array_equal(again.parts[0].nu, whole.parts[0].nu)
+    np.testing.assert_array_equal(again.parts[0].second, whole.parts[0].second)
     assert window_store.load_windows(second, PROFILE, SETTINGS, divided=True).name == "day2"
     for path in first.glob("windows-*.parquet"):
         path.write_bytes(path.read_bytes()[:-100])
