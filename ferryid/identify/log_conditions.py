@@ -21,13 +21,15 @@ from ferryid.regression import window_weights
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats, Ints
 from ferryid.vessel.profile import Profile, WindAreas
-from ferryid.vessel.wind import wind_force
+from ferryid.vessel.wind import relative_wind_force
 
 _SAMPLES = 16
 """Points of a window at which the wind load is evaluated: it changes with heading and speed, not faster."""
 _DIRECTIONS = 8
 _SPEEDS = (1.0, 3.0, 8.0)
 """Starts of the search, times the spread that is expected; the load has no slope at rest in still air."""
+_START_WINDOWS = 500
+"""Windows of a log, evenly spaced, in which the starts are compared."""
 _STEP_MPS = 0.05
 
 
@@ -134,16 +136,23 @@ class _Load:
 
     def __init__(self, areas: WindAreas, samples: LoadSamples, zeta: float) -> None:
         self.areas, self.weight, self.zeta = areas, samples.weight, zeta
-        self.psi, self.nu = samples.psi, samples.nu
+        self.cos, self.sin = np.cos(samples.psi), np.sin(samples.psi)
+        self.surge, self.sway = samples.nu[..., 0], samples.nu[..., 1]
         self.still = self._mean(np.zeros(2))
 
-    def _mean(self, wind: Floats) -> Floats:
-        load = wind_force(self.areas, np.broadcast_to(wind, (*self.psi.shape, 2)), self.psi, self.nu)
+    def _mean(self, wind: Floats, every: int = 1) -> Floats:
+        north, east = wind
+        cos, sin = self.cos[::every], self.sin[::every]
+        along, across = cos * north + sin * east, cos * east - sin * north
+        load = relative_wind_force(self.areas, self.surge[::every] - along, self.sway[::every] - across)
         return np.asarray(np.einsum("jsa,s->ja", load, self.weight)) / self.zeta
 
-    def of(self, wind: Floats) -> Floats:
-        """Return the load beyond that of still air, shape (J, 3): a hull's damping holds that of still air."""
-        return self._mean(wind) - self.still
+    def of(self, wind: Floats, every: int = 1) -> Floats:
+        """Return the load beyond that of still air, shape (J, 3), or of one in so many windows.
+
+        That of still air is in the hull's damping.
+        """
+        return self._mean(wind, every) - self.still[::every]
 
     def slope(self, wind: Floats) -> Floats:
         """Return its derivative with respect to the wind, shape (J, 3, 2)."""
@@ -249,15 +258,16 @@ class _Problem:
     def _start(self, k: int, load: _Load) -> Floats:
         """Return the likeliest wind of a log for the hull found so far, of some directions and speeds."""
         X, Y = self._table(k, np.zeros((len(self.windows[k]), 3)))
-        left, G = Y - X @ self.gains - self.intercept, self._G()
+        every = -(-len(Y) // _START_WINDOWS)
+        left, G = (Y - X @ self.gains - self.intercept)[::every], self._G()
         best, least = np.zeros(2), np.inf
         angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
         for speed in _SPEEDS:
             for angle in angles:
                 wind = speed * np.array([np.cos(angle), np.sin(angle)])
-                error = (left + load.of(wind) @ G.T) / self.sigma
+                error = (left + load.of(wind, every) @ G.T) / self.sigma
                 error = error - error.mean(axis=0)
-                cost = float(np.sum(error**2)) / self.noise + float(wind @ wind) / self.wind_spread**2
+                cost = every * float(np.sum(error**2)) / self.noise + float(wind @ wind) / self.wind_spread**2
                 if cost < least:
                     best, least = wind, cost
         return best
