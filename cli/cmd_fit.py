@@ -23,6 +23,7 @@ from ferryid.cli.options import (
     Structure,
     Verify,
     Vessel,
+    WeakWindow,
     Zeta,
     given,
 )
@@ -46,6 +47,7 @@ def command(
     rate: Rate = None,
     inertia: Inertia = "auto",
     estimator: Estimator = "auto",
+    weak_window: WeakWindow = None,
     accept: Accept = "full",
     delta: Delta = 1.0,
     sigma: Sigma = 1.0,
@@ -57,7 +59,8 @@ def command(
     archive: Annotated[
         bool,
         typer.Option(
-            "--archive", help="Fit to sums kept of every log ingested to --out, or of those named; reads no log."
+            "--archive",
+            help="Fit to what is kept of every log ingested to --out, or of those named; reads no log.",
         ),
     ] = False,
     verify: Verify = False,
@@ -71,7 +74,7 @@ def command(
     settings = FitSettings(
         basis=basis, structure=structure, components=components, **parse_window(window), smoother=smoother, residual=residual,
         split=split, inertia=inertia, estimator=estimator, accept=accept, rate_hz=rate, delta=delta, sigma=sigma,
-        zeta=zeta, seed=seed,
+        zeta=zeta, seed=seed, weak_window_s=weak_window,
     )  # fmt: skip
     chosen = logs or () if archive else given(logs)
     outcome = api.fit(chosen, vessel, settings, out, name=name, archive=archive, verify=verify, progress=progress)

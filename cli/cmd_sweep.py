@@ -20,6 +20,7 @@ from ferryid.cli.options import (
     Smoother,
     Structure,
     Vessel,
+    WeakWindow,
     Zeta,
     given,
 )
@@ -30,9 +31,7 @@ def command(
     what: Annotated[str, typer.Argument(help="components, window, both at once, or basis.")],
     vessel: Vessel,
     logs: MaybeLogs = None,
-    windows: Annotated[
-        str, typer.Option(help="Smoothing windows to try [s], as 0.5,1,2; a usual range if left out.")
-    ] = "",
+    windows: Annotated[str, typer.Option(help="Windows to try [s], as 0.5,1,2; a usual range if left out.")] = "",
     window: Annotated[float, typer.Option(help="Smoothing window [s] for sweeps of components or basis.")] = 1.0,
     components: Annotated[
         str, typer.Option(help="Number of components for sweeps of window or basis, or auto.")
@@ -43,6 +42,10 @@ def command(
     smoother: Smoother = "square",
     residual: Residual = "measured",
     rate: Rate = None,
+    estimator: Annotated[
+        str, typer.Option("--estimator", help="derivative, or weak: windows are then those of the weak form.")
+    ] = "derivative",
+    weak_window: WeakWindow = None,
     inertia: Inertia = "auto",
     delta: Delta = 1.0,
     sigma: Sigma = 1.0,
@@ -50,19 +53,19 @@ def command(
     archive: Annotated[
         bool,
         typer.Option(
-            "--archive", help="Sweep sums kept of every log ingested to --out, or of those named; reads no log."
+            "--archive", help="Sweep what is kept of every log ingested to --out, or of those named; reads no log."
         ),
     ] = False,
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """Cross-validate smoothing windows, component counts, or all bases in both structures, and mark which to fit with."""
+    """Cross-validate windows, component counts, or all bases in both structures, and mark which to fit with."""
     from ferryid import api
     from ferryid.identify import FitSettings, parse_windows
 
     settings = FitSettings(
         basis=basis, structure=structure, components=components, window_s=window, smoother=smoother, residual=residual,
-        inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta,
+        inertia=inertia, rate_hz=rate, delta=delta, sigma=sigma, zeta=zeta, estimator=estimator, weak_window_s=weak_window,
     )  # fmt: skip
     chosen = logs or () if archive else given(logs)
     outcome = api.sweep(

@@ -42,6 +42,12 @@ Inertia = Annotated[
         "--inertia", help="auto: keep the base model's inertia where the fitted one cannot be right; or fitted."
     ),
 ]
+WeakWindow = Annotated[
+    float | None,
+    typer.Option(
+        "--weak-window", help="Length of the windows of the weak form [s]; 8 s for a vessel of 5 m if left out."
+    ),
+]
 Estimator = Annotated[
     str,
     typer.Option(

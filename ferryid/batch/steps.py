@@ -13,7 +13,7 @@ from ferryid.batch.recipe import Recipe
 from ferryid.compare import evaluate
 from ferryid.diagnose import DiagnosisSettings
 from ferryid.files import dump_json, finite, write_text
-from ferryid.identify import load_block_sums
+from ferryid.identify import load_block_sums, load_windows
 from ferryid.models import Model, blank_model
 from ferryid.report.batch_rows import BaseAndModel, DiagnosisSummary, EvaluationSummary, FindingSummary, FitSummary
 from ferryid.report.diagnosis_report import diagnose_and_report
@@ -76,7 +76,10 @@ def _fitted(job: Job) -> FitSummary:
     # What a fit over the whole archive adds up is made here, where logs are worked on side by side.
     if job.recorded.exists():
         settings = job.recipe.fit.on(job.profile)
-        load_block_sums(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
+        if settings.estimator == "weak":
+            load_windows(job.recorded, job.profile, settings, divided=settings.split == "blocks")
+        else:
+            load_block_sums(job.recorded, job.profile, settings, settings.windows_s or (settings.window_s,))
     told, scores = made.json, finite(made.json["scores"])
     return FitSummary(
         model=job.below(told["model"]["path"]),

@@ -7,6 +7,7 @@ from ferryid.identify.model_selection import Selection
 from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
 from ferryid.identify.pipeline import fit_logs
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings, check_window, parse_window, parse_windows
+from ferryid.identify.window_store import load_windows
 
 __all__ = [
     "FOLDS",
@@ -25,6 +26,7 @@ __all__ = [
     "fit_logs",
     "force_mse",
     "load_block_sums",
+    "load_windows",
     "parse_window",
     "parse_windows",
 ]

@@ -15,7 +15,7 @@ import numpy as np
 
 from ferryid.counts import counted
 from ferryid.errors import FerryIdError
-from ferryid.identify.archived_logs import archived_folders
+from ferryid.identify.archived_logs import archived_folders, refuse_other_basis
 from ferryid.identify.block_sum_store import StoredSums, load_block_sums
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.excitation import SECTORS, sector_coverage
@@ -28,6 +28,8 @@ from ferryid.identify.outcome import ArchivedLog, Excitation, FitOutcome, LogFit
 from ferryid.identify.pipeline import accept_estimate
 from ferryid.identify.settings import FOLDS, FitSettings, check_components
 from ferryid.identify.split import validation_blocks
+from ferryid.identify.weak_archive import fit_weak_archive
+from ferryid.identify.windowed_data import NOT_RUN
 from ferryid.models import ForceScores, ModelScores, span_ranges
 from ferryid.models.prediction import FreeRun
 from ferryid.models.store import check_name
@@ -39,9 +41,6 @@ from ferryid.vessel.profile import Profile
 
 MOST_DRAWN = 500
 """Blocks that the bootstrap draws from; with more of them several logs' blocks are joined."""
-_NOT_RUN = FreeRun.not_run(
-    "not run free: a fit over an archive sees sums and no motion; ferryid evaluate runs it on a log"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +244,7 @@ class ArchiveData(FitData):
 
     def free_runs(self, found: Coefficients, progress: Callable[[str], None]) -> tuple[FreeRun, FreeRun]:
         """Return no free runs, as there is no motion."""
-        return _NOT_RUN, _NOT_RUN
+        return NOT_RUN, NOT_RUN
 
     def training_logs(self) -> tuple[Mapping[str, Any], ...]:
         """Return the training logs as a model file lists them."""
@@ -268,7 +267,9 @@ class ArchiveData(FitData):
     def warnings(self, excitation: Excitation, scores: ModelScores) -> list[str]:
         """Return what to know before trusting the scores, as sentences."""
         logs = self.sums.logs
+        auto = "The derivative's estimator was used, as auto does for an archive; --estimator weak uses the weak form."
         return [
+            *([auto] if self.settings.estimator == "auto" else []),
             *general_warnings(self.settings, excitation, scores, len(logs)),
             *log_warnings([(log.name, log.warnings) for log in logs]),
         ]
@@ -293,10 +294,7 @@ def fit_archive(
     if settings.split == "every-kth":
         raise FerryIdError("--split every-kth: an archive keeps blocks, no rows. Fix: give blocks or logs")
     if settings.estimator == "weak":
-        raise FerryIdError(
-            "--estimator weak: an archive keeps sums of the derivative's rows. "
-            "Fix: fit the logs, or give --estimator derivative"
-        )
+        return fit_weak_archive(profile, settings, run, names, name)
     windows_s = settings.windows_s or (settings.window_s,)
     where = archived_folders(run.tables or run.out, profile, names)
     sums = _Sums(len(windows_s), len(where), by_logs=settings.split == "logs")
@@ -369,12 +367,8 @@ def _add_logs(
     for number, folder in enumerate(where):
         progress(f"adding up log {number + 1} of {len(where)}")
         log = load_block_sums(folder, profile, settings, windows_s)
-        if first is not None and log.basis != first.basis:
-            raise FerryIdError(
-                f"{log.name}: its basis is {log.basis}, as its measurements allow, that of {first.name} {first.basis}: they do "
-                "not add up. Fix: fit them apart, naming the logs of one kind"
-            )
         first = first or log
+        refuse_other_basis((first.name, first.basis), (log.name, log.basis))
         add(log)
     assert first is not None
     return make_basis(first.basis, structure=settings.structure)

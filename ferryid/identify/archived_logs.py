@@ -84,6 +84,15 @@ def archived_folders(out: Path, profile: Profile, names: Sequence[str] = ()) -> 
     return [one.folder for one in chosen]
 
 
+def refuse_other_basis(first: tuple[str, str], log: tuple[str, str]) -> None:
+    """Refuse a log whose basis is not that of the first; each is given as name and basis."""
+    if log[1] != first[1]:
+        raise FerryIdError(
+            f"{log[0]}: its basis is {log[1]}, as its measurements allow, that of {first[0]} {first[1]}: they do "
+            "not add up. Fix: fit them apart, naming the logs of one kind"
+        )
+
+
 def _refuse_shared(logs: Sequence[_Ingested]) -> None:
     """Refuse two logs that were read from one file: rows of both would train and validate at once."""
     by_file: dict[str, _Ingested] = {}

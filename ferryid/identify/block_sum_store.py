@@ -89,14 +89,8 @@ def load_block_sums(folder: Path, profile: Profile, settings: FitSettings, windo
     FerryIdError
         For a log that cannot be used, and a folder that cannot be written.
     """
-    key = {
-        "version": __version__,
-        "profile_sha256": profile.sha256,
-        "windows_s": [float(window_s) for window_s in windows_s],
-        **{name: getattr(settings, name) for name in _MATTERS},
-    }
-    digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
-    path = folder / f"pieces-{digest[:16]}.parquet"
+    key = key_of(profile, settings, windows_s=[float(window_s) for window_s in windows_s])
+    path = path_of(folder, "pieces", key)
     remove_abandoned(folder)
     if path.exists():
         try:
@@ -106,6 +100,22 @@ def load_block_sums(folder: Path, profile: Profile, settings: FitSettings, windo
     made = _compute(folder, profile, settings, windows_s)
     write_block_sums(path, key, made)
     return made
+
+
+def key_of(profile: Profile, settings: FitSettings, **more: Any) -> dict[str, Any]:
+    """Return all that what is kept of a log depends on, besides the log."""
+    return {
+        "version": __version__,
+        "profile_sha256": profile.sha256,
+        **more,
+        **{name: getattr(settings, name) for name in _MATTERS},
+    }
+
+
+def path_of(folder: Path, kind: str, key: Mapping[str, Any]) -> Path:
+    """Return the file of what is kept of the log in a folder."""
+    digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
+    return folder / f"{kind}-{digest[:16]}.parquet"
 
 
 def _compute(folder: Path, profile: Profile, settings: FitSettings, windows_s: Sequence[float]) -> StoredSums:

@@ -17,19 +17,21 @@ import numpy as np
 from ferryid.identify.gusts import GustEquations, Gusts
 from ferryid.identify.outcome import LogWind
 from ferryid.identify.thresholds import IDENTIFY
-from ferryid.identify.weak_rows import STRIDES, WeakRows
+from ferryid.identify.weak_rows import STRIDES, WeakRows, window_rows
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import window_weights
 from ferryid.signals.track import Motion
-from ferryid.types import Flags, Floats
+from ferryid.types import Flags, Floats, Ints
 from ferryid.vessel.profile import Profile, WindAreas
-from ferryid.vessel.wind import wind_force
+from ferryid.vessel.wind import relative_wind_force
 
 _SAMPLES = 16
 """Points of a window at which the wind load is evaluated: it changes with heading and speed, not faster."""
 _DIRECTIONS = 8
 _SPEEDS = (1.0, 3.0, 8.0)
 """Starts of the search, times the spread that is expected; the load has no slope at rest in still air."""
+_START_WINDOWS = 500
+"""Windows of a log, evenly spaced, in which the starts are compared."""
 _STEP_MPS = 0.05
 
 
@@ -89,28 +91,78 @@ class Conditions:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class LoadSamples:
+    """Points of the J windows of a log at which the wind load is evaluated, S a window.
+
+    Attributes
+    ----------
+    psi
+        Heading [rad], shape (J, S).
+    nu
+        Velocity [m/s, m/s, rad/s], shape (J, S, 3).
+    weight
+        Weight of each point, shape (S,).
+    """
+
+    psi: Floats
+    nu: Floats
+    weight: Floats
+
+
+def sample_load(
+    profile: Profile, motion: Motion, velocity: Floats, windows: WeakRows, length_s: float
+) -> LoadSamples | None:
+    """Return where the wind load of a log's windows is evaluated; None where there is none to estimate.
+
+    Parameters
+    ----------
+    profile
+        The vessel; without wind areas there is nothing to estimate.
+    motion, velocity
+        The log, and the velocity that enters products, shape (n, 3).
+    windows
+        Its windows.
+    length_s
+        Their length [s].
+    """
+    if profile.wind is None or motion.wind is not None or not np.any(windows.heading):
+        return None
+    offsets, weight = sample_weights(length_s, motion.rate_hz)
+    places = windows.start[:, None] + offsets
+    return LoadSamples(motion.eta[places, 2], velocity[places], weight)
+
+
+def sample_weights(length_s: float, rate_hz: float) -> tuple[Ints, Floats]:
+    """Return the rows of a window at which the wind load is evaluated and their weights, shape (S,) each."""
+    rows = window_rows(length_s, rate_hz)
+    offsets = np.unique(np.linspace(0, rows - 1, _SAMPLES + 2).round().astype(np.int64)[1:-1])
+    weight = window_weights(rows, 1.0)[0][offsets]
+    return offsets, weight / weight.sum()
+
+
 class _Load:
     """Wind load of one log, averaged over its windows, as a function of the wind."""
 
-    def __init__(self, areas: WindAreas, motion: Motion, velocity: Floats, windows: WeakRows, rows: int, zeta: float):
-        offsets = np.unique(np.linspace(0, rows - 1, _SAMPLES + 2).round().astype(np.int64)[1:-1])
-        weight = window_weights(rows, 1.0)[0][offsets]
-        self.areas, self.weight, self.zeta = areas, weight / weight.sum(), zeta
-        places = windows.start[:, None] + offsets
-        self.psi, self.nu = motion.eta[places, 2], velocity[places]
+    def __init__(self, areas: WindAreas, samples: LoadSamples, zeta: float) -> None:
+        self.areas, self.weight, self.zeta = areas, samples.weight, zeta
+        self.cos, self.sin = np.cos(samples.psi), np.sin(samples.psi)
+        self.surge, self.sway = samples.nu[..., 0], samples.nu[..., 1]
         self.still = self._mean(np.zeros(2))
 
-    def _mean(self, wind: Floats) -> Floats:
-        every = np.broadcast_to(wind, (len(self.psi), 2))[:, None, :]
-        load = wind_force(self.areas, np.broadcast_to(every, (*self.psi.shape, 2)), self.psi, self.nu)
+    def _mean(self, wind: Floats, every: int = 1) -> Floats:
+        north, east = (np.broadcast_to(part, (len(self.cos),))[::every, None] for part in np.asarray(wind).T)
+        cos, sin = self.cos[::every], self.sin[::every]
+        along, across = cos * north + sin * east, cos * east - sin * north
+        load = relative_wind_force(self.areas, self.surge[::every] - along, self.sway[::every] - across)
         return np.asarray(np.einsum("jsa,s->ja", load, self.weight)) / self.zeta
 
-    def of(self, wind: Floats) -> Floats:
-        """Return the load beyond that of still air, shape (J, 3), of a wind (2,) or one a window (J, 2).
+    def of(self, wind: Floats, every: int = 1) -> Floats:
+        """Return the load beyond that of still air, shape (J, 3), or of one in so many windows.
 
-        A hull's damping holds that of still air.
+        The wind is one for all, (2,), or one a window, (J, 2). The load of still air is in the hull's damping.
         """
-        return self._mean(wind) - self.still
+        return self._mean(wind, every) - self.still[::every]
 
     def slope(self, wind: Floats) -> Floats:
         """Return its derivative with respect to the wind, shape (J, 3, 2)."""
@@ -120,8 +172,7 @@ class _Load:
 
 def estimate_conditions(
     profile: Profile,
-    motions: Sequence[Motion],
-    velocities: Sequence[Floats],
+    samples: Sequence[LoadSamples | None],
     windows: Sequence[WeakRows],
     length_s: float,
     zeta: float,
@@ -136,8 +187,8 @@ def estimate_conditions(
     ----------
     profile
         The vessel; without wind areas there is nothing to estimate.
-    motions, velocities
-        Logs, and the velocities that enter products, shape (n, 3) each.
+    samples
+        Where the wind load of each log is evaluated; None where there is none to estimate.
     windows
         Training windows of each log.
     length_s
@@ -152,20 +203,17 @@ def estimate_conditions(
         Axes whose acceleration comes from poses, shape (3,).
     """
     nothing = Conditions.none(windows, len(terms))
-    some = [
-        k
-        for k, (one, motion) in enumerate(zip(windows, motions, strict=True))
-        if len(one) >= IDENTIFY.fewest_condition_windows and motion.wind is None and np.any(one.heading)
-    ]
-    if profile.wind is None or not some:
+    areas = profile.wind
+    if areas is None:
+        return nothing
+    loads = {
+        k: _Load(areas, points, zeta)
+        for k, (one, points) in enumerate(zip(windows, samples, strict=True))
+        if points is not None and len(one) >= IDENTIFY.fewest_condition_windows
+    }
+    if not loads:
         return nothing
     problem = _Problem(windows, terms, mask, prior_spread, posed, length_s / STRIDES)
-    loads = {
-        k: _Load(
-            profile.wind, motions[k], velocities[k], windows[k], max(4, round(length_s * motions[k].rate_hz)), zeta
-        )
-        for k in some
-    }
     wind, covariance = problem.solve(loads)
     return Conditions(
         wind,
@@ -280,15 +328,16 @@ class _Problem:
     def _start(self, k: int, load: _Load) -> Floats:
         """Return the likeliest wind of a log for the hull found so far, of some directions and speeds."""
         X, Y = self._table(k, np.zeros((len(self.windows[k]), 3)))
-        left, G = Y - X @ self.gains - self.intercept, self._G()
+        every = -(-len(Y) // _START_WINDOWS)
+        left, G = (Y - X @ self.gains - self.intercept)[::every], self._G()
         best, least = np.zeros(2), np.inf
         angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
         for speed in _SPEEDS:
             for angle in angles:
                 wind = speed * np.array([np.cos(angle), np.sin(angle)])
-                error = (left + load.of(wind) @ G.T) / self.sigma
+                error = (left + load.of(wind, every) @ G.T) / self.sigma
                 error = error - error.mean(axis=0)
-                cost = float(np.sum(error**2)) / self.noise + float(wind @ wind) / self.wind_spread**2
+                cost = every * float(np.sum(error**2)) / self.noise + float(wind @ wind) / self.wind_spread**2
                 if cost < least:
                     best, least = wind, cost
         return best

@@ -128,7 +128,7 @@ def sum_motions(
     at_windows = [pieces(one, target, known_rows(one, functions, target, target) & every) for one, target in training]
     spans = [slice(low, high) for low, high in pairwise(edges[::3])]
     force, base, judged = (
-        np.array([_moments(values[span][used[span]]) for span in spans])
+        np.array([moments_of(values[span][used[span]]) for span in spans])
         for values in (motion.tau, motion.tau - error, error if reference is None else reference)
     )
     return LogSums(motion.log, tuple(at_windows), pieces(motion, error, used), force, base, judged)
@@ -140,7 +140,8 @@ def force_free_axes(logs: Sequence[LogSums]) -> Flags:
     return axes_without_force(pooled_deviation(force), pooled_deviation(base))
 
 
-def _moments(values: Floats) -> Floats:
+def moments_of(values: Floats) -> Floats:
+    """Return count, mean and sum of squares about the mean of values (n, 3), shape (3, 3)."""
     if not len(values):
         return np.zeros((3, 3))
     mean = values.mean(axis=0)

@@ -116,7 +116,7 @@ class FitSettings:
             raise FerryIdError(f"--rate: {self.rate_hz} Hz is no usable rate. Fix: give 0.1 to 1000 Hz, 20 is usual")
         if self.weak_window_s is not None and not 0.5 <= self.weak_window_s <= 300.0:
             raise FerryIdError(
-                f"weak_window_s: {self.weak_window_s} s is no window of the weak form. Fix: give 0.5 to 300 s, or none"
+                f"--weak-window: {self.weak_window_s} s is no window of the weak form. Fix: give 0.5 to 300 s, or none"
             )
         if not 1 <= self.draws <= 100_000:
             raise FerryIdError(f"draws: {self.draws} is no number of draws. Fix: give 1 to 100000, 500 is usual")

@@ -17,7 +17,7 @@ from ferryid.identify.contradictions import response_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, feasible_gains
 from ferryid.identify.fit_data import Estimate
 from ferryid.identify.inertia import relative_inertia, without_inertia
-from ferryid.identify.log_conditions import Conditions, estimate_conditions
+from ferryid.identify.log_conditions import Conditions, LoadSamples, estimate_conditions, sample_load
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
 from ferryid.identify.settings import FOLDS
@@ -27,7 +27,7 @@ from ferryid.models.forces import ACCELERATIONS, MAPPED
 from ferryid.regression import CrossProducts, QrFactor, Rows, Simpls, fit_simpls
 from ferryid.regression.cross_validation import Folds
 from ferryid.regression.resampling import Blocks, block_seconds
-from ferryid.types import Flags, Floats
+from ferryid.types import Flags, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +104,7 @@ class WeakData(LogData):
         """Steady wind of every log in which it was not measured."""
         return estimate_conditions(
             self.profile,
-            self.motions,
-            self.windows.velocities,
+            self.load_samples,
             self.windows.training,
             self.windows.length_s,
             float(self.settings.scale.get("zeta", 1.0)),
@@ -116,9 +115,30 @@ class WeakData(LogData):
         )
 
     @property
+    def load_samples(self) -> tuple[LoadSamples | None, ...]:
+        """Motion at which the wind load of the training windows is evaluated, one a log; None where wind was measured."""
+        windows = self.windows
+        return tuple(
+            sample_load(self.profile, motion, velocity, one, windows.length_s)
+            for motion, velocity, one in zip(self.motions, windows.velocities, windows.training, strict=True)
+        )
+
+    @property
+    def training_velocities(self) -> Floats:
+        """Velocities of the training rows, one row a second, shape (n, 3): they say how fast the vessel goes."""
+        return np.concatenate(
+            [m.nu[every_second(rows, m.rate_hz)] for m, rows in zip(self.motions, self.split.training, strict=True)]
+        )
+
+    @property
+    def log_names(self) -> tuple[str, ...]:
+        """Names of the logs."""
+        return tuple(motion.log for motion in self.motions)
+
+    @property
     def winds(self) -> tuple[LogWind, ...]:
         """Steady winds of the logs in which nobody measured them."""
-        return self.conditions.listed([motion.log for motion in self.motions])
+        return self.conditions.listed(self.log_names)
 
     @property
     def impossible(self) -> str:
@@ -235,8 +255,7 @@ class WeakData(LogData):
     def prior_spread(self) -> Floats:
         """Standard deviations of the prior of each gain, shape (K, 3); infinite where nothing is known."""
         spread = np.full((len(self.functions.terms), 3), np.inf)
-        nu = np.concatenate([m.nu[mask] for m, mask in zip(self.motions, self.split.training, strict=True)])
-        known = default_hull_spread(self.profile, nu)
+        known = default_hull_spread(self.profile, self.training_velocities)
         if self.profile.hull.has_model:
             known = IDENTIFY.hull_spread * np.abs(hull_of(self.profile)) + IDENTIFY.unmodelled_share * known
         for name, places in MAPPED.items():
@@ -322,10 +341,10 @@ class WeakData(LogData):
     ) -> tuple[Sequence[CrossProducts], float, tuple[str, ...]]:
         """Return blocks of training windows as long as the whitened residual is correlated, each with its part of the prior."""
         stride_s = self.windows.length_s / STRIDES
-        rates = [1.0 / stride_s] * len(self.motions)
         rows = [one for one in self.whitened.rows if len(one.Y)]
-        block_s, notes = block_seconds(rows, rates[: len(rows)], theta, intercept)
-        stacked = Blocks.of(rows, rates[: len(rows)], block_s)
+        rates = [1.0 / stride_s] * len(rows)
+        block_s, notes = block_seconds(rows, rates, theta, intercept)
+        stacked = Blocks.of(rows, rates, block_s)
         prior = self._prior(self.whitening.sigma, 1.0 / len(stacked.n), self.prior_factor)
         blocks = [
             CrossProducts(int(n), stacked.K, stacked.m, stacked.shift, products) + prior
@@ -381,8 +400,15 @@ class WeakData(LogData):
 
     def feasible(self, gains: Floats, mask: Flags) -> Feasible:
         """Return the gains nearest to given ones that physics allows, (K, 3), nearest as the training windows measure it."""
-        nu = np.concatenate([m.nu[rows] for m, rows in zip(self.motions, self.split.training, strict=True)])
-        return feasible_gains(self.profile, self.settings.scale, self.functions, mask, gains, self._information(), nu)
+        return feasible_gains(
+            self.profile,
+            self.settings.scale,
+            self.functions,
+            mask,
+            gains,
+            self._information(),
+            self.training_velocities,
+        )
 
     def _information(self) -> Floats:
         """Return the second derivative of half the squared error over the gains, shape (3, K, K)."""
@@ -428,6 +454,11 @@ class WeakData(LogData):
 def weak_data(data: LogData) -> WeakData:
     """Return the same logs as windows of the weak form."""
     return WeakData(**{one.name: getattr(data, one.name) for one in fields(data)})
+
+
+def every_second(rows: Flags, rate_hz: float) -> Ints:
+    """Return one in so many of the marked rows (n,) that there is one a second."""
+    return np.flatnonzero(rows)[:: max(1, round(rate_hz))]
 
 
 def _steady(windows: WeakRows) -> Floats:

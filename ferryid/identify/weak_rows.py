@@ -121,12 +121,12 @@ def average_over_windows(
     profile, scale, functions
         Base model, factors on it, and basis.
     length_s
-        Length of a window [s]; windows of 4 rows at least.
+        Length of a window [s].
     velocity
         Velocity that enters products, shape (n, 3); the measured one where it is None.
     """
     step_s = 1.0 / motion.rate_hz
-    m = max(4, round(length_s * motion.rate_hz))
+    m = window_rows(length_s, motion.rate_hz)
     stride = max(1, m // STRIDES)
     weight, slope, bend = (step_s * each for each in window_weights(m, step_s))
     starts, runs = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
@@ -162,6 +162,11 @@ def average_over_windows(
         run=run,
         start=start,
     )
+
+
+def window_rows(length_s: float, rate_hz: float) -> int:
+    """Return the number of rows of a window of a length [s]: 4 at least."""
+    return max(4, round(length_s * rate_hz))
 
 
 def to_force(gains: Floats, intercept: Floats, terms: tuple[str, ...], mass: Floats) -> tuple[Floats, Floats]:

@@ -40,7 +40,7 @@ def heat_map(found: Sweep, choice: Selection) -> str:
         ax.plot(choice.window, choice.components - 1, "*", color="#d55e00", markersize=15, markeredgecolor="white")
         ax.set_xticks(range(len(found.windows_s)), [f"{window_s:g}" for window_s in found.windows_s])
         ax.set_yticks(range(score.shape[1]), [str(count + 1) for count in range(score.shape[1])])
-        ax.set_xlabel("smoothing window of the training rows [s]")
+        ax.set_xlabel(f"{'window of the weak form' if found.weak else 'smoothing window of the training rows'} [s]")
         ax.set_ylabel("components")
         bar = figure.colorbar(image, ax=ax, pad=0.02)
         bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

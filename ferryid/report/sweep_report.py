@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ferryid.files import dump_json, replacing
-from ferryid.identify import FOLDS, TEST_WINDOW_S, FitSettings
+from ferryid.identify import FOLDS, FitSettings
 from ferryid.identify.sweeps import BY, Sweep, sweep_json, sweep_settings
 from ferryid.report.html import template
 from ferryid.report.outcome import Report
@@ -83,7 +83,9 @@ def render(found: Sweep) -> tuple[str, dict[str, str]]:
         logs=[{**log, "seconds": f"{log['seconds']:.0f}"} for log in found.logs],
         sections=sections,
         axes=AXES,
-        test_window_s=f"{TEST_WINDOW_S:g}",
+        test_window_s=f"{found.test_window_s:g}",
+        weak=found.weak,
+        tested=found.tested,
         settings={**found.settings.plain(), **found.settings.scale},
         many=len(found.windows_s) > 1,
     )

@@ -14,7 +14,7 @@ def render_sweep(found: Sweep) -> str:
     """Return a sweep for a terminal."""
     lines = [headline(found), ""]
     for key, choice in found.by.items():
-        title = f"by {BY[key]}, {counted(choice.curves.folds, 'fold')}, {counted(choice.curves.rows, 'row')}"
+        title = f"by {BY[key]}, {counted(choice.curves.folds, 'fold')}, {counted(choice.curves.rows, found.tested)}"
         lines += [title, *(_matrix(found, choice) if found.what == "both" else _table(found, choice)), ""]
     lines += [f"note: {note}" for note in found.notes]
     return "\n".join(lines).rstrip()
@@ -25,7 +25,7 @@ def headline(found: Sweep) -> str:
     choice = found.choice
     ratio = choice.over_base[choice.window, choice.components - 1]
     told = ", ".join(f"{axis} {value:.3g}" for axis, value in zip(AXES, ratio, strict=True) if np.isfinite(value))
-    return f"Choice: {choice.title}. Cross-validated force MSE over the base model's: {told}."
+    return f"Choice: {choice.title}. Cross-validated {found.error} over the base model's: {told}."
 
 
 def _table(found: Sweep, choice: Selection) -> list[str]:

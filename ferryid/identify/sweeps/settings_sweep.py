@@ -16,6 +16,7 @@ from ferryid.identify.log_sums import LogSums, folds_by_blocks, folds_by_logs, f
 from ferryid.identify.model_selection import Selection, select_model, windows_to_try
 from ferryid.identify.rows import basis_for
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, WINDOWS_S, FitSettings
+from ferryid.identify.sweeps.weak_sweep import sweep_weak
 from ferryid.regression.bases import Basis
 from ferryid.regression.cross_validation import Folds
 from ferryid.signals.prepare import Opened
@@ -47,6 +48,8 @@ class Sweep:
         Cross-validation by contiguous stretches of every log (``"blocks"``) and, of several logs, by whole ones (``"logs"``).
     notes
         What a reader must know, as sentences.
+    test_window_s
+        Smoothing window of the test rows [s], or in the weak form the length of the windows that are tested in.
     """
 
     what: str
@@ -56,6 +59,22 @@ class Sweep:
     windows_s: tuple[float, ...]
     by: Mapping[str, Selection]
     notes: tuple[str, ...]
+    test_window_s: float = TEST_WINDOW_S
+
+    @property
+    def weak(self) -> bool:
+        """Whether settings of the weak form were swept."""
+        return self.settings.estimator == "weak"
+
+    @property
+    def tested(self) -> str:
+        """What a fold tests: a row, or a window."""
+        return "window" if self.weak else "row"
+
+    @property
+    def error(self) -> str:
+        """What is compared."""
+        return "squared prediction error" if self.weak else "force MSE"
 
     @property
     def choice(self) -> Selection:
@@ -74,7 +93,9 @@ def sweep_settings(
     folds: int = FOLDS,
     archive: bool = False,
 ) -> Sweep:
-    """Cross-validate logs over smoothing windows and component counts.
+    """Cross-validate logs over windows and component counts of one estimator.
+
+    The derivative's, unless the settings say ``"weak"``; windows are then those of the weak form.
 
     Parameters
     ----------
@@ -105,16 +126,22 @@ def sweep_settings(
             f"{', '.join(KINDS)} or basis"
         )
     check_folds(folds)
+    weak = settings.estimator == "weak"
     if what == "components" and windows_s:
-        raise FerryIdError("--windows: components are swept at one window. Fix: give --window, or sweep both")
-    if what != "components" and settings.smoother == "kalman":
+        raise FerryIdError(
+            f"--windows: components are swept at one window. Fix: give --{'weak-' if weak else ''}window, or sweep both"
+        )
+    if what != "components" and settings.smoother == "kalman" and not weak:
         raise FerryIdError(
             "--smoother: the Kalman smoother finds its window by likelihood, so that windows cannot be swept. "
             "Fix: sweep components, or take another --smoother"
         )
-    settings = replace(settings, windows_s=tuple(windows_s)).on(profile)
+    settings = replace(settings, windows_s=() if weak else tuple(windows_s)).on(profile)
     if what != "window":
         settings = replace(settings, components="auto")
+    if weak:
+        return _sweep_weak(what, logs, profile, settings, run, windows_s, folds, archive)
+    settings = replace(settings, estimator="derivative")
     fixed = (settings.window_s,) if what == "components" else tuple(windows_s)
     if archive:
         windows = fixed or WINDOWS_S
@@ -139,6 +166,36 @@ def sweep_settings(
         windows,
         by,
         (*_notes(by, windows, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
+    )
+
+
+def _sweep_weak(
+    what: str,
+    logs: Sequence[str],
+    profile: Profile,
+    settings: FitSettings,
+    run: RunContext,
+    windows_s: Sequence[float],
+    folds: int,
+    archive: bool,
+) -> Sweep:
+    lengths_s, basis, test_s, by, told, notes = sweep_weak(
+        logs, profile, settings, run, what=what, windows_s=windows_s, folds=folds, archive=archive
+    )
+    if what != "components" and len(lengths_s) < 2:
+        raise FerryIdError(
+            f"{told[0]['name']}: nothing to compare, as only windows of {lengths_s[0]:.3g} s can be fitted. "
+            "Fix: give at least two --windows, or longer logs"
+        )
+    return Sweep(
+        what,
+        profile.name,
+        tuple(told),
+        replace(settings, basis=basis),
+        lengths_s,
+        by,
+        (*notes, *_notes(by, lengths_s, settings), *log_warnings([(log["name"], log["warnings"]) for log in told])),
+        test_s,
     )
 
 
@@ -214,7 +271,7 @@ def sweep_json(found: Sweep, report: str | None = None) -> dict[str, Any]:
         "settings": {**found.settings.plain(), **found.settings.scale},
         "windows_s": list(found.windows_s),
         "components": list(range(1, found.choice.curves.mse.shape[1] + 1)),
-        "test_window_s": TEST_WINDOW_S,
+        "test_window_s": found.test_window_s,
         "by": {key: _choice_json(choice) for key, choice in found.by.items()},
         "choice": {"window_s": found.choice.window_s, "components": found.choice.components},
         "notes": list(found.notes),

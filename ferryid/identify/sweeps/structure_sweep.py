@@ -88,6 +88,12 @@ def sweep_structures(
         For input that cannot be used, with file, cause and remedy.
     """
     check_folds(folds)
+    if settings.estimator == "weak":
+        raise FerryIdError(
+            "--estimator weak: bases are compared by the force errors of the derivative's rows. "
+            "Fix: leave it out, or compare sweep components --estimator weak --basis NAME of one basis and another"
+        )
+    settings = replace(settings, estimator="derivative")
     usable, unusable = usable_bases(settings, profile)
     opened = read_logs(logs, profile, settings, run)
     motions = [smooth_measured(one.measured, TEST_WINDOW_S) for one in opened]

@@ -1,0 +1,93 @@
+"""A fit in the weak form over every log that was ingested, from the windows that are kept of each: no row is read again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.errors import FerryIdError
+from ferryid.identify.archived_logs import archived_folders, refuse_other_basis
+from ferryid.identify.estimation import estimate_correction
+from ferryid.identify.log_windows import LogWindows, WindowPart
+from ferryid.identify.outcome import FitOutcome
+from ferryid.identify.pipeline import accept_estimate
+from ferryid.identify.settings import FitSettings, check_components
+from ferryid.identify.split import validation_blocks
+from ferryid.identify.thresholds import IDENTIFY
+from ferryid.identify.window_store import load_windows
+from ferryid.identify.windowed_data import WindowedData
+from ferryid.regression.bases import Basis, make_basis
+from ferryid.types import RunContext
+from ferryid.vessel.profile import Profile
+
+
+def fit_weak_archive(
+    profile: Profile, settings: FitSettings, run: RunContext, names: Sequence[str], name: str
+) -> FitOutcome:
+    """Fit one correction in the weak form to every log under an output folder; see `ferryid.identify.archive.fit_archive`."""
+    if settings.windows_s:
+        raise FerryIdError(
+            "--window auto: smoothing windows are chosen by sums of the derivative's rows, and the weak form hardly depends "
+            "on them. Fix: give --window 1, or --estimator derivative"
+        )
+    where = archived_folders(run.tables or run.out, profile, names)
+    logs, functions = archived_windows(where, profile, settings, run.progress, divided=settings.split == "blocks")
+    check_components(settings.components, functions)
+    data = WindowedData.of(profile, settings, functions, logs, *_divided(logs, settings.split))
+    judged = sum(len(one) for one in data.windows.validation)
+    if judged < IDENTIFY.fewest_judged:
+        raise FerryIdError(
+            f"{data.where}: too little for validation in the weak form, found {counted(len(logs), 'log')} with "
+            f"{counted(judged, 'validation window')} of {data.windows.length_s:.3g} s. "
+            "Fix: ingest more or longer logs, or give --estimator derivative"
+        )
+    run.progress("fitting")
+    data.refuse_contradictions()
+    estimate = estimate_correction(data, data.components(), settings.draws, run.progress)
+    return accept_estimate(data, estimate, name, run)
+
+
+def archived_windows(
+    where: Sequence[Path],
+    profile: Profile,
+    settings: FitSettings,
+    progress: Callable[[str], None],
+    *,
+    divided: bool,
+) -> tuple[tuple[LogWindows, ...], Basis]:
+    """Return the windows of every log, and the basis that they share.
+
+    Raises
+    ------
+    FerryIdError
+        For a log of another basis, by name.
+    """
+    logs: list[LogWindows] = []
+    for number, folder in enumerate(where):
+        progress(f"adding log {number + 1} of {len(where)}")
+        logs.append(load_windows(folder, profile, settings, divided=divided))
+        refuse_other_basis((logs[0].name, logs[0].basis), (logs[-1].name, logs[-1].basis))
+    return tuple(logs), make_basis(logs[0].basis, structure=settings.structure)
+
+
+def _divided(logs: Sequence[LogWindows], split: str) -> tuple[list[WindowPart], list[WindowPart]]:
+    """Return training and validation parts of every log."""
+    whole = validation_blocks(len(logs)) if split == "logs" else np.zeros(len(logs), dtype=bool)
+    trained, validated, short = [], [], 0
+    for number, log in enumerate(logs):
+        one = log.whole
+        if one is None:
+            train, held_out = log.parts
+        else:
+            validates = bool(whole[number])
+            if split != "logs":
+                # A log too short for blocks of its own is one block among those of its kind.
+                short += 1
+                validates = short % IDENTIFY.validates_every == 2
+            train, held_out = (one.none(), one) if validates else (one, one.none())
+        trained.append(train)
+        validated.append(held_out)
+    return trained, validated
