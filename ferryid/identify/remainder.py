@@ -204,10 +204,17 @@ def _unexplained(model: Model, opened: Opened, profile: Profile, bare: Profile, 
     needed = found.force(seen.nu_dot, seen.nu, seen.eta[:, 2], seen.wind, seen.current, seen.payload)
     hull = base_force(bare, replace(seen, current=before.current, payload=before.payload), settings.scale)
     known = before.valid & np.isfinite(needed - hull).all(axis=1)
-    tau = interpolate_gaps(np.where(known[:, None], seen.tau - before.tau - needed + hull, np.nan), known)
-    nu = interpolate_gaps(np.where(known[:, None], seen.nu - before.nu, np.nan), known)
-    eta = np.where(np.isfinite(measured.eta), measured.eta + (seen.eta - before.eta), np.nan)
-    return replace(measured, tau=measured.tau + tau, nu=measured.nu + nu, eta=eta)
+
+    def bridged(values: Floats) -> Floats:
+        # Smoothing once more would lose as many rows again beside every gap.
+        return interpolate_gaps(np.where(known[:, None], values, np.nan), known)
+
+    return replace(
+        measured,
+        tau=measured.tau + bridged(seen.tau - before.tau - needed + hull),
+        nu=measured.nu + bridged(seen.nu - before.nu),
+        eta=measured.eta if seen.eta is before.eta else measured.eta + bridged(seen.eta - before.eta),
+    )
 
 
 def _kept(model: Model) -> dict[str, object]:

@@ -8,7 +8,6 @@ from math import isfinite, nan
 
 import numpy as np
 
-from ferryid.diagnose.data.measurements import WITHHELD
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.errors import FerryIdError
 from ferryid.identify import (
@@ -127,28 +126,33 @@ class Learner:
         return (found.model if accepted else None), Learnt(accepted, said, found.acceptance.reasons, ratio)
 
     def _on_top(self, base: Model, diagnosed: Model | None) -> tuple[Model | None, Learnt]:
+        """Return the model to store: what is examined or diagnosed, with a correction where that is accepted."""
         start = self.start or blank_model(self.profile, base.name)
         plain = fit_logs(self.paths, self.profile, self.settings, self.run, name=base.name)
         found = self._remainder(base)
         rows = [one.validation & other.validation for one, other in zip(plain.logs, found.outcome.logs, strict=True)]
-        models = [start, base, found.model, plain.model]
-        before, known, after, fitted = self._errors(models, rows)
-        verdict = _both(found.outcome.acceptance, accept(known, after, "prediction"))
-        stored, best = (found.model, after) if verdict.accepted else (diagnosed, known)
-        ratio, over_fit = by_axis(_over(after, known)), _over(best, fitted)
-        said = _says("A correction learnt on top", ratio, verdict, "the model with the findings")
-        if plain.acceptance.accepted and float(np.mean(over_fit)) > 1.0 + JUDGING.reported_change:
+        before, known, after, fitted = self._errors([start, base, found.model, plain.model], rows)
+        verdict, what = _judged(found.outcome, known, after), "A correction learnt on top of the findings"
+        best = after if verdict.accepted else known
+        if diagnosed is not None and plain.acceptance.accepted and _fit_is_better(best, fitted):
+            # The refit of the diagnosis may be to blame: what was named stays, the hull is the fit's to estimate.
+            other = self._remainder(replace(base, hull=start.hull))
+            second = self._errors([base, other.model], rows)[1]
+            new = _judged(other.outcome, known, second)
+            if new.accepted and float(np.mean(_over(second, best))) < 1.0:
+                found, after, verdict, best = other, second, new, second
+                what = "A correction learnt beside the effects on the hull as it was before the diagnosis"
+        stored = diagnosed
+        if verdict.accepted:
+            stored = replace(found.model, accepted=True, scores=_scores(before, after, found.outcome))
+        over_fit = _over(best, fitted)
+        said = _says(what, by_axis(_over(after, known)), verdict, "the model without it")
+        if plain.acceptance.accepted and _fit_is_better(best, fitted):
             said += (
-                f" ferryid fit alone predicts these logs better: the squared error of the model stored here is "
+                f" The model of ferryid fit predicts these logs better: the squared error with the model of the diagnosis is "
                 f"{float(np.mean(over_fit)):.2f} times as large."
             )
-        if verdict.accepted:
-            stored = replace(
-                found.model,
-                accepted=True,
-                scores=_scores(before, after, found.outcome),
-            )
-        return stored, Learnt(verdict.accepted, said, verdict.reasons, ratio, by_axis(over_fit))
+        return stored, Learnt(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
 
     def _remainder(self, base: Model) -> _Candidate:
         outcome = fit_remainder(base, self.paths, self.profile, self.settings, self.run)
@@ -160,15 +164,34 @@ class Learner:
 
 def without_withheld(profile: Profile, withhold: Sequence[str]) -> Profile:
     """Return a profile that does not map what is hidden from a diagnosis."""
-    hidden = {column for name in withhold for column in WITHHELD[name]}
-    return replace(profile, signals=tuple(one for one in profile.signals if one.quantity not in hidden))
+    return replace(profile, signals=tuple(one for one in profile.signals if one.quantity not in withhold))
 
 
-def _both(fit: Acceptance, stored: Acceptance) -> Acceptance:
-    """Return the verdict on a correction: it was accepted, and what would be stored predicts better by the same rule."""
-    if not fit.accepted or stored.accepted:
-        return replace(fit, per_axis=stored.per_axis)
-    return replace(stored, checks=fit.checks, reasons=(*stored.reasons, *fit.reasons))
+def _judged(found: FitOutcome, without: Floats, after: Floats) -> Acceptance:
+    """Return the verdict on a correction: that of its fit, unless the folds or what would be stored speak against it.
+
+    Parameters
+    ----------
+    found
+        The correction.
+    without, after
+        Held-out squared prediction errors of the models without and with it, shape (3,) each.
+    """
+    stored = accept(without, after, "prediction")
+    reasons = [*found.acceptance.reasons]
+    folds = next((one.folds for one in found.estimators if one.chosen), 0.0)
+    accepted = found.acceptance.accepted and stored.accepted and folds < 1.0
+    if found.acceptance.accepted and not stored.accepted:
+        reasons = [*stored.reasons, *reasons]
+    if not folds < 1.0:
+        times = f"{folds:.2f} times as large" if isfinite(folds) else "infinite"
+        reasons.insert(0, f"{PREFIX}on folds of the training rows the squared prediction error with it is {times}.")
+    return replace(found.acceptance, accepted=accepted, reasons=tuple(reasons))
+
+
+def _fit_is_better(stored: Floats, fitted: Floats) -> bool:
+    """Return whether the error of the model to be stored is larger than that of a fit, by more than is reported."""
+    return float(np.mean(_over(stored, fitted))) > 1.0 + JUDGING.reported_change
 
 
 def _over(one: Floats, other: Floats) -> Floats:
