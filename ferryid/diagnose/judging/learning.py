@@ -122,7 +122,9 @@ class Learner:
         """Return what a fit alone makes of the logs, of which nothing was named."""
         found = fit_logs(self.paths, self.profile, self.settings, self.run, name=name)
         ratio, accepted = found.acceptance.per_axis, found.acceptance.accepted
-        said = _says("No effect was named. A correction of the hull", ratio, found.acceptance, "the profile's hull")
+        said = _says(
+            "No named effect enters the model. A correction of the hull", ratio, found.acceptance, "the profile's hull"
+        )
         return (found.model if accepted else None), Learnt(accepted, said, found.acceptance.reasons, ratio)
 
     def _on_top(self, base: Model, diagnosed: Model | None) -> tuple[Model | None, Learnt]:

@@ -181,7 +181,9 @@ def test_where_nothing_is_named_the_model_is_the_fits(windy: tuple[str, Model], 
     np.testing.assert_array_equal(stored.theta, fitted.model.theta)
     np.testing.assert_array_equal(stored.intercept, fitted.model.intercept)
     assert told.learnt is not None
-    assert told.learnt.says.startswith("No effect was named. A correction of the hull is part of the model;")
+    assert told.learnt.says.startswith(
+        "No named effect enters the model. A correction of the hull is part of the model;"
+    )
 
 
 def test_a_log_that_cannot_be_fitted_leaves_the_model_as_it_is(folder: Path) -> None:
