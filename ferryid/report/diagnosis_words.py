@@ -225,14 +225,16 @@ def _meant(finding: Finding, name: str) -> list[str]:
 
 
 def new_model(diagnosis: Diagnosis) -> str:
-    """Return where the model with the findings lies and how to use it; empty where there is none."""
+    """Return which model it is, where it lies and how to use it; empty where there is none."""
     if diagnosis.model is None:
         return ""
     path = PurePath(diagnosis.model)
     label = f"{path.parent.name}@{path.stem}"
     out = path.parents[2] if len(path.parents) > 2 else PurePath(USUAL_OUT)
     where = "" if out == PurePath(USUAL_OUT) else f" --out {out}"
-    return f"{label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
+    learnt = diagnosis.learnt is not None and diagnosis.posterior is None
+    what = "The model that was learnt is" if learnt else "The model with the findings is"
+    return f"{what} {label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
 
 
 def summary(diagnoses: Sequence[Diagnosis]) -> str:
