@@ -21,9 +21,11 @@ from tests.rivals.page import (
     recorded_section,
     simulated_section,
     targets,
+    variants_section,
 )
 from tests.rivals.recorded import CASES, recorded
-from tests.rivals.simulated import KINDS, compared, trials
+from tests.rivals.simulated import KINDS, Found, compared, trials
+from tests.rivals.variants import VARIANTS
 
 
 def main() -> None:
@@ -32,13 +34,19 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=5, help="simulated trials of each kind")
     count = parser.parse_args().trials
     lines, ahead, absent = [SIMULATED_HEAD], [], []
-    simulated, recordings = {}, []
+    simulated, varied = dict[str, list[dict[str, Found | str]]](), dict[str, list[dict[str, Found | str]]]()
+    recordings = []
     with tempfile.TemporaryDirectory() as folder:
         for kind in KINDS if count else ():
             print(kind.name, flush=True)
-            found = simulated[kind.name] = [compared(trial) for trial in trials(kind, count, Path(folder))]
+            found = simulated[kind.name] = []
+            varied[kind.name] = []
+            for trial in trials(kind, count, Path(folder)):
+                found.append(compared(trial))
+                varied[kind.name].append(compared(trial, VARIANTS, 0))
             lines += simulated_section(kind.name, found)
             ahead += better_simulated(kind.name, found)
+    lines += variants_section(varied) if varied else []
     lines.append(RECORDED_HEAD)
     for case in CASES:
         print(case.name, flush=True)

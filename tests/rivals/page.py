@@ -53,6 +53,15 @@ block bootstrap of {DRAWS} draws for ferryid and thesis, for the others those of
 *Position*: median error of free runs after {HORIZONS_S[-1]:g} s, diverged ones counted as infinite.
 """
 
+VARIANTS_HEAD = """
+## Errors in the regressors
+
+The weak form with other treatments of noise in the velocity and of wind that nobody measured, on the trials above; medians.
+*As it is*: of the velocities measured and steadied by positions those that leave less. *Noise-corrected products*: the products
+of either velocity's regressors with the other's in place of squares, without bounds (Fuller 1987, section 2.4). Orders are no
+instruments in a closed loop: the controller forms them from the same noisy navigation.
+"""
+
 RECORDED_HEAD = """
 ## Real recordings
 
@@ -219,6 +228,21 @@ def recorded_section(one: Recorded) -> list[str]:
             lines.append(
                 f"- {name}: no model that can be simulated in {counted(len(score.failed), 'fold')} ({score.failed[0]})."
             )
+    return lines
+
+
+def variants_section(found: Mapping[str, Sequence[Mapping[str, Found | str]]]) -> list[str]:
+    """Return the part of the page about treatments of errors in the regressors; trials by the name of their kind."""
+    lines = [VARIANTS_HEAD]
+    for what, place in (("m33", 2), ("damping force", 3), ("position after 60 s", 5)):
+        unit = "m" if place == 5 else "%"
+        names = list(next(iter(found.values()))[0])
+        rows = []
+        for kind, trials in found.items():
+            rows.append((kind, [summary([one[name] for one in trials])[place] for name in names]))
+        lines += [f"\n*{what}* [{unit}]\n", "| trials | " + " | ".join(names) + " |", "|---|" + "---|" * len(names)]
+        spec = ".2f" if place == 5 else ".1f"
+        lines += [f"| {kind} | " + " | ".join(format(value, spec) for value in values) + " |" for kind, values in rows]
     return lines
 
 

@@ -25,7 +25,7 @@ from ferryid.validation.prior_profile import masses, profile_text
 from ferryid.vessel import load_profile, parse_profile
 from ferryid.vessel.parse_hull import DAMPING_TERMS
 from ferryid.vessel.profile import Profile
-from tests.rivals.methods import METHODS
+from tests.rivals.methods import METHODS, Method
 from tests.rivals.scores import HORIZONS_S, free_runs
 from tests.rivals.task import Task
 
@@ -164,16 +164,16 @@ def _independent(kind: Kind, seed: int, factors: Mapping[str, float], folder: Pa
     return Trial(profile, *logs, mass, None)
 
 
-def compared(trial: Trial) -> dict[str, Found | str]:
+def compared(trial: Trial, methods: Mapping[str, Method] = METHODS, draws: int = DRAWS) -> dict[str, Found | str]:
     """Return what each method found in a trial, or why it found no model."""
     task, test = Task.of(trial.profile, [trial.learn]), Task.of(trial.profile, [trial.judge])
     nu = np.concatenate([m.nu[m.valid] for m in task.data.motions])[::10]
     true = trial.damping(nu)
     told: dict[str, Found | str] = {}
-    for name, method in METHODS.items():
+    for name, method in methods.items():
         began = time.perf_counter()
         try:
-            found = method(task, DRAWS)
+            found = method(task, draws)
         except FerryIdError as error:
             told[name] = str(error)
             continue

@@ -1,0 +1,94 @@
+"""Ways in which the weak form could treat errors in its regressors and unmeasured winds, measured beside what it does.
+
+Orders are no instruments here: the controller forms them from the same noisy navigation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ferryid.identify.estimation import estimate_correction
+from ferryid.identify.fit_data import Coefficients
+from ferryid.identify.log_conditions import Conditions
+from ferryid.identify.weak_data import WeakData, weak_data
+from ferryid.identify.weak_rows import to_force
+from ferryid.signals.complementary_filter import complementary_filter
+from ferryid.types import Floats, no_progress
+from tests.rivals.task import Task, coefficients
+
+
+def as_it_is(task: Task, draws: int) -> Coefficients:
+    """Return what the weak form finds."""
+    return _estimate(weak_data(task.data), draws)
+
+
+def measured_velocity(task: Task, draws: int) -> Coefficients:
+    """Return what it finds with the velocities as measured in every product."""
+    return _estimate(_with_velocities(task, [m.nu for m in task.data.motions]), draws)
+
+
+def steadied_velocity(task: Task, draws: int) -> Coefficients:
+    """Return what it finds with velocities steadied by positions in every log."""
+    steadied = [complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in task.data.motions]
+    return _estimate(_with_velocities(task, steadied), draws)
+
+
+def without_winds(task: Task, draws: int) -> Coefficients:
+    """Return what it finds without winds of single logs: steady forces along the hull, north and east stay."""
+    data = weak_data(task.data)
+    data.__dict__["conditions"] = Conditions.none(data.windows.training, len(data.functions.terms))
+    return _estimate(data, draws)
+
+
+def noise_corrected(task: Task, draws: int) -> Coefficients:
+    """Return what corrected normal equations find: half the difference of two velocities takes the place of the noise.
+
+    The products of regressors from measured and from steadied velocities, whose noises are nearly independent, replace the
+    squares of either (the symmetrised instrument of repeated measurements; Fuller 1987, section 2.4).
+    """
+    data = weak_data(task.data)
+    first = _with_velocities(task, [m.nu for m in task.data.motions])
+    slow = [complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in task.data.motions]
+    return _instrumented(data, *(_regressors(one) for one in (first, _with_velocities(task, slow))))
+
+
+def _with_velocities(task: Task, velocities: list[Floats]) -> WeakData:
+    data = weak_data(replace(task.data))
+    data.windows.__dict__["velocities"] = tuple(velocities)
+    return data
+
+
+def _estimate(data: WeakData, draws: int) -> Coefficients:
+    return estimate_correction(data, data.components(), draws, no_progress).coefficients
+
+
+def _regressors(data: WeakData) -> Floats:
+    return np.concatenate([one.regressors(data.functions.terms) for one in data.training_windows])
+
+
+def _instrumented(data: WeakData, X: Floats, Z: Floats) -> Coefficients:
+    """Return the estimate of instruments Z (J, K) for regressors X (J, K), with the prior of the weak form."""
+    whitening, windows = data.whitening, data.training_windows
+    Y = np.concatenate([one.force - one.base(one.acceleration(whitening.posed)) for one in windows])
+    gains, intercept = np.zeros((X.shape[1], 3)), np.zeros(3)
+    X0, Z0, Y0 = X - X.mean(axis=0), Z - Z.mean(axis=0), Y - Y.mean(axis=0)
+    for axis, own in enumerate(data.functions.mask.T):
+        spread = data.prior_factor * data.prior_spread[own, axis]
+        prior = whitening.sigma[axis] ** 2 * np.where(np.isfinite(spread), spread**-2.0, 0.0)
+        normal = (Z0[:, own].T @ X0[:, own] + X0[:, own].T @ Z0[:, own]) / 2.0 + np.diag(prior)
+        gains[own, axis] = np.linalg.lstsq(normal, Z0[:, own].T @ Y0[:, axis], rcond=1e-12)[0]
+        intercept[axis] = Y[:, axis].mean() - X.mean(axis=0) @ gains[:, axis]
+    return coefficients(*to_force(gains, intercept, data.functions.terms, data.windows.base_mass))
+
+
+VARIANTS: Mapping[str, Callable[[Task, int], Coefficients]] = {
+    "as it is": as_it_is,
+    "velocities as measured": measured_velocity,
+    "velocities steadied by positions": steadied_velocity,
+    "noise-corrected products": noise_corrected,
+    "no winds of single logs": without_winds,
+}
+"""Every variant by the name that the page gives it."""
