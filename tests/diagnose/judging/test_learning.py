@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ferryid.compare.evaluation import evaluate
+from ferryid.diagnose.judging import learning
 from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
 from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.export.model_file import export_model
-from ferryid.identify import FitSettings, fit_logs, prediction_errors, with_remainder
-from ferryid.models import Conditions, Model, Quantity, Source, StoredEffect, blank_model
+from ferryid.identify import Acceptance, FitSettings, accept, fit_logs, prediction_errors, with_remainder
+from ferryid.identify.outcome import EstimatorScore
+from ferryid.models import Conditions, ForceScores, Model, ModelScores, Quantity, Source, StoredEffect, blank_model
 from ferryid.models.forces import beside_the_hull
 from ferryid.models.prediction import predict
 from ferryid.models.store import load_file, save
@@ -240,3 +245,59 @@ def random_correction() -> Model:
 def test_withheld_signals_are_not_learnt_from() -> None:
     mapped, hidden = ({one.quantity for one in without_withheld(FERRY, names).signals} for names in ((), ("wind",)))
     assert mapped - hidden == {"wind"}
+
+
+@pytest.mark.parametrize(
+    ("folds", "first", "second", "fitted", "kept", "told"),
+    [
+        # Better on top than without, and than the fit.
+        (0.8, 60.0, 50.0, 70.0, "first", "on top of the findings is part of the model"),
+        # The fit is better, and so is the correction on the hull as it was.
+        (0.8, 80.0, 50.0, 50.0, "second", "on the hull as it was before the diagnosis is part of the model"),
+        # The fit is better than either: told.
+        (0.8, 80.0, 90.0, 40.0, "first", "The model of ferryid fit predicts these logs better: .* 2.00 times as large"),
+        # What folds speak against is not stored, whatever the held-out rows say.
+        (1.1, 60.0, 50.0, 90.0, "none", "on folds of the training rows .* 1.10 times as large"),
+    ],
+)
+def test_which_correction_is_stored(
+    monkeypatch: pytest.MonkeyPatch, folds: float, first: float, second: float, fitted: float, kept: str, told: str
+) -> None:
+    """Held-out errors are 100 without a correction, `first` with it, `second` with that on the hull as it was."""
+    diagnosed = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
+    rows = (SimpleNamespace(validation=np.ones(3, dtype=bool)),)
+    good = accept(np.full(3, 100.0), np.full(3, 50.0), "prediction")
+    scores = ModelScores(ForceScores.of(np.ones(3), np.ones(3), np.ones(3)), 9, 9.0, "blocks", ())
+    errors = {"none": 100.0, "first": first, "second": second, "fit": fitted}
+    models = {name: replace(diagnosed, settings={**diagnosed.settings, "test": name}, scores=scores) for name in errors}
+
+    def fit(*_: object, **__: object) -> SimpleNamespace:
+        return SimpleNamespace(acceptance=good, logs=rows, model=models["fit"])
+
+    def remainder(_: Learner, base: Model) -> SimpleNamespace:
+        estimators = (EstimatorScore("weak", folds, 0.5, True),)
+        outcome = SimpleNamespace(acceptance=good, logs=rows, estimators=estimators, model=models["first"])
+        return SimpleNamespace(model=models["first" if base.hull else "second"], outcome=Outcome(**vars(outcome)))
+
+    def measured(_: Learner, several: Sequence[Model], __: object) -> list[np.ndarray]:
+        return [np.full(3, errors[str(one.settings.get("test", "none"))]) for one in several]
+
+    monkeypatch.setattr(learning, "fit_logs", fit)
+    monkeypatch.setattr(Learner, "_remainder", remainder)
+    monkeypatch.setattr(Learner, "_errors", measured)
+    stored, learnt = Learner(("log",), FERRY, None, RunContext(Path("nowhere"))).learn(diagnosed, "ferry")
+    assert stored is not None
+    assert stored.settings.get("test", "none") == kept
+    assert learnt.accepted == stored.accepted == (kept != "none")
+    assert re.search(told, learnt.says), learnt.says
+    assert learnt.over_fit == dict.fromkeys(AXES, pytest.approx(errors[kept] / fitted))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What is read of the outcome of a fit."""
+
+    acceptance: Acceptance
+    logs: tuple[object, ...]
+    estimators: tuple[EstimatorScore, ...]
+    model: Model
