@@ -17,10 +17,10 @@ _COLOURS = (NEW, BASE, "#009e73")
 
 
 def heat_map(found: Sweep, choice: Selection) -> str:
-    """Return the score of every window and component count; what lies within one standard error of the least is outlined."""
+    """Return the score of every window and component count; what cannot be told from the least is outlined."""
     score, band = choice.curves.normalised()
     best = np.unravel_index(int(np.argmin(score)), score.shape)
-    near = score <= score[best] + band[best]
+    near = choice.curves.near()
     with mpl.rc_context({**STYLE, "axes.grid": False}):
         figure, (ax,) = canvas(1, 5.6, top=0.2)
         excess = score.T - score.min()

@@ -50,9 +50,7 @@ def _table(found: Sweep, choice: Selection) -> list[str]:
 
 def _matrix(found: Sweep, choice: Selection) -> list[str]:
     """Return a line for each component count, a column for each window."""
-    score, band = choice.curves.normalised()
-    best = np.unravel_index(int(np.argmin(score)), score.shape)
-    near = score <= score[best] + band[best]
+    score, near = choice.curves.normalised()[0], choice.curves.near()
     lines = ["  components" + "".join(f"{window_s:>9g} s" for window_s in found.windows_s)]
     for count in range(score.shape[1]):
         cells = []
@@ -61,5 +59,7 @@ def _matrix(found: Sweep, choice: Selection) -> list[str]:
             mark = "*" if chosen else "·" if near[window, count] else " "
             cells.append(f"{score[window, count]:>10.4f}{mark}")
         lines.append(f"  {count + 1:<10}" + "".join(cells))
-    lines.append("  each axis over its least MSE, mean; · within one standard error of the least; * the choice")
+    lines.append(
+        "  each axis over its least MSE, mean; · within one standard error of the paired differences; * the choice"
+    )
     return lines

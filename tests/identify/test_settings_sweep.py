@@ -114,9 +114,8 @@ def test_what_is_told_is_what_was_found(run: Run) -> None:
     assert headline(found).startswith(
         f"Choice: {choice['components']} components at a window of {choice['window_s']:g} s."
     )
-    # Of all within one standard error of the least, none has fewer components.
-    score, band = np.array(one["score"]), np.array(one["score_standard_error"])
-    near = score <= score.min() + band.ravel()[score.argmin()]
+    # Of all that cannot be told from the least, none has fewer components.
+    score, near = np.array(one["score"]), found.choice.curves.near()
     assert near[place]
     assert not near[:, : place[1]].any()
     lines = render_sweep(found).splitlines()

@@ -36,12 +36,21 @@ def curves_of(score: Sequence[Sequence[float]], band: Sequence[Sequence[float]])
 
 
 def test_the_choice_by_hand() -> None:
-    # The best, 1.0 with four components, has a standard error of 0.3: 1.25 and 1.3 cannot be told from it, 1.31 can.
+    # The best, 1.0 with four components. Two folds that differ by 2 d in their difference give a standard error of d.
     few, more = [1.9, 1.31, 1.3, 1.0], [1.5, 1.4, 1.25, 1.2]
-    bands = [[0.5, 0.5, 0.5, 0.3], [0.5, 0.5, 0.5, 0.9]]
-    assert curves_of([few, more], bands).choice() == (1, 3)
-    assert curves_of([few, more], [[9.0, 9.0, 9.0, 0.31], bands[1]]).choice() == (0, 2)
-    assert curves_of([few, more], [[9.0, 9.0, 9.0, 0.0], bands[1]]).choice() == (0, 4)
+    apart = np.array([[0.2, 0.2, 0.31, 0.0], [0.2, 0.2, 0.26, 0.5]])
+
+    def curves(differences: NDArray[np.float64], common: float = 0.0) -> Curves:
+        mse = np.array([few, more])[:, :, None]
+        harder = np.array([common, -common])[:, None, None, None]
+        folds = mse + np.stack([differences, -differences])[:, :, :, None] + harder
+        return Curves(mse, np.zeros_like(mse), np.ones(3), 2, 100, folds.transpose(1, 0, 2, 3))
+
+    assert curves(apart).choice() == (1, 3)
+    # A fold that is harder for all combinations alike changes nothing.
+    assert curves(apart, common=0.9).choice() == (1, 3)
+    assert curves(np.where(apart == 0.2, 0.315, apart)).choice() == (0, 2)
+    assert curves(0.0 * apart).choice() == (0, 4)
     assert curves_of([[2.0, 2.0]], [[0.1, 0.1]]).choice() == (0, 1)
 
 
@@ -53,6 +62,7 @@ def test_every_axis_counts_alike_by_hand() -> None:
     np.testing.assert_allclose(score, [[(2.0 + 1.0 + 0.0) / 3.0, (1.0 + 3.0 + 0.0) / 3.0]])
     np.testing.assert_allclose(band, 0.1 * score)
     assert curves.choice() == (0, 1)
+    np.testing.assert_array_equal(curves.near(), [[True, False]])
 
 
 def parts(log: Measured, window_s: float) -> Part:
