@@ -142,6 +142,9 @@ def test_wind_is_named_and_damping_is_learnt(windy: tuple[str, Model], folder: P
     entry = evaluate(stored, [log], RunContext(folder))["logs"][0]
     assert [one["effect"] for one in entry["effects"]["conditions"]] == ["wind"]
     assert max(entry["per_axis"].values()) < 0.9
+    # What it is compared with has learnt nothing.
+    base = evaluate(diagnosed, [log], RunContext(folder))["logs"][0]["mse"]["base"]
+    assert entry["mse"]["base"] == pytest.approx(base)
 
 
 def test_what_was_learnt_is_exported_and_simulated(windy: tuple[str, Model], folder: Path) -> None:
