@@ -108,7 +108,7 @@ def evaluate(
 
 
 def _base_of(model: Model) -> str:
-    return "the base model" if model.learnt else "the model before its diagnosis"
+    return "the base model" if model.learned else "the model before its diagnosis"
 
 
 def _list_effects(found: Prediction, sha256: str) -> dict[str, Any]:

@@ -116,18 +116,18 @@ class Model:
         return bool(self.hull or self.vessel_effects or self.conditions)
 
     @property
-    def learnt(self) -> bool:
-        """True where terms were learnt beside a diagnosis."""
-        return self.diagnosed and bool(self.settings.get("learnt", False))
+    def learned(self) -> bool:
+        """True where terms were learned beside a diagnosis."""
+        return self.diagnosed and bool(self.settings.get("learned", False))
 
     def conditions_of(self, sha256: str) -> tuple[StoredEffect, ...]:
         """Return what a log was recorded in, by its hash; nothing for a log that was not diagnosed."""
         return tuple(one for known in self.conditions if known.sha256 == sha256 for one in known.effects)
 
     def undiagnosed(self) -> Model:
-        """Return the model as it was before any diagnosis; where one has learnt terms, the base model."""
+        """Return the model as it was before any diagnosis; where one has learned terms, the base model."""
         bare = replace(self, hull={}, vessel_effects=(), conditions=())
-        if not self.learnt:
+        if not self.learned:
             return bare
         nothing = np.zeros((0, 3))
         return replace(
