@@ -99,12 +99,16 @@ def evaluate(
             "name": model.name,
             "version": model.version,
             "accepted": model.accepted,
-            **({"base": "the model before its diagnosis"} if model.diagnosed else {}),
+            **({"base": _base_of(model)} if model.diagnosed else {}),
         },
         "window_s": window,
         "logs": entries,
         "pooled": force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)).to_json(),
     }
+
+
+def _base_of(model: Model) -> str:
+    return "the base model" if model.learned else "the model before its diagnosis"
 
 
 def _list_effects(found: Prediction, sha256: str) -> dict[str, Any]:

@@ -105,7 +105,8 @@ class Exported:
             titles = ", ".join(titled(effects()[e.effect].title, e.instance).lower() for e in one.effects)
             told.append(f"not exported: {titles} of the log {one.log}. Conditions are those of one log.")
         if self.model.conditions and not self.acting:
-            told.append("the diagnosis found no property of the vessel: what is exported is the hull alone.")
+            what = "hull and what was learned beside it" if self.model.learned else "hull alone"
+            told.append(f"the diagnosis found no property of the vessel: what is exported is the {what}.")
         return tuple(told)
 
     def warnings(self) -> tuple[str, ...]:

@@ -81,7 +81,7 @@ def with_remainder(model: Model, remainder: Model) -> Model:
     constant = model.intercept if model.terms else np.zeros(3)
     corrected = replace(
         model,
-        settings={**remainder.settings, **_kept(model)},
+        settings={**remainder.settings, **_kept(model), "learned": True},
         terms=remainder.terms,
         units=remainder.units,
         theta=before + remainder.theta,

@@ -115,13 +115,34 @@ class Model:
         """True where a diagnosis has changed hull or forces."""
         return bool(self.hull or self.vessel_effects or self.conditions)
 
+    @property
+    def learned(self) -> bool:
+        """True where terms were learned beside a diagnosis."""
+        return self.diagnosed and bool(self.settings.get("learned", False))
+
     def conditions_of(self, sha256: str) -> tuple[StoredEffect, ...]:
         """Return what a log was recorded in, by its hash; nothing for a log that was not diagnosed."""
         return tuple(one for known in self.conditions if known.sha256 == sha256 for one in known.effects)
 
     def undiagnosed(self) -> Model:
-        """Return the model as it was before any diagnosis."""
-        return replace(self, hull={}, vessel_effects=(), conditions=())
+        """Return the model as it was before any diagnosis; where one has learned terms, the base model."""
+        bare = replace(self, hull={}, vessel_effects=(), conditions=())
+        if not self.learned:
+            return bare
+        nothing = np.zeros((0, 3))
+        return replace(
+            bare,
+            settings={**self.settings, "basis": NO_BASIS},
+            terms=(),
+            units=(),
+            theta=nothing,
+            low=nothing,
+            high=nothing,
+            intercept=np.zeros(3),
+            intercept_low=np.zeros(3),
+            intercept_high=np.zeros(3),
+            covariance=np.zeros((3, 1, 1)),
+        )
 
 
 def blank_model(profile: Profile, name: str) -> Model:

@@ -232,8 +232,8 @@ def new_model(diagnosis: Diagnosis) -> str:
     label = f"{path.parent.name}@{path.stem}"
     out = path.parents[2] if len(path.parents) > 2 else PurePath(USUAL_OUT)
     where = "" if out == PurePath(USUAL_OUT) else f" --out {out}"
-    learnt = diagnosis.learnt is not None and diagnosis.posterior is None
-    what = "The model that was learnt is" if learnt else "The model with the findings is"
+    learned = diagnosis.learned is not None and diagnosis.posterior is None
+    what = "The model that was learned is" if learned else "The model with the findings is"
     return f"{what} {label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
 
 

@@ -40,10 +40,10 @@ def test_from_a_diagnosis_to_a_simulation(ferryid, tmp_path: Path) -> None:
     assert run.code == 0, run.err
     result = conforms((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert {one["effect"] for one in result["findings"]} >= {"wind", "thruster_gain"}
-    learnt = result["learnt"]
-    assert any(note == learnt["says"] for note in result["notes"])
-    assert set(learnt["over_fit"]) == {"surge", "sway", "yaw"}
-    assert sum(learnt["over_fit"].values()) < 3.0
+    learned = result["learned"]
+    assert any(note == learned["says"] for note in result["notes"])
+    assert set(learned["over_fit"]) == {"surge", "sway", "yaw"}
+    assert sum(learned["over_fit"].values()) < 3.0
     path = Path(result["model"])
     assert path == out / "models" / "ferry" / "1.json"
     assert "ferryid evaluate ferry@1 LOG" in " ".join(run.out.split())

@@ -28,8 +28,8 @@ PREFIX = "Rejected: "
 
 
 @dataclass(frozen=True)
-class Learnt:
-    """What was learnt from what the diagnosed model leaves of the logs.
+class Learned:
+    """What was learned from what the diagnosed model leaves of the logs.
 
     Attributes
     ----------
@@ -95,8 +95,8 @@ class Learner:
     run: RunContext
     settings: FitSettings = field(default_factory=FitSettings)
 
-    def learn(self, diagnosed: Model | None, name: str) -> tuple[Model | None, Learnt]:
-        """Return the model to store, and what was learnt; logs that cannot be fitted leave the model as it is.
+    def learn(self, diagnosed: Model | None, name: str) -> tuple[Model | None, Learned]:
+        """Return the model to store, and what was learned; logs that cannot be fitted leave the model as it is.
 
         Parameters
         ----------
@@ -112,29 +112,29 @@ class Learner:
             base = diagnosed or replace(self._known_start(), name=name)
             return self._on_top(base, diagnosed)
         except FerryIdError as error:
-            return diagnosed, Learnt(False, f"Nothing was learnt beside the findings: {error}")
+            return diagnosed, Learned(False, f"Nothing was learned beside the findings: {error}")
 
     def _known_start(self) -> Model:
         assert self.start is not None
         return self.start
 
-    def _fitted(self, name: str) -> tuple[Model | None, Learnt]:
+    def _fitted(self, name: str) -> tuple[Model | None, Learned]:
         """Return what a fit alone makes of the logs, of which nothing was named."""
         found = fit_logs(self.paths, self.profile, self.settings, self.run, name=name)
         ratio, accepted = found.acceptance.per_axis, found.acceptance.accepted
         said = _says(
             "No named effect enters the model. A correction of the hull", ratio, found.acceptance, "the profile's hull"
         )
-        return (found.model if accepted else None), Learnt(accepted, said, found.acceptance.reasons, ratio)
+        return (found.model if accepted else None), Learned(accepted, said, found.acceptance.reasons, ratio)
 
-    def _on_top(self, base: Model, diagnosed: Model | None) -> tuple[Model | None, Learnt]:
+    def _on_top(self, base: Model, diagnosed: Model | None) -> tuple[Model | None, Learned]:
         """Return the model to store: what is examined or diagnosed, with a correction where that is accepted."""
         start = self.start or blank_model(self.profile, base.name)
         plain = fit_logs(self.paths, self.profile, self.settings, self.run, name=base.name)
         found = self._remainder(base)
         rows = [one.validation & other.validation for one, other in zip(plain.logs, found.outcome.logs, strict=True)]
         before, known, after, fitted = self._errors([start, base, found.model, plain.model], rows)
-        verdict, what = _judged(found.outcome, known, after), "A correction learnt on top of the findings"
+        verdict, what = _judged(found.outcome, known, after), "A correction learned on top of the findings"
         best = after if verdict.accepted else known
         if diagnosed is not None and plain.acceptance.accepted and _fit_is_better(best, fitted):
             # The refit of the diagnosis may be to blame: what was named stays, the hull is the fit's to estimate.
@@ -143,7 +143,7 @@ class Learner:
             new = _judged(other.outcome, known, second)
             if new.accepted and float(np.mean(_over(second, best))) < 1.0:
                 found, after, verdict, best = other, second, new, second
-                what = "A correction learnt beside the effects on the hull as it was before the diagnosis"
+                what = "A correction learned beside the effects on the hull as it was before the diagnosis"
         stored = diagnosed
         if verdict.accepted:
             stored = replace(found.model, accepted=True, scores=_scores(before, after, found.outcome))
@@ -154,7 +154,7 @@ class Learner:
                 f" The model of ferryid fit predicts these logs better: the squared error with the model of the diagnosis is "
                 f"{float(np.mean(over_fit)):.2f} times as large."
             )
-        return stored, Learnt(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
+        return stored, Learned(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
 
     def _remainder(self, base: Model) -> _Candidate:
         outcome = fit_remainder(base, self.paths, self.profile, self.settings, self.run)
@@ -202,7 +202,7 @@ def _over(one: Floats, other: Floats) -> Floats:
 
 
 def _says(what: str, ratio: Mapping[str, float], verdict: Acceptance, base: str) -> str:
-    """Return in one line what was learnt, or why it was not accepted."""
+    """Return in one line what was learned, or why it was not accepted."""
     change = ", ".join(
         f"{axis} {100.0 * (ratio[axis] - 1.0):+.0f} %" for axis in AXES if isfinite(ratio.get(axis, nan))
     )
@@ -222,6 +222,6 @@ def _scores(before: Floats, after: Floats, outcome: FitOutcome) -> ModelScores:
     return replace(
         judged,
         force=ForceScores(before, after, unknown, unknown, ratio, float(np.mean(ratio))),
-        split_notes=(*judged.split_notes, "Hull and effects have seen the held-out rows, what was learnt has not."),
+        split_notes=(*judged.split_notes, "Hull and effects have seen the held-out rows, what was learned has not."),
         measure="prediction",
     )

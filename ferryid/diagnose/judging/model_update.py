@@ -52,7 +52,7 @@ def store_updated_model(
     name
         Name of the new model; that of the examined model, else the vessel's, where empty.
     learner
-        Learns from the logs what the findings leave; None: nothing is learnt.
+        Learns from the logs what the findings leave; None: nothing is learned.
 
     Raises
     ------
@@ -61,23 +61,23 @@ def store_updated_model(
     """
     name = check_name(name or (model.name if model else profile.name))
     made, notes = update_model(diagnoses, profile, model, name)
-    learnt = None
+    learned = None
     if learner is not None:
-        made, learnt = learner.learn(made, name)
-        notes = (*notes, learnt.says)
-        diagnoses = [replace(one, learnt=learnt) for one in diagnoses]
+        made, learned = learner.learn(made, name)
+        notes = (*notes, learned.says)
+        diagnoses = [replace(one, learned=learned) for one in diagnoses]
     path = None
     if made is not None:
         with alone(out / "models"):
             path = str(save(made, out).path)
-    everywhere = learnt is not None and learnt.accepted
+    everywhere = learned is not None and learned.accepted
     return tuple(
         replace(
             one,
             model=path if one.posterior or everywhere else None,
             notes=(*one.notes, *(one.posterior.notes if one.posterior else ()), *notes),
         )
-        if one.posterior or learnt
+        if one.posterior or learned
         else one
         for one in diagnoses
     )

@@ -155,8 +155,8 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     N = tau[2] + wave[2] + blown[2] - C[2] - factor * D[2]
     more = added_load(plant.added, t, x, y, psi, u, v, r, u_r, v_r)
     X, Y, N = X + more[0], Y + more[1], N + more[2]
-    learnt = beside_load(plant.beside, u, v, r, u_rw, v_rw, u_r, v_r)
-    X, Y, N = X + learnt[0], Y + learnt[1], N + learnt[2]
+    learned = beside_load(plant.beside, u, v, r, u_rw, v_rw, u_r, v_r)
+    X, Y, N = X + learned[0], Y + learned[1], N + learned[2]
     # nu_c_dot: [r v_c, -r u_c, 0], and R^T dV/dt of a current that turns clockwise, the current itself a quarter turn on.
     turn = r - plant.turn_radps
     inv = plant.phases.inverse[phase]

@@ -1,4 +1,4 @@
-"""What is learnt beside named effects: accepted only where it helps, stored with them, and no worse than a fit alone."""
+"""What is learned beside named effects: accepted only where it helps, stored with them, and no worse than a fit alone."""
 
 from __future__ import annotations
 
@@ -79,11 +79,11 @@ def named(sha256: str, **values: float) -> StoredEffect:
     return StoredEffect("wind", None, parameters, (Source("windy", sha256, 0.99),))
 
 
-def learnt_on(log: str, folder: Path, model: Model | None, name: str = "ferry") -> tuple[Model | None, Diagnosis]:
+def learned_on(log: str, folder: Path, model: Model | None, name: str = "ferry") -> tuple[Model | None, Diagnosis]:
     """Return what is stored, read back, and a diagnosis that tells of it."""
     run = RunContext(folder)
-    stored, learnt = Learner((log,), FERRY, None, run, QUICK).learn(model, name)
-    told = Diagnosis(Path(log).stem, "milliampere", "matched", (), {}, {}, learnt=learnt)
+    stored, learned = Learner((log,), FERRY, None, run, QUICK).learn(model, name)
+    told = Diagnosis(Path(log).stem, "milliampere", "matched", (), {}, {}, learned=learned)
     return (None if stored is None else load_file(save(stored, folder).path)), told
 
 
@@ -96,7 +96,7 @@ def errors_on(log: str, folder: Path, *models: Model) -> list[float]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("learnt")
+    return tmp_path_factory.mktemp("learned")
 
 
 @pytest.fixture(scope="module")
@@ -112,23 +112,23 @@ def prepare_sha256(log: str, folder: Path) -> str:
     return prepare(log, FERRY, folder, window_s=1.0).recording.sha256
 
 
-def test_wind_is_named_and_damping_is_learnt(windy: tuple[str, Model], folder: Path) -> None:
+def test_wind_is_named_and_damping_is_learned(windy: tuple[str, Model], folder: Path) -> None:
     log, diagnosed = windy
-    stored, told = learnt_on(log, folder, diagnosed)
+    stored, told = learned_on(log, folder, diagnosed)
     assert stored is not None
-    assert told.learnt is not None
-    assert told.learnt.accepted, told.learnt.says
+    assert told.learned is not None
+    assert told.learned.accepted, told.learned.says
     assert stored.accepted
     assert (
         "is part of the model; held-out squared prediction error against the model without it: surge -"
-        in told.learnt.says
+        in told.learned.says
     )
     assert stored.conditions == diagnosed.conditions
-    # The hull in the file is the whole hull: what was learnt is counted in.
+    # The hull in the file is the whole hull: what was learned is counted in.
     assert stored.terms
     factor = {name: stored.hull[name].value / diagnosed.hull[name].value for name in ("X_u", "N_r")}
     assert min(factor.values()) > 1.3
-    plain = to_json(told)["learnt"]
+    plain = to_json(told)["learned"]
     assert set(plain["over_fit"]) == set(plain["per_axis"]) == set(AXES)
     assert np.mean(list(plain["over_fit"].values())) <= 1.02
 
@@ -142,11 +142,14 @@ def test_wind_is_named_and_damping_is_learnt(windy: tuple[str, Model], folder: P
     entry = evaluate(stored, [log], RunContext(folder))["logs"][0]
     assert [one["effect"] for one in entry["effects"]["conditions"]] == ["wind"]
     assert max(entry["per_axis"].values()) < 0.9
+    # What it is compared with has learned nothing.
+    base = evaluate(diagnosed, [log], RunContext(folder))["logs"][0]["mse"]["base"]
+    assert entry["mse"]["base"] == pytest.approx(base)
 
 
-def test_what_was_learnt_is_exported_and_simulated(windy: tuple[str, Model], folder: Path) -> None:
+def test_what_was_learned_is_exported_and_simulated(windy: tuple[str, Model], folder: Path) -> None:
     log, diagnosed = windy
-    stored, _ = learnt_on(log, folder, diagnosed)
+    stored, _ = learned_on(log, folder, diagnosed)
     assert stored is not None
     made = export_model(stored.label, "python", folder)
     run = subprocess.run([sys.executable, made["file"]], capture_output=True, text=True, check=False)
@@ -170,23 +173,23 @@ path = { kind = "four-corner", dwell_s = 15 }
 def test_a_hull_that_is_right_learns_nothing(folder: Path) -> None:
     log = sailed(folder, "right", TWELVE, 3)
     model = replace(blank_model(FERRY, "right"), hull=hull_of_ferry())
-    stored, learnt = Learner((log,), FERRY, None, RunContext(folder), QUICK).learn(model, "right")
+    stored, learned = Learner((log,), FERRY, None, RunContext(folder), QUICK).learn(model, "right")
     assert stored is model
-    assert not learnt.accepted
-    assert "A correction learnt on top of the findings was not accepted" in learnt.says
-    assert learnt.reasons[0].startswith("Rejected: ")
+    assert not learned.accepted
+    assert "A correction learned on top of the findings was not accepted" in learned.says
+    assert learned.reasons[0].startswith("Rejected: ")
 
 
 def test_where_nothing_is_named_the_model_is_the_fits(windy: tuple[str, Model], folder: Path) -> None:
     log = sailed(folder, "calm", TWELVE, 4, DAMPED)
-    stored, told = learnt_on(log, folder, None, "calm")
+    stored, told = learned_on(log, folder, None, "calm")
     fitted = fit_logs([log], FERRY, QUICK, RunContext(folder), name="calm")
     assert fitted.acceptance.accepted
     assert stored is not None
     np.testing.assert_array_equal(stored.theta, fitted.model.theta)
     np.testing.assert_array_equal(stored.intercept, fitted.model.intercept)
-    assert told.learnt is not None
-    assert told.learnt.says.startswith(
+    assert told.learned is not None
+    assert told.learned.says.startswith(
         "No named effect enters the model. A correction of the hull is part of the model;"
     )
 
@@ -194,13 +197,13 @@ def test_where_nothing_is_named_the_model_is_the_fits(windy: tuple[str, Model], 
 def test_a_log_that_cannot_be_fitted_leaves_the_model_as_it_is(folder: Path) -> None:
     model = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
     short = sailed(folder, "short", f"duration_s = 15\n{TWELVE}", 5)
-    stored, learnt = Learner((short,), FERRY, None, RunContext(folder), QUICK).learn(model, "ferry")
+    stored, learned = Learner((short,), FERRY, None, RunContext(folder), QUICK).learn(model, "ferry")
     assert stored is model
-    assert learnt.says.startswith("Nothing was learnt beside the findings: ")
+    assert learned.says.startswith("Nothing was learned beside the findings: ")
 
 
 def test_what_is_stored_predicts_what_was_fitted(windy: tuple[str, Model], folder: Path) -> None:
-    """Properties of the vessel act on the hull alone, and not on what was learnt with them in place."""
+    """Properties of the vessel act on the hull alone, and not on what was learned with them in place."""
     log, diagnosed = windy
     fouling = {"surge": 1.8, "sway": 1.3, "yaw": 1.3}
     fouled = StoredEffect(
@@ -242,7 +245,7 @@ def random_correction() -> Model:
     )
 
 
-def test_withheld_signals_are_not_learnt_from() -> None:
+def test_withheld_signals_are_not_learned_from() -> None:
     mapped, hidden = ({one.quantity for one in without_withheld(FERRY, names).signals} for names in ((), ("wind",)))
     assert mapped - hidden == {"wind"}
 
@@ -285,12 +288,12 @@ def test_which_correction_is_stored(
     monkeypatch.setattr(learning, "fit_logs", fit)
     monkeypatch.setattr(Learner, "_remainder", remainder)
     monkeypatch.setattr(Learner, "_errors", measured)
-    stored, learnt = Learner(("log",), FERRY, None, RunContext(Path("nowhere"))).learn(diagnosed, "ferry")
+    stored, learned = Learner(("log",), FERRY, None, RunContext(Path("nowhere"))).learn(diagnosed, "ferry")
     assert stored is not None
     assert stored.settings.get("test", "none") == kept
-    assert learnt.accepted == stored.accepted == (kept != "none")
-    assert re.search(told, learnt.says), learnt.says
-    assert learnt.over_fit == dict.fromkeys(AXES, pytest.approx(errors[kept] / fitted))
+    assert learned.accepted == stored.accepted == (kept != "none")
+    assert re.search(told, learned.says), learned.says
+    assert learned.over_fit == dict.fromkeys(AXES, pytest.approx(errors[kept] / fitted))
 
 
 @dataclass(frozen=True)
