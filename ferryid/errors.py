@@ -59,12 +59,19 @@ def printable(text: str, keep: str = "") -> str:
     )
 
 
+_MOST_OPTIONS = 5000
+"""More names are not searched for the nearest: no vessel has so many topics, and it would take minutes."""
+
+
 def did_you_mean(name: str, options: Iterable[str]) -> str:
     """Return ``' Did you mean "x"?'`` for the option nearest to a misspelt name, or an empty string.
 
     Of topics (``/a/b``) the last parts must be alike as well, and one that only lacks its first parts is found too.
     """
-    likeness, near = max(((_likeness(name, option), option) for option in set(options)), default=(0.0, ""))
+    others = set(options)
+    if len(others) > _MOST_OPTIONS:
+        return ""
+    likeness, near = max(((_likeness(name, option), option) for option in others), default=(0.0, ""))
     # One letter of two or three is much of a short name.
     enough = 0.5 if max(len(name), len(near)) <= 3 else _LIKE
     return f' Did you mean "{near}"?' if likeness >= enough else ""

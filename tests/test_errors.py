@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from ferryid.errors import FerryIdError, did_you_mean
@@ -61,3 +63,9 @@ def test_a_message_keeps_its_ends_when_it_quotes_too_much() -> None:
     assert len(message) < 2100
     assert message.startswith("log: found x")
     assert message.endswith("x. Fix: less")
+
+
+def test_a_log_of_very_many_topics_costs_no_search_for_the_nearest() -> None:
+    begun = time.process_time()
+    assert did_you_mean("/thruster9/state", (f"/thruster/{number}/state" for number in range(50_000))) == ""
+    assert time.process_time() - begun < 0.5

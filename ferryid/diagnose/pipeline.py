@@ -14,6 +14,7 @@ from ferryid.diagnose.inference.stages import Baseline, average, estimate, selec
 from ferryid.diagnose.judging.conclude import conclude
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.judge import judge
+from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.diagnose.judging.model_update import store_updated_model
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
@@ -47,7 +48,7 @@ class DiagnosisSettings:
         """Refuse two things to compare with at once."""
         if self.against is not None and self.model is not None:
             raise FerryIdError(
-                "diagnose: a recording is held against one thing at a time, found both --model and --against. "
+                "diagnose: a recording is compared with one thing at a time, found both --model and --against. "
                 "Fix: leave out one of the two"
             )
         if self.together and (self.against is not None or self.model is not None):
@@ -153,4 +154,9 @@ def diagnose_and_store(
     if name:
         check_name(name)
     found = diagnose(logs, profile, settings, run)
-    return store_updated_model(found, profile, settings.model, run.out, name=name)
+    # Of logs that share one hull, and of a simulation, no model comes.
+    learner = None
+    if not settings.together and settings.against is None:
+        seen = without_withheld(profile, settings.withhold)
+        learner = Learner(tuple(logs), seen, settings.model, run)
+    return store_updated_model(found, profile, settings.model, run.out, name=name, learner=learner)

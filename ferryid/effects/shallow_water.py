@@ -22,6 +22,8 @@ EDGE_M = 2.0
 """Width over which the factor comes in at a side, outside of it."""
 CELLS = 8
 """Cells of the grid along north and east each."""
+MOST_VALUES = 3e6
+"""Numbers of the residuals of rectangles that are held at once: those of all need gigabytes in a log of hours."""
 FACTOR = Parameter("factor", "-", 0.4, 1.0, 6.0, neutral=1.0)
 SIDES = ("south", "north", "west", "east")
 HEAVIER = Parameter("added_mass", "-", 0.3, 0.0, 2.0, start=0.2)
@@ -96,9 +98,14 @@ def choose(force_model: ForceModel, prior_hull: Floats, residual: Residual) -> C
     if not fits.any():
         return Choice(parameters_of(measurements.profile), 0.0)
     south, north, west, east = south[fits], north[fits], west[fits], east[fits]
-    columns = (sums[north, east] - sums[south, east] - sums[north, west] + sums[south, west]).T
     J, linear = hull_jacobian(force_model, prior_hull, residual, np.flatnonzero(prior_hull).tolist())
-    gains = log_evidence_gains(J, linear, columns, FACTOR.size)
+    gains = np.empty(len(south))
+    at_once = max(1, int(MOST_VALUES / len(e)))
+    for first in range(0, len(south), at_once):
+        some = slice(first, first + at_once)
+        a, b, c, d = south[some], north[some], west[some], east[some]
+        columns = (sums[b, d] - sums[a, d] - sums[b, c] + sums[a, c]).T
+        gains[some] = log_evidence_gains(J, linear, columns, FACTOR.size)
     k = int(np.argmax(gains))
     sides = (lines[south[k], 0], lines[north[k], 0], lines[west[k], 1], lines[east[k], 1])
     sizes = np.repeat((high - low) / CELLS, 2)

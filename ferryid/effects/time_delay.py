@@ -34,10 +34,10 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 def says(values: Values, instance: str | None) -> str:
     """Return the finding as a sentence; no physics moves a vessel before it is pushed, but late clocks seem to."""
     if values["seconds"] > 0.0:
-        return f"The navigation's data are {values['seconds']:.2f} s later than the actuators'."
+        return f"The navigation's data lag the actuators' by {values['seconds']:.2f} s."
     return (
-        f"The actuators' data are {-values['seconds']:.2f} s later than the navigation's: the motion comes before its force, "
-        "which a clock can make of it, or a force that the model lacks, but no delay of the thrusters."
+        f"The actuators' data lag the navigation's by {-values['seconds']:.2f} s: the motion precedes its force. An error of a "
+        "clock or a force missing from the model can cause this, a delay of the thrusters cannot."
     )
 
 

@@ -6,6 +6,7 @@ from ferryid.identify.block_sum_store import load_block_sums
 from ferryid.identify.model_selection import Selection
 from ferryid.identify.outcome import ComponentCurve, Excitation, FitOutcome, LogFit
 from ferryid.identify.pipeline import fit_logs
+from ferryid.identify.remainder import fit_remainder, prediction_errors, with_remainder
 from ferryid.identify.settings import FOLDS, TEST_WINDOW_S, FitSettings, check_window, parse_window, parse_windows
 from ferryid.identify.window_store import load_windows
 
@@ -24,9 +25,12 @@ __all__ = [
     "check_window",
     "fit_archive",
     "fit_logs",
+    "fit_remainder",
     "force_mse",
     "load_block_sums",
     "load_windows",
     "parse_window",
     "parse_windows",
+    "prediction_errors",
+    "with_remainder",
 ]

@@ -59,8 +59,8 @@ def general_warnings(settings: FitSettings, known: Excitation, scores: ModelScor
     warnings = []
     if np.isfinite(known.heading_coverage) and known.heading_coverage < 0.5:
         warnings.append(
-            f"Headings cover only {known.heading_coverage:.0%} of the compass: a steady wind or current could not be told "
-            "from the hull."
+            f"Headings cover only {known.heading_coverage:.0%} of the compass: a steady wind or current could not be "
+            "separated from the hull."
         )
     if known.undetermined:
         terms = list(known.undetermined)

@@ -1,9 +1,10 @@
-"""Conditions of single logs: a steady wind that nobody measured, estimated together with the hull that all logs share.
+"""Conditions of single logs: wind that nobody measured, estimated together with the hull that all logs share.
 
 Without it a breeze ends up in the hull: its load changes with heading and speed as damping, Coriolis force and a steady moment
-do. Every log has its own wind and its own steady force along the hull, north and east, as random effects whose spread between
-logs is estimated (Laird and Ware 1982); hull and conditions are found together by Gauss-Newton steps, with the logs' part
-eliminated from the normal equations. What is estimated is then treated as if it had been measured.
+do. Every log has its own mean wind, gusts about it (a first-order process), and its own steady force along the hull, north and
+east, as random effects whose spreads are estimated (Laird and Ware 1982); hull and conditions are found together by
+Gauss-Newton steps, with the logs' part eliminated from the normal equations. What is estimated is then treated as if it had
+been measured, and the hull's covariance keeps what that leaves uncertain.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ferryid.identify.gusts import GustEquations, Gusts
 from ferryid.identify.outcome import LogWind
 from ferryid.identify.thresholds import IDENTIFY
-from ferryid.identify.weak_rows import WeakRows, window_rows
+from ferryid.identify.weak_rows import STRIDES, WeakRows, window_rows
 from ferryid.models.forces import ACCELERATIONS
 from ferryid.regression import window_weights
 from ferryid.signals.track import Motion
@@ -44,25 +46,33 @@ class Conditions:
     covariance
         Of it, shape (L, 2, 2), with that of hull and steady forces in it.
     spread_mps
-        Standard deviation of a component of the wind between logs.
+        Standard deviation of a component of the mean wind between logs.
+    gust_mps
+        Standard deviation of a component of the gusts.
     load
         Wind load averaged over the training windows [N, N, N·m], (J, 3) each.
+    added
+        What the conditions add to the covariance of gains and intercept of the weak form, by axis, shape (3, K + 1, K + 1).
     """
 
     wind: Floats
     covariance: Floats
     spread_mps: float
+    gust_mps: float
     load: tuple[Floats, ...]
+    added: Floats
 
     @classmethod
-    def none(cls, windows: Sequence[WeakRows]) -> Conditions:
+    def none(cls, windows: Sequence[WeakRows], K: int) -> Conditions:
         """Return that no log has conditions to estimate."""
         L = len(windows)
         return cls(
             np.full((L, 2), np.nan),
             np.full((L, 2, 2), np.nan),
             0.0,
+            0.0,
             tuple(np.zeros((len(one), 3)) for one in windows),
+            np.zeros((3, K + 1, K + 1)),
         )
 
     def listed(self, logs: Sequence[str]) -> tuple[LogWind, ...]:
@@ -141,7 +151,7 @@ class _Load:
         self.still = self._mean(np.zeros(2))
 
     def _mean(self, wind: Floats, every: int = 1) -> Floats:
-        north, east = wind
+        north, east = (np.broadcast_to(part, (len(self.cos),))[::every, None] for part in np.asarray(wind).T)
         cos, sin = self.cos[::every], self.sin[::every]
         along, across = cos * north + sin * east, cos * east - sin * north
         load = relative_wind_force(self.areas, self.surge[::every] - along, self.sway[::every] - across)
@@ -150,7 +160,7 @@ class _Load:
     def of(self, wind: Floats, every: int = 1) -> Floats:
         """Return the load beyond that of still air, shape (J, 3), or of one in so many windows.
 
-        That of still air is in the hull's damping.
+        The wind is one for all, (2,), or one a window, (J, 2). The load of still air is in the hull's damping.
         """
         return self._mean(wind, every) - self.still[::every]
 
@@ -164,6 +174,7 @@ def estimate_conditions(
     profile: Profile,
     samples: Sequence[LoadSamples | None],
     windows: Sequence[WeakRows],
+    length_s: float,
     zeta: float,
     terms: tuple[str, ...],
     mask: Flags,
@@ -180,6 +191,8 @@ def estimate_conditions(
         Where the wind load of each log is evaluated; None where there is none to estimate.
     windows
         Training windows of each log.
+    length_s
+        Length of a window [s].
     zeta
         Factor on the measured force.
     terms, mask
@@ -189,7 +202,7 @@ def estimate_conditions(
     posed
         Axes whose acceleration comes from poses, shape (3,).
     """
-    nothing = Conditions.none(windows)
+    nothing = Conditions.none(windows, len(terms))
     areas = profile.wind
     if areas is None:
         return nothing
@@ -200,21 +213,75 @@ def estimate_conditions(
     }
     if not loads:
         return nothing
-    problem = _Problem(windows, terms, mask, prior_spread, posed)
+    problem = _Problem(windows, terms, mask, prior_spread, posed, length_s / STRIDES)
     wind, covariance = problem.solve(loads)
     return Conditions(
         wind,
         covariance,
         problem.wind_spread,
-        tuple(loads[k].of(wind[k]) if k in loads else np.zeros((len(one), 3)) for k, one in enumerate(windows)),
+        problem.gusts.spread,
+        tuple(
+            loads[k].of(wind[k] + problem.gusts.found[k]) if k in loads else np.zeros((len(one), 3))
+            for k, one in enumerate(windows)
+        ),
+        problem.added,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """Normal equations of one log: of the hull (P), of its own conditions (D), and between them, without its gusts.
+
+    `bare` is that of the hull with all conditions known.
+    """
+
+    bare: Floats
+    hull: Floats
+    hull_right: Floats
+    own: Floats
+    right: Floats
+    across: Floats
+    table: Floats
+    gusts: Floats
+
+    @classmethod
+    def of(cls, table: Floats, P: int, weight: Floats, prior: Floats, gusts: GustEquations) -> _Equations:
+        """Return those of a table [hull, conditions, target], (3, J, P + D + 1), with weights of the axes (3,)."""
+        whole = np.einsum("a,ajp,ajq->pq", weight, table, table, optimize=True)
+        bare = whole[:P, :P]
+        response, found = gusts.eliminated(table, weight)
+        whole = whole - response.T @ found
+        return cls(
+            bare=bare,
+            hull=whole[:P, :P],
+            hull_right=whole[:P, -1],
+            own=whole[P:-1, P:-1] + np.diag(prior),
+            right=whole[P:-1, -1],
+            across=whole[P:-1, :P],
+            table=table,
+            gusts=found,
+        )
+
+    def gusts_at(self, hull: Floats, conditions: Floats) -> Floats:
+        """Return the likeliest gusts beside a hull and conditions, shape (J, 2)."""
+        return np.asarray((self.gusts @ np.concatenate([-hull, -conditions, [1.0]])).reshape(-1, 2))
+
+    def left(self, hull: Floats, conditions: Floats) -> Floats:
+        """Return what hull and conditions leave, shape (J, 3)."""
+        return np.asarray((self.table @ np.concatenate([-hull, -conditions, [1.0]])).T)
 
 
 class _Problem:
     """Gains of the hull (P of them, with an intercept an axis) and of every log its wind and its steady forces."""
 
     def __init__(
-        self, windows: Sequence[WeakRows], terms: tuple[str, ...], mask: Flags, spread: Floats, posed: Flags
+        self,
+        windows: Sequence[WeakRows],
+        terms: tuple[str, ...],
+        mask: Flags,
+        spread: Floats,
+        posed: Flags,
+        stride_s: float,
     ) -> None:
         self.windows, self.terms, self.mask, self.spread, self.posed = windows, terms, mask, spread, posed
         self.own = [np.flatnonzero(column) for column in mask.T]
@@ -222,9 +289,12 @@ class _Problem:
         self.P = int(self.low[-1])
         self.steady = [np.column_stack([np.ones(len(one)), one.heading]) for one in windows]
         self.wind_spread, self.force_spread = IDENTIFY.wind_spread_mps, 0.1
-        self.factor, self.noise = 1.0, 1.0
+        self.gusts = Gusts([one.run for one in windows], stride_s)
+        self.added = np.zeros((3, len(terms) + 1, len(terms) + 1))
+        self.factor, self.noise, self.offset_spread = 1.0, 1.0, 0.1
         targets = [np.zeros((1, 3)), *(self._table(k, np.zeros((len(one), 3)))[1] for k, one in enumerate(windows))]
         self.sigma = np.maximum(np.std(np.concatenate(targets), axis=0), IDENTIFY.no_force)
+        self.slopes = [np.zeros((len(one), 3, 2)) for one in windows]
         self.gains = np.zeros((len(terms), 3))
         self.intercept = np.zeros(3)
 
@@ -277,84 +347,95 @@ class _Problem:
 
         Logs without a load have steady forces only.
         """
-        P, L, G = self.P, len(self.windows), self._G()
-        normal, right = np.zeros((P, P)), np.zeros(P)
-        logs = []
-        for k in range(L):
-            load = loads.get(k)
-            J = len(self.windows[k])
-            X, Y = self._table(k, np.zeros((J, 3)) if load is None else load.of(wind[k]))
-            slope = np.zeros((J, 3, 2)) if load is None else -np.einsum("ab,jbc->jac", G, load.slope(wind[k]))
-            Y = Y + np.einsum("jac,c->ja", slope, wind[k])
-            D = 2 + 9
-            own, across, b = np.zeros((D, D)), np.zeros((D, P)), np.zeros(D)
-            tables = []
-            for axis in range(3):
-                weight = 1.0 / (self.noise * self.sigma[axis] ** 2)
-                A = np.column_stack([X[:, self.own[axis]], np.ones(J)])
-                B = np.zeros((J, D))
-                B[:, :2] = slope[:, axis]
-                B[:, 2 + 3 * axis : 5 + 3 * axis] = self.steady[k] * self.sigma[axis]
-                part = slice(self.low[axis], self.low[axis + 1])
-                normal[part, part] += weight * A.T @ A
-                right[part] += weight * A.T @ Y[:, axis]
-                own += weight * B.T @ B
-                across[:, part] += weight * B.T @ A
-                b += weight * B.T @ Y[:, axis]
-                tables.append((A, B, Y[:, axis]))
-            own[np.arange(2), np.arange(2)] += self.wind_spread**-2.0
-            own[np.arange(2, D), np.arange(2, D)] += self.force_spread**-2.0
-            logs.append((own, across, b, tables))
-        prior = self._prior()
-        normal += np.diag(prior)
-        schur, rest = normal.copy(), right.copy()
-        for own, across, b, _ in logs:
-            gone = np.linalg.solve(own, np.column_stack([across, b]))
-            schur -= across.T @ gone[:, :P]
-            rest -= across.T @ gone[:, P]
-        inverse = np.linalg.pinv(schur, hermitian=True)
-        hull = inverse @ rest
-        covariance = np.zeros((L, 2, 2))
-        squares, counts = np.zeros(3), np.zeros(3)
-        winds, forces = list[float](), list[float]()
-        lagged = list[list[float]]()
-        for k, (own, across, b, tables) in enumerate(logs):
-            inner = np.linalg.inv(own)
-            q = inner @ (b - across @ hull)
-            spread = inner + inner @ across @ inverse @ across.T @ inner
-            left = [Y - A @ hull[self.low[a] : self.low[a + 1]] - B @ q for a, (A, B, Y) in enumerate(tables)]
-            squares += [float(e @ e) for e in left]
-            counts += len(left[0])
-            follows = np.diff(self.windows[k].run) == 0
-            lagged.append([float(np.sum((e[1:] * e[:-1])[follows])) for e in left])
-            if loads.get(k) is not None:
-                step = q[:2] - wind[k]
-                size = float(np.linalg.norm(step))
-                most = max(2.0, float(np.linalg.norm(wind[k])))
-                wind[k] = wind[k] + step * min(1.0, most / max(size, 1e-9))
+        logs = [self._equations(k, loads.get(k), wind[k]) for k in range(len(self.windows))]
+        normal, right = np.diag(self._prior()), np.zeros(self.P)
+        bare = normal + sum(log.bare for log in logs)
+        for log in logs:
+            gone = np.linalg.solve(log.own, np.column_stack([log.across, log.right]))
+            normal += log.hull - log.across.T @ gone[:, :-1]
+            right += log.hull_right - log.across.T @ gone[:, -1]
+        inverse = np.linalg.pinv(normal, hermitian=True)
+        hull = inverse @ right
+        covariance, winds, forces, left = np.zeros((len(logs), 2, 2)), list[float](), list[float](), list[Floats]()
+        for k, log in enumerate(logs):
+            inner = np.linalg.inv(log.own)
+            found = inner @ (log.right - log.across @ hull)
+            spread = inner + inner @ log.across @ inverse @ log.across.T @ inner
+            left.append(log.left(hull, found))
+            if k in loads:
+                gusts = log.gusts_at(hull, found)
+                left[-1] = left[-1] - np.einsum("jac,jc->ja", self.slopes[k], gusts)
+                self.gusts.take(k, gusts)
+            squares = found**2 + np.diag(spread)
+            if k in loads:
+                step = found[:2] - wind[k]
+                most = max(IDENTIFY.wind_spread_mps, float(np.linalg.norm(wind[k])))
+                wind[k] += step * min(1.0, most / max(float(np.linalg.norm(step)), 1e-9))
                 covariance[k] = spread[:2, :2]
-                winds.append(float(q[:2] @ q[:2] + np.trace(spread[:2, :2])))
-            if len(left[0]):
-                forces.append(float(np.mean(q[2:] ** 2 + np.diag(spread)[2:])))
+                winds.append(float(np.sum(squares[:2])))
+            if len(left[-1]):
+                forces.append(float(np.mean(squares[2:])))
         self._take(hull, np.diag(inverse))
-        freedom = np.maximum(counts - (np.diff(self.low)), 1.0)
-        self.sigma = np.maximum(np.sqrt(squares / freedom), IDENTIFY.no_force)
-        alike = np.sum(np.array(lagged), axis=0) / np.maximum(squares, np.finfo(np.float64).tiny)
-        correlation = float(np.clip(np.mean(alike), 0.0, IDENTIFY.most_autocorrelation))
-        self.noise = (1.0 + correlation) / (1.0 - correlation)
+        self._add(inverse - np.linalg.pinv(bare, hermitian=True))
+        self._spreads(winds, forces)
+        self._noise(left)
+        self.gusts.update()
+        return covariance
+
+    def _equations(self, k: int, load: _Load | None, wind: Floats) -> _Equations:
+        """Return the normal equations of one log, linearised about a wind."""
+        J, G = len(self.windows[k]), self._G()
+        blown = wind + self.gusts.found[k]
+        X, Y = self._table(k, np.zeros((J, 3)) if load is None else load.of(blown))
+        slope = np.zeros((J, 3, 2)) if load is None else -np.einsum("ab,jbc->jac", G, load.slope(blown))
+        Y = Y + np.einsum("jac,jc->ja", slope, blown)
+        self.slopes[k] = slope
+        table = np.zeros((3, J, self.P + 2 + 9 + 1))
+        for axis in range(3):
+            low, high = self.low[axis], self.low[axis + 1]
+            table[axis, :, low : high - 1], table[axis, :, high - 1] = X[:, self.own[axis]], 1.0
+            table[axis, :, self.P : self.P + 2] = slope[:, axis]
+            first = self.P + 2 + 3 * axis
+            table[axis, :, first : first + 3] = self.steady[k] * self.sigma[axis]
+            table[axis, :, -1] = Y[:, axis]
+        weight = 1.0 / (self.noise * self.sigma**2)
+        prior = np.repeat([self.wind_spread, self.force_spread], [2, 9]) ** -2.0
+        return _Equations.of(table, self.P, weight, prior, self.gusts.equations(k, slope, weight))
+
+    def _add(self, covariance: Floats) -> None:
+        """Keep what the conditions add to the covariance of gains and intercepts."""
+        for axis, own in enumerate(self.own):
+            part, places = slice(self.low[axis], self.low[axis + 1]), [*own.tolist(), len(self.terms)]
+            self.added[axis][np.ix_(places, places)] = covariance[part, part]
+
+    def _spreads(self, winds: Sequence[float], forces: Sequence[float]) -> None:
+        """Update the spreads of winds and steady forces between logs."""
         if forces:
-            self.force_spread = float(np.sqrt(max(float(np.mean(forces)), 1e-6)))
+            self.force_spread = float(np.sqrt(max(sum(forces) / len(forces), 1e-6)))
         if winds:
             # Two logs' worth of what is usual keeps the spread of few logs apart from zero and from everything.
             usual = IDENTIFY.wind_spread_mps
             self.wind_spread = float(np.sqrt((sum(winds) + 4.0 * usual**2) / (2.0 * len(winds) + 4.0)))
-        return covariance
+
+    def _noise(self, left: Sequence[Floats]) -> None:
+        """Update size and correlation of the residual from what is left of every log, shape (J, 3) each."""
+        squares = np.sum([np.sum(one**2, axis=0) for one in left], axis=0) + self.gusts.uncertain
+        freedom = np.maximum(sum(len(one) for one in left) - np.diff(self.low), 1.0)
+        self.sigma = np.maximum(np.sqrt(squares / freedom), IDENTIFY.no_force)
+        lagged = np.zeros(3)
+        for one, windows in zip(left, self.windows, strict=True):
+            lagged += np.sum((one[1:] * one[:-1])[np.diff(windows.run) == 0], axis=0)
+        alike = float(np.mean(lagged / np.maximum(squares, np.finfo(np.float64).tiny)))
+        correlation = float(np.clip(alike, 0.0, IDENTIFY.most_autocorrelation))
+        self.noise = (1.0 + correlation) / (1.0 - correlation)
 
     def _prior(self) -> Floats:
         values = np.zeros(self.P)
         for axis, own in enumerate(self.own):
             spread = self.factor * self.spread[own, axis]
             values[self.low[axis] : self.low[axis + 1] - 1] = np.where(np.isfinite(spread), spread**-2.0, 0.0)
+            # A hull that port and starboard make alike feels no force at rest.
+            values[self.low[axis + 1] - 1] = (self.offset_spread * self.sigma[axis]) ** -2.0
         return values
 
     def _take(self, hull: Floats, variance: Floats) -> None:
@@ -365,6 +446,8 @@ class _Problem:
             self.intercept[axis] = hull[self.low[axis + 1] - 1]
             some = np.isfinite(self.spread[own, axis])
             sizes.append(((hull[part] ** 2 + variance[part]) / self.spread[own, axis] ** 2)[some])
+        offsets = np.array([hull[high - 1] ** 2 + variance[high - 1] for high in self.low[1:]])
+        self.offset_spread = float(np.sqrt(max(np.mean(offsets / self.sigma**2), 1e-6)))
         every = np.concatenate(sizes)
         if len(every):
             self.factor = float(np.clip(np.sqrt(np.mean(every)), 1.0, IDENTIFY.widest_prior))

@@ -76,6 +76,7 @@ def damping_checks(force: Callable[[Floats], Floats], visited: Floats) -> tuple[
     """
     nu = visited[np.isfinite(visited).all(axis=1)]
     nu = nu[:: max(1, -(-len(nu) // MOST_ROWS))]
+    whole = float(np.mean(np.sum(np.abs(nu * (force(nu) - force(np.zeros((1, 3))))), axis=1))) if len(nu) else 0.0
     alone = [np.where(np.arange(3) == axis, nu, 0.0) for axis in range(3)]
     checks = []
     for name, where, several in (
@@ -85,7 +86,7 @@ def damping_checks(force: Callable[[Floats], Floats], visited: Floats) -> tuple[
             for i, axis in enumerate(AXES)
         ),
     ):
-        shares = [_feeding_share(force, scale * several) for scale in (1.0, IDENTIFY.damping_margin)]
+        shares = [_feeding_share(force, scale * several, whole) for scale in (1.0, IDENTIFY.damping_margin)]
         share = max(shares)
         passed = share <= IDENTIFY.damping_rows
         at = (
@@ -112,10 +113,14 @@ def damping_checks(force: Callable[[Floats], Floats], visited: Floats) -> tuple[
     return tuple(checks)
 
 
-def _feeding_share(force: Callable[[Floats], Floats], nu: Floats) -> float:
-    """Return the share of velocities at which the damping force adds energy to the motion."""
+def _feeding_share(force: Callable[[Floats], Floats], nu: Floats, whole: float) -> float:
+    """Return the share of velocities at which the damping force adds energy to the motion.
+
+    `whole` is the mean power of damping in all axes: an axis whose damping is held at none has rounding beside it.
+    """
     if not len(nu):
         return 0.0
     damping = force(nu) - force(np.zeros((1, 3)))
     power = np.sum(nu * damping, axis=1)
-    return float(np.mean(power < -IDENTIFY.damping_power * np.mean(np.abs(power))))
+    usual = max(float(np.mean(np.abs(power))), IDENTIFY.damping_power * whole)
+    return float(np.mean(power < -IDENTIFY.damping_power * usual))

@@ -65,8 +65,13 @@ def fit_logs(
         For input that cannot be used, with file, cause and remedy.
     """
     name, settings = check_name(name or profile.name), settings.on(profile)
-    # Read, align.
-    opened = read_logs(paths, profile, settings, run)
+    return fit_opened(read_logs(paths, profile, settings, run), profile, settings, run, name)
+
+
+def fit_opened(
+    opened: Sequence[Opened], profile: Profile, settings: FitSettings, run: RunContext, name: str
+) -> FitOutcome:
+    """Fit a correction of a profile's hull to logs that were read and aligned; arguments and errors as of `fit_logs`."""
     parts = None
     if settings.windows_s:
         run.progress("choosing the window")

@@ -161,6 +161,28 @@ class IdentifyThresholds:
         "usual standard deviation of a component of the wind, from which that between the logs starts",
         "convention: a light to gentle breeze, in which trials are done",
     )
+    gust_spread_mps: float = threshold(
+        0.3,
+        "m/s",
+        "standard deviation of a component of the gusts, from which its estimate starts",
+        "convention: a tenth of the wind",
+    )
+    least_gust_mps: float = threshold(0.01, "m/s", "below which gusts are none", "convention: moves no vessel")
+    fewest_gust_windows: int = threshold(
+        100,
+        "windows",
+        "of a log from which gusts are estimated",
+        "tuned on real recordings: in shorter ones gusts explain the hull's own forces",
+    )
+    gust_time_s: float = threshold(
+        20.0, "s", "time constant of gusts", "convention: longer than a vessel's windows, shorter than a trial"
+    )
+    inertia_error: float = threshold(
+        0.01,
+        "of the inertia",
+        "standard deviation of what windows, time stamps and remaining errors in variables shift an estimated inertia by",
+        "tuned on simulated trials of the simulator: the error beyond the scatter",
+    )
     hull_spread: float = threshold(
         0.4,
         "of the coefficient",

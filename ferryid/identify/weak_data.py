@@ -64,11 +64,14 @@ class Whitened:
         Functions and target that the intercept explains, shape (K + 3,).
     unit
         Mean of the column of ones, whitened.
+    weight
+        Sum of squares of that column: what determines the intercept, in units of the residual's variance.
     """
 
     rows: tuple[Rows, ...]
     mean: Floats
     unit: float
+    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +106,7 @@ class WeakData(LogData):
             self.profile,
             self.load_samples,
             self.windows.training,
+            self.windows.length_s,
             float(self.settings.scale.get("zeta", 1.0)),
             self.functions.terms,
             self.functions.mask,
@@ -233,7 +237,7 @@ class WeakData(LogData):
         cleared = [part - np.outer(one, explained) for part, one in zip(parts, ones, strict=True)]
         unit = float(np.mean(np.concatenate(ones)))
         return Whitened(
-            tuple(Rows.of(one[:, :K], one[:, K:]) for one in cleared), np.asarray(explained), max(unit, 1e-3)
+            tuple(Rows.of(one[:, :K], one[:, K:]) for one in cleared), np.asarray(explained), max(unit, 1e-3), weight
         )
 
     @cached_property
@@ -351,7 +355,8 @@ class WeakData(LogData):
     def scattered(self, gains: Floats) -> Floats:
         """Return drawn gains, (draws, K, 3), with the scatter of the prior: the truth is as far from its mean as it states.
 
-        Drawing windows again leaves the prior where it is, so that what only the prior determines would have no interval.
+        Drawing windows again leaves the prior where it is, so that what only the prior determines would have no interval, and
+        it leaves the winds of the logs where they are. Errors in variables that remain shift every draw alike.
         """
         rng = np.random.default_rng(self.settings.seed)
         information, out = self._information(), gains.copy()
@@ -362,6 +367,15 @@ class WeakData(LogData):
             covariance = np.linalg.pinv(information[axis][np.ix_(every, every)], hermitian=True)
             pulls = rng.standard_normal((len(gains), len(own))) / spread
             out[:, every, axis] += pulls @ covariance[np.searchsorted(every, own)]
+            out[:, every, axis] += rng.standard_normal((len(gains), len(every))) @ _root(
+                self.conditions.added[axis][np.ix_(every, every)]
+            )
+            own_inertia = ACCELERATIONS[axis]
+            if (
+                own_inertia in self.functions.terms
+                and self.functions.mask[row := self.functions.terms.index(own_inertia), axis]
+            ):
+                out[:, row, axis] += IDENTIFY.inertia_error * rng.standard_normal(len(gains))
         return out
 
     def refuse_contradictions(self) -> None:
@@ -404,10 +418,16 @@ class WeakData(LogData):
         return np.array([Sxx / self.whitening.sigma[a] ** 2 + np.diag(prior[:, a]) for a in range(3)])
 
     def intercepts(self, gains: Floats, offsets: Floats) -> Floats:
-        """Return intercepts, (..., 3), from gains (..., K, 3) and what whitened rows leave on average (..., 3)."""
+        """Return intercepts, (..., 3), from gains (..., K, 3) and what whitened rows leave on average (..., 3).
+
+        A hull at rest that port and starboard make alike feels no force. An intercept is therefore drawn towards none as far as
+        its standard error, with the steady forces of single logs in it, explains its size (James and Stein 1961).
+        """
         K = len(self.functions.terms)
         found = self.whitened.mean[K:] - np.einsum("k,...ka->...a", self.whitened.mean[:K], gains)
-        return np.asarray(found + offsets / self.whitened.unit)
+        found = found + offsets / self.whitened.unit
+        chance = self.whitening.sigma**2 / max(self.whitened.weight, 1e-12) + self.conditions.added[:, K, K]
+        return np.asarray(found * np.maximum(0.0, 1.0 - chance / np.maximum(found**2, np.finfo(np.float64).tiny)))
 
     def fitted(self, regression: Simpls) -> tuple[Floats, Floats]:
         """Return gains and intercepts for every number of components, shape (A, K, 3) and (A, 3)."""
@@ -444,6 +464,12 @@ def every_second(rows: Flags, rate_hz: float) -> Ints:
 def _steady(windows: WeakRows) -> Floats:
     """Return the ways in which a steady force of a log's own acts: along the hull, and along north and east, shape (J, 3)."""
     return np.column_stack([np.ones(len(windows)), windows.heading])
+
+
+def _root(covariance: Floats) -> Floats:
+    """Return a symmetric square root of a matrix without what is negative in it, shape (k, k)."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
 def _decorrelate(table: Floats, conditions: Floats, run: np.ndarray, autocorrelation: float) -> Floats:

@@ -79,7 +79,7 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
         hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
         remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, shared))]
         lines += ["", *remarks] if remarks else []
-        lines += ["", f"The model with the findings is {diagnosis_words.new_model(one)}"] if one.model else [""]
+        lines += ["", diagnosis_words.new_model(one)] if one.model else [""]
         blocks.append("\n".join(_folded(line) for line in lines))
     if shared:
         blocks.append("\n".join(_folded(f"note on all logs: {note}") for note in shared))

@@ -133,6 +133,7 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         "after": {"mse": _pooled(diagnoses, "after"), "free_run": {}},
         "notes": [],
         "withheld": [],
+        **({} if diagnoses[0].learnt is None else {"learnt": diagnoses[0].learnt.to_json()}),
         # What several logs teach is one model.
         "model": next((one.model for one in diagnoses if one.model), None),
         "logs": [{key: value for key, value in one.items() if key != "schema"} for one in logs],

@@ -175,7 +175,9 @@ def _throughout(finding: Finding) -> bool:
 def trust(finding: Finding) -> str:
     """Return the probability, and what the finding removes of the squared force error."""
     no_name = finding.effect == UNKNOWN
-    of_what = " that it is no chance" if no_name else ", among the effects that were tried" if finding.rivals else ""
+    of_what = (
+        " that it is not due to chance" if no_name else ", among the effects that were tried" if finding.rivals else ""
+    )
     told = f"Probability {probability(finding.probability)}{of_what}."
     change = changed(finding.improvement)
     if not change:
@@ -223,14 +225,16 @@ def _meant(finding: Finding, name: str) -> list[str]:
 
 
 def new_model(diagnosis: Diagnosis) -> str:
-    """Return where the model with the findings lies and how to use it; empty where there is none."""
+    """Return which model it is, where it lies and how to use it; empty where there is none."""
     if diagnosis.model is None:
         return ""
     path = PurePath(diagnosis.model)
     label = f"{path.parent.name}@{path.stem}"
     out = path.parents[2] if len(path.parents) > 2 else PurePath(USUAL_OUT)
     where = "" if out == PurePath(USUAL_OUT) else f" --out {out}"
-    return f"{label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
+    learnt = diagnosis.learnt is not None and diagnosis.posterior is None
+    what = "The model that was learnt is" if learnt else "The model with the findings is"
+    return f"{what} {label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
 
 
 def summary(diagnoses: Sequence[Diagnosis]) -> str:
@@ -263,10 +267,10 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
         unsteady = [_inline(title(one.effect)) for one in diagnosis.findings if one.effect in UNSTEADY]
         absent = [
             *unsteady,
-            *(["what has no name"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []),
+            *(["unexplained forces"] if any(one.effect == UNKNOWN for one in diagnosis.findings) else []),
         ]
         if absent:
-            lines.append(f"{_upper(listed(absent))}: not subtracted from these errors, and left in both rows.")
+            lines.append(f"Not subtracted from these errors, and left in both rows: {listed(absent)}.")
     if diagnosis.moved is not None:
         one = diagnosis.moved
         lines.append(

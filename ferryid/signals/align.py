@@ -82,6 +82,9 @@ def align(recording: Recording, profile: Profile, rate_hz: float | None = None, 
     # On the samples of the velocity, interpolation leaves them as they are.
     first = int(lead.time_ns[min(int(np.searchsorted(lead.time_ns, start)), len(lead.time_ns) - 1)])
     t0_ns = max(start, first)
+    if t0_ns - start > SIGNALS.overlap_ns:
+        # A gap before that sample is on the grid too, so that it is counted.
+        t0_ns -= round(int((t0_ns - start) * 1e-9 * rate) * 1e9 / rate)
     count = int((end - t0_ns) * 1e-9 * rate + EXACT_S) + 1
     if count < 2 or count > max(SIGNALS.most_grid_rows, SIGNALS.most_rows_per_sample * len(lead.time_ns)):
         raise FerryIdError(_spread(recording.name, lead, max(0.0, (end - t0_ns) * 1e-9)))

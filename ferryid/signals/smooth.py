@@ -80,7 +80,9 @@ def measure(track: Track, profile: Profile) -> Measured:
         )
     require_excited(track, nu, tau)
     unknown = LeftOut.of(
-        "wind, current or payload was not measured, or no force can be had", track.valid & ~usable, track.rate_hz
+        "wind, current or payload was not measured, or the force cannot be computed",
+        track.valid & ~usable,
+        track.rate_hz,
     )
     left_out = (*track.left_out, *unknown)
     return Measured(

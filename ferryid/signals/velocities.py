@@ -180,8 +180,10 @@ def _held(
         away = path[inside] - at * path_s[inside]
         moved = float(np.ptp(away))
         slack = max(resolution, band) if at == 0.0 else resolution
+        # The mean square of noise in several windows scatters less about its expectation than that in one.
+        scatter = (SIGNALS.moved_noises**2 - 1.0) / np.sqrt(_windows(last_s - first_s))
         if moved <= least or _speed(path_s[inside], away) <= max(
-            slack + SIGNALS.moved_noises * noise, SIGNALS.moved_share * usual
+            slack + noise * np.sqrt(1.0 + scatter), SIGNALS.moved_share * usual
         ):
             continue
         # A value that is not zero was measured once.
@@ -211,7 +213,12 @@ def _speed(time_s: Floats, path: Floats) -> float:
     length = float(time_s[-1] - time_s[0])
     if length <= 0.0:
         return 0.0
-    parts = max(1, int(length / SIGNALS.moved_window_s))
+    parts = _windows(length)
     edges = np.linspace(time_s[0], time_s[-1], parts + 1)
     way: NDArray[np.float64] = np.diff(np.interp(edges, time_s, path)) * (parts / length)
     return float(np.sqrt(np.mean(way**2)))
+
+
+def _windows(seconds: float) -> int:
+    """Return how many means a stretch of this length has."""
+    return max(1, int(seconds / SIGNALS.moved_window_s))

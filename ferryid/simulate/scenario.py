@@ -158,9 +158,16 @@ def check_seed(seed: int) -> None:
 
 def list_scenarios() -> dict[str, str]:
     """Return the bundled scenarios: name to title, in alphabetical order."""
+    return {name: tomllib.loads(_bundled(name))["title"] for name in _names()}
+
+
+def _names() -> list[str]:
     folder = resources.files("ferryid.simulate.scenarios")
-    names = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return {name: tomllib.loads((folder / f"{name}.toml").read_text("utf-8"))["title"] for name in names}
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def _bundled(name: str) -> str:
+    return (resources.files("ferryid.simulate.scenarios") / f"{name}.toml").read_text("utf-8")
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
@@ -172,14 +179,13 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         When there is no such scenario or file, or the file has a fault; the message gives its line.
     """
     name = str(name_or_path)
-    if name in list_scenarios():
-        text = (resources.files("ferryid.simulate.scenarios") / f"{name}.toml").read_text("utf-8")
-        return parse_scenario(text, f"{name}.toml")
+    if name in _names():
+        return parse_scenario(_bundled(name), f"{name}.toml")
     path = Path(name_or_path)
     if path.suffix != ".toml" and not path.exists():
         raise FerryIdError(
-            f"{name}: no scenario of this name, found {', '.join(list_scenarios())}."
-            f"{did_you_mean(name, list_scenarios())} Fix: use one of these or give the path of a TOML file"
+            f"{name}: no scenario of this name, found {', '.join(_names())}."
+            f"{did_you_mean(name, _names())} Fix: use one of these or give the path of a TOML file"
         )
     try:
         text = path.read_text("utf-8-sig")

@@ -28,6 +28,7 @@ from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
     from ferryid.models import Model
+    from ferryid.models.forces import UnmappedTerms
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,12 @@ class Simulation:
 
 
 def simulate(
-    scenario: Scenario, seed: int | None = None, *, model: Model | None = None, vessel: Profile | None = None
+    scenario: Scenario,
+    seed: int | None = None,
+    *,
+    model: Model | None = None,
+    vessel: Profile | None = None,
+    terms: UnmappedTerms | None = None,
 ) -> Simulation:
     """Run a scenario.
 
@@ -58,6 +64,8 @@ def simulate(
     vessel
         The vessel that moves, with another hull than the profile's, in which the controller believes; see
         `ferryid.simulate.vessel_model`.
+    terms
+        What acts on it beside its hull.
 
     Raises
     ------
@@ -67,12 +75,17 @@ def simulate(
     profile = vessel_of(scenario)
     number = scenario.seed if seed is None else seed
     check_size(scenario, len(profile.actuators))
-    truth, control = sail(scenario, profile, number, model, vessel)
+    truth, control = sail(scenario, profile, number, model, vessel, terms)
     return Simulation(scenario, number, profile, truth, control, sense(scenario, profile, number, truth, control))
 
 
 def sail(
-    scenario: Scenario, profile: Profile, seed: int, model: Model | None = None, vessel: Profile | None = None
+    scenario: Scenario,
+    profile: Profile,
+    seed: int,
+    model: Model | None = None,
+    vessel: Profile | None = None,
+    terms: UnmappedTerms | None = None,
 ) -> tuple[Truth, Control]:
     """Run the closed loop without the log's sensors; parameters and errors as for `simulate`."""
     moving = vessel or profile
@@ -86,7 +99,7 @@ def sail(
             f"{scenario.where}:{line_in(scenario, 'duration_s')}: a trial needs at least two control cycles, found "
             f"duration_s = {scenario.duration_s:g}. Fix: make it longer"
         )
-    plant = build(scenario, moving, seed, h, steps * cycles)
+    plant = build(scenario, moving, seed, h, steps * cycles, terms)
     thrusters = resting(plant)
     guidance, way = build_guidance(scenario)
     tuning, reference = build_reference(scenario)

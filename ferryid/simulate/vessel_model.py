@@ -11,8 +11,9 @@ from typing import Any
 from ferryid.effects import effects
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.models import Conditions, Model, StoredEffect
-from ferryid.models.forces import hull_coefficients, replace_hull_coefficients, unmapped_terms
+from ferryid.models.forces import UnmappedTerms, beside_the_hull, hull_coefficients, replace_hull_coefficients
 from ferryid.simulate.check_scenario import vessel_of
+from ferryid.simulate.plant.beside import FACTORS
 from ferryid.simulate.scenario import Scenario, scenario_of
 from ferryid.vessel import parse_profile
 from ferryid.vessel.profile import Profile
@@ -30,11 +31,15 @@ VESSEL_KEYS = (
 
 @dataclass(frozen=True)
 class Sailing:
-    """A scenario as a model sails it: what was changed in it, the vessel, and what of the scenario was set aside."""
+    """A scenario as a model sails it: what was changed in it, the vessel, and what of the scenario was set aside.
+
+    `terms` is what the model has beside the hull of the vessel; None where it has nothing.
+    """
 
     scenario: Scenario
     vessel: Profile
     notes: tuple[str, ...]
+    terms: UnmappedTerms | None = None
 
 
 def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing:
@@ -55,8 +60,8 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
     Raises
     ------
     FerryIdError
-        For a model of another vessel, one with terms that no hull has, a log that the model knows no conditions of, and
-        conditions that a scenario cannot have.
+        For a model of another vessel, one with terms that neither a hull nor the simulator has, a log that the model knows no
+        conditions of, and conditions that a scenario cannot have.
     """
     expected = vessel_of(scenario)
     own = parse_profile(model.profile_text, model.name)
@@ -65,12 +70,13 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
             f"{scenario.where}: a trial of {expected.name} cannot be sailed by {model.label}, a model of {own.name}. "
             "Fix: give a model and a scenario of one vessel"
         )
-    left = unmapped_terms(model)
+    terms = beside_the_hull(model)
+    left = [] if terms is None else [one.name for one in terms.functions if not set(one.factors) <= set(FACTORS)]
     if left:
         raise FerryIdError(
-            f"{model.label}: the simulated vessel cannot have the model's terms {', '.join(left)}, which no hull has. Fix: "
-            "simulate a model that ferryid diagnose made from the profile, or give this one to the controller "
-            '([controller] model = "FILE")'
+            f"{model.label}: the simulated vessel cannot have the model's terms {', '.join(left)}: neither a hull nor the "
+            "simulator has them. Fix: fit with --structure decoupled and a basis of velocities such as modulus, or give this "
+            'model to the controller ([controller] model = "FILE")'
         )
     chosen = _conditions(model, conditions) if conditions else None
     data = tomllib.loads(scenario.text)
@@ -89,6 +95,7 @@ def sailed_by(scenario: Scenario, model: Model, conditions: str = "") -> Sailing
         changed,
         replace(own, hull=replace_hull_coefficients(own.hull, hull_coefficients(model))),
         tuple(f"the scenario's [{'.'.join(place)}] is set aside: the vessel is {model.label}" for place in aside),
+        terms,
     )
 
 

@@ -153,7 +153,7 @@ def outcome_of_missed(result: CaseResult, key: Key) -> str:
         return "a hint"
     effect = effects().get(key[0])
     title = key[0] if effect is None else titled(effect.title, key[1])
-    if any("suspected, but dropped" in note and title.lower() in note.lower() for note in diagnosis.notes):
+    if any("but dropped" in note and title.lower() in note.lower() for note in diagnosis.notes):
         return "dropped"
     other = first_name(result)
     return other if other in (UNKNOWN, NONE, OTHER) else f"taken for {other}"

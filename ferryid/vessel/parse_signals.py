@@ -267,11 +267,11 @@ def _check_complete(reader: TableReader, signals: list[Signal], actuators: tuple
     mapped = {signal.quantity: signal for signal in signals}
     if "velocity" not in mapped and not {"position", "heading"} <= set(mapped):
         reader.fault(
-            "no surge and sway velocity can be had. Fix: map [signals.velocity], or both [signals.position] and "
+            "no surge and sway velocity is available. Fix: map [signals.velocity], or both [signals.position] and "
             "[signals.heading]"
         )
     if "yaw_rate" not in mapped and "heading" not in mapped:
-        reader.fault("no yaw rate can be had. Fix: map [signals.yaw_rate] or [signals.heading]")
+        reader.fault("no yaw rate is available. Fix: map [signals.yaw_rate] or [signals.heading]")
     velocity = mapped.get("velocity")
     if velocity is not None and velocity.frame in WORLD_FRAMES and "heading" not in mapped:
         reader.fault(

@@ -23,7 +23,7 @@ from tests.attack.run import Result, attack
 
 SEED = int(os.environ.get("ATTACK_SEED", int(time.time())))
 """Other cases in every run; the summary of the tests prints it, with which a run is repeated."""
-SECONDS = float(os.environ.get("ATTACK_SECONDS", 30))
+SECONDS = float(os.environ.get("ATTACK_SECONDS", 15))
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ schema = "ferryid.scenario/1"
 vessel = "milliampere"
 seed = 6
 sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
-path = { kind = "twelve-corner" }
+path = { kind = "twelve-corner", dwell_s = 40 }
 controller = { delta = 0.7, sigma = 0.7 }
 [environment.wind]
 north_mps = -2.0
@@ -40,6 +40,10 @@ def test_from_a_diagnosis_to_a_simulation(ferryid, tmp_path: Path) -> None:
     assert run.code == 0, run.err
     result = conforms((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert {one["effect"] for one in result["findings"]} >= {"wind", "thruster_gain"}
+    learnt = result["learnt"]
+    assert any(note == learnt["says"] for note in result["notes"])
+    assert set(learnt["over_fit"]) == {"surge", "sway", "yaw"}
+    assert sum(learnt["over_fit"].values()) < 3.0
     path = Path(result["model"])
     assert path == out / "models" / "ferry" / "1.json"
     assert "ferryid evaluate ferry@1 LOG" in " ".join(run.out.split())

@@ -13,9 +13,7 @@ import pytest
 
 from tests.batch.work import children_of, default_interrupts, ended, environment
 
-pytestmark = pytest.mark.slow
-
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")]
 MESSAGE = "ferryid: interrupted, nothing half-written was left\n"
 BUSY = """
 import subprocess, sys, time
@@ -61,7 +59,8 @@ def busy(*_, **__):
         temporary.mkdir()
         (temporary / "page").write_text("half")
         (out / "scratch").write_text(str(scratch))
-        compiled(1)
+        if {compiles}:
+            compiled(1)
         print("busy", flush=True)
         {how}()
 
@@ -79,7 +78,6 @@ def started(code: str, *arguments: str | Path) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("module", ["ferryid.cli.main", "typer"])
 def test_an_interrupt_while_the_command_line_is_loaded_shows_no_traceback(module: str) -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -101,7 +99,6 @@ from {entry} import {function}
     assert (process.returncode, out, error) == (130, "", MESSAGE)
 
 
-@pytest.mark.slow
 def test_two_threads_that_end_a_process_say_so_once() -> None:
     ending = """
 import threading, time
@@ -114,11 +111,11 @@ for _ in range(3):
     assert (process.returncode, error) == (130, MESSAGE)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["interrupt", "terminate"])
 @pytest.mark.parametrize("how", ["pool", "compiled_alone", "clean_up", "swallow", "child"])
 def test_a_command_ends_within_two_seconds_whatever_it_is_at(tmp_path: Path, number: signal.Signals, how: str) -> None:
     code = BUSY.replace("{how}()", "compiled(10**12)" if how == "compiled_alone" else f"{how}()")
+    code = code.replace("{compiles}", str(how in ("pool", "compiled_alone")))
     with started(code, tmp_path) as working:
         assert working.stdout is not None
         assert working.stdout.readline() == "busy\n", working.communicate()
@@ -150,7 +147,6 @@ main()
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["typer", "ferryid.cli.app", "ferryid.cli.cmd_fit", "ferryid.errors", "numpy", "scipy.special", "numba"]
 )
@@ -161,7 +157,6 @@ def test_an_interrupt_during_imports_is_one(tmp_path: Path, fixtures: Path, name
     assert (working.returncode, told) == (130, MESSAGE)
 
 
-@pytest.mark.slow
 def test_an_ignored_interrupt_stays_ignored() -> None:
     code = (
         "import os, signal, sys; import ferryid.signals.inspect as module\n"

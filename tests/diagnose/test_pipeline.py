@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -31,8 +32,10 @@ def one_round(name: str) -> Scenario:
 
 
 def diagnosed(scenario: Scenario, folder: Path) -> Diagnosis:
+    """Diagnose the log of a scenario, without the many messages of sensors that a diagnosis does not read."""
     log = folder / f"{scenario.name}.mcap"
-    write_log(simulate(scenario), log)
+    sensors = replace(scenario.sensors, imu_rate_hz=0.0, camera_rate_hz=0.0)
+    write_log(simulate(replace(scenario, sensors=sensors)), log)
     return diagnose([str(log)], load_profile("milliampere"), DiagnosisSettings(), IN_MEMORY)[0]
 
 
@@ -109,11 +112,11 @@ def test_a_calm_log_matches(tmp_path: Path) -> None:
 
 
 def test_a_squall_that_no_steady_wind_explains_is_not_matched(tmp_path: Path) -> None:
-    rows = [(0.0, 0.0), (412.0, 0.0), (427.0, 1.0), (552.0, 1.0), (567.0, 0.0)]
+    rows = [(0.0, 0.0), (272.0, 0.0), (287.0, 1.0), (412.0, 1.0), (427.0, 0.0)]
     text = "time,north,east\n" + "".join(f"{t:.1f},{3.4 * share:.3f},{-1.6 * share:.3f}\n" for t, share in rows)
     (tmp_path / "wind.csv").write_text(text, encoding="utf-8")
     scenario = (
-        'schema = "ferryid.scenario/1"\nvessel = "milliampere"\npath = { kind = "twelve-corner" }\n'
+        'schema = "ferryid.scenario/1"\nvessel = "milliampere"\npath = { kind = "twelve-corner", dwell_s = 40 }\n'
         'controller = { delta = 0.7, sigma = 0.7 }\nenvironment = { wind = { series = "wind.csv" } }\n'
         "true_hull = { m11 = 0.9, m22 = 1.1, m33 = 0.9, X_u = 1.1, Y_v = 0.9 }\n"
         "sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }\n"

@@ -99,6 +99,7 @@ NO_DECISION = {
         effects.shallow_water CELLS
         effects.wind SPEEDS_MPS BEARINGS
         identify.feasible _ROUNDS _SHARES _DIRECTIONS
+        identify.log_conditions _DIRECTIONS _SPEEDS _STEP_MPS
         identify.settings WINDOWS_S
         models.forces.residual _PASSES
         regression.nipals MOST_ITERATIONS
@@ -119,11 +120,15 @@ NO_DECISION = {
         identify.block_sum_store _VELOCITIES
         identify.excitation SECTORS
         identify.fit_warnings MOST_LOGS_SAID
+        identify.gusts _PROBES
+        identify.log_conditions _SAMPLES _START_WINDOWS
         identify.physical_checks MOST_ROWS
         identify.settings FOLDS
         identify.split EVERY
         identify.sweeps.structure_sweep DRAWS
+        identify.sweeps.weak_sweep USUAL _WINDOWS_A_FOLD
         models.forces.estimator CHUNK_ROWS
+        effects.shallow_water MOST_VALUES
         effects.wind KEPT
         models.forces.residual _RUNS
         models.prediction.free_run MAX_STARTS

@@ -25,9 +25,12 @@ FERRY = load_profile("milliampere")
 BASE = """
 schema = "ferryid.scenario/1"
 vessel = "milliampere"
-path = { kind = "twelve-corner" }
+path = { kind = "twelve-corner", dwell_s = DWELL_S }
 controller = { delta = 0.7, sigma = 0.7 }
 """
+DWELL_S = {"shallow_water": 60.0}
+"""Where the time at a corner must be longer than `BRIEF_S` for an effect to be sized: a place has edges to be crossed."""
+BRIEF_S = 40.0
 HULL = ("m11", "m22", "m33", "X_u", "X_|u|u", "Y_v", "Y_|v|v", "Y_|r|v", "Y_|v|r", "N_r", "N_|r|r", "N_|r|v")
 """Coefficients that the true vessel has ten per cent off the profile's, either way."""
 NAMES = tuple(name for name, effect in effects().items() if effect.unsteady is None)
@@ -54,10 +57,17 @@ def inline(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(float(value))
 
 
-def found_in(tables: dict[str, Any], seed: int, folder: Path) -> Search:
+def base(dwell_s: float = BRIEF_S) -> str:
+    """Return the scenario of a round."""
+    return BASE.replace("DWELL_S", f"{dwell_s}")
+
+
+def found_in(tables: dict[str, Any], seed: int, folder: Path, dwell_s: float = BRIEF_S) -> Search:
     """Simulate a round with these tables in its scenario, and search its log."""
     sensors = {"imu_rate_hz": 0.0, "camera_rate_hz": 0.0, **tables.get("sensors", {})}
-    text = BASE + "".join(f"{key} = {inline(value)}\n" for key, value in {**tables, "sensors": sensors}.items())
+    text = base(dwell_s) + "".join(
+        f"{key} = {inline(value)}\n" for key, value in {**tables, "sensors": sensors}.items()
+    )
     scenario = parse_scenario(text, "effect")
     signs = np.random.default_rng(seed).choice([0.9, 1.1], len(HULL)).tolist()
     hull = dict(scenario.true_hull)
@@ -87,24 +97,23 @@ def test_effect_is_found_where_it_acts(name: str, tmp_path: Path) -> None:
     instance = effect.instances(FERRY)[-1]
     parameters = effect.parameters_of(FERRY)
     truth = moderate(name)
-    result = found_in(effect.scenario(truth, instance), 3, tmp_path)
+    result = found_in(effect.scenario(truth, instance), 3, tmp_path, DWELL_S.get(name, BRIEF_S))
     assert [(one.effect.id, one.instance) for one in result.fit.candidates[:1]] == [(name, instance)]
     assert effect.says(truth, instance)
     for one, value, error in zip(parameters, result.fit.values[0], result.fit.errors(0), strict=True):
         assert abs(value - truth[one.name]) < max(4.0 * error, 0.15 * one.size), one.name
 
 
-@pytest.mark.parametrize("seed", [5, 6])
 @pytest.mark.parametrize("name", RELATED)
-def test_related_effects_are_not_mistaken_for_each_other(name: str, seed: int, tmp_path: Path) -> None:
+def test_related_effects_are_not_mistaken_for_each_other(name: str, tmp_path: Path) -> None:
     instance = effects()[name].instances(FERRY)[0]
-    result = found_in(effects()[name].scenario(moderate(name), instance), seed, tmp_path)
+    result = found_in(effects()[name].scenario(moderate(name), instance), 5, tmp_path)
     assert [(one.effect.id, one.instance) for one in result.fit.candidates] == [(name, instance)]
 
 
 def test_a_hull_model_that_is_wrong_all_over_is_named(tmp_path: Path) -> None:
     log = tmp_path / "trial.mcap"
-    write_log(simulate(parse_scenario(BASE, "effect"), 1), log)
+    write_log(simulate(parse_scenario(base(), "effect"), 1), log)
     measurements, _ = read_measurements(str(log), FERRY)
     seen = windows(measurements, *window_lengths(FERRY))
     plain, spread = prior_force_model(seen.measurements, FERRY)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from ferryid.effects import effects
+from ferryid.effects import effects, shallow_water
 from ferryid.effects.force_model import ForceModel, Measurements, acceleration, hull_of
 from ferryid.effects.shallow_water import EDGE_M, HEAVIER, SIDES
 from ferryid.vessel import load_profile
@@ -80,6 +81,28 @@ def test_a_place_that_was_visited_once_is_a_time_as_well() -> None:
         inside = np.any([(t >= first) & (t < last) for first, last in times], axis=0)
         eta = np.where(inside[:, None], there, there + np.array([0.0, 50.0, 0.0]))
         assert EFFECT.single_visit(replace(force_model.measurements, eta=eta), p) == wanted, times
+
+
+def test_a_place_is_chosen_in_little_memory_and_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    force_model = sailed()
+    p = values(south=30.0, north=60.0, west=10.0, east=30.0)
+    measured = acceleration(EFFECT.apply(force_model, p, None))
+
+    def residual(of: ForceModel) -> np.ndarray:
+        return (10.0 * (acceleration(of) - measured)).ravel()
+
+    choose, hull = shallow_water.choose, hull_of(FERRY)
+    chosen = choose(force_model, hull, residual)
+    assert chosen.parameters[1].neutral == pytest.approx(30.0, abs=15.0)
+    tracemalloc.start()
+    choose(force_model, hull, residual)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # All rectangles at once need 200 MB.
+    assert peak < 160e6
+    monkeypatch.setattr(shallow_water, "MOST_VALUES", 1e5)
+    in_parts = choose(force_model, hull, residual)
+    assert (in_parts.parameters, in_parts.log_alternatives) == (chosen.parameters, chosen.log_alternatives)
 
 
 @pytest.mark.parametrize(

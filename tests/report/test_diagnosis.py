@@ -307,7 +307,7 @@ def nameless() -> Finding:
         effect="unknown",
         parameters={},
         intervals=((200.0, 260.0),),
-        says="Something unsteady moves the vessel.",
+        says="An unsteady disturbance acts.",
         evidence={"t": T, "before": burst},
         labels={"residual": "yaw moment left over [N·m]"},
         band_hz=(0.1, 0.2),
@@ -323,7 +323,7 @@ def test_what_has_no_name_is_no_fault_of_the_sensors() -> None:
     assert "2. Something without a name" in page
     # Nothing explains it, so that there is no figure of what it adds.
     assert {name for name in drawings if name.startswith("finding-2")} == {"finding-2-time"}
-    assert "that it is no chance" in trust(nameless())
+    assert "that it is not due to chance" in trust(nameless())
     alone = replace(one, verdict="unexplained", findings=(nameless(),))
     assert headline(alone).startswith("Unexplained:")
 
@@ -407,7 +407,7 @@ def test_the_table_says_what_its_errors_are_of_and_what_is_not_in_them() -> None
         moved=moved,
     )
     absent, hull, windows = about_errors(one)
-    assert absent == "Gusts and what has no name: not subtracted from these errors, and left in both rows."
+    assert absent == "Not subtracted from these errors, and left in both rows: gusts and unexplained forces."
     assert "the coefficient Y_v moved farthest, from -200 to -230 kg/s: 1.2 prior standard deviations" in hull
     assert "windows of 8 s" in windows
     assert "ferryid evaluate" in windows

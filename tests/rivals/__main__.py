@@ -20,6 +20,7 @@ from tests.rivals.page import (
     better_simulated,
     recorded_section,
     simulated_section,
+    targets,
 )
 from tests.rivals.recorded import CASES, recorded
 from tests.rivals.simulated import KINDS, compared, trials
@@ -30,11 +31,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.rivals")
     parser.add_argument("--trials", type=int, default=5, help="simulated trials of each kind")
     count = parser.parse_args().trials
-    lines, ahead, absent = [HEAD, SIMULATED_HEAD], [], []
+    lines, ahead, absent = [SIMULATED_HEAD], [], []
+    simulated, recordings = {}, []
     with tempfile.TemporaryDirectory() as folder:
         for kind in KINDS if count else ():
             print(kind.name, flush=True)
-            found = [compared(trial) for trial in trials(kind, count, Path(folder))]
+            found = simulated[kind.name] = [compared(trial) for trial in trials(kind, count, Path(folder))]
             lines += simulated_section(kind.name, found)
             ahead += better_simulated(kind.name, found)
     lines.append(RECORDED_HEAD)
@@ -44,11 +46,13 @@ def main() -> None:
         if one is None:
             absent.append(case.name)
             continue
+        recordings.append(one)
         lines += recorded_section(one)
         ahead += better(one)
     if absent:
         lines.append(f"\nNot at hand, and so left out: {', '.join(absent)}.\n")
     lines += [ELSEWHERE, *(ahead or ["Nowhere."]), ""]
+    lines = [HEAD, *targets(simulated, recordings, absent), *lines]
     (REPORTS / "rivals.md").write_text("\n".join(lines), encoding="utf-8")
     stamp(REPORTS / "rivals.md")
 

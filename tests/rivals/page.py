@@ -44,7 +44,7 @@ SIMULATED_HEAD = f"""
 ## Simulated trials
 
 Learnt from one trial with the sensors' noise, judged on another of the same vessel without noise, in calm. Every coefficient of
-the profile (in the simulator of the truth) is off by the stated share, up or down at random. The simulator shares its equations
+the profile is off by the stated share, up or down at random. The simulator shares its equations
 with ferryid; the independent plant (`ferryid.validation`) has six degrees of freedom, strips in cross flow and lift, which no
 method's terms describe exactly. The breeze of {hypot(*WIND_MPS):.1f} m/s, in the simulator with gusts of {GUST_MPS:g} m/s and
 in the plant steady, is not measured. *m11*, *m22*, *m33*: relative error, median over trials. *Damping*: error of its force at
@@ -69,6 +69,70 @@ ELSEWHERE = f"""
 
 By more than {100 * MARGIN:g} % of the error of ferryid auto. Diverged runs are not in the rms.
 """
+
+
+def simulated_targets(found: Mapping[str, Sequence[Mapping[str, Found | str]]]) -> list[str]:
+    """Return how many kinds of simulated trials, by name, meet each target, as rows of a table."""
+    every = {name: summary([one[OURS] for one in trials]) for name, trials in found.items()}
+    held = [one[OURS].covered for trials in found.values() for one in trials if isinstance(one[OURS], Found)]
+    covered = np.concatenate(held)
+    share = 100.0 * float(np.mean(covered[np.isfinite(covered)]))
+    rows = []
+    for what, place, most in (("m11", 0, 2.0), ("m22", 1, 2.0), ("m33", 2, 2.0), ("damping force", 3, 5.0)):
+        values = [numbers[place] for numbers in every.values()]
+        met = sum(value <= most for value in values)
+        span = f"{min(values):.1f} to {max(values):.1f} %"
+        rows.append(f"| median error of {what} at most {most:g} % | {met} of {len(values)} kinds | {span} |")
+    met = "yes" if 93.0 <= share <= 97.0 else "no"
+    trials = sum(len(one) for one in found.values())
+    rows.append(f"| 95 % intervals of the inertias hold 93 to 97 % | {met} | {share:.1f} % of {trials} trials |")
+    return rows
+
+
+def recorded_targets(every: Sequence[Recorded]) -> list[str]:
+    """Return how free runs of 60 s compare with base model and rivals on all recordings, as rows of a table."""
+    rows = []
+    for name in every[0].scores:
+        if name.startswith("ferryid"):
+            continue
+        ratios = []
+        for one in every:
+            theirs = one.scores[name]
+            both = [score.median(POSITION, LAST) for score in (one.scores[OURS], theirs)]
+            if not theirs.failed:
+                # A median run that diverged has no error: infinitely worse than one that did not.
+                ratios.append(both[0] / both[1] if isfinite(both[1]) else 0.0)
+        if not ratios:
+            continue
+        better = sum(ratio < 1.0 for ratio in ratios)
+        rows.append(
+            f"| position after {HORIZONS_S[-1]:g} s better than that of {name} | {better} of {len(ratios)} sets | "
+            f"median ratio {np.median(ratios):.2f} |"
+        )
+    lost = sum(one.scores[OURS].diverged for one in every)
+    runs = sum(len(one.scores[OURS].runs) for one in every)
+    rows.append(f"| free runs that diverge | {lost or 'none'} | of {runs} |")
+    return rows
+
+
+def targets(
+    found: Mapping[str, Sequence[Mapping[str, Found | str]]], recorded: Sequence[Recorded], absent: Sequence[str]
+) -> list[str]:
+    """Return the table of what was aimed at and what was reached, by ferryid's default."""
+    rows = [*(simulated_targets(found) if found else []), *(recorded_targets(recorded) if recorded else [])]
+    missing = [] if found else ["simulated trials"]
+    missing += ["recordings"] if absent and not recorded else []
+    left = [f"\nNot tested: {', '.join(missing)}."] if missing else []
+    return [
+        "\n## Aims and results\n",
+        "Of `fit` with its defaults (ferryid auto). Rivals count where they have a model that can be simulated.",
+        "",
+        "| aim | reached | figures |",
+        "|---|---|---|",
+        *rows,
+        *left,
+        "",
+    ]
 
 
 def simulated_section(name: str, found: Sequence[Mapping[str, Found | str]]) -> list[str]:

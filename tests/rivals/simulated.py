@@ -118,41 +118,46 @@ def damping_force(force: Estimator, mass: Floats, nu: Floats) -> Floats:
 
 def trials(kind: Kind, count: int, folder: Path) -> Iterator[Trial]:
     """Yield trials of a kind."""
+    # Logs of one plant, seed and weather serve every kind: only the profile differs.
+    where = folder / kind.plant.replace(" ", "-")
+    where.mkdir(parents=True, exist_ok=True)
     for seed in range(count):
         rng = np.random.default_rng([seed, round(100 * kind.off)])
         names = (*INERTIAS, *DAMPING_TERMS)
         factors = dict(zip(names, (1.0 + kind.off * rng.choice([-1.0, 1.0], len(names))).tolist(), strict=True))
-        where = folder / f"{kind.plant.replace(' ', '-')}-{kind.off}-{kind.breeze}-{seed}"
-        where.mkdir(parents=True)
         yield (_simulator if kind.plant == "simulator" else _independent)(kind, seed, factors, where)
 
 
 def _simulator(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path) -> Trial:
-    profile = load_profile("milliampere")
-    calm = replace(load_scenario("twelve-corner-calm"), true_hull=factors)
+    true = load_profile("milliampere")
+    profile = replace(true, hull=perturbed(true.hull, factors))
+    calm = load_scenario("twelve-corner-calm")
     blown = replace(
         calm, wind=Wind(north_mps=WIND_MPS[0], east_mps=WIND_MPS[1], gust_std_mps=GUST_MPS, gust_time_s=8.0)
     )
     noise = replace(calm.sensors.noise, position_m=0.0, heading_deg=0.0, velocity_mps=0.0, yaw_rate_degps=0.0)
     exact = replace(calm, sensors=replace(calm.sensors, noise=noise))
     logs = []
-    for name, scenario, number in (("learn", blown if kind.breeze else calm, seed), ("judge", exact, 1000 + seed)):
-        path = folder / f"{name}.mcap"
-        write_log(simulate(scenario, number), path)
+    learn = ("breeze", blown) if kind.breeze else ("calm", calm)
+    for (name, scenario), number in ((learn, seed), (("judge", exact), 1000 + seed)):
+        path = folder / f"{name}-{seed}.mcap"
+        if not path.exists():
+            write_log(simulate(scenario, number), path)
         logs.append(open_track(str(path), profile, None))
-    true = replace(profile, hull=perturbed(profile.hull, factors))
     return Trial(profile, *logs, true.hull.M, true)
 
 
 def _independent(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path) -> Trial:
     profile = parse_profile(profile_text(FERRY, factors, FERRY.thrusters), "ferry")
     logs = []
-    for name, number in (("learn", seed), ("judge", 1000 + seed)):
+    for name, number in (("breeze" if kind.breeze else "calm", seed), ("judge", 1000 + seed)):
         conditions: dict[str, object] = {"noise": 0.0} if name == "judge" else {}
-        if kind.breeze and name == "learn":
+        if name == "breeze":
             conditions["wind"] = WIND_MPS
-        trial = simulate_trial(FERRY, conditions, "calibration", number)
-        path = log_writer.write_log(log_writer.streams(trial, number), folder, name, "mcap")
+        path = folder / f"{name}-{seed}.mcap"
+        if not path.exists():
+            trial = simulate_trial(FERRY, conditions, "calibration", number)
+            path = log_writer.write_log(log_writer.streams(trial, number), folder, path.stem, "mcap")
         logs.append(open_track(str(path), profile, None))
     m = masses(FERRY)
     mass = np.array([[m["m11"], 0.0, 0.0], [0.0, m["m22"], m["m23"]], [0.0, m["m32"], m["m33"]]])

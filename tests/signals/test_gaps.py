@@ -156,6 +156,22 @@ def test_velocities_that_stay_while_the_pose_moves_are_left_out_and_counted(
     assert any(one.startswith(f"{signals[0]}: the ") and "left out" in one for one in opened.track.repairs)
 
 
+def test_velocities_that_stay_at_zero_for_half_a_minute_are_found_in_a_noisy_log(tmp_path: Path) -> None:
+    # The pose moves by 3.6 m, at 0.12 m/s: three times what it and the velocity usually differ by, in six windows.
+    made = changed(ten_minutes(), [(200.0, 30.0)], stuck((SURGE, SWAY, YAW_RATE), 0.0))
+    opened = open_track(str(written(made, tmp_path / "stuck.mcap")), FERRY, None)
+    (left,) = opened.track.left_out
+    assert left.rows == pytest.approx(600, abs=2)
+    assert "u 599" in left.reason
+
+
+def test_a_gap_after_the_first_message_of_the_navigation_is_counted(tmp_path: Path) -> None:
+    log = written(silent(ten_minutes(), NAVIGATION, [(0.0, 60.0)]), tmp_path / "begins.mcap")
+    opened = open_track(str(log), FERRY, None)
+    assert opened.track.left_out[0].seconds == pytest.approx(60.0, abs=0.2)
+    assert any("1199 of 11999 rows" in one or "1200 of 12000 rows" in one for one in opened.left_out)
+
+
 def test_a_heading_that_steps_and_stays_is_a_warning(tmp_path: Path) -> None:
     made = changed(ten_minutes(), [(300.0, 1000.0)], turned_by(10.0))
     opened = open_track(str(written(made, tmp_path / "step.mcap")), FERRY, None)

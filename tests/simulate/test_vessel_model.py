@@ -9,8 +9,10 @@ import pytest
 
 from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
 from ferryid.errors import FerryIdError
+from ferryid.models.forces import MAPPED, model_estimator
 from ferryid.models.model import Model
 from ferryid.models.stored_effect import Conditions, Quantity
+from ferryid.regression.bases import make_basis
 from ferryid.simulate import load_scenario, parse_scenario, simulate
 from ferryid.simulate.vessel_model import sailed_by
 from ferryid.vessel import load_profile
@@ -115,10 +117,41 @@ def test_what_the_scenario_says_of_the_vessel_is_set_aside() -> None:
     assert sailing.notes == ("the scenario's [thrusters.faults] is set aside: the vessel is boat@0",)
 
 
+def test_terms_that_no_hull_has_act_beside_it() -> None:
+    functions = make_basis("modulus+wind-thesis+current-thesis", structure="decoupled")
+    K, rng = len(functions.terms), np.random.default_rng(1)
+    theta = np.where(functions.mask, 20.0 * rng.standard_normal((K, 3)), 0.0)
+    for term, axis in (place for places in MAPPED.values() for place in places):
+        # Those of the hull act on what moves through the water, and make its mass.
+        theta[functions.terms.index(term) if term in functions.terms else [], axis] = 0.0
+    model = replace(
+        hull_alone(),
+        settings={"basis": functions.name, "structure": "decoupled", "components": 3, "window_s": 1.0},
+        terms=functions.terms,
+        units=functions.units,
+        theta=theta,
+        low=theta,
+        high=theta,
+        intercept=np.array([5.0, -3.0, 2.0]),
+        covariance=np.zeros((3, K + 1, K + 1)),
+    )
+    windy = (
+        f"{TRIAL}[environment]\nwind = {{ north_mps = 2.0, east_mps = -3.0 }}\n"
+        "current = { north_mps = 0.2, east_mps = 0.1 }\n"
+    )
+    sailing = sailed_by(parse_scenario(windy, "t"), model)
+    truth = simulate(sailing.scenario, 3, vessel=sailing.vessel, terms=sailing.terms).truth
+    n = len(truth.t)
+    flows = [np.tile(flow, (n, 1)) for flow in ([2.0, -3.0], [0.2, 0.1])]
+    needed = model_estimator(model)(truth.nu_dot, truth.nu, truth.eta[:, 2], *flows)
+    np.testing.assert_allclose(needed, truth.tau, rtol=1e-6, atol=1e-6)
+
+
 def test_what_cannot_be_sailed_is_told() -> None:
     scenario = parse_scenario(TRIAL, "t")
-    with pytest.raises(FerryIdError, match=r"boat@0: the simulated vessel cannot have .* uv, .*the constant"):
-        sailed_by(scenario, diagnosed())
+    coupled = replace(diagnosed(), settings={**diagnosed().settings, "structure": "coupled"})
+    with pytest.raises(FerryIdError, match=r"boat@0: the simulated vessel cannot have .* u_dot, "):
+        sailed_by(scenario, coupled)
     with pytest.raises(FerryIdError, match="a trial of milliampere cannot be sailed by boat@0, a model of revolt"):
         sailed_by(scenario, hull_alone(profile_text=load_profile("revolt").text))
     light = hull_alone(conditions=(Conditions("trial", HERE, (stored("payload", mass=-200.0, x=0.5),)),))

@@ -83,8 +83,9 @@ def test_a_cluster_that_cannot_be_used_is_one_line(
     assert ferryid_run("prove", "--processes", "0", "--out", tmp_path / "out").code == 2
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["interrupt", "terminate"])
-@pytest.mark.parametrize("processes", [1, 2])
+@pytest.mark.parametrize(
+    ("processes", "number"), [(1, signal.SIGINT), (2, signal.SIGTERM)], ids=["interrupt", "terminate"]
+)
 def test_it_ends_at_once_with_all_its_processes(tmp_path: Path, number: signal.Signals, processes: int) -> None:
     cli = str(Path(ferryid.cli.__path__[0]))
     code = f"""

@@ -306,7 +306,7 @@ def test_what_became_of_what_the_oracle_alone_named() -> None:
     assert outcome_of_missed(result([WIND], [finding("unknown")]), ("wind", None)) == "unknown"
     assert outcome_of_missed(result([WIND], [finding("wind", p=0.5), finding("current")]), ("wind", None)) == "a hint"
     assert outcome_of_missed(weak, key) == "taken for wind"
-    note = "Thruster force (thruster1) was suspected, but dropped: a law explains more."
+    note = "Thruster force (thruster1) was considered, but dropped: a law explains more."
     weak = replace(weak, diagnosis=replace(weak.diagnosis, notes=(note,)))
     assert outcome_of_missed(weak, key) == "dropped"
     assert outcome_of_missed(weak, ("thruster_gain", "thruster2")) == "taken for wind"

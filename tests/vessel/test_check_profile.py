@@ -278,12 +278,12 @@ CASES = {
     "no yaw": (
         '[signals.yaw_rate]\ntopic = "/nav"\nfield = "r"\nunit = "rad/s"\nframe = "FRD"\n',
         "",
-        "no yaw rate can be had",
+        "no yaw rate is available",
     ),
     "no velocity": (
         '[signals.velocity]\ntopic = "/nav"\nfields = ["u", "v"]\nunit = "m/s"\nframe = "FRD"\n',
         "",
-        "no surge and sway velocity can be had",
+        "no surge and sway velocity is available",
     ),
     "sign": ('field = "a"\nunit = "rad"', 'field = "a"\nunit = "rad"\nsign = -2@', "must be 1 or -1"),
     "body frame for a heading": (

@@ -23,7 +23,7 @@ def find(measurements: Measurements) -> SensorFinding | None:
     if found is None or not found.found(LATE, CHECKS.least_delay_s):
         return None
     late = found.solution.estimate(LATE, "s")
-    word = "later" if late.value > 0.0 else "earlier"
+    lagging, leading = ("Position", "velocity") if late.value > 0.0 else ("Velocity", "position")
 
     def correct(measured: Measurements) -> Measurements:
         when = measured.t + abs(late.value)
@@ -39,7 +39,7 @@ def find(measurements: Measurements) -> SensorFinding | None:
     return SensorFinding(
         "clock_offset",
         {"seconds": late},
-        f"The positions are {abs(late.value):.2f} s {word} than the velocities.",
+        f"{lagging} lags {leading} by {abs(late.value):.2f} s.",
         correct,
         found.evidence(LATE),
     )

@@ -91,7 +91,7 @@ def _told(fallen_by_reason: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
     said = []
     for why, titles in fallen_by_reason.items():
         names = list(dict.fromkeys(titles))
-        said.append(f"{listed(names)} {'were' if len(names) > 1 else 'was'} suspected, but dropped: {why}.")
+        said.append(f"{listed(names)} {'were' if len(names) > 1 else 'was'} considered, but dropped: {why}.")
     return tuple(said)
 
 

@@ -132,7 +132,7 @@ def recording_advice(every: Sequence[DetectionPower], axes: Sequence[str]) -> li
     if axes:
         what = " and ".join(axes)
         sentences.append(
-            f"The vessel was hardly moved in {what}: the log tells nothing of its hull there. "
+            f"The vessel was hardly moved in {what}: the hull cannot be identified there. "
             f"To excite {'it' if len(axes) == 1 else 'them'}, record {'; '.join(EXCITES[axis] for axis in axes)}."
         )
     by_manoeuvre: dict[str, dict[str, list[str]]] = {}

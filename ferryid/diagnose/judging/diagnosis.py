@@ -8,6 +8,7 @@ from typing import Any
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import Finding
+from ferryid.diagnose.judging.learning import Learnt
 from ferryid.diagnose.judging.locate import Location, plain_location
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.verdict import Remainder
@@ -102,6 +103,8 @@ class Diagnosis:
         What is left beside the findings.
     left_out
         Rows of the log that are not used, by reason.
+    learnt
+        What a fit learnt beside the findings; None where nothing was to be learnt.
     """
 
     log: str
@@ -121,6 +124,7 @@ class Diagnosis:
     duration_s: float | None = None
     remainder: Remainder = field(default_factory=Remainder)
     left_out: tuple[LeftOut, ...] = ()
+    learnt: Learnt | None = None
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -149,6 +153,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.moved is None else {"hull_moved": vars(diagnosis.moved)}),
         **({} if diagnosis.duration_s is None else {"duration_s": diagnosis.duration_s}),
         "left_out": [asdict(one) for one in diagnosis.left_out],
+        **({} if diagnosis.learnt is None else {"learnt": diagnosis.learnt.to_json()}),
     }
 
 

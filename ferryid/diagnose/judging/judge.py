@@ -64,7 +64,7 @@ def _judged(
 ) -> JudgedLog:
     problem, states, measurements = log.search.problem, log.search.states, log.estimated.averaged.screened.measurements
     base = fit(problem, ())
-    progress("looking for what has no name")
+    progress("looking for unexplained forces")
     unknown = find_unexplained(problem, stands.fit, measurements, laws)
     progress("locating")
     claims = (

@@ -14,6 +14,7 @@ import numpy as np
 from ferryid import __version__
 from ferryid.counts import counted
 from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.learning import Learner
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
@@ -28,9 +29,15 @@ from ferryid.vessel.profile import Profile
 
 
 def store_updated_model(
-    diagnoses: Sequence[Diagnosis], profile: Profile, model: Model | None, out: Path, *, name: str = ""
+    diagnoses: Sequence[Diagnosis],
+    profile: Profile,
+    model: Model | None,
+    out: Path,
+    *,
+    name: str = "",
+    learner: Learner | None = None,
 ) -> tuple[Diagnosis, ...]:
-    """Store the model that diagnoses lead to, and return them with its path; as they are where nothing was left out.
+    """Store the model that diagnoses lead to, and return them with its path; as they are where there is nothing to store.
 
     Parameters
     ----------
@@ -44,19 +51,34 @@ def store_updated_model(
         Output folder.
     name
         Name of the new model; that of the examined model, else the vessel's, where empty.
+    learner
+        Learns from the logs what the findings leave; None: nothing is learnt.
 
     Raises
     ------
     FerryIdError
         For a name that a model cannot have, and a folder that cannot be written.
     """
-    made, notes = update_model(diagnoses, profile, model, check_name(name or (model.name if model else profile.name)))
-    if made is None:
-        return tuple(diagnoses)
-    with alone(out / "models"):
-        path = str(save(made, out).path)
+    name = check_name(name or (model.name if model else profile.name))
+    made, notes = update_model(diagnoses, profile, model, name)
+    learnt = None
+    if learner is not None:
+        made, learnt = learner.learn(made, name)
+        notes = (*notes, learnt.says)
+        diagnoses = [replace(one, learnt=learnt) for one in diagnoses]
+    path = None
+    if made is not None:
+        with alone(out / "models"):
+            path = str(save(made, out).path)
+    everywhere = learnt is not None and learnt.accepted
     return tuple(
-        replace(one, model=path, notes=(*one.notes, *one.posterior.notes, *notes)) if one.posterior else one
+        replace(
+            one,
+            model=path if one.posterior or everywhere else None,
+            notes=(*one.notes, *(one.posterior.notes if one.posterior else ()), *notes),
+        )
+        if one.posterior or learnt
+        else one
         for one in diagnoses
     )
 

@@ -30,7 +30,7 @@ class JudgingThresholds:
         6,
         "replacements",
         "most candidates that a rival replaces in backward elimination",
-        "convention: physics that has no name may be explained by one candidate after the other",
+        "convention: physics outside the library may be explained by one candidate after the other",
     )
     missing_share: float = threshold(
         0.6,

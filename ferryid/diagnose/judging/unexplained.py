@@ -157,7 +157,7 @@ def _lawful(law: Law, kept: Fit, measurements: Measurements, whose: str) -> Find
         regime=place.regime,
         improvement=dict(zip(AXES, law.held_out.removed.tolist(), strict=True)),
         held_out=True,
-        says=f"A force acts that has no name here, but a law {whose}: {listing}.",
+        says=f"An unmodelled force follows a law {whose}: {listing}.",
         band_hz=_band(place.bands, place.shares, [band.before - band.after for band in place.bands]),
         law=tuple(terms),
         **figure_columns(problem, place, regressor),
@@ -205,8 +205,8 @@ def _in_bursts(burst: Burst) -> Finding:
         parameters={},
         axes=dict(zip(AXES, burst.shares.tolist(), strict=True)),
         intervals=burst.intervals,
-        says=f"Something unsteady moves the vessel in bursts of {band}, most in {AXES[axis]} ({size:.2g} {unit} in the root "
-        f"mean square){when}; no law of its motion explains it.",
+        says=f"An unsteady disturbance acts in bursts of {band}, most in {AXES[axis]} ({size:.2g} {unit} RMS){when}; no law of "
+        "the vessel's motion explains it.",
         evidence={"t": burst.t, "before": burst.force[:, axis]},
         labels={"residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'}, {band} [{unit}]"},
         band_hz=(burst.low_hz, burst.high_hz),
@@ -237,7 +237,7 @@ def _unsteady(problem: EstimationProblem, left: Location) -> Finding:
         onset_s=left.onset_s,
         offset_s=left.offset_s,
         regime=left.regime,
-        says=f"Something unsteady moves the vessel, most in {axis}{fast}{when}{where}; no law of its motion explains it.",
+        says=f"An unsteady disturbance acts, most in {axis}{fast}{when}{where}; no law of the vessel's motion explains it.",
         band_hz=band,
         **figure_columns(problem, left, None, alone=True),
     )

@@ -8,7 +8,7 @@ from ferryid.models.forces.estimator import (
     model_estimator,
     replace_hull_coefficients,
 )
-from ferryid.models.forces.hull_terms import MAPPED, hull_contribution, unmapped_terms
+from ferryid.models.forces.hull_terms import MAPPED, UnmappedTerms, beside_the_hull, hull_contribution, unmapped_terms
 from ferryid.models.forces.model_forces import ModelForces, acting_estimator, force_law
 from ferryid.models.forces.residual import FORMS, base_force, compute_residual, motion_force, scale_hull, without_inputs
 
@@ -18,8 +18,10 @@ __all__ = [
     "MAPPED",
     "Estimator",
     "ModelForces",
+    "UnmappedTerms",
     "acting_estimator",
     "base_force",
+    "beside_the_hull",
     "compute_residual",
     "effective_mass",
     "force_law",

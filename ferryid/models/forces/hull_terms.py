@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from ferryid.effects.force_model import COEFFICIENTS
 from ferryid.models.model import Model
+from ferryid.regression.bases import Term, make_basis
 from ferryid.types import Floats
 
 MAPPED: Mapping[str, tuple[tuple[str, int], ...]] = {
@@ -53,6 +55,39 @@ def hull_contribution(model: Model) -> tuple[Floats, Floats]:
         part[index] = (1.0 if name.startswith("m") else -1.0) * float(model.theta[rows, axis].sum())
         variance[index] = float(model.covariance[axis][np.ix_(rows, rows)].sum())
     return part, variance
+
+
+@dataclass(frozen=True, eq=False)
+class UnmappedTerms:
+    """What a model's force has beside that of its hull.
+
+    Attributes
+    ----------
+    functions
+        T terms.
+    theta
+        Their coefficients on the axes on which no coefficient of a hull stands for them, shape (T, 3).
+    intercept
+        Shape (3,) [N, N, N·m].
+    """
+
+    functions: tuple[Term, ...]
+    theta: Floats
+    intercept: Floats
+
+
+def beside_the_hull(model: Model) -> UnmappedTerms | None:
+    """Return the terms of `unmapped_terms` with their coefficients; None where there are none."""
+    if not unmapped_terms(model):
+        return None
+    theta, taken = model.theta.copy(), {place for places in MAPPED.values() for place in places}
+    for k, term in enumerate(model.terms):
+        for axis in range(3):
+            if (term, axis) in taken:
+                theta[k, axis] = 0.0
+    functions = make_basis(str(model.settings["basis"]), structure=str(model.settings["structure"])).functions
+    some = np.flatnonzero(theta.any(axis=1))
+    return UnmappedTerms(tuple(functions[k] for k in some.tolist()), theta[some], model.intercept)
 
 
 def unmapped_terms(model: Model) -> tuple[str, ...]:

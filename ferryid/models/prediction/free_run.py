@@ -179,6 +179,20 @@ def single_runs(force: ForceLaw, motion: Motion, starts: Ints, ends: Ints, horiz
     return _errors(path, stride, motion, starts, ends, horizons)
 
 
+def predicted_acceleration(force: ForceLaw, motion: Motion) -> Floats:
+    """Return the acceleration that a model expects in every row from force and velocity [m/s², m/s², rad/s²], shape (n, 3).
+
+    NaN where what it needs was not measured, and everywhere where its mass matrix cannot be inverted.
+    """
+    masses = _masses(force, motion)
+    if not (np.linalg.det(masses) > 0.0).all():
+        return np.full_like(motion.nu, np.nan)
+    payload = () if motion.payload is None else (motion.payload,)
+    needed = force(np.zeros_like(motion.nu), motion.nu, motion.eta[:, 2], motion.wind, motion.current, *payload)
+    inverses = np.broadcast_to(np.linalg.inv(masses), (len(motion.t), 3, 3))
+    return np.asarray(np.einsum("nij,nj->ni", inverses, motion.tau - needed))
+
+
 def _masses(force: ForceLaw, motion: Motion) -> Floats:
     """Return the effective mass, the derivative of the force by the acceleration, for every row: (n, 3, 3), or (1, 3, 3)."""
     if motion.payload is None:

@@ -13,6 +13,7 @@ from ferryid.simulate.added_effects import acting
 from ferryid.simulate.environment import wind_series
 from ferryid.simulate.plant import rolling
 from ferryid.simulate.plant.added import Added, added_load, build_added
+from ferryid.simulate.plant.beside import Beside, beside_load, beside_of
 from ferryid.simulate.plant.current import current_series, turn_rate
 from ferryid.simulate.plant.hull import (
     Force,
@@ -33,6 +34,7 @@ from ferryid.types import Floats
 from ferryid.vessel.profile import Profile
 
 if TYPE_CHECKING:
+    from ferryid.models.forces import UnmappedTerms
     from ferryid.simulate.scenario import Scenario
 
 
@@ -53,10 +55,13 @@ class Plant(NamedTuple):
     sea: Sea
     added: Added
     shallow: Patch
+    beside: Beside
 
 
-def build(scenario: Scenario, profile: Profile, seed: int, h: float, steps: int) -> Plant:
-    """Return the plant of a scenario, for `steps` steps of `h` seconds.
+def build(
+    scenario: Scenario, profile: Profile, seed: int, h: float, steps: int, terms: UnmappedTerms | None = None
+) -> Plant:
+    """Return the plant of a scenario, for `steps` steps of `h` seconds; `terms` act beside the hull of the profile.
 
     Raises
     ------
@@ -86,6 +91,7 @@ def build(scenario: Scenario, profile: Profile, seed: int, h: float, steps: int)
         sea=sea_of(profile, scenario.waves, scenario.wakes, seed, (p[0] - m, p[1] - m, p[4] - I_z)),
         added=added,
         shallow=patch_of(scenario.shallow),
+        beside=beside_of(terms),
     )
 
 
@@ -138,7 +144,8 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     tau = thrust_load(plant.gear, node, u_r, v_r, r)
     wave = wave_load(plant.sea, t, x, y, psi, c, s)
     north, east = plant.wind[i, 0], plant.wind[i, 1]
-    blown = wind_load(plant.areas, u - c * north - s * east, v - c * east + s * north)
+    u_rw, v_rw = u - c * north - s * east, v - c * east + s * north
+    blown = wind_load(plant.areas, u_rw, v_rw)
     mass = plant.phases.mass[phase]
     C = coriolis_load(mass[0], mass[1], mass[2], u_r, v_r, r)
     D = damping_load(plant.p, u_r, v_r, r)
@@ -148,6 +155,8 @@ def derivative(plant: Plant, phase: int, node: int, i: int, t: float, state: Sta
     N = tau[2] + wave[2] + blown[2] - C[2] - factor * D[2]
     more = added_load(plant.added, t, x, y, psi, u, v, r, u_r, v_r)
     X, Y, N = X + more[0], Y + more[1], N + more[2]
+    learnt = beside_load(plant.beside, u, v, r, u_rw, v_rw, u_r, v_r)
+    X, Y, N = X + learnt[0], Y + learnt[1], N + learnt[2]
     # nu_c_dot: [r v_c, -r u_c, 0], and R^T dV/dt of a current that turns clockwise, the current itself a quarter turn on.
     turn = r - plant.turn_radps
     inv = plant.phases.inverse[phase]

@@ -137,6 +137,14 @@ def test_a_gyro_of_the_wrong_sign() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
+    ("seconds", "says"), [(0.5, "Position lags velocity by 0."), (-0.5, "Velocity lags position by 0.")]
+)
+def test_a_clock_offset_says_which_lags(seconds: float, says: str) -> None:
+    assert alone(late(quiet(1), seconds), "clock_offset").says.startswith(says)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
     ("spoil", "effect", "truth"),
     [
         (lambda measurements: turned(measurements, 6.0), "heading_bias", {"angle": 6.0}),

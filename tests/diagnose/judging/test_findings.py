@@ -159,5 +159,5 @@ def test_a_strong_likelihood_needs_no_more(windy: tuple[EstimationProblem, Elimi
 
 def test_a_motion_before_its_force_is_a_clocks() -> None:
     says = effects()["time_delay"].says
-    assert says({"seconds": 0.2}, None) == "The navigation's data are 0.20 s later than the actuators'."
-    assert says({"seconds": -0.09}, None).startswith("The actuators' data are 0.09 s later than the navigation's: ")
+    assert says({"seconds": 0.2}, None) == "The navigation's data lag the actuators' by 0.20 s."
+    assert says({"seconds": -0.09}, None).startswith("The actuators' data lag the navigation's by 0.09 s: ")

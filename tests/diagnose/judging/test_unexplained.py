@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -85,13 +86,14 @@ def nu() -> Floats:
 @pytest.mark.parametrize(
     ("force", "on", "name", "size"),
     [
-        (pushes(surge=-25.0), "surge", "1", -25.0),
-        (pushes(sway=-40.0 * np.abs(nu()[:, 0]) * nu()[:, 0]), "sway", "u|u|", -40.0),
-        (pushes(yaw=400.0 * nu()[:, 0] * nu()[:, 1]), "yaw", "uv", 400.0),
+        (lambda: pushes(surge=-25.0), "surge", "1", -25.0),
+        (lambda: pushes(sway=-40.0 * np.abs(nu()[:, 0]) * nu()[:, 0]), "sway", "u|u|", -40.0),
+        (lambda: pushes(yaw=400.0 * nu()[:, 0] * nu()[:, 1]), "yaw", "uv", 400.0),
     ],
+    ids=["constant", "quadratic", "product"],
 )
-def test_a_law_comes_back(force: Floats, on: str, name: str, size: float) -> None:
-    problem = trial_with(force)
+def test_a_law_comes_back(force: Callable[[], Floats], on: str, name: str, size: float) -> None:
+    problem = trial_with(force())
     law = select_law(problem, fit(problem, ()), folds_of(problem.windows))
     assert law is not None
     assert [(term.on, term.name) for term in law.terms] == [(on, name)]

@@ -1,0 +1,227 @@
+"""What a fit learns from logs beyond the hull and the effects that their diagnoses name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite, nan
+
+import numpy as np
+
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.errors import FerryIdError
+from ferryid.identify import (
+    Acceptance,
+    FitOutcome,
+    FitSettings,
+    accept,
+    fit_logs,
+    fit_remainder,
+    prediction_errors,
+    with_remainder,
+)
+from ferryid.models import ForceScores, Model, ModelScores, blank_model
+from ferryid.types import AXES, Flags, Floats, RunContext, by_axis
+from ferryid.vessel.profile import Profile
+
+PREFIX = "Rejected: "
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What was learnt from what the diagnosed model leaves of the logs.
+
+    Attributes
+    ----------
+    accepted
+        Whether it is part of the model that is stored.
+    says
+        The outcome in one line.
+    reasons
+        Why it was accepted or not, as sentences.
+    ratio
+        Held-out squared prediction error with it over that without it, by axis; NaN where it is not known.
+    over_fit
+        That of the model that is stored over that of ``ferryid fit`` alone, by axis; empty where it is the model of the fit, or
+        none.
+    """
+
+    accepted: bool
+    says: str
+    reasons: tuple[str, ...] = ()
+    ratio: Mapping[str, float] | None = None
+    over_fit: Mapping[str, float] | None = None
+
+    def to_json(self) -> dict[str, object]:
+        """Return it as plain values."""
+        return {
+            "accepted": self.accepted,
+            "says": self.says,
+            "reasons": list(self.reasons),
+            "per_axis": dict(self.ratio or {}),
+            "over_fit": dict(self.over_fit or {}),
+        }
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A model with a correction on top, and how it was judged."""
+
+    model: Model
+    outcome: FitOutcome
+
+
+@dataclass(frozen=True)
+class Learner:
+    """The logs of a diagnosis, from which to learn what it leaves.
+
+    Attributes
+    ----------
+    paths
+        Logs; parts of one recording joined by ``+``.
+    profile
+        The vessel, without the signals that were withheld.
+    start
+        The model that was examined; None for the profile's hull.
+    run
+        Folder of the ingested tables, and progress.
+    settings
+        How to fit: as ``ferryid fit`` does without options.
+    """
+
+    paths: tuple[str, ...]
+    profile: Profile
+    start: Model | None
+    run: RunContext
+    settings: FitSettings = field(default_factory=FitSettings)
+
+    def learn(self, diagnosed: Model | None, name: str) -> tuple[Model | None, Learnt]:
+        """Return the model to store, and what was learnt; logs that cannot be fitted leave the model as it is.
+
+        Parameters
+        ----------
+        diagnosed
+            The model with the findings; None where there are none.
+        name
+            Name of a model where there is none yet.
+        """
+        self.run.progress("learning what is left")
+        try:
+            if diagnosed is None and self.start is None:
+                return self._fitted(name)
+            base = diagnosed or replace(self._known_start(), name=name)
+            return self._on_top(base, diagnosed)
+        except FerryIdError as error:
+            return diagnosed, Learnt(False, f"Nothing was learnt beside the findings: {error}")
+
+    def _known_start(self) -> Model:
+        assert self.start is not None
+        return self.start
+
+    def _fitted(self, name: str) -> tuple[Model | None, Learnt]:
+        """Return what a fit alone makes of the logs, of which nothing was named."""
+        found = fit_logs(self.paths, self.profile, self.settings, self.run, name=name)
+        ratio, accepted = found.acceptance.per_axis, found.acceptance.accepted
+        said = _says(
+            "No named effect enters the model. A correction of the hull", ratio, found.acceptance, "the profile's hull"
+        )
+        return (found.model if accepted else None), Learnt(accepted, said, found.acceptance.reasons, ratio)
+
+    def _on_top(self, base: Model, diagnosed: Model | None) -> tuple[Model | None, Learnt]:
+        """Return the model to store: what is examined or diagnosed, with a correction where that is accepted."""
+        start = self.start or blank_model(self.profile, base.name)
+        plain = fit_logs(self.paths, self.profile, self.settings, self.run, name=base.name)
+        found = self._remainder(base)
+        rows = [one.validation & other.validation for one, other in zip(plain.logs, found.outcome.logs, strict=True)]
+        before, known, after, fitted = self._errors([start, base, found.model, plain.model], rows)
+        verdict, what = _judged(found.outcome, known, after), "A correction learnt on top of the findings"
+        best = after if verdict.accepted else known
+        if diagnosed is not None and plain.acceptance.accepted and _fit_is_better(best, fitted):
+            # The refit of the diagnosis may be to blame: what was named stays, the hull is the fit's to estimate.
+            other = self._remainder(replace(base, hull=start.hull))
+            second = self._errors([base, other.model], rows)[1]
+            new = _judged(other.outcome, known, second)
+            if new.accepted and float(np.mean(_over(second, best))) < 1.0:
+                found, after, verdict, best = other, second, new, second
+                what = "A correction learnt beside the effects on the hull as it was before the diagnosis"
+        stored = diagnosed
+        if verdict.accepted:
+            stored = replace(found.model, accepted=True, scores=_scores(before, after, found.outcome))
+        over_fit = _over(best, fitted)
+        said = _says(what, by_axis(_over(after, known)), verdict, "the model without it")
+        if plain.acceptance.accepted and _fit_is_better(best, fitted):
+            said += (
+                f" The model of ferryid fit predicts these logs better: the squared error with the model of the diagnosis is "
+                f"{float(np.mean(over_fit)):.2f} times as large."
+            )
+        return stored, Learnt(verdict.accepted, said, verdict.reasons, by_axis(_over(after, known)), by_axis(over_fit))
+
+    def _remainder(self, base: Model) -> _Candidate:
+        outcome = fit_remainder(base, self.paths, self.profile, self.settings, self.run)
+        return _Candidate(with_remainder(base, outcome.model), outcome)
+
+    def _errors(self, models: Sequence[Model], rows: Sequence[Flags]) -> list[Floats]:
+        return prediction_errors(models, self.paths, self.profile, self.settings, self.run, rows)
+
+
+def without_withheld(profile: Profile, withhold: Sequence[str]) -> Profile:
+    """Return a profile that does not map what is hidden from a diagnosis."""
+    return replace(profile, signals=tuple(one for one in profile.signals if one.quantity not in withhold))
+
+
+def _judged(found: FitOutcome, without: Floats, after: Floats) -> Acceptance:
+    """Return the verdict on a correction: that of its fit, unless the folds or what would be stored speak against it.
+
+    Parameters
+    ----------
+    found
+        The correction.
+    without, after
+        Held-out squared prediction errors of the models without and with it, shape (3,) each.
+    """
+    stored = accept(without, after, "prediction")
+    reasons = [*found.acceptance.reasons]
+    folds = next((one.folds for one in found.estimators if one.chosen), 0.0)
+    accepted = found.acceptance.accepted and stored.accepted and folds < 1.0
+    if found.acceptance.accepted and not stored.accepted:
+        reasons = [*stored.reasons, *reasons]
+    if not folds < 1.0:
+        times = f"{folds:.2f} times as large" if isfinite(folds) else "infinite"
+        reasons.insert(0, f"{PREFIX}on folds of the training rows the squared prediction error with it is {times}.")
+    return replace(found.acceptance, accepted=accepted, reasons=tuple(reasons))
+
+
+def _fit_is_better(stored: Floats, fitted: Floats) -> bool:
+    """Return whether the error of the model to be stored is larger than that of a fit, by more than is reported."""
+    return float(np.mean(_over(stored, fitted))) > 1.0 + JUDGING.reported_change
+
+
+def _over(one: Floats, other: Floats) -> Floats:
+    ratio: Floats = np.divide(one, other, out=np.full(3, nan), where=other > 0.0)
+    return ratio
+
+
+def _says(what: str, ratio: Mapping[str, float], verdict: Acceptance, base: str) -> str:
+    """Return in one line what was learnt, or why it was not accepted."""
+    change = ", ".join(
+        f"{axis} {100.0 * (ratio[axis] - 1.0):+.0f} %" for axis in AXES if isfinite(ratio.get(axis, nan))
+    )
+    told = f"held-out squared prediction error against {base}: {change or 'unknown'}"
+    if verdict.accepted:
+        return f"{what} is part of the model; {told}."
+    reasons = [one.removeprefix(PREFIX) for one in verdict.reasons if one.startswith(PREFIX)]
+    why = reasons[0] if reasons else (verdict.reasons or ("it was not judged.",))[0]
+    return f"{what} was not accepted ({told}): {why}"
+
+
+def _scores(before: Floats, after: Floats, outcome: FitOutcome) -> ModelScores:
+    """Return the held-out prediction errors of the model before and after, as a model file has its scores."""
+    unknown, ratio = np.full(len(AXES), nan), _over(after, before)
+    judged = outcome.model.scores
+    assert judged is not None
+    return replace(
+        judged,
+        force=ForceScores(before, after, unknown, unknown, ratio, float(np.mean(ratio))),
+        split_notes=(*judged.split_notes, "Hull and effects have seen the held-out rows, what was learnt has not."),
+        measure="prediction",
+    )

@@ -1,0 +1,133 @@
+"""Gusts of a wind that nobody measured: a first-order process in every log, one value a window of the weak form.
+
+As a random effect with 2 J unknowns a log they are eliminated from the normal equations; their precision is banded, so that the
+cost grows with the length of the log (Rue and Held 2005, chapter 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ferryid.identify.thresholds import IDENTIFY
+from ferryid.types import Floats, Ints
+
+_PROBES = 8
+"""Random vectors by which the trace of an inverse is estimated (Hutchinson 1990)."""
+
+
+@dataclass(frozen=True, eq=False)
+class GustEquations:
+    """Banded precision of the gusts of one log, given hull and conditions.
+
+    Attributes
+    ----------
+    bands
+        Diagonal and the two above it, in the upper form of `scipy.linalg.solveh_banded`, shape (3, 2 J).
+    slope
+        Derivative of the target with respect to the wind, shape (J, 3, 2).
+    blow
+        Whether the log is long enough to tell gusts from the hull's forces, and has a wind at all.
+    """
+
+    bands: Floats
+    slope: Floats
+    blow: bool
+
+    def eliminated(self, table: Floats, weight: Floats) -> tuple[Floats, Floats]:
+        """Return the gusts' side of the normal equations with columns (3, J, c), and its solution, shape (2 J, c) each."""
+        response = np.einsum("jax,a,ajc->jxc", self.slope, weight, table, optimize=True).reshape(-1, table.shape[2])
+        if not self.blow:
+            return response, np.zeros_like(response)
+        return response, self.solve(response)
+
+    def solve(self, right: Floats) -> Floats:
+        """Return the solution for right-hand sides, shape (2 J, c)."""
+        from scipy.linalg import solveh_banded
+
+        return np.asarray(solveh_banded(self.bands, right, check_finite=False))
+
+
+class Gusts:
+    """Gusts of L logs, found window by window.
+
+    `uncertain` is the sum of squares that they leave uncertain in the targets since the last `update`, shape (3,).
+
+    Parameters
+    ----------
+    runs
+        Number of the unbroken stretch that each window lies in, shape (J,) each.
+    stride_s
+        Time between windows [s].
+    """
+
+    def __init__(self, runs: Sequence[Ints], stride_s: float) -> None:
+        self.found = [np.zeros((len(run), 2)) for run in runs]
+        self.spread = IDENTIFY.gust_spread_mps
+        self._kept = float(np.exp(-stride_s / IDENTIFY.gust_time_s))
+        self._follows = [np.diff(run) == 0 for run in runs]
+        self._sums = list[tuple[float, int]]()
+        self.uncertain = np.zeros(3)
+
+    def precision(self, k: int) -> tuple[Floats, Floats]:
+        """Return diagonal (J,) and neighbours (J - 1,) of the precision of a process of unit variance in one log."""
+        follows, kept = self._follows[k], self._kept
+        share = 1.0 / (1.0 - kept**2)
+        diagonal = np.ones(len(self.found[k]))
+        diagonal[:-1] += np.where(follows, kept**2 * share, 0.0)
+        diagonal[1:] += np.where(follows, share - 1.0, 0.0)
+        return diagonal, np.where(follows, -kept * share, 0.0)
+
+    def equations(self, k: int, slope: Floats, weight: Floats) -> GustEquations:
+        """Return the precision of one log's gusts for this slope of the target (J, 3, 2) and weights of the axes (3,)."""
+        J = len(slope)
+        bands = np.zeros((3, 2 * J))
+        if J:
+            data = np.einsum("jax,a,jay->jxy", slope, weight, slope)
+            diagonal, beside = (part / self.spread**2 for part in self.precision(k))
+            bands[2] = (np.einsum("jxx->jx", data) + diagonal[:, None]).reshape(-1)
+            bands[1, 1::2] = data[:, 0, 1]
+            bands[0, 2:] = np.repeat(beside, 2)
+        equations = GustEquations(bands, slope, IDENTIFY.fewest_gust_windows <= J and bool(slope.any()))
+        if equations.blow:
+            self._uncertain(k, equations)
+        return equations
+
+    def _uncertain(self, k: int, equations: GustEquations) -> None:
+        """Add up the expected squares of what remains uncertain, in the measure of the process and in the targets."""
+        size, rng = equations.bands.shape[1], np.random.default_rng(0)
+        probes = rng.choice([-1.0, 1.0], (size, _PROBES))
+        self._sums.append((float(np.sum(self._weighted(k, probes) * equations.solve(probes))) / _PROBES, size))
+        signs = rng.choice([-1.0, 1.0], (size // 2, _PROBES))
+        for axis in range(3):
+            probes = (equations.slope[:, axis, :, None] * signs[:, None, :]).reshape(size, _PROBES)
+            self.uncertain[axis] += float(np.sum(probes * equations.solve(probes))) / _PROBES
+
+    def _weighted(self, k: int, values: Floats) -> Floats:
+        """Return the process's precision times values, shape (2 J, c)."""
+        diagonal, beside = self.precision(k)
+        table = values.reshape(len(diagonal), 2, -1)
+        out = table * diagonal[:, None, None]
+        out[:-1] += beside[:, None, None] * table[1:]
+        out[1:] += beside[:, None, None] * table[:-1]
+        return np.asarray(out.reshape(values.shape))
+
+    def take(self, k: int, gusts: Floats) -> None:
+        """Take the gusts that were found in one log, shape (J, 2)."""
+        limit = 4.0 * self.spread
+        self.found[k] = np.clip(gusts, -limit, limit)
+
+    def update(self) -> None:
+        """Estimate their spread anew, by expectation and maximisation."""
+        self.uncertain = np.zeros(3)
+        if not self._sums:
+            return
+        squares = sum(trace for trace, _ in self._sums)
+        for k, gusts in enumerate(self.found):
+            flat = gusts.reshape(-1, 1)
+            squares += float(np.sum(flat * self._weighted(k, flat))) if len(flat) else 0.0
+        count = sum(size for _, size in self._sums)
+        self.spread = float(max(np.sqrt(squares / count), IDENTIFY.least_gust_mps))
+        self._sums.clear()

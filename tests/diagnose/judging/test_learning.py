@@ -1,0 +1,242 @@
+"""What is learnt beside named effects: accepted only where it helps, stored with them, and no worse than a fit alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ferryid.compare.evaluation import evaluate
+from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
+from ferryid.diagnose.judging.learning import Learner, without_withheld
+from ferryid.effects import effects
+from ferryid.effects.force_model import COEFFICIENTS, UNITS, hull_of
+from ferryid.export.model_file import export_model
+from ferryid.identify import FitSettings, fit_logs, prediction_errors, with_remainder
+from ferryid.models import Conditions, Model, Quantity, Source, StoredEffect, blank_model
+from ferryid.models.forces import beside_the_hull
+from ferryid.models.prediction import predict
+from ferryid.models.store import load_file, save
+from ferryid.regression.bases import make_basis
+from ferryid.signals.prepare import prepare
+from ferryid.simulate import parse_scenario, simulate, write_log
+from ferryid.simulate.vessel_model import sailed_by
+from ferryid.types import AXES, RunContext
+from ferryid.vessel import load_profile
+
+pytestmark = pytest.mark.slow
+
+FERRY = load_profile("milliampere")
+DAMPED = {"X_u": 2.5, "X_|u|u": 1.8, "Y_v": 2.0, "Y_|v|v": 1.5, "N_r": 2.5, "N_|r|r": 1.5}
+"""Factors on the true hull's damping."""
+QUICK = FitSettings(draws=30)
+TWELVE = 'path = { kind = "twelve-corner" }\ncontroller = { delta = 0.7, sigma = 0.7 }\n'
+BRISK = """
+path = { kind = "points", dwell_s = 40, rounds = 2, points = [[0, 0, 0], [25, 5, 45], [20, 25, 180], [0, 30, 300],
+  [-15, 10, 90], [10, 0, 200], [-5, -20, 20], [5, 20, 270]] }
+[controller.reference]
+omega_radps = [0.4, 0.4, 0.4]
+speed_limit = [1.4, 1.0, 0.25]
+acceleration_limit = [0.2, 0.2, 0.06]
+"""
+WINDY = "[environment.wind]\nnorth_mps = -3.0\neast_mps = 2.0\n"
+
+
+def sailed(folder: Path, name: str, text: str, seed: int, hull: dict[str, float] | None = None) -> str:
+    """Simulate a trial without the bulk, and return the path of its log."""
+    head = (
+        'schema = "ferryid.scenario/1"\nvessel = "milliampere"\nsensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }\n'
+    )
+    scenario = replace(parse_scenario(head + text, name), true_hull=hull or {})
+    log = folder / f"{name}.mcap"
+    write_log(simulate(scenario, seed), log)
+    return str(log)
+
+
+def hull_of_ferry() -> dict[str, Quantity]:
+    return {
+        name: Quantity(value, value, value, unit)
+        for name, value, unit in zip(COEFFICIENTS, hull_of(FERRY).tolist(), UNITS, strict=True)
+    }
+
+
+def named(sha256: str, **values: float) -> StoredEffect:
+    """Return a wind as a diagnosis stores it."""
+    parameters = {
+        one.name: Quantity(values[one.name], values[one.name], values[one.name], one.unit)
+        for one in effects()["wind"].parameters_of(FERRY)
+        if one.name in values
+    }
+    return StoredEffect("wind", None, parameters, (Source("windy", sha256, 0.99),))
+
+
+def learnt_on(log: str, folder: Path, model: Model | None, name: str = "ferry") -> tuple[Model | None, Diagnosis]:
+    """Return what is stored, read back, and a diagnosis that tells of it."""
+    run = RunContext(folder)
+    stored, learnt = Learner((log,), FERRY, None, run, QUICK).learn(model, name)
+    told = Diagnosis(Path(log).stem, "milliampere", "matched", (), {}, {}, learnt=learnt)
+    return (None if stored is None else load_file(save(stored, folder).path)), told
+
+
+def errors_on(log: str, folder: Path, *models: Model) -> list[float]:
+    """Return root-mean-square prediction errors on a whole log, over the first model's, mean of the axes."""
+    motion = prepare(log, FERRY, folder, window_s=1.0).motion
+    every = prediction_errors(models, [log], FERRY, QUICK, RunContext(folder), [motion.valid])
+    return [float(np.mean(np.sqrt(one / every[0]))) for one in every]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("learnt")
+
+
+@pytest.fixture(scope="module")
+def windy(folder: Path) -> tuple[str, Model]:
+    """Return a log in wind of a hull with more damping, and a model in which the wind alone is named."""
+    log = sailed(folder, "windy", TWELVE + WINDY, 11, DAMPED)
+    sha256 = prepare_sha256(log, folder)
+    blank = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
+    return log, replace(blank, conditions=(Conditions("windy", sha256, (named(sha256, north=-3.0, east=2.0),)),))
+
+
+def prepare_sha256(log: str, folder: Path) -> str:
+    return prepare(log, FERRY, folder, window_s=1.0).recording.sha256
+
+
+def test_wind_is_named_and_damping_is_learnt(windy: tuple[str, Model], folder: Path) -> None:
+    log, diagnosed = windy
+    stored, told = learnt_on(log, folder, diagnosed)
+    assert stored is not None
+    assert told.learnt is not None
+    assert told.learnt.accepted, told.learnt.says
+    assert stored.accepted
+    assert (
+        "is part of the model; held-out squared prediction error against the model without it: surge -"
+        in told.learnt.says
+    )
+    assert stored.conditions == diagnosed.conditions
+    # The hull in the file is the whole hull: what was learnt is counted in.
+    assert stored.terms
+    factor = {name: stored.hull[name].value / diagnosed.hull[name].value for name in ("X_u", "N_r")}
+    assert min(factor.values()) > 1.3
+    plain = to_json(told)["learnt"]
+    assert set(plain["over_fit"]) == set(plain["per_axis"]) == set(AXES)
+    assert np.mean(list(plain["over_fit"].values())) <= 1.02
+
+    other = sailed(folder, "other", BRISK, 111, DAMPED)
+    fitted = fit_logs([log], FERRY, QUICK, RunContext(folder)).model
+    base, alone, ours, theirs = errors_on(other, folder, blank_model(FERRY, "base"), diagnosed, stored, fitted)
+    assert ours < 0.8 * base
+    assert ours < 0.8 * alone
+    assert ours <= 1.02 * theirs
+    # The commands see the same model.
+    entry = evaluate(stored, [log], RunContext(folder))["logs"][0]
+    assert [one["effect"] for one in entry["effects"]["conditions"]] == ["wind"]
+    assert max(entry["per_axis"].values()) < 0.9
+
+
+def test_what_was_learnt_is_exported_and_simulated(windy: tuple[str, Model], folder: Path) -> None:
+    log, diagnosed = windy
+    stored, _ = learnt_on(log, folder, diagnosed)
+    assert stored is not None
+    made = export_model(stored.label, "python", folder)
+    run = subprocess.run([sys.executable, made["file"]], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert beside_the_hull(stored) is not None
+    sailing = sailed_by(parse_scenario(SHORT, "t"), stored, "windy")
+    truth = simulate(sailing.scenario, 3, vessel=sailing.vessel, terms=sailing.terms).truth
+    assert np.isfinite(truth.nu).all()
+    assert sailing.scenario.wind.north_mps == -3.0
+
+
+SHORT = """
+schema = "ferryid.scenario/1"
+vessel = "milliampere"
+duration_s = 40
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+path = { kind = "four-corner", dwell_s = 15 }
+"""
+
+
+def test_a_hull_that_is_right_learns_nothing(folder: Path) -> None:
+    log = sailed(folder, "right", TWELVE, 3)
+    model = replace(blank_model(FERRY, "right"), hull=hull_of_ferry())
+    stored, learnt = Learner((log,), FERRY, None, RunContext(folder), QUICK).learn(model, "right")
+    assert stored is model
+    assert not learnt.accepted
+    assert "A correction learnt on top of the findings was not accepted" in learnt.says
+    assert learnt.reasons[0].startswith("Rejected: ")
+
+
+def test_where_nothing_is_named_the_model_is_the_fits(windy: tuple[str, Model], folder: Path) -> None:
+    log = sailed(folder, "calm", TWELVE, 4, DAMPED)
+    stored, told = learnt_on(log, folder, None, "calm")
+    fitted = fit_logs([log], FERRY, QUICK, RunContext(folder), name="calm")
+    assert fitted.acceptance.accepted
+    assert stored is not None
+    np.testing.assert_array_equal(stored.theta, fitted.model.theta)
+    np.testing.assert_array_equal(stored.intercept, fitted.model.intercept)
+    assert told.learnt is not None
+    assert told.learnt.says.startswith(
+        "No named effect enters the model. A correction of the hull is part of the model;"
+    )
+
+
+def test_a_log_that_cannot_be_fitted_leaves_the_model_as_it_is(folder: Path) -> None:
+    model = replace(blank_model(FERRY, "ferry"), hull=hull_of_ferry())
+    short = sailed(folder, "short", f"duration_s = 15\n{TWELVE}", 5)
+    stored, learnt = Learner((short,), FERRY, None, RunContext(folder), QUICK).learn(model, "ferry")
+    assert stored is model
+    assert learnt.says.startswith("Nothing was learnt beside the findings: ")
+
+
+def test_what_is_stored_predicts_what_was_fitted(windy: tuple[str, Model], folder: Path) -> None:
+    """Properties of the vessel act on the hull alone, and not on what was learnt with them in place."""
+    log, diagnosed = windy
+    fouling = {"surge": 1.8, "sway": 1.3, "yaw": 1.3}
+    fouled = StoredEffect(
+        "fouling",
+        None,
+        {name: Quantity(one, one, one, "-") for name, one in fouling.items()},
+        (Source("windy", "ab", 0.9),),
+    )
+    before = replace(diagnosed, vessel_effects=(fouled,))
+    prepared = prepare(log, FERRY, folder, window_s=1.0, keep_track=True)
+    correction = random_correction()
+    after = with_remainder(before, correction)
+    empty = with_remainder(before, replace(correction, theta=0.0 * correction.theta, intercept=np.zeros(3)))
+    seen = [predict(one, prepared, FERRY, window_s=1.0, smoother="square") for one in (empty, after)]
+    functions = make_basis("modulus", structure="decoupled")
+    more = functions.of(prepared.motion) @ correction.theta + correction.intercept
+    rows = prepared.motion.valid
+    np.testing.assert_allclose((seen[1].tau - seen[0].tau)[rows], more[rows], atol=1e-6)
+    # A correction of the correction adds up.
+    twice = with_remainder(after, correction)
+    told = predict(twice, prepared, FERRY, window_s=1.0, smoother="square").tau
+    np.testing.assert_allclose((told - seen[1].tau)[rows], more[rows], atol=1e-6)
+
+
+def random_correction() -> Model:
+    functions = make_basis("modulus", structure="decoupled")
+    K, rng = len(functions.terms), np.random.default_rng(2)
+    theta = np.where(functions.mask, 10.0 * rng.standard_normal((K, 3)), 0.0)
+    return replace(
+        blank_model(FERRY, "ferry"),
+        settings={"basis": "modulus", "structure": "decoupled", "components": 3, "window_s": 1.0, "smoother": "square"},
+        terms=functions.terms,
+        units=functions.units,
+        theta=theta,
+        intercept=np.array([4.0, -2.0, 1.0]),
+        low=theta - 1.0,
+        high=theta + 1.0,
+        covariance=np.tile(np.eye(K + 1), (3, 1, 1)),
+    )
+
+
+def test_withheld_signals_are_not_learnt_from() -> None:
+    mapped, hidden = ({one.quantity for one in without_withheld(FERRY, names).signals} for names in ((), ("wind",)))
+    assert mapped - hidden == {"wind"}
