@@ -36,9 +36,22 @@ class GustEquations:
     slope: Floats
     blow: bool
 
-    def eliminated(self, table: Floats, weight: Floats) -> tuple[Floats, Floats]:
-        """Return the gusts' side of the normal equations with columns (3, J, c), and its solution, shape (2 J, c) each."""
-        response = np.einsum("jax,a,ajc->jxc", self.slope, weight, table, optimize=True).reshape(-1, table.shape[2])
+    def eliminated(self, columns: Sequence[tuple[Ints, Floats]], size: int, weight: Floats) -> tuple[Floats, Floats]:
+        """Return the gusts' side of the normal equations and its solution, shape (2 J, size) each.
+
+        Parameters
+        ----------
+        columns
+            Of each axis the numbers of its columns, (c,), and the columns, shape (J, c).
+        size
+            Number of columns of all axes.
+        weight
+            Of the axes, shape (3,).
+        """
+        cube = np.zeros((len(self.slope), 2, size))
+        for axis, (places, table) in enumerate(columns):
+            cube[:, :, places] += weight[axis] * self.slope[:, axis, :, None] * table[:, None, :]
+        response = cube.reshape(-1, size)
         if not self.blow:
             return response, np.zeros_like(response)
         return response, self.solve(response)

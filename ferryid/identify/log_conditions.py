@@ -241,16 +241,29 @@ class _Equations:
     own: Floats
     right: Floats
     across: Floats
-    table: Floats
+    columns: tuple[tuple[Ints, Floats], ...]
     gusts: Floats
 
     @classmethod
-    def of(cls, table: Floats, P: int, weight: Floats, prior: Floats, gusts: GustEquations) -> _Equations:
-        """Return those of a table [hull, conditions, target], (3, J, P + D + 1), with weights of the axes (3,)."""
-        whole = np.einsum("a,ajp,ajq->pq", weight, table, table, optimize=True)
-        bare = whole[:P, :P]
-        response, found = gusts.eliminated(table, weight)
-        whole = whole - response.T @ found
+    def of(
+        cls,
+        columns: tuple[tuple[Ints, Floats], ...],
+        P: int,
+        weight: Floats,
+        prior: Floats,
+        gusts: GustEquations,
+    ) -> _Equations:
+        """Return the equations of columns of [hull (P), conditions (D), target]: an axis's numbers (c,) and values (J, c).
+
+        `weight` is that of the axes, (3,), and `prior` the precision of the conditions, (D,).
+        """
+        size = P + len(prior) + 1
+        whole = np.zeros((size, size))
+        for axis, (places, values) in enumerate(columns):
+            whole[np.ix_(places, places)] += weight[axis] * values.T @ values
+        bare = whole[:P, :P].copy()
+        response, found = gusts.eliminated(columns, size, weight)
+        whole -= response.T @ found
         return cls(
             bare=bare,
             hull=whole[:P, :P],
@@ -258,7 +271,7 @@ class _Equations:
             own=whole[P:-1, P:-1] + np.diag(prior),
             right=whole[P:-1, -1],
             across=whole[P:-1, :P],
-            table=table,
+            columns=columns,
             gusts=found,
         )
 
@@ -268,7 +281,8 @@ class _Equations:
 
     def left(self, hull: Floats, conditions: Floats) -> Floats:
         """Return what hull and conditions leave, shape (J, 3)."""
-        return np.asarray((self.table @ np.concatenate([-hull, -conditions, [1.0]])).T)
+        every = np.concatenate([-hull, -conditions, [1.0]])
+        return np.column_stack([values @ every[places] for places, values in self.columns])
 
 
 class _Problem:
@@ -390,17 +404,21 @@ class _Problem:
         slope = np.zeros((J, 3, 2)) if load is None else -np.einsum("ab,jbc->jac", G, load.slope(blown))
         Y = Y + np.einsum("jac,jc->ja", slope, blown)
         self.slopes[k] = slope
-        table = np.zeros((3, J, self.P + 2 + 9 + 1))
+        columns = []
         for axis in range(3):
-            low, high = self.low[axis], self.low[axis + 1]
-            table[axis, :, low : high - 1], table[axis, :, high - 1] = X[:, self.own[axis]], 1.0
-            table[axis, :, self.P : self.P + 2] = slope[:, axis]
-            first = self.P + 2 + 3 * axis
-            table[axis, :, first : first + 3] = self.steady[k] * self.sigma[axis]
-            table[axis, :, -1] = Y[:, axis]
+            steady = self.P + 2 + 3 * axis
+            places = [
+                *range(self.low[axis], self.low[axis + 1]),
+                self.P,
+                self.P + 1,
+                *range(steady, steady + 3),
+                self.P + 11,
+            ]
+            hull, forces = X[:, self.own[axis]], self.steady[k] * self.sigma[axis]
+            columns.append((np.array(places), np.column_stack([hull, np.ones(J), slope[:, axis], forces, Y[:, axis]])))
         weight = 1.0 / (self.noise * self.sigma**2)
         prior = np.repeat([self.wind_spread, self.force_spread], [2, 9]) ** -2.0
-        return _Equations.of(table, self.P, weight, prior, self.gusts.equations(k, slope, weight))
+        return _Equations.of(tuple(columns), self.P, weight, prior, self.gusts.equations(k, slope, weight))
 
     def _add(self, covariance: Floats) -> None:
         """Keep what the conditions add to the covariance of gains and intercepts."""

@@ -127,8 +127,9 @@ def test_elimination_of_gusts_is_that_of_dense_equations() -> None:
     slope, table, weight = rng.standard_normal((J, 3, 2)), rng.standard_normal((3, J, 4)), np.array([1.0, 2.0, 0.5])
     short = gusts.equations(0, slope, weight)
     # So short a log has no gusts.
-    assert not short.eliminated(table, weight)[1].any()
-    _, found = replace(short, blow=True).eliminated(table, weight)
+    columns = [(np.arange(4), one) for one in table]
+    assert not short.eliminated(columns, 4, weight)[1].any()
+    _, found = replace(short, blow=True).eliminated(columns, 4, weight)
     diagonal, beside = gusts.precision(0)
     single = (np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)) / gusts.spread**2
     precision, right = np.kron(single, np.eye(2)), np.zeros((2 * J, 4))
