@@ -29,15 +29,16 @@ _SAMPLES = 16
 """Points of a window at which the wind load is evaluated: it changes with heading and speed, not faster."""
 _DIRECTIONS = 8
 _SPEEDS = (1.0, 3.0, 8.0)
-"""Starts of the search, times the spread that is expected; the load has no slope at rest in still air."""
+"""Speeds at which the search starts [m/s]: at rest in still air the load has no slope."""
 _START_WINDOWS = 500
 """Windows of a log, evenly spaced, in which the starts are compared."""
 _STEP_MPS = 0.05
+"""Half the difference of winds by which the slope of the load is taken."""
 
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Steady conditions of L logs.
+    """Wind of L logs, mean and gusts.
 
     Attributes
     ----------
