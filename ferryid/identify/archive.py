@@ -205,8 +205,9 @@ class ArchiveData(FitData):
             "whole logs, one of every three in a row." if by_logs else "in blocks of every log."
         )
         reference = np.concatenate([log.reference for log in logged])
+        force = ForceScores.of(*_errors(validation, reference, found), variance)
         return ModelScores(
-            ForceScores.of(*_errors(validation, reference, found), variance),
+            force.without_sway() if self.settings.reduced else force,
             validation.n,
             validated,
             self.settings.split,
@@ -377,7 +378,8 @@ def _add_logs(
         first = first or log
         add(log)
     assert first is not None
-    return make_basis(first.basis, structure=settings.structure)
+    functions = make_basis(first.basis, structure=settings.structure)
+    return functions.without_sway() if settings.reduced else functions
 
 
 def _errors(rows: CrossProducts, reference: Floats, found: Coefficients) -> tuple[Floats, Floats]:

@@ -46,11 +46,15 @@ def assess_excitation(
     payload = None
     if any(motion.payload is not None for motion in motions):
         payload = np.concatenate([payload_kg(motion, mask) for motion, mask in zip(motions, masks, strict=True)])
+    tied = undetermined_terms(source, terms, allowed)
+    if allowed is not None:
+        # A term that acts nowhere is not asked for.
+        tied = {name: why for name, why in tied.items() if allowed[list(terms).index(name)].any()}
     return Excitation(
         singular_values=singular_values(source),
         ranges=validity_ranges(nu, nu_dot, payload),
         heading_coverage=heading_coverage(psi),
-        undetermined=undetermined_terms(source, terms, allowed),
+        undetermined=tied,
         vip=vip,
     )
 

@@ -139,8 +139,9 @@ class MotionData(FitData):
         masks = [log.validation if self.held_out else log.training for log in logs]
         tau = stacked([log.motion.tau for log in logs], masks)
         base, model = stacked([log.tau_base for log in logs], masks), stacked([log.tau_model for log in logs], masks)
+        force = force_scores(tau, base, model, np.ones(len(tau), dtype=bool))
         return ModelScores(
-            force_scores(tau, base, model, np.ones(len(tau), dtype=bool)),
+            force.without_sway() if self.settings.reduced else force,
             rows=len(tau),
             seconds=sum(float(mask.sum()) / log.motion.rate_hz for log, mask in zip(logs, masks, strict=True)),
             split=self.split.kind,
@@ -234,6 +235,9 @@ def compute_residuals(
     check_components(settings.components, functions)
     targets = [compute_residual(profile, motion, settings.scale, settings.residual) for motion in motions]
     errors = [compute_residual(profile, motion, settings.scale) for motion in motions]
+    if settings.reduced:
+        for residual in (*targets, *errors):
+            residual[:, 1] = 0.0
     motions = [
         replace(motion, valid=known_rows(motion, functions, target, error))
         for motion, target, error in zip(motions, targets, errors, strict=True)

@@ -115,7 +115,7 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
     free_base, free_new = data.free_runs(found, run.progress)
     acceptance = NOT_JUDGED
     if data.held_out:
-        acceptance = accept(scores.force.mse_base, scores.force.mse_model, scores.measure)
+        acceptance = accept(scores.force.mse_base, scores.force.mse_model, scores.measure, data.settings.axes)
     if data.held_out and data.settings.accept == "full":
         acceptance = acceptance.with_checks(_checks(data, found, scores, free_base, free_new))
     return FitOutcome(
@@ -144,12 +144,13 @@ def _checks(
     """Return what the full criterion asks for besides the held-out error."""
     profile, scale, functions = data.profile, data.settings.scale, data.functions
     law = Estimator(profile, scale, functions, found.theta, found.intercept)
-    return (
+    every = (
         *inertia_checks(profile, effective_mass(profile, scale, functions.terms, found.theta)),
         *damping_checks(law.at_constant_velocity, data.visited),
         *free_run_checks(free_base, free_new),
         *held_out_checks(scores.seconds, data.held_out_blocks, scores.split),
     )
+    return tuple(check for check in every if not (data.settings.reduced and check.name.endswith("_sway")))
 
 
 def _model(
@@ -183,7 +184,11 @@ def _model(
         intercept_low=found.intercept_low,
         intercept_high=found.intercept_high,
         covariance=found.covariance,
-        ranges=data.ranges(excitation),
+        ranges={
+            name: span
+            for name, span in data.ranges(excitation).items()
+            if not (data.settings.reduced and name in ("v", "v_dot"))
+        },
         training=data.training_logs(),
         scores=scores,
         accepted=acceptance.accepted,

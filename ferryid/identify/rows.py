@@ -18,7 +18,15 @@ from ferryid.types import Flags, Floats
 
 
 def basis_for(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
-    """Return the basis of the settings; wind and current join it when every log has them, unless the name says how."""
+    """Return the basis of the settings; wind and current join it when every log has them, unless the name says how.
+
+    Its mask is without sway where that is not measured.
+    """
+    functions = _full_basis(settings, motions)
+    return functions.without_sway() if settings.reduced else functions
+
+
+def _full_basis(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
     if "+" in settings.basis:
         return make_basis(settings.basis, structure=settings.structure)
     wind = "thesis" if all(motion.wind is not None for motion in motions) else None
