@@ -32,7 +32,7 @@ from ferryid.models import ForceScores, ModelScores, span_ranges
 from ferryid.models.prediction import FreeRun
 from ferryid.models.store import check_name
 from ferryid.regression import CrossProducts, singular_values, total, undetermined_terms
-from ferryid.regression.bases import Basis, make_basis
+from ferryid.regression.bases import SWAY, Basis, make_basis
 from ferryid.regression.cross_validation import Folds, FoldSums
 from ferryid.types import Flags, Floats, RunContext
 from ferryid.vessel.profile import Profile
@@ -379,7 +379,7 @@ def _add_logs(
         add(log)
     assert first is not None
     functions = make_basis(first.basis, structure=settings.structure)
-    return functions.without_sway() if settings.reduced else functions
+    return functions.without((SWAY,)) if settings.reduced else functions
 
 
 def _errors(rows: CrossProducts, reference: Floats, found: Coefficients) -> tuple[Floats, Floats]:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.identify.excitation import assess_excitation
+from ferryid.identify.contradictions import faint_force
+from ferryid.identify.excitation import assess_excitation, still_warnings
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import fit_warnings
 from ferryid.identify.inertia import axes_without_force
@@ -215,7 +216,20 @@ class LogData(MotionData):
 
     def warnings(self, excitation: Excitation, scores: ModelScores) -> tuple[str, ...]:
         """Return what to know before trusting the scores, as sentences."""
-        return fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores)
+        windows = [one for one in self.windows.training if len(one)]
+        faint = ""
+        if windows:
+            force, needed = (
+                np.concatenate(columns)
+                for columns in zip(*((one.force, one.base(one.by_velocity)) for one in windows), strict=True)
+            )
+            known = np.array([1.0, 0.0 if self.settings.reduced else 1.0, 1.0])
+            faint = faint_force(force * known, needed, f"the profile {self.profile.name}")
+        return (
+            *filter(None, [faint]),
+            *still_warnings(self.profile, self.motions),
+            *fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores),
+        )
 
 
 def compute_residuals(

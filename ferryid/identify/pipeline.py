@@ -16,6 +16,7 @@ from ferryid import __version__
 from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, Check, accept
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.estimators import choose_estimator
+from ferryid.identify.excitation import still_axes
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import free_run_warnings
 from ferryid.identify.free_run_checks import free_run_checks
@@ -74,6 +75,7 @@ def fit_logs(
     prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
     run.progress("computing the residual")
     data = compute_residuals(profile, settings, prepared)
+    data = replace(data, functions=data.functions.without(still_axes(profile, data.motions)))
     if parts is None:
         parts = split_rows(data.motions, settings.split, window_s=settings.window_s)
     data = replace(data, split=parts.within([motion.valid for motion in data.motions]))

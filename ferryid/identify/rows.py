@@ -11,7 +11,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify.settings import FitSettings
 from ferryid.models import usable_rows
 from ferryid.regression import Rows
-from ferryid.regression.bases import Basis, make_basis, relative_flow
+from ferryid.regression.bases import SWAY, Basis, make_basis, relative_flow
 from ferryid.signals.smooth import odd_rows
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
@@ -23,7 +23,7 @@ def basis_for(settings: FitSettings, motions: Sequence[Motion]) -> Basis:
     Its mask is without sway where that is not measured.
     """
     functions = _full_basis(settings, motions)
-    return functions.without_sway() if settings.reduced else functions
+    return functions.without((SWAY,)) if settings.reduced else functions
 
 
 def _full_basis(settings: FitSettings, motions: Sequence[Motion]) -> Basis:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 
@@ -23,8 +23,12 @@ Rows = NDArray[np.bool_] | NDArray[np.int64] | slice
 STRUCTURES = ("coupled", "decoupled")
 
 _EVERY_ROW = slice(None)
-_WITH_SWAY = ("v", "|v|", "v_dot", *CROSSFLOW_FACTORS)
-"""Factors that are zero, or only part of what they stand for, where sway velocity is not measured."""
+_OWN = (
+    ("u", "|u|", "u_dot"),
+    ("v", "|v|", "v_dot", *CROSSFLOW_FACTORS),
+    ("r", "|r|", "r_dot", *CROSSFLOW_FACTORS),
+)
+"""Factors of each axis, which are zero, or only part of what they stand for, without motion on it."""
 _SIZED = re.compile(r"(.+)-(\d{1,4}(?:\.\d{1,4})?)m")
 
 BASES: Mapping[str, tuple[Term, ...]] = {name: form.terms for name, form in basis_forms().items()}
@@ -109,14 +113,15 @@ class Basis:
     def _needs(self, flow: str) -> bool:
         return any(factor.endswith(f"_{flow}") for term in self.functions for factor in term.factors)
 
-    def without_sway(self) -> Basis:
-        """Return the basis for a hull whose sway is not measured: nothing acts on sway, and nothing with sway in it acts.
+    def without(self, axes: Sequence[int]) -> Basis:
+        """Return the basis for motion without some axes: no function acts on one, and none that has its velocity in it acts.
 
         The apparent wind stays, whose part across the hull is the wind's own for the most part.
         """
         mask = self.mask.copy()
-        mask[:, SWAY] = False
-        mask[[any(factor in _WITH_SWAY for factor in term.factors) for term in self.functions]] = False
+        for axis in axes:
+            mask[:, axis] = False
+            mask[[any(factor in _OWN[axis] for factor in term.factors) for term in self.functions]] = False
         mask.setflags(write=False)
         return replace(self, mask=mask)
 
