@@ -192,3 +192,17 @@ def test_ten_logs_of_twenty_seconds_are_fitted_as_one_and_are_too_little_to_acce
     assert "held-out data are" in reasons
     assert "give longer logs, or more of them" in reasons
     assert json.loads(Path(result["model"]["path"]).read_text(encoding="utf-8"))["training"]
+
+
+@pytest.mark.slow
+def test_left_and_right_exchanged_on_a_real_catamaran_are_refused(ferryid, shared_data, tmp_path: Path) -> None:
+    names = ("48000_2016-02-11-10-52-07", "exp50_v_2016-02-11-11-12-11", "exp52_v_2016-02-11-11-14-28")
+    logs = [shared_data(f"vtec_usv/{name}.bag") for name in names]
+    text = load_profile("vtec-usv").text
+    other = text.replace('"/left_thruster"', '"/other"').replace('"/right_thruster"', '"/left_thruster"')
+    vessel = tmp_path / "exchanged.toml"
+    vessel.write_text(other.replace('"/other"', '"/right_thruster"'), encoding="utf-8")
+    run = ferryid("fit", *logs, "--vessel", vessel, "--components", "6", "--out", tmp_path / "out")
+    refused(run, "the yaw moment accelerates the vessel", "actuators are exchanged (port and starboard")
+    assert not (tmp_path / "out" / "models").exists()
+    assert not (tmp_path / "out" / "reports").exists()
