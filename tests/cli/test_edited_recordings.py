@@ -117,7 +117,7 @@ def test_velocities_over_ground_in_a_current_come_with_a_warning(ferryid, tmp_pa
     assert result["excitation"]["heading_coverage"] < 0.5
     assert any("a steady wind or current could not be separated" in warning for warning in result["warnings"])
     assert not result["model"]["current"]
-    # What pushes the vessel is estimated as a wind of the log, and differs from none.
+    # What pushes the vessel is listed as a wind of the log: there is no estimate of a current.
     assert result["conditions"]
 
 
