@@ -61,7 +61,7 @@ class ComparedLog:
     taus
         Force that each of m models estimates [N, N, N·m], shape (m, n, 3).
     sums
-        Squared force errors summed over blocks, shape (blocks, m, 3).
+        Squared force errors summed over blocks, shape (blocks, m, 3); zero in sway where that was not measured.
     block_s
         Length of a block [s].
     starts_s
@@ -196,6 +196,8 @@ def _compare_log(
             raise FerryIdError(
                 f"{one.label}: its force on {path} is too large to be squared. Fix: fit the model again, or restore its file"
             )
+    if not motion.sway_measured:
+        squares[:, :, 1] = 0.0
     block_s, remembered = paired_block_seconds(squares.reshape(len(squares), -1), motion.rate_hz)
     starts, ends = starting_points(motion, rows, HORIZONS_S[0], HORIZONS_S[-1])
     steps = np.round(np.array(HORIZONS_S) * motion.rate_hz).astype(int)
@@ -333,6 +335,8 @@ def _errors(
     """Return rows, blocks, errors of every model and ratios of every two, on one log or on several together."""
     tau = np.concatenate([log.motion.tau[log.rows] for log in compared])
     mse = np.sum([log.sums.sum(axis=0) for log in compared], axis=0) / len(tau)
+    if not all(log.motion.sway_measured for log in compared):
+        mse[:, 1] = np.nan
     variance = np.var(tau, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         r2 = np.where(variance > 0.0, 1.0 - mse / variance, np.nan)

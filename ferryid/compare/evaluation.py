@@ -10,7 +10,7 @@ import numpy as np
 
 from ferryid.compare.thresholds import COMPARE
 from ferryid.identify import check_window
-from ferryid.models import RANGE_UNITS, Model, StoredEffect, force_scores, outside_ranges, usable_rows
+from ferryid.models import RANGE_UNITS, ForceScores, Model, StoredEffect, force_scores, outside_ranges, usable_rows
 from ferryid.models.prediction import Prediction, predict, predict_base, signal_map
 from ferryid.signals.prepare import prepare
 from ferryid.signals.track import Motion
@@ -76,7 +76,7 @@ def evaluate(
                 "sha256": prepared.recording.sha256,
                 "rows": int(rows.sum()),
                 "seconds": float(rows.sum() / motion.rate_hz),
-                **force_scores(motion.tau, tau_base, tau_model, rows).to_json(),
+                **_scores(force_scores(motion.tau, tau_base, tau_model, rows), profile).to_json(),
                 "free_run": {
                     "base": old.free_run(rows).to_json(),
                     "model": new.free_run(rows).to_json(),
@@ -103,12 +103,17 @@ def evaluate(
         },
         "window_s": window,
         "logs": entries,
-        "pooled": force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)).to_json(),
+        "pooled": _scores(force_scores(tau, base_all, model_all, np.ones(len(tau), dtype=bool)), profile).to_json(),
     }
 
 
 def _base_of(model: Model) -> str:
     return "the base model" if model.learned else "the model before its diagnosis"
+
+
+def _scores(force: ForceScores, profile: Profile) -> ForceScores:
+    """Return force errors on the axes of which the velocity is measured."""
+    return force if profile.measures_sway else force.without_sway()
 
 
 def _list_effects(found: Prediction, sha256: str) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.errors import FerryIdError
+from ferryid.identify.settings import WITHOUT_SWAY
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import Model, mean_square, usable_rows
 from ferryid.models.forces import Estimator, model_estimator
@@ -97,7 +98,7 @@ NOT_JUDGED = Acceptance(False, float("nan"), dict.fromkeys(AXES, float("nan")), 
 """Acceptance of a model that was fitted to all rows there are."""
 
 
-def accept(base_mse: Floats, model_mse: Floats, measure: str = "force") -> Acceptance:
+def accept(base_mse: Floats, model_mse: Floats, measure: str = "force", judged: Sequence[str] = AXES) -> Acceptance:
     """Judge a model by its error on validation rows against the base model's.
 
     Accepted when the MSE (in the thesis that of the estimated applied force), normalised per axis by the base
@@ -111,6 +112,8 @@ def accept(base_mse: Floats, model_mse: Floats, measure: str = "force") -> Accep
         Validation MSE in surge, sway [N²] and yaw [N²·m²], shape (3,).
     measure
         What the error is of, in the sentences: ``"force"`` or ``"prediction"``.
+    judged
+        Names of the axes that count.
 
     Returns
     -------
@@ -118,25 +121,29 @@ def accept(base_mse: Floats, model_mse: Floats, measure: str = "force") -> Accep
         With one sentence for the mean and one for every axis that stands in the way or needs an explanation.
     """
     base, model = np.asarray(base_mse, dtype=float), np.asarray(model_mse, dtype=float)
-    axes = [_error_on_axis(axis, float(base[i]), float(model[i]), measure) for i, axis in enumerate(AXES)]
+    places = [AXES.index(axis) for axis in judged]
+    axes = [_error_on_axis(AXES[i], float(base[i]), float(model[i]), measure) for i in places]
     ratios = [check.value for check in axes]
     obstacles = [f"Rejected: {check.reason}" for check in axes if check.passed is False]
-    reasons = [check.reason for check, mse in zip(axes, base, strict=True) if check.passed and mse <= _NOTHING**2]
+    reasons = [
+        check.reason for check, mse in zip(axes, base[places], strict=True) if check.passed and mse <= _NOTHING**2
+    ]
     mean = float(np.mean(ratios))
     sentence = f"the {measure} errors could not be compared."
     enough = False
     if np.isfinite(mean):
         enough = mean <= 1.0 - IDENTIFY.improvement + _ROUNDING
         sentence = (
-            f"On held-out data the {measure} error (MSE relative to the base model, mean of three axes) "
-            f"changes by {_change(mean)}: surge {_change(ratios[0])}, sway {_change(ratios[1])}, yaw {_change(ratios[2])}."
+            f"On held-out data the {measure} error (MSE relative to the base model, mean of "
+            f"{'three axes' if len(places) == len(AXES) else ' and '.join(judged)}) changes by {_change(mean)}: "
+            f"{', '.join(f'{axis} {_change(ratio)}' for axis, ratio in zip(judged, ratios, strict=True))}."
         )
         if not enough:
             obstacles.insert(0, f"Rejected: a fall of {100 * IDENTIFY.improvement:.0f} % or more is needed. {sentence}")
         else:
             reasons.insert(0, sentence)
     mean_check = Check("held_out_error", enough, mean, 1.0 - IDENTIFY.improvement, "of the base model's MSE", sentence)
-    per_axis = dict(zip(AXES, ratios, strict=True))
+    per_axis = dict.fromkeys(AXES, float("nan")) | dict(zip(judged, ratios, strict=True))
     return Acceptance(not obstacles, mean, per_axis, (*obstacles, *reasons), (mean_check, *axes))
 
 
@@ -223,7 +230,8 @@ def accept_on_motions(
         usable_rows(motion, _force(old).of(motion), _force(new).of(motion)) & wanted
         for motion, wanted in zip(motions, wanted_rows(motions, rows), strict=True)
     ]
-    return accept(force_mse(old, motions, known), force_mse(new, motions, known))
+    judged = AXES if all(motion.sway_measured for motion in motions) else WITHOUT_SWAY
+    return accept(force_mse(old, motions, known), force_mse(new, motions, known), judged=judged)
 
 
 def wanted_rows(motions: Sequence[Motion], rows: Sequence[Flags] | None) -> list[Flags]:

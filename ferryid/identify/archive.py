@@ -34,7 +34,7 @@ from ferryid.models import ForceScores, ModelScores, span_ranges
 from ferryid.models.prediction import FreeRun
 from ferryid.models.store import check_name
 from ferryid.regression import CrossProducts, singular_values, total, undetermined_terms
-from ferryid.regression.bases import Basis, make_basis
+from ferryid.regression.bases import SWAY, Basis, make_basis
 from ferryid.regression.cross_validation import Folds, FoldSums
 from ferryid.types import Flags, Floats, RunContext
 from ferryid.vessel.profile import Profile
@@ -204,8 +204,9 @@ class ArchiveData(FitData):
             "whole logs, one of every three in a row." if by_logs else "in blocks of every log."
         )
         reference = np.concatenate([log.reference for log in logged])
+        force = ForceScores.of(*_errors(validation, reference, found), variance)
         return ModelScores(
-            ForceScores.of(*_errors(validation, reference, found), variance),
+            force.without_sway() if self.settings.reduced else force,
             validation.n,
             validated,
             self.settings.split,
@@ -371,7 +372,8 @@ def _add_logs(
         refuse_other_basis((first.name, first.basis), (log.name, log.basis))
         add(log)
     assert first is not None
-    return make_basis(first.basis, structure=settings.structure)
+    functions = make_basis(first.basis, structure=settings.structure)
+    return functions.without((SWAY,)) if settings.reduced else functions
 
 
 def _errors(rows: CrossProducts, reference: Floats, found: Coefficients) -> tuple[Floats, Floats]:

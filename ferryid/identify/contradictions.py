@@ -48,7 +48,7 @@ def wrong_way(response: Floats, spread: Floats, profile: str) -> str:
 def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) -> str:
     """Return what is wrong and how to mend it where the applied force is many times too large or too small; empty where not.
 
-    It is where the inertia that it means is impossible on every axis on which it is estimated, two of them at least, and by
+    It is where the inertia that it means is impossible on every axis on which it is estimated, and on two of them at least by
     more than chance: one wrong coefficient does not do that, a wrong unit does.
 
     Parameters
@@ -60,13 +60,14 @@ def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) ->
     """
     known = np.isfinite(response)
     reach = IDENTIFY.wrong_way_sigmas * spread[known]
-    large = response[known] + reach < share[known] / IDENTIFY.most_inertia
-    small = response[known] - reach > share[known] / IDENTIFY.least_inertia
-    if np.count_nonzero(known) < 2 or not (large.all() or small.all()):
+    low, high = share[known] / IDENTIFY.most_inertia, share[known] / IDENTIFY.least_inertia
+    large = bool(np.all(response[known] < low)) and np.count_nonzero(response[known] + reach < low) >= 2
+    small = bool(np.all(response[known] > high)) and np.count_nonzero(response[known] - reach > high) >= 2
+    if not (large or small):
         return ""
     measured = ", ".join(f"{AXES[axis]} {response[axis]:.2g} ± {spread[axis]:.1g}" for axis in np.flatnonzero(known))
     told = f"the applied forces accelerate the vessel by {measured} of what the base model expects: "
-    if small.all():
+    if small:
         cause = "they are several times too small, or the profile's mass is too large"
     else:
         cause = "they are several times too large, the actuators were not engaged, or the profile's mass is too small"
@@ -74,6 +75,31 @@ def wrong_size(response: Floats, spread: Floats, share: Floats, profile: str) ->
         "correct the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N), the thrust curve or mass_kg"
     )
     return f"{told}{cause}. Fix: in {profile}, {remedy}"
+
+
+def faint_force(force: Floats, needed: Floats, profile: str) -> str:
+    """Return a warning where the applied force is a small part of what the motion needs on every axis; empty where it is not.
+
+    Such a force hardly determines an inertia, so that `wrong_size` does not see it. A vessel that drifts looks the same.
+
+    Parameters
+    ----------
+    force, needed
+        Applied force, and what the base model needs for the motion, averaged over windows, [N, N, N·m], shape (J, 3) each.
+    profile
+        Where the profile stands.
+    """
+    sizes = np.sqrt(np.mean(force**2, axis=0)), np.sqrt(np.mean(needed**2, axis=0))
+    acting = sizes[0] > IDENTIFY.no_force * sizes[1]
+    shares = sizes[0][acting] / sizes[1][acting]
+    if np.count_nonzero(acting) < 2 or np.any(shares > IDENTIFY.faint_force):
+        return ""
+    parts = ", ".join(f"{AXES[axis]} {share:.2g}" for axis, share in zip(np.flatnonzero(acting), shares, strict=True))
+    return (
+        f"The applied force is a small part of what the base model needs for this motion ({parts}): if the vessel did not "
+        f"drift, correct in {profile} the unit of the actuators' signals (1 rad/s is 9.55 rpm, 1 kgf 9.81 N) or the thrust "
+        "curve."
+    )
 
 
 def response_of(gains: Floats, information: Floats, mask: Flags, places: tuple[int, int, int]) -> tuple[Floats, Floats]:

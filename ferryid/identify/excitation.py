@@ -11,8 +11,10 @@ from ferryid.identify.outcome import Excitation
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models import payload_kg, validity_ranges
 from ferryid.regression import CrossProducts, QrFactor, singular_values, undetermined_terms
+from ferryid.regression.bases import SWAY
 from ferryid.signals.track import Motion
-from ferryid.types import Flags, Floats
+from ferryid.types import AXES, Flags, Floats
+from ferryid.vessel.profile import Profile
 
 SECTORS = 12
 
@@ -46,13 +48,36 @@ def assess_excitation(
     payload = None
     if any(motion.payload is not None for motion in motions):
         payload = np.concatenate([payload_kg(motion, mask) for motion, mask in zip(motions, masks, strict=True)])
+    tied = undetermined_terms(source, terms, allowed)
+    if allowed is not None:
+        # A term that acts nowhere is not asked for.
+        tied = {name: why for name, why in tied.items() if allowed[list(terms).index(name)].any()}
     return Excitation(
         singular_values=singular_values(source),
         ranges=validity_ranges(nu, nu_dot, payload),
         heading_coverage=heading_coverage(psi),
-        undetermined=undetermined_terms(source, terms, allowed),
+        undetermined=tied,
         vip=vip,
     )
+
+
+def still_axes(profile: Profile, motions: Sequence[Motion]) -> tuple[int, ...]:
+    """Return the axes on which the vessel hardly moves, so that noise alone would determine their coefficients.
+
+    Velocities are compared as parts of the kinetic energy of the base model, in which metres and radians are alike.
+    """
+    nu = np.concatenate([motion.nu[motion.valid] for motion in motions])
+    sizes = np.sqrt(np.diag(profile.hull.M) * np.mean(nu**2, axis=0))
+    return tuple(np.flatnonzero(sizes < IDENTIFY.least_motion * np.linalg.norm(sizes)).tolist())
+
+
+def still_warnings(profile: Profile, motions: Sequence[Motion]) -> list[str]:
+    """Return which axes the logs do not excite, as sentences; not sway where it was not measured at all."""
+    return [
+        f"These logs do not excite {AXES[axis]}: the vessel hardly moves there, and the base model's coefficients are kept."
+        for axis in still_axes(profile, motions)
+        if axis != SWAY or all(motion.sway_measured for motion in motions)
+    ]
 
 
 def heading_coverage(psi: Floats) -> float:

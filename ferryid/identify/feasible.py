@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from ferryid.identify.inertia import rigid_body
+from ferryid.identify.inertia import rigid_body, without_sway_coupling
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.models.forces import ACCELERATIONS, effective_mass, motion_force
 from ferryid.regression.bases import Basis
@@ -71,6 +71,8 @@ def feasible_gains(
     gains: Floats,
     information: Floats,
     nu: Floats,
+    *,
+    reduced: bool = False,
 ) -> Feasible:
     """Return the gains nearest to `gains` that physics allows.
 
@@ -86,8 +88,10 @@ def feasible_gains(
         What moving them costs, shape (3, K, K).
     nu
         Velocities visited, shape (n, 3).
+    reduced
+        Whether the gains are those of a hull that cannot sway.
     """
-    problem = _Problem(profile, scale, functions, mask, information)
+    problem = _Problem(profile, scale, functions, mask, information, reduced)
     wanted = problem.flat(gains)
     cuts: list[tuple[Floats, float, str]] = []
     symmetry = problem.symmetry()
@@ -119,12 +123,20 @@ class _Problem:
     """The gains as one vector, and what it must satisfy as ``normal @ b >= level``."""
 
     def __init__(
-        self, profile: Profile, scale: Mapping[str, float], functions: Basis, mask: Flags, information: Floats
+        self,
+        profile: Profile,
+        scale: Mapping[str, float],
+        functions: Basis,
+        mask: Flags,
+        information: Floats,
+        reduced: bool,
     ) -> None:
         self.profile, self.scale, self.functions = profile, scale, functions
         self.places = [(k, axis) for axis in range(3) for k in range(len(functions.terms)) if mask[k, axis]]
         self.index = {place: number for number, place in enumerate(self.places)}
-        self.mass0 = effective_mass(profile, scale, (), np.zeros((0, 3)))
+        self.mass0, self.rigid = effective_mass(profile, scale, (), np.zeros((0, 3))), rigid_body(profile.hull)
+        if reduced:
+            self.mass0, self.rigid = without_sway_coupling(self.mass0), without_sway_coupling(self.rigid)
         self.acceleration = {
             column: functions.terms.index(name) for column, name in enumerate(ACCELERATIONS) if name in functions.terms
         }
@@ -176,8 +188,7 @@ class _Problem:
 
     def mass_cuts(self, mass: Floats) -> list[tuple[Floats, float, str]]:
         """Return half-spaces that a mass matrix outside its bounds violates: one for each direction in which it does."""
-        rigid = rigid_body(self.profile.hull)
-        root = np.linalg.cholesky(rigid)
+        root = np.linalg.cholesky(self.rigid)
         inverse = np.linalg.inv(mass)
         values, vectors = np.linalg.eigh(root.T @ ((inverse + inverse.T) / 2.0) @ root)
         cuts = []

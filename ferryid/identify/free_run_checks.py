@@ -72,7 +72,9 @@ def _at_horizon(
     old: SingleRuns, new: SingleRuns, column: int, horizon_s: float, reached: Flags, reference: str
 ) -> list[Check]:
     """Return whether each of `_QUANTITIES` is predicted no worse after a horizon; one check where no interval is possible."""
-    paired = reached & np.isfinite(old.errors[:, column, 0] + new.errors[:, column, 0])
+    some = np.isfinite(old.errors[:, column] + new.errors[:, column])
+    known = [quantity for quantity in _QUANTITIES if some[:, quantity[1]].any()]
+    paired = reached & some[:, [which for _, which, _, _ in known]].all(axis=1)
     clusters = _clusters(old, max(IDENTIFY.block_s, horizon_s))[paired]
     stretches = np.unique(clusters).size
     if stretches < 2:
@@ -82,7 +84,7 @@ def _at_horizon(
         )
         return [_not_compared(f"free_run_{horizon_s:g}s", reason)]
     checks = []
-    for label, which, unit, factor in _QUANTITIES:
+    for label, which, unit, factor in known:
         before, after = (one.errors[paired, column, which] * factor for one in (old, new))
         mean, low, high = paired_interval(after - before, clusters)
         reason = (

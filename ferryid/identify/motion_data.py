@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.identify.excitation import assess_excitation
+from ferryid.identify.contradictions import faint_force
+from ferryid.identify.excitation import assess_excitation, still_warnings
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import fit_warnings
 from ferryid.identify.inertia import axes_without_force
@@ -139,8 +140,9 @@ class MotionData(FitData):
         masks = [log.validation if self.held_out else log.training for log in logs]
         tau = stacked([log.motion.tau for log in logs], masks)
         base, model = stacked([log.tau_base for log in logs], masks), stacked([log.tau_model for log in logs], masks)
+        force = force_scores(tau, base, model, np.ones(len(tau), dtype=bool))
         return ModelScores(
-            force_scores(tau, base, model, np.ones(len(tau), dtype=bool)),
+            force.without_sway() if self.settings.reduced else force,
             rows=len(tau),
             seconds=sum(float(mask.sum()) / log.motion.rate_hz for log, mask in zip(logs, masks, strict=True)),
             split=self.split.kind,
@@ -214,7 +216,20 @@ class LogData(MotionData):
 
     def warnings(self, excitation: Excitation, scores: ModelScores) -> tuple[str, ...]:
         """Return what to know before trusting the scores, as sentences."""
-        return fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores)
+        windows = [one for one in self.windows.training if len(one)]
+        faint = ""
+        if windows:
+            force, needed = (
+                np.concatenate(columns)
+                for columns in zip(*((one.force, one.base(one.by_velocity)) for one in windows), strict=True)
+            )
+            known = np.array([1.0, 0.0 if self.settings.reduced else 1.0, 1.0])
+            faint = faint_force(force * known, needed, f"the profile {self.profile.name}")
+        return (
+            *filter(None, [faint]),
+            *still_warnings(self.profile, self.motions),
+            *fit_warnings(self.settings, self.split, excitation, self.prepared, self.motions, scores),
+        )
 
 
 def compute_residuals(
@@ -234,6 +249,9 @@ def compute_residuals(
     check_components(settings.components, functions)
     targets = [compute_residual(profile, motion, settings.scale, settings.residual) for motion in motions]
     errors = [compute_residual(profile, motion, settings.scale) for motion in motions]
+    if settings.reduced:
+        for residual in (*targets, *errors):
+            residual[:, 1] = 0.0
     motions = [
         replace(motion, valid=known_rows(motion, functions, target, error))
         for motion, target, error in zip(motions, targets, errors, strict=True)

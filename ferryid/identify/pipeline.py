@@ -16,6 +16,7 @@ from ferryid import __version__
 from ferryid.identify.acceptance import NOT_JUDGED, Acceptance, Check, accept
 from ferryid.identify.estimation import estimate_correction
 from ferryid.identify.estimators import choose_estimator
+from ferryid.identify.excitation import still_axes
 from ferryid.identify.fit_data import Coefficients, Estimate, FitData
 from ferryid.identify.fit_warnings import free_run_warnings
 from ferryid.identify.free_run_checks import free_run_checks
@@ -79,6 +80,7 @@ def fit_opened(
     prepared = [smoothed(one, settings.window_s, settings.smoother) for one in opened]
     run.progress("computing the residual")
     data = compute_residuals(profile, settings, prepared)
+    data = replace(data, functions=data.functions.without(still_axes(profile, data.motions)))
     if parts is None:
         parts = split_rows(data.motions, settings.split, window_s=settings.window_s)
     data = replace(data, split=parts.within([motion.valid for motion in data.motions]))
@@ -120,7 +122,7 @@ def accept_estimate(data: FitData, estimate: Estimate, name: str, run: RunContex
     free_base, free_new = data.free_runs(found, run.progress)
     acceptance = NOT_JUDGED
     if data.held_out:
-        acceptance = accept(scores.force.mse_base, scores.force.mse_model, scores.measure)
+        acceptance = accept(scores.force.mse_base, scores.force.mse_model, scores.measure, data.settings.axes)
     if data.held_out and data.settings.accept == "full":
         acceptance = acceptance.with_checks(_checks(data, found, scores, free_base, free_new))
     return FitOutcome(
@@ -149,12 +151,13 @@ def _checks(
     """Return what the full criterion asks for besides the held-out error."""
     profile, scale, functions = data.profile, data.settings.scale, data.functions
     law = Estimator(profile, scale, functions, found.theta, found.intercept)
-    return (
+    every = (
         *inertia_checks(profile, effective_mass(profile, scale, functions.terms, found.theta)),
         *damping_checks(law.at_constant_velocity, data.visited),
         *free_run_checks(free_base, free_new),
         *held_out_checks(scores.seconds, data.held_out_blocks, scores.split),
     )
+    return tuple(check for check in every if not (data.settings.reduced and check.name.endswith("_sway")))
 
 
 def _model(
@@ -188,7 +191,11 @@ def _model(
         intercept_low=found.intercept_low,
         intercept_high=found.intercept_high,
         covariance=found.covariance,
-        ranges=data.ranges(excitation),
+        ranges={
+            name: span
+            for name, span in data.ranges(excitation).items()
+            if not (data.settings.reduced and name in ("v", "v_dot"))
+        },
         training=data.training_logs(),
         scores=scores,
         accepted=acceptance.accepted,

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from ferryid.identify.fit_data import Coefficients
+from ferryid.identify.inertia import without_sway_coupling
 from ferryid.identify.settings import FitSettings
 from ferryid.identify.split import Split
 from ferryid.identify.weak_rows import WeakRows, average_over_windows
@@ -68,11 +69,13 @@ class PredictionWindows:
     def velocities(self) -> tuple[Floats, ...]:
         """Velocities that enter products, shape (n, 3) each: measured, or with slow errors replaced by the position's.
 
+        Without sway velocity they are as measured: the position's holds the sway that is taken as zero.
+
         Noise of a velocity that lasts for seconds, multiplied into damping and Coriolis forces, biases their coefficients
         towards zero (errors in variables). Whichever leaves less of the training windows to a regression has less of it.
         """
         measured = tuple(motion.nu for motion in self.motions)
-        if not any(mask.any() for mask in self.split.training):
+        if self.settings.reduced or not any(mask.any() for mask in self.split.training):
             return measured
         steadied = tuple(complementary_filter(m.nu, m.nu, m.eta, m.rate_hz) for m in self.motions)
         left = [self._left(self._averaged(self.split.training, each)) for each in (measured, steadied)]
@@ -109,9 +112,13 @@ class PredictionWindows:
             estimate = one.base(one.by_velocity) + one.basis(terms, one.by_velocity) @ found.theta + found.intercept
             tau.append(one.force)
             base.append(one.reference(self.base_mass))
-            model.append(one.force - _on_mass(one.inertia, one.inertia + added, one.force - estimate))
+            inertia, mass = one.inertia, one.inertia + added
+            if self.settings.reduced:
+                inertia, mass = without_sway_coupling(inertia), without_sway_coupling(mass)
+            model.append(one.force - _on_mass(inertia, mass, one.force - estimate))
         every = np.concatenate(tau)
-        return force_scores(every, np.concatenate(base), np.concatenate(model), np.ones(len(every), dtype=bool))
+        found_scores = force_scores(every, np.concatenate(base), np.concatenate(model), np.ones(len(every), dtype=bool))
+        return found_scores.without_sway() if self.settings.reduced else found_scores
 
     def scores(self, found: Coefficients) -> ModelScores:
         """Return the errors of a model as a model file has them."""

@@ -8,6 +8,7 @@ from typing import Any
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.identify.thresholds import IDENTIFY
 from ferryid.regression.bases import Basis, make_basis, with_hull_length
+from ferryid.types import AXES
 from ferryid.vessel.profile import Profile
 
 CHOICES = {
@@ -22,6 +23,8 @@ CHOICES = {
 
 FOLDS = 5
 """Usual number of folds of a cross-validation."""
+WITHOUT_SWAY = ("surge", "yaw")
+"""Axes of a model that is reduced to them, as sway is not measured."""
 TEST_WINDOW_S = 1.0
 """Smoothing window of test rows [s], whatever window is tried."""
 WINDOWS_S = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
@@ -62,6 +65,9 @@ class FitSettings:
         `ferryid.identify.weak_rows`; ``"auto"``: the one of less error on folds of the training rows.
     weak_window_s
         Length of the windows of the weak form [s]; None: 8 s for a vessel of 5 m, by Froude's law for others.
+    axes
+        Axes that are fitted and judged. `on` leaves out sway for a vessel of which it is not measured; the base model's sway
+        is then kept.
 
     Raises
     ------
@@ -87,6 +93,7 @@ class FitSettings:
     seed: int = 0
     estimator: str = "auto"
     weak_window_s: float | None = None
+    axes: tuple[str, ...] = AXES
 
     def __post_init__(self) -> None:
         # Says what is wrong with either before any log is read; the hull's length comes with the profile.
@@ -134,19 +141,27 @@ class FitSettings:
         return {"delta": self.delta, "sigma": self.sigma, "zeta": self.zeta}
 
     def on(self, profile: Profile) -> FitSettings:
-        """Return the settings on one vessel: the basis with the length of its hull, where it needs one.
+        """Return the settings on one vessel: the basis with the length of its hull, where it needs one, and its axes.
 
         Raises
         ------
         FerryIdError
             Where the basis needs a length that the profile does not have.
         """
-        return replace(self, basis=with_hull_length(self.basis, profile.hull.length_m, profile.path or profile.name))
+        basis = with_hull_length(self.basis, profile.hull.length_m, profile.path or profile.name)
+        return replace(self, basis=basis, axes=AXES if profile.measures_sway else WITHOUT_SWAY)
+
+    @property
+    def reduced(self) -> bool:
+        """Whether sway is not measured, so that surge and yaw alone are fitted and judged."""
+        return self.axes == WITHOUT_SWAY
 
     def plain(self) -> dict[str, Any]:
         """Return the settings as plain values for a model file."""
         plain = {key: value for key, value in asdict(self).items() if key not in self.scale}
-        windows_s = list(plain.pop("windows_s"))
+        windows_s, axes = list(plain.pop("windows_s")), list(plain.pop("axes"))
+        if self.reduced:
+            plain["axes"] = axes
         return {**plain, "windows_s": windows_s} if windows_s else plain
 
 

@@ -41,6 +41,18 @@ class IdentifyThresholds:
         "standard deviation of the force below which an axis has no actuator",
         "convention: rounding of logged actuator signals",
     )
+    faint_force: float = threshold(
+        0.15,
+        "of the force that the motion needs",
+        "applied force on every axis below which its unit is doubted",
+        "derived: a unit that is 9.55 times too small, and half as much again for the base model",
+    )
+    least_motion: float = threshold(
+        0.01,
+        "of the velocity",
+        "root-mean-square velocity of an axis, in units of kinetic energy, below which it is not excited and nothing is fitted",
+        "tuned on simulated recordings: noise of 0.01 m/s and 0.05 deg/s beside 0.5 m/s is below it",
+    )
     block_s: float = threshold(
         40.0,
         "s",

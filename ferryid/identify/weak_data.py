@@ -16,7 +16,7 @@ from ferryid.errors import FerryIdError
 from ferryid.identify.contradictions import response_of, wrong_size, wrong_way
 from ferryid.identify.feasible import Feasible, feasible_gains
 from ferryid.identify.fit_data import Estimate
-from ferryid.identify.inertia import relative_inertia, without_inertia
+from ferryid.identify.inertia import relative_inertia, without_inertia, without_sway_coupling
 from ferryid.identify.log_conditions import Conditions, LoadSamples, estimate_conditions, sample_load
 from ferryid.identify.motion_data import LogData
 from ferryid.identify.outcome import Excitation, LogWind
@@ -101,7 +101,9 @@ class WeakData(LogData):
 
     @cached_property
     def conditions(self) -> Conditions:
-        """Steady wind of every log in which it was not measured."""
+        """Steady wind of every log in which it was not measured; none without sway, which tells most of it."""
+        if self.settings.reduced:
+            return Conditions.none(self.windows.training, len(self.functions.terms))
         return estimate_conditions(
             self.profile,
             self.load_samples,
@@ -173,7 +175,12 @@ class WeakData(LogData):
         return np.array([best[0], best[0], best[1]], dtype=bool)
 
     def _poses_agree(self) -> bool:
-        """Return whether acceleration from poses is known and goes with that from velocities; of a stuck pose it does not."""
+        """Return whether acceleration from poses is known and goes with that from velocities; of a stuck pose it does not.
+
+        Without sway velocity there is nothing for it to go with.
+        """
+        if self.settings.reduced:
+            return False
         pose, velocity = (
             np.concatenate([getattr(one, name) for one in self.windows.training]) for name in ("by_pose", "by_velocity")
         )
@@ -192,6 +199,8 @@ class WeakData(LogData):
 
     def _rows_of(self, windows: WeakRows, posed: Flags) -> Rows:
         target = windows.force - windows.base(windows.acceleration(posed))
+        if self.settings.reduced:
+            target[:, 1] = 0.0
         return Rows.of(windows.regressors(self.functions.terms), target)
 
     def _autocorrelation(self, left: Sequence[Floats]) -> float:
@@ -408,6 +417,7 @@ class WeakData(LogData):
             gains,
             self._information(),
             self.training_velocities,
+            reduced=self.settings.reduced,
         )
 
     def _information(self) -> Floats:
@@ -435,7 +445,10 @@ class WeakData(LogData):
 
     def force_form(self, gains: Floats, offsets: Floats) -> tuple[Floats, Floats]:
         """Return coefficients and intercepts of the applied force; see `to_force`."""
-        return to_force(gains, self.intercepts(gains, offsets), self.functions.terms, self.windows.base_mass)
+        mass = self.windows.base_mass
+        if self.settings.reduced:
+            mass = without_sway_coupling(mass)
+        return to_force(gains, self.intercepts(gains, offsets), self.functions.terms, mass)
 
     def excitation(self, estimate: Estimate) -> Excitation:
         """Return what the training windows determine by themselves, without the prior."""

@@ -45,6 +45,20 @@ class ForceScores:
         known = ratio[np.isfinite(ratio)]
         return cls(mse_base, mse_model, r2[0], r2[1], ratio, float(known.mean()) if known.size else math.nan)
 
+    def without_sway(self) -> ForceScores:
+        """Return the scores where sway was not measured: NaN there, and the mean of the other axes."""
+        known = np.array([1.0, np.nan, 1.0])
+        ratio = self.ratio * known
+        finite = ratio[np.isfinite(ratio)]
+        return ForceScores(
+            self.mse_base * known,
+            self.mse_model * known,
+            self.r2_base * known,
+            self.r2_model * known,
+            ratio,
+            float(finite.mean()) if finite.size else math.nan,
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Return the scores as plain values by the names of the axes."""
         return {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import degrees, isfinite, nan
+from math import degrees, isfinite, isnan, nan
 
 from ferryid.compare import (
     BASE,
@@ -123,10 +123,12 @@ def headline(result: ComparisonResult) -> str:
     known = scopes(result)
     if not known:
         return f"{counted(len(result.models), 'model')} by their coefficients alone: no log was given to judge them on."
-    on, title, _ = known[-1]
+    on, title, scope = known[-1]
     groups: dict[tuple[str, str], list[str]] = {}
     for axis in AXES:
         rows = [row for row in result.statements if (row.on, row.kind, row.what) == (on, "force", axis)]
+        if scope.scores and all(isnan(scores.mse[axis]) for scores in scope.scores.values()):
+            continue  # nothing was measured there
         best = _best(rows, rows[0])
         own = [row for row in rows if row.first == best]
         if not all(isfinite(row.ratio) for row in rows):

@@ -24,7 +24,7 @@ def render_evaluation(result: dict[str, Any]) -> str:
         for label, part in (("base", "base"), ("model", "model")):
             lines.append(
                 f"{'  rms error, ' + label + ' [N, N, N·m]':<34}"
-                + "".join(f"{entry['mse'][part][axis] ** 0.5:>11.3g}" for axis in AXES)
+                + "".join(f"{_root(entry['mse'][part][axis]):>11}" for axis in AXES)
             )
         lines.append(f"{'  R², model':<34}" + "".join(f"{_number(entry['r2']['model'][axis]):>11}" for axis in AXES))
         if "free_run" in entry:
@@ -67,6 +67,10 @@ def _free_run_lines(runs: dict[str, Any]) -> list[str]:
         if run["note"]:
             lines.append(f"  {part}: {run['note']}")
     return lines
+
+
+def _root(value: float) -> str:
+    return f"{value**0.5:.3g}" if np.isfinite(value) else "-"
 
 
 def _number(value: float | None, factor: float = 1.0) -> str:

@@ -176,4 +176,6 @@ def _number(value: float) -> str:
 
 def _three_digits(value: float) -> str:
     """Return a number with three significant digits, those of its integer part all written."""
+    if not np.isfinite(value):
+        return "–"
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:#.3g}".rstrip(".")

@@ -19,6 +19,7 @@ from ferryid.signals.sampling import check_sampling
 from ferryid.signals.smooth import Measured, measure, smooth_measured
 from ferryid.signals.thresholds import SIGNALS
 from ferryid.signals.track import Motion, Track
+from ferryid.vessel import SWAY_NOT_MEASURED
 from ferryid.vessel.profile import Profile
 
 
@@ -62,6 +63,7 @@ def doubts_of(recording: Recording, track: Track) -> tuple[str, ...]:
     empty = [name for name in POSE if name in track.columns and not np.isfinite(track.columns[name]).any()]
     return (
         *(doubt.says for doubt in track.doubts),
+        *(repair for repair in track.repairs if repair == SWAY_NOT_MEASURED),
         *recording.orders_for_feedback,
         *_overlap(recording, track),
         *(f"{name} is mapped and has no value in this log." for name in empty),

@@ -254,7 +254,7 @@ def _long_runs(time_s: Floats, repeats: Flags, at_rest: Flags, longest_s: float)
     return old
 
 
-def require_excited(track: Track, nu: Floats, tau: Floats) -> None:
+def require_excited(track: Track, nu: Floats, tau: Floats, *, sway_measured: bool = True) -> None:
     """Refuse signals from which nothing can be identified.
 
     Parameters
@@ -263,6 +263,8 @@ def require_excited(track: Track, nu: Floats, tau: Floats) -> None:
         Names the log, and says which rows are valid.
     nu, tau
         Unsmoothed velocity and applied force, shape (n, 3).
+    sway_measured
+        False for a sway velocity that stands as zero, which is then not asked for.
 
     Raises
     ------
@@ -271,10 +273,12 @@ def require_excited(track: Track, nu: Floats, tau: Floats) -> None:
     """
     rows = track.valid
     for name, values, unit in zip(("u", "v", "r"), nu.T, ("m/s", "m/s", "rad/s"), strict=True):
-        if np.ptp(values[rows]) == 0.0:
+        if np.ptp(values[rows]) == 0.0 and (sway_measured or name != "v"):
+            surge_alone = ", map surge velocity alone where sway is not measured" if name == "v" else ""
             raise FerryIdError(
                 f"{track.log}: constant signal {name}, needed by the fit, found {values[rows][0]:g} {unit} throughout. "
-                "Fix: check that the profile maps the right field, or use a log in which the vessel moves in every axis"
+                f"Fix: check that the profile maps the right field{surge_alone}, or use a log in which the vessel moves in "
+                "every axis"
             )
     if np.all(np.ptp(tau[rows], axis=0) == 0.0):
         force = ", ".join(f"{value:g}" for value in tau[rows][0])

@@ -42,6 +42,7 @@ class Measured:
     payload: Floats | None
     repairs: tuple[str, ...]
     left_out: tuple[LeftOut, ...] = ()
+    sway_measured: bool = True
 
 
 def measure(track: Track, profile: Profile) -> Measured:
@@ -78,7 +79,7 @@ def measure(track: Track, profile: Profile) -> Measured:
             f"{track.log}: no row has both velocity and applied force, found "
             f"{counted(int(np.count_nonzero(track.valid)), 'aligned row')}. Fix: check the actuator signals in the profile"
         )
-    require_excited(track, nu, tau)
+    require_excited(track, nu, tau, sway_measured=profile.measures_sway)
     unknown = LeftOut.of(
         "wind, current or payload was not measured, or the force cannot be computed",
         track.valid & ~usable,
@@ -100,6 +101,7 @@ def measure(track: Track, profile: Profile) -> Measured:
         payload,
         tuple(repairs),
         left_out,
+        profile.measures_sway,
     )
 
 
@@ -190,6 +192,7 @@ def smooth_measured(measured: Measured, window_s: float, smoother: str = "square
             *(f"{counted(one.rows, 'row')} {verb(one.rows, 'is')} not used: {one.reason}." for one in beside),
         ),
         left_out=(*measured.left_out, *beside),
+        sway_measured=measured.sway_measured,
     )
 
 

@@ -179,6 +179,8 @@ class Motion:
         Sentences carried on from the track, and those of smoothing.
     left_out
         Rows that are not valid because of gaps, faults and what smoothing loses beside them, by reason; each row once.
+    sway_measured
+        False where sway velocity was not measured and stands as zero: forces and motion in sway say nothing.
     """
 
     log: str
@@ -197,3 +199,4 @@ class Motion:
     payload: Floats | None = None
     repairs: tuple[str, ...] = field(default=())
     left_out: tuple[LeftOut, ...] = ()
+    sway_measured: bool = True

@@ -3,11 +3,12 @@
 from ferryid.vessel.describe import describe
 from ferryid.vessel.faults import Fault
 from ferryid.vessel.load import bundled, check_profile, load_profile, parse_profile
-from ferryid.vessel.resolve import resolve, resolve_notes
+from ferryid.vessel.resolve import SWAY_NOT_MEASURED, resolve, resolve_notes
 from ferryid.vessel.signal_map import Selection, convert, select, survey
 from ferryid.vessel.thrusters import actuator_columns, applied_force, speed_doubts
 
 __all__ = [
+    "SWAY_NOT_MEASURED",
     "Fault",
     "Selection",
     "actuator_columns",

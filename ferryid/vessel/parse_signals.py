@@ -87,12 +87,15 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         unit = _unit(table, "force")
         options["moment_unit"] = _unit(table, "moment", "moment_unit", default="N*m")
     else:
-        fields = table.texts("fields", 2, required=True)
+        surge_alone = quantity == "velocity" and _has_one_field(table)
+        fields = table.texts("fields", 1 if surge_alone else 2, required=True)
         frames = (*BODY_FRAMES, *WORLD_FRAMES) if quantity == "velocity" else WORLD_FRAMES
         frame = _frame(table, frames, quantity)
         unit = _unit(table, "speed")
         if quantity == "velocity":
             mount_m = _mount(table)
+        if surge_alone:
+            _check_surge(table, frame)
     required = table.flag("required", quantity not in _OPTIONAL)
     table.close()
     return Signal(
@@ -108,6 +111,27 @@ def _vessel_signal(quantity: str, table: TableReader) -> Signal | None:
         line=table.line(),
         mount_m=mount_m,
     )
+
+
+def _has_one_field(table: TableReader) -> bool:
+    fields = table.data.get("fields")
+    return isinstance(fields, list) and len(fields) == 1
+
+
+def _check_surge(table: TableReader, frame: str) -> None:
+    """Note what a velocity of one field, surge alone, cannot be."""
+    if frame in WORLD_FRAMES:
+        table.fault(
+            f'one field of a velocity is surge alone, which is measured along the hull, found frame "{frame}". '
+            'Fix: give frame = "FRD" or "FLU", or both fields of the velocity over ground',
+            "frame",
+        )
+    if table.data.get("required") is False:
+        table.fault(
+            "one field of a velocity is surge alone, and a model reduced to surge and yaw needs it, found required = false. "
+            "Fix: leave out required, or leave out [signals.velocity] where position and heading give surge and sway",
+            "required",
+        )
 
 
 def _wind_fields(table: TableReader, options: dict[str, str]) -> tuple[tuple[str, ...], str]:

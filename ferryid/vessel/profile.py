@@ -137,3 +137,8 @@ class Profile:
     path: str
     text: str
     sha256: str
+
+    @property
+    def measures_sway(self) -> bool:
+        """False where the velocity has one field: surge alone is measured, and sway is taken as zero."""
+        return all(len(signal.fields) > 1 for signal in self.signals if signal.quantity == "velocity")

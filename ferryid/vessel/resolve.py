@@ -11,12 +11,15 @@ from ferryid.types import Floats
 from ferryid.vessel.frames import derivative, to_body, to_world
 from ferryid.vessel.profile import Profile, Signal
 
+SWAY_NOT_MEASURED = "Sway velocity is not measured: taken as zero; the model is reduced to surge and yaw."
+"""What inspect, fit and every command that opens a log say of a velocity that has surge alone."""
+
 
 def resolve(profile: Profile, columns: Mapping[str, Floats], rate_hz: float | None = None) -> dict[str, Floats]:
     """Complete aligned columns: `u, v, r` and true wind, at the body origin, and the payload's place.
 
-    Where the log has no yaw rate it is the slope of the heading, and where it has no velocity that of the position;
-    `resolve_notes` says so. Differences never reach across missing samples.
+    Where the log has no yaw rate it is the slope of the heading, where it has no velocity that of the position, and beside
+    a velocity of surge alone, sway is taken as zero. `resolve_notes` says so. Differences never reach across missing samples.
 
     Parameters
     ----------
@@ -63,6 +66,8 @@ def resolve_notes(profile: Profile, columns: Collection[str]) -> tuple[str, ...]
         notes.append("Surge and sway are the slope of the position turned by the heading: the log has no velocity.")
     elif "u" not in columns and "vel_N" in columns:
         notes.append("Surge and sway are the velocity over ground turned by the heading.")
+    elif "u" in columns and "v" not in columns:
+        notes.append(SWAY_NOT_MEASURED)
     payload = next((signal for signal in profile.signals if signal.quantity == "payload"), None)
     if payload is not None and "payload_kg" in columns and "payload_x" not in columns:
         notes.append(f"The payload's place is not measured: the profile puts it at x = {payload.mount_m[0]:g} m.")
@@ -110,10 +115,13 @@ def _body_velocity(
             f"{profile.path}: surge and sway velocity are needed, found neither body velocity nor world velocity or "
             "position with a heading in the log. Fix: map one of them"
         )
+    reduced = "v" not in out
+    if reduced:
+        out["v"] = np.where(np.isfinite(out["u"]), 0.0, np.nan)
     if mount_m != (0.0, 0.0):
         # v_P = v_O + r × p, so the velocity at the origin is the measured one less the turning of the arm.
         out["u"] = out["u"] + out["r"] * mount_m[1]
-        out["v"] = out["v"] - out["r"] * mount_m[0]
+        out["v"] = out["v"] if reduced else out["v"] - out["r"] * mount_m[0]
 
 
 def _true_wind(out: dict[str, Floats], signal: Signal | None) -> None:

@@ -68,7 +68,7 @@ class Selection:
 def canonical_columns(signal: Signal) -> tuple[str, ...]:
     """Return the names of the columns that `convert` makes of a signal."""
     if signal.quantity == "velocity":
-        return ("u", "v") if signal.frame in ("FRD", "FLU") else ("vel_N", "vel_E")
+        return ("u", "v")[: len(signal.fields)] if signal.frame in ("FRD", "FLU") else ("vel_N", "vel_E")
     if signal.quantity == "wind":
         return ("wind_N", "wind_E") if signal.frame else ("wind_speed", "wind_from")
     if signal.quantity == "payload":

@@ -247,7 +247,17 @@ CASES = {
         'field = "r"\nunit = "rad/s"\nframe = "FLU"',
         "one message has one body frame",
     ),
-    "one field for a velocity": ('fields = ["u", "v"]', 'fields = ["u"]@', "must name 2 fields, found 1"),
+    "three fields for a velocity": ('fields = ["u", "v"]', 'fields = ["u", "v", "w"]@', "must name 2 fields, found 3"),
+    "one field for a velocity over ground": (
+        'fields = ["u", "v"]\nunit = "m/s"\nframe = "FRD"',
+        'fields = ["u"]\nunit = "m/s"\nframe = "NED"@\n',
+        "one field of a velocity is surge alone, which is measured along the hull",
+    ),
+    "surge alone that may be missing": (
+        'fields = ["u", "v"]\nunit = "m/s"',
+        'fields = ["u"]\nrequired = false@\nunit = "m/s"',
+        "a model reduced to surge and yaw needs it",
+    ),
     "no topic": (
         '[signals.velocity]\ntopic = "/nav"',
         "[signals.velocity]@",

@@ -121,6 +121,12 @@ def read_measurements(
             f"{profile.path}: a diagnosis weighs motion against the actuators' force, found no actuator in the profile. "
             "Fix: describe them in [[actuator]] and map their signals"
         )
+    if not profile.measures_sway:
+        raise FerryIdError(
+            f"{profile.path}: a diagnosis weighs forces on all three axes, found surge velocity alone, without sway. "
+            "Fix: map both fields of [signals.velocity], or leave it out where position and heading are measured, or use "
+            "ferryid fit, which reduces the model to surge and yaw"
+        )
     run.progress(f"reading {Path(path).name}")
     recording = record(path, profile, run.tables, verify=run.verify)
     check_sampling(recording, profile)

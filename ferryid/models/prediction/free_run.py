@@ -257,6 +257,8 @@ def _integrate(force: ForceLaw, motion: Motion, starts: Ints, horizon_s: float) 
     masses = _masses(force, motion)
     inverses = np.linalg.inv(np.where(np.isfinite(masses), masses, np.eye(3)))
     limit = 10.0 * np.nanmax(np.abs(motion.nu), axis=0) + 1e-3
+    if not motion.sway_measured:
+        limit[1] = limit[0]
 
     position = np.where(np.isfinite(motion.eta[starts]), motion.eta[starts], 0.0)
     state = np.hstack([position, motion.nu[starts]])
@@ -299,17 +301,22 @@ def _between(values: Floats, rows: Ints, following: Ints, part: float) -> Floats
 
 
 def _errors(path: Floats, stride: int, motion: Motion, starts: Ints, ends: Ints, horizons: Floats) -> Floats:
-    """Return |error| of position, heading, speed and yaw rate, shape (starts, horizons, 4)."""
+    """Return |error| of position, heading, speed and yaw rate, shape (starts, horizons, 4).
+
+    Where sway was not measured there is none of position, which sway moves too, and that of speed is of surge alone.
+    """
     error = np.full((len(starts), len(horizons), 4), np.nan)
     every = _rows_at(starts, stride, motion.rate_hz, horizons)
     for h, rows in enumerate(every.T):
         inside = rows < ends
         at = rows[inside]
         now = path[inside, (at - starts[inside]) // stride]
-        error[inside, h, 0] = np.hypot(*(now[:, :2] - motion.eta[at, :2]).T)
+        if motion.sway_measured:
+            error[inside, h, 0] = np.hypot(*(now[:, :2] - motion.eta[at, :2]).T)
         turned = now[:, 2] - motion.eta[at, 2]
         error[inside, h, 1] = np.abs((turned + np.pi) % (2 * np.pi) - np.pi)
-        error[inside, h, 2] = np.hypot(*(now[:, 3:5] - motion.nu[at, :2]).T)
+        astray = now[:, 3:5] - motion.nu[at, :2]
+        error[inside, h, 2] = np.hypot(*astray.T) if motion.sway_measured else np.abs(astray[:, 0])
         error[inside, h, 3] = np.abs(now[:, 5] - motion.nu[at, 2])
     return error
 

@@ -13,13 +13,14 @@ if TYPE_CHECKING:
     from ferryid.regression.bases.basis import STRUCTURES, Basis, make_basis, relative_flow, with_hull_length
     from ferryid.regression.bases.crossflow_integrals import LEAST_SPEED_MPS
     from ferryid.regression.bases.forms import basis_names
-    from ferryid.regression.bases.term import CROSSFLOW_FACTORS, DIMENSIONS, Term
+    from ferryid.regression.bases.term import CROSSFLOW_FACTORS, DIMENSIONS, SWAY, Term
 
 __all__ = [
     "CROSSFLOW_FACTORS",
     "DIMENSIONS",
     "LEAST_SPEED_MPS",
     "STRUCTURES",
+    "SWAY",
     "Basis",
     "Term",
     "basis_names",
@@ -43,6 +44,7 @@ __getattr__ = import_on_demand(
         "term": (
             "CROSSFLOW_FACTORS",
             "DIMENSIONS",
+            "SWAY",
             "Term",
         ),
     },

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.regression.bases.crossflow_integrals import crossflow_integrals
 from ferryid.regression.bases.forms import basis_forms
-from ferryid.regression.bases.term import SURGE, SWAY, YAW, Term, terms
+from ferryid.regression.bases.term import CROSSFLOW_FACTORS, SURGE, SWAY, YAW, Term, terms
 from ferryid.signals.track import Motion
 from ferryid.types import Flags, Floats
 
@@ -23,6 +23,12 @@ Rows = NDArray[np.bool_] | NDArray[np.int64] | slice
 STRUCTURES = ("coupled", "decoupled")
 
 _EVERY_ROW = slice(None)
+_OWN = (
+    ("u", "|u|", "u_dot"),
+    ("v", "|v|", "v_dot", *CROSSFLOW_FACTORS),
+    ("r", "|r|", "r_dot", *CROSSFLOW_FACTORS),
+)
+"""Factors of each axis, which are zero, or only part of what they stand for, without motion on it."""
 _SIZED = re.compile(r"(.+)-(\d{1,4}(?:\.\d{1,4})?)m")
 
 BASES: Mapping[str, tuple[Term, ...]] = {name: form.terms for name, form in basis_forms().items()}
@@ -106,6 +112,18 @@ class Basis:
 
     def _needs(self, flow: str) -> bool:
         return any(factor.endswith(f"_{flow}") for term in self.functions for factor in term.factors)
+
+    def without(self, axes: Sequence[int]) -> Basis:
+        """Return the basis for motion without some axes: no function acts on one, and none that has its velocity in it acts.
+
+        The apparent wind stays, whose part across the hull is the wind's own for the most part.
+        """
+        mask = self.mask.copy()
+        for axis in axes:
+            mask[:, axis] = False
+            mask[[any(factor in _OWN[axis] for factor in term.factors) for term in self.functions]] = False
+        mask.setflags(write=False)
+        return replace(self, mask=mask)
 
     def fill(
         self,
