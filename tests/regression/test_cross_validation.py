@@ -40,17 +40,20 @@ def test_the_choice_by_hand() -> None:
     few, more = [1.9, 1.31, 1.3, 1.0], [1.5, 1.4, 1.25, 1.2]
     apart = np.array([[0.2, 0.2, 0.31, 0.0], [0.2, 0.2, 0.26, 0.5]])
 
-    def curves(differences: NDArray[np.float64], common: float = 0.0) -> Curves:
+    def curves(differences: NDArray[np.float64], common: float = 0.0, own: float = 9.0) -> Curves:
         mse = np.array([few, more])[:, :, None]
         harder = np.array([common, -common])[:, None, None, None]
         folds = mse + np.stack([differences, -differences])[:, :, :, None] + harder
-        return Curves(mse, np.zeros_like(mse), np.ones(3), 2, 100, folds.transpose(1, 0, 2, 3))
+        return Curves(mse, np.full_like(mse, own), np.ones(3), 2, 100, folds.transpose(1, 0, 2, 3))
 
     assert curves(apart).choice() == (1, 3)
     # A fold that is harder for all combinations alike changes nothing.
     assert curves(apart, common=0.9).choice() == (1, 3)
     assert curves(np.where(apart == 0.2, 0.315, apart)).choice() == (0, 2)
     assert curves(0.0 * apart).choice() == (0, 4)
+    # Few components that fail in one fold differ by much, and are worse all the same.
+    assert curves(9.0 + apart, own=0.26).choice() == (1, 3)
+    assert curves(9.0 + apart, own=0.1).choice() == (0, 4)
     assert curves_of([[2.0, 2.0]], [[0.1, 0.1]]).choice() == (0, 1)
 
 

@@ -53,22 +53,25 @@ class Curves:
         return (self.mse / unit).mean(axis=2), (self.standard_error / unit).mean(axis=2)
 
     def near(self) -> Flags:
-        """Return which combinations are worse than the best by no more than the paired differences scatter, shape (W, A)."""
-        curve = self.normalised()[0]
+        """Return which combinations cannot be told from the best, shape (W, A).
+
+        They are worse by no more than one standard error of the paired differences over the folds, nor by more than one of the
+        best's own error: that folds differ is no reason to take fewer components, nor is it that few of them fail in one fold.
+        """
+        curve, own = self.normalised()
         window, count = np.unravel_index(int(np.argmin(curve)), curve.shape)
         least = self.mse.min(axis=(0, 1))
         error = (self.by_fold / np.where(least > 0.0, least, 1.0)).mean(axis=3)
         worse = error - error[window, :, count][None, :, None]
         folds = error.shape[1]
         band = np.std(worse, axis=1, ddof=1) / sqrt(folds) if folds > 1 else np.zeros_like(curve)
-        return np.asarray(curve <= curve[window, count] + band)
+        return np.asarray(curve <= curve[window, count] + np.minimum(band, own[window, count]))
 
     def choice(self) -> tuple[int, int]:
         """Return number of window and of components (1..A): the simplest that cannot be told from the best.
 
-        Of all combinations that are worse than the best by no more than one standard error of the paired differences over the
-        folds, those with fewest components, and of these the one with the least error (Breiman et al. 1984, 3.4.3, with
-        differences: how much harder one fold is than another says nothing of which combination is better).
+        Of all that `near` has, those with fewest components, and of these the one with the least error; Breiman et al. (1984),
+        3.4.3, with differences.
         """
         curve, near = self.normalised()[0], self.near()
         fewest = int(np.argmax(near.any(axis=0)))
