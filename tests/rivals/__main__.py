@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 from tests.evidence import stamp
@@ -24,8 +26,10 @@ from tests.rivals.page import (
     variants_section,
 )
 from tests.rivals.recorded import CASES, recorded
-from tests.rivals.simulated import KINDS, Found, compared, trials
+from tests.rivals.simulated import KINDS, Found, Kind, compared, trials
 from tests.rivals.variants import VARIANTS
+
+Findings = dict[str, Found | str]
 
 
 def main() -> None:
@@ -34,35 +38,44 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=5, help="simulated trials of each kind")
     count = parser.parse_args().trials
     lines, ahead, absent = [SIMULATED_HEAD], [], []
-    simulated, varied = dict[str, list[dict[str, Found | str]]](), dict[str, list[dict[str, Found | str]]]()
+    simulated, varied = dict[str, list[Findings]](), dict[str, list[Findings]]()
     recordings = []
-    with tempfile.TemporaryDirectory() as folder:
-        for kind in KINDS if count else ():
+    with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        kinds = KINDS if count else ()
+        trying = [pool.submit(_simulated, kind, count, Path(folder)) for kind in kinds]
+        recording = [pool.submit(recorded, case) for case in CASES]
+        for kind, task in zip(kinds, trying, strict=True):
+            found, varied[kind.name] = task.result()
+            simulated[kind.name] = found
             print(kind.name, flush=True)
-            found = simulated[kind.name] = []
-            varied[kind.name] = []
-            for trial in trials(kind, count, Path(folder)):
-                found.append(compared(trial))
-                varied[kind.name].append(compared(trial, VARIANTS, 0))
             lines += simulated_section(kind.name, found)
             ahead += better_simulated(kind.name, found)
-    lines += variants_section(varied) if varied else []
-    lines.append(RECORDED_HEAD)
-    for case in CASES:
-        print(case.name, flush=True)
-        one = recorded(case)
-        if one is None:
-            absent.append(case.name)
-            continue
-        recordings.append(one)
-        lines += recorded_section(one)
-        ahead += better(one)
+        lines += variants_section(varied) if varied else []
+        lines.append(RECORDED_HEAD)
+        for case, result in zip(CASES, recording, strict=True):
+            one = result.result()
+            print(case.name, flush=True)
+            if one is None:
+                absent.append(case.name)
+                continue
+            recordings.append(one)
+            lines += recorded_section(one)
+            ahead += better(one)
     if absent:
         lines.append(f"\nNot at hand, and so left out: {', '.join(absent)}.\n")
     lines += [ELSEWHERE, *(ahead or ["Nowhere."]), ""]
     lines = [HEAD, *targets(simulated, recordings, absent), *lines]
     (REPORTS / "rivals.md").write_text("\n".join(lines), encoding="utf-8")
     stamp(REPORTS / "rivals.md")
+
+
+def _simulated(kind: Kind, count: int, folder: Path) -> tuple[list[Findings], list[Findings]]:
+    """Return what the methods and the variants find in trials of a kind."""
+    found, varied = list[Findings](), list[Findings]()
+    for trial in trials(kind, count, folder):
+        found.append(compared(trial))
+        varied.append(compared(trial, VARIANTS, 0))
+    return found, varied
 
 
 if __name__ == "__main__":

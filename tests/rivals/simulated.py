@@ -142,7 +142,7 @@ def _simulator(kind: Kind, seed: int, factors: Mapping[str, float], folder: Path
     for (name, scenario), number in ((learn, seed), (("judge", exact), 1000 + seed)):
         path = folder / f"{name}-{seed}.mcap"
         if not path.exists():
-            write_log(simulate(scenario, number), path)
+            write_log(simulate(scenario, number), path, overwrite=True)
         logs.append(open_track(str(path), profile, None))
     return Trial(profile, *logs, true.hull.M, true)
 
