@@ -26,10 +26,7 @@ from tests.rivals.page import (
     variants_section,
 )
 from tests.rivals.recorded import CASES, recorded
-from tests.rivals.simulated import KINDS, Found, Kind, compared, trials
-from tests.rivals.variants import VARIANTS
-
-Findings = dict[str, Found | str]
+from tests.rivals.simulated import KINDS, Findings, try_all
 
 
 def main() -> None:
@@ -42,7 +39,7 @@ def main() -> None:
     recordings = []
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(2, get_context("spawn")) as pool:
         kinds = KINDS if count else ()
-        trying = [pool.submit(_simulated, kind, count, Path(folder)) for kind in kinds]
+        trying = [pool.submit(try_all, kind, count, Path(folder)) for kind in kinds]
         recording = [pool.submit(recorded, case) for case in CASES]
         for kind, task in zip(kinds, trying, strict=True):
             found, varied[kind.name] = task.result()
@@ -67,15 +64,6 @@ def main() -> None:
     lines = [HEAD, *targets(simulated, recordings, absent), *lines]
     (REPORTS / "rivals.md").write_text("\n".join(lines), encoding="utf-8")
     stamp(REPORTS / "rivals.md")
-
-
-def _simulated(kind: Kind, count: int, folder: Path) -> tuple[list[Findings], list[Findings]]:
-    """Return what the methods and the variants find in trials of a kind."""
-    found, varied = list[Findings](), list[Findings]()
-    for trial in trials(kind, count, folder):
-        found.append(compared(trial))
-        varied.append(compared(trial, VARIANTS, 0))
-    return found, varied
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from ferryid.vessel.profile import Profile
 from tests.rivals.methods import METHODS, Method
 from tests.rivals.scores import HORIZONS_S, free_runs
 from tests.rivals.task import Task
+from tests.rivals.variants import VARIANTS
 
 DRAWS = 200
 """Draws of the bootstrap of ferryid's intervals."""
@@ -106,6 +107,10 @@ class Found:
     seconds: float
 
 
+Findings = dict[str, Found | str]
+"""What every method found in a trial, or why it found no model."""
+
+
 def damping_force(force: Estimator, mass: Floats, nu: Floats) -> Floats:
     """Return a model's force for steady velocities without its intercept and the Coriolis force of a mass, shape (n, 3)."""
     zero = np.zeros_like(nu)
@@ -164,7 +169,7 @@ def _independent(kind: Kind, seed: int, factors: Mapping[str, float], folder: Pa
     return Trial(profile, *logs, mass, None)
 
 
-def compared(trial: Trial, methods: Mapping[str, Method] = METHODS, draws: int = DRAWS) -> dict[str, Found | str]:
+def compared(trial: Trial, methods: Mapping[str, Method] = METHODS, draws: int = DRAWS) -> Findings:
     """Return what each method found in a trial, or why it found no model."""
     task, test = Task.of(trial.profile, [trial.learn]), Task.of(trial.profile, [trial.judge])
     nu = np.concatenate([m.nu[m.valid] for m in task.data.motions])[::10]
@@ -188,6 +193,15 @@ def compared(trial: Trial, methods: Mapping[str, Method] = METHODS, draws: int =
         runs = free_runs(task, test, found)
         told[name] = Found(inertia, share, covered(task, found, trial.mass), runs, seconds)
     return told
+
+
+def try_all(kind: Kind, count: int, folder: Path) -> tuple[list[Findings], list[Findings]]:
+    """Return what the methods and the variants find in trials of a kind."""
+    found, varied = list[Findings](), list[Findings]()
+    for trial in trials(kind, count, folder):
+        found.append(compared(trial))
+        varied.append(compared(trial, VARIANTS, 0))
+    return found, varied
 
 
 def covered(task: Task, found: Coefficients, mass: Floats) -> Floats:
