@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,7 @@ class Recipe:
         """Return what of it the results of a log depend on, but for the model, whose content counts."""
         told: dict[str, Any] = {"steps": list(self.steps)}
         if "fit" in self.steps:
-            told["fit"] = {one.name: getattr(self.fit, one.name) for one in fields(self.fit)}
+            told["fit"] = {one.name: getattr(self.fit, one.name) for one in self.fit.options()}
         if "diagnose" in self.steps:
             told["diagnose"] = {"withhold": list(self.withhold)}
         return told
@@ -106,7 +106,7 @@ class _Reader:
         return Recipe(chosen, model, self._fit(self._section(data, "fit")), tuple(withhold))
 
     def _fit(self, section: Mapping[str, Any]) -> FitSettings:
-        kinds = {one.name: str(one.type).split(" | ") for one in fields(FitSettings)}
+        kinds = {one.name: str(one.type).split(" | ") for one in FitSettings.options()}
         self._known(section, ("fit",), tuple(kinds))
         for name, value in section.items():
             allowed = [KINDS[kind] for kind in kinds[name] if kind in KINDS]

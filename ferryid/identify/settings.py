@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import Field, asdict, dataclass, field, fields, replace
 from typing import Any
 
 from ferryid.errors import FerryIdError, did_you_mean
@@ -93,7 +93,12 @@ class FitSettings:
     seed: int = 0
     estimator: str = "auto"
     weak_window_s: float | None = None
-    axes: tuple[str, ...] = AXES
+    axes: tuple[str, ...] = field(default=AXES, metadata={"follows": "the vessel"})
+
+    @classmethod
+    def options(cls) -> tuple[Field[Any], ...]:
+        """Return the settings that are to be chosen; the others follow from the vessel."""
+        return tuple(one for one in fields(cls) if "follows" not in one.metadata)
 
     def __post_init__(self) -> None:
         # Says what is wrong with either before any log is read; the hull's length comes with the profile.
