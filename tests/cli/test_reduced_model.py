@@ -27,7 +27,7 @@ def test_fit_judges_surge_and_yaw_and_keeps_the_sway_of_the_base_model(ferryid, 
     assert ferryid("vessel", "check", vessel).code == 0
     told = ferryid("inspect", log, "--vessel", vessel)
     assert told.code == 0
-    assert SAYS in told.out
+    assert SAYS in " ".join(told.out.split())
 
     run = ferryid("fit", log, "--vessel", vessel, *out, "--json", "-")
     assert run.code == 0, run.err
@@ -66,7 +66,7 @@ def test_a_reduced_model_is_evaluated_compared_exported_and_steers(ferryid, tmp_
     text = ferryid("evaluate", f"{name}@1", log, *out)
     assert text.code == 0
     assert "nan" not in text.out
-    assert SAYS in text.out
+    assert SAYS in " ".join(text.out.split())
     pooled = conforms(ferryid("evaluate", f"{name}@1", log, *out, "--json", "-").out)["pooled"]
     assert pooled["per_axis"]["sway"] is None
     assert pooled["mse"]["model"]["surge"] > 0.0
