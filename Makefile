@@ -44,7 +44,7 @@ demo: $(VENV)/installed
 # The picture in the README.
 picture: demo
 	mkdir -p reports/demo
-	cp $(DEMO)/reports/milliampere-v1/forces-twelve-corner-worst-minute.svg reports/demo/forces.svg
+	cp $(DEMO)/reports/milliampere-v1/forces-twelve-corner.svg reports/demo/forces.svg
 	$(BIN)/python -m tests.evidence reports/demo/forces.svg
 
 bench: $(VENV)/installed $(VENV)/bench-installed
