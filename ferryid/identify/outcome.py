@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import atan2, degrees, hypot, sqrt
+from math import atan2, degrees, hypot
 from typing import Any
 
 import numpy as np
@@ -154,7 +154,8 @@ class LogWind:
     wind
         North and east, where the air goes to [m/s].
     standard_error
-        Of either, from the scatter within the logs; days differ by more.
+        Of either, from the scatter within the logs alone. On recordings with an anemometer that was withheld the error was many
+        times as large, so that texts do not show it.
     """
 
     log: str
@@ -169,10 +170,9 @@ class LogWind:
     def __str__(self) -> str:
         north, east = self.wind
         speed, towards = hypot(north, east), degrees(atan2(east, north)) % 360.0
-        error = hypot(*self.standard_error) / sqrt(2.0)
         if not self.significant:
-            return f"{self.log}: none that differs from zero ({speed:.1f} m/s, standard error {error:.1f} m/s)"
-        return f"{self.log}: {speed:.1f} m/s towards {towards:.0f}° (standard error {error:.1f} m/s)"
+            return f"{self.log}: none that differs from zero"
+        return f"{self.log}: {speed:.1f} m/s towards {towards:.0f}° (estimated, not confirmed)"
 
     def to_json(self) -> dict[str, Any]:
         """Return the wind as plain values."""
