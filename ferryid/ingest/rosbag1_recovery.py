@@ -42,6 +42,7 @@ BEFORE_KIND = 64
 MAX_SHORT_HEADER = 1024
 EXCESS = "the bag holds more records than a recorder writes to as many bytes"
 NOT_LISTED = "no chunk information agrees with them"
+RESIZED = "its stated length is damaged, or they are"
 
 
 @dataclass
@@ -115,7 +116,7 @@ def walk(records: Records) -> Walked:
                 found.chunks.append(chunk)
                 if chunk.end != stated:
                     # The index records found there may be another chunk's.
-                    found.doubts[position] = "its stated length is damaged, or they are"
+                    found.doubts[position] = RESIZED
             elif record.op == BAG_HEADER and position == len(MAGIC):
                 following = finder.next(record.start, (CHUNK, CHUNK_INFO, CONNECTION))
                 first = record.end if record.end < following else record.start
@@ -329,6 +330,9 @@ def _walk_chunks(data: Any, found: Walked) -> None:
             chunk.walked = walked.entries
             if not whole:
                 found.faults[chunk.position] = content.fault or (EXCESS if walked.excess else "its records are damaged")
-            elif last and chunk.position not in found.doubts and missing(chunk, chunk, found.connections):
+            elif found.doubts.get(chunk.position, RESIZED if last else "") == RESIZED and missing(
+                chunk, chunk, found.connections
+            ):
+                # A record with a damaged length may end where another one does, and swallow those between.
                 found.faults[chunk.position] = "its index records count more messages than it holds"
     found.gaps.sort()

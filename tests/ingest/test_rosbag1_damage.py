@@ -21,6 +21,7 @@ from ferryid.ingest.rosbag1_records import (
     CHUNK_INFO,
     CONNECTION,
     INDEX,
+    MESSAGE,
     Chunk,
     RecordError,
     Records,
@@ -437,3 +438,25 @@ def test_a_stretch_that_is_gone_behind_a_chunk_may_have_held_others(
     rows, reader = rows_and_reader(tmp_path / "a.bag", content, verify=verify)
     assert rows < ALL
     assert any(loss.messages is None for loss in reader.losses if "without an index" not in loss.what), reader.losses
+
+
+def test_messages_swallowed_by_one_with_a_damaged_length_are_reported(tmp_path: Path) -> None:
+    content = never_closed(write_bag(tmp_path / "whole.bag", "none").read_bytes())
+    chunk = [one for one in _records(content, 13, len(content)) if one.op == CHUNK][1]
+    inside = [one for one in _records(content, chunk.start, chunk.end) if one.op == MESSAGE]
+    # Bytes that came in stand where the length of a message was: it ends where the third behind it does.
+    came_in = struct.pack("<I", inside[5].end - inside[2].start + 4)
+    damaged = content[: inside[2].start - 4] + came_in + content[inside[2].start - 4 :]
+    (tmp_path / "a.bag").write_bytes(damaged)
+    reader = open_log(tmp_path / "a.bag")
+    series = reader.read(WANTED)
+    assert sum(len(one.receive_ns) for one in series.values()) < ALL
+    assert any("index records count more messages" in loss.what for loss in reader.losses), reader.losses
+
+
+def _records(content: bytes, first: int, end: int) -> list[Any]:
+    records, found = Records(content), []
+    while first < end:
+        found.append(records.at(first))
+        first = found[-1].end
+    return found
