@@ -21,10 +21,10 @@ def command(
         str | None,
         typer.Option(help="A simulated log of the same trial to compare the recording with, instead of a model."),
     ] = None,
-    together: Annotated[
-        bool,
-        typer.Option("--together", help="Fit one hull to all logs, and diagnose each with what the others say of it."),
+    each: Annotated[
+        bool, typer.Option("--each", help="Diagnose every log by itself; else several logs are one campaign.")
     ] = False,
+    together: Annotated[bool, typer.Option("--together", hidden=True)] = False,
     withhold: Annotated[
         list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")
     ] = None,
@@ -35,11 +35,15 @@ def command(
     out: Out = OUT,
     json: Json = None,
 ) -> None:
-    """Say which physics a model left out of a recording, and what shows it."""
+    """Say which physics a model left out of recordings, and what shows it.
+
+    Several logs of one vessel are a campaign: one hull is estimated from all of them, and conditions such as a wind are
+    confirmed over all.
+    """
     from ferryid import api
     from ferryid.diagnose import DiagnosisSettings
 
-    settings = DiagnosisSettings(None, against, together, tuple(withhold or ()))
+    settings = DiagnosisSettings(None, against, each and not together, tuple(withhold or ()))
     words = ("ferryid", *sys.argv[1:])
     outcome = api.diagnose(
         logs, vessel, out, model=model, settings=settings, name=name, command=words, verify=verify, progress=progress

@@ -285,7 +285,7 @@ def diagnose(
     model
         The model to examine: path, name or name@version; the profile's hull where None.
     settings
-        Against a simulated log, one hull for all logs, signals to withhold: `ferryid.diagnose.DiagnosisSettings`. Its model
+        Against a simulated log, every log by itself, signals to withhold: `ferryid.diagnose.DiagnosisSettings`. Its model
         is `model`.
     name
         Name of the model with the findings.

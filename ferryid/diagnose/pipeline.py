@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from ferryid.diagnose.checks.screening import screen_sensors
 from ferryid.diagnose.data.measurements import measure_log
 from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline, SimulationBaseline
-from ferryid.diagnose.inference.campaign import fit_campaign
+from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.simulation_baseline import learn_simulation
-from ferryid.diagnose.inference.stages import Baseline, average, estimate, select
+from ferryid.diagnose.inference.stages import AveragedLog, Baseline, average, estimate, select
+from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge_conditions
 from ferryid.diagnose.judging.conclude import conclude
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.judge import judge
@@ -33,15 +34,15 @@ class DiagnosisSettings:
         A fitted model to examine; the profile's hull where None.
     against
         Path of a simulated log of the trial: what is found is the difference to that simulation.
-    together
-        Fit one hull to all logs first, and diagnose each with what the others say of it.
+    each
+        Diagnose every log by itself; else several logs are one campaign, with one hull, and conditions judged over all logs.
     withhold
         Signals to hide from the diagnosis.
     """
 
     model: Model | None = None
     against: str | None = None
-    together: bool = False
+    each: bool = False
     withhold: tuple[str, ...] = ()
 
     def check(self) -> None:
@@ -51,17 +52,11 @@ class DiagnosisSettings:
                 "diagnose: a recording is compared with one thing at a time, found both --model and --against. "
                 "Fix: leave out one of the two"
             )
-        if self.together and (self.against is not None or self.model is not None):
-            raise FerryIdError(
-                "diagnose: --together finds the hull in the logs, found --model or --against as well, which bring their own. "
-                "Fix: leave out one of the two"
-            )
 
 
 def diagnose_campaign(
     logs: Sequence[str],
     profile: Profile,
-    baseline: Baseline | None,
     settings: DiagnosisSettings,
     run: RunContext,
 ) -> tuple[Diagnosis, ...]:
@@ -73,27 +68,37 @@ def diagnose_campaign(
         Paths; parts of one recording joined by ``+``.
     profile
         The vessel.
-    baseline
-        What the logs are compared with; None for one hull that is fitted to all of them.
     settings
-        Which signals are hidden.
+        What the logs are compared with, and which signals are hidden.
     run
         Folder of the ingested tables, progress, and whether to check every checksum of the logs.
 
     Raises
     ------
     FerryIdError
-        For logs that cannot be used, and for fewer than two where a hull is to be fitted to all.
+        For logs that cannot be used.
     """
     measured = [measure_log(log, profile, run, withhold=settings.withhold) for log in logs]
     screened = [screen_sensors(log, run.progress) for log in measured]
     averaged = [average(log) for log in screened]
-    if baseline is None:
-        baseline = CampaignBaseline(profile, fit_campaign(averaged, profile, run.progress))
+    baseline, conditions = _baseline(averaged, profile, settings, run)
     estimated = [estimate(log, baseline) for log in averaged if log.long_enough]
     selected = [select(log, run.progress) for log in estimated]
     judged = judge(selected, run.progress)
-    return conclude(averaged, judged, baseline)
+    return conclude(averaged, judged, baseline, conditions)
+
+
+def _baseline(
+    logs: Sequence[AveragedLog], profile: Profile, settings: DiagnosisSettings, run: RunContext
+) -> tuple[Baseline, JudgedConditions | None]:
+    """Return what logs are compared with, and of a campaign the conditions of its logs."""
+    if settings.against is not None:
+        return SimulationBaseline(learn_simulation(settings.against, profile, run)), None
+    assembled = assemble(logs, profile, settings.model)
+    if assembled is None:
+        return HullBaseline(profile, settings.model), None
+    conditions = judge_conditions(*assembled, run.progress)
+    return CampaignBaseline(profile, conditions.hull, settings.model), conditions
 
 
 def diagnose(
@@ -102,7 +107,7 @@ def diagnose(
     settings: DiagnosisSettings,
     run: RunContext,
 ) -> tuple[Diagnosis, ...]:
-    """Diagnose logs of one vessel, each as a campaign of its own, or all together.
+    """Diagnose logs of one vessel as a campaign, or each by itself.
 
     Parameters
     ----------
@@ -117,13 +122,11 @@ def diagnose(
         For input that cannot be used.
     """
     settings.check()
-    baseline: Baseline | None = None if settings.together else HullBaseline(profile, settings.model)
-    if settings.against is not None:
-        baseline = SimulationBaseline(learn_simulation(settings.against, profile, run))
+    apart = settings.each or settings.against is not None
     return tuple(
         diagnosis
-        for campaign in ([logs] if settings.together else [[log] for log in logs])
-        for diagnosis in diagnose_campaign(campaign, profile, baseline, settings, run)
+        for campaign in ([[log] for log in logs] if apart else [logs])
+        for diagnosis in diagnose_campaign(campaign, profile, settings, run)
     )
 
 
@@ -156,7 +159,7 @@ def diagnose_and_store(
     found = diagnose(logs, profile, settings, run)
     # Of logs that share one hull, and of a simulation, no model comes.
     learner = None
-    if not settings.together and settings.against is None:
+    if (settings.each or len(logs) < 2) and settings.against is None:
         seen = without_withheld(profile, settings.withhold)
         learner = Learner(tuple(logs), seen, settings.model, run)
     return store_updated_model(found, profile, settings.model, run.out, name=name, learner=learner)

@@ -60,4 +60,5 @@ EFFECT = Effect(
     regressor=regressor,
     changes_hull=True,
     negligible=EFFECTS.least_current,
+    of_log=("north", "east"),
 )

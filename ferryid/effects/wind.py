@@ -137,4 +137,5 @@ EFFECT = Effect(
     unreported=unreported,
     regressor=regressor,
     formula_error=EFFECTS.load_error,
+    of_log=("north", "east"),
 )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.path_comparison import PathComparison, compare_paths
-from ferryid.diagnose.inference.campaign import Campaign
+from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import list_candidates
@@ -83,17 +83,18 @@ class SimulationBaseline:
 
 @dataclass(frozen=True)
 class CampaignBaseline:
-    """One hull for all logs of a campaign; each is compared with what the others say of it."""
+    """One hull for all logs of a campaign; each is compared with what the others say of it, in its own conditions."""
 
     profile: Profile
-    campaign: Campaign
+    hull: CommonHull
+    model: Model | None = None
     joint: bool = True
     updates_model: bool = False  # The lift of a common hull is in no model file.
 
     @property
     def hull_known(self) -> bool:
-        """True where the profile has a hull model."""
-        return self.profile.hull.has_model
+        """True where the profile has a hull model, or there is a fitted one."""
+        return self.model is not None or self.profile.hull.has_model
 
     @property
     def sensors(self) -> Mapping[str, Mapping[str, Estimate]]:
@@ -101,10 +102,12 @@ class CampaignBaseline:
         return {}
 
     def expect(self, log: AveragedLog) -> Expectation:
-        """Return the forces of the hull that the other logs speak for."""
-        plain, _ = prior_force_model(log.windows.measurements, self.profile)
-        force_model, spread = self.campaign.force_model(log.path, plain)
-        return Expectation(force_model, spread, _library(log), (self.campaign.says(log.path),))
+        """Return the forces of the hull that the other logs speak for; conditions are judged over all logs, not here."""
+        sha256 = log.screened.measured.survey.recording.sha256
+        plain, _ = prior_force_model(log.windows.measurements, self.profile, self.model, sha256)
+        force_model, spread = self.hull.force_model(log.path, plain)
+        library = tuple(one for one in _library(log) if not one.effect.of_log)
+        return Expectation(force_model, spread, library, (self.hull.says(log.path),))
 
 
 def _library(log: AveragedLog) -> tuple[Candidate, ...]:

@@ -1,48 +1,61 @@
-"""Logs of one vessel, diagnosed together: read, and given one hull, before each is looked at by itself."""
+"""Logs of one vessel that are diagnosed together: which of them have a say, and the hull that they speak for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, Member, fit_campaign_hull, induced_spread
-from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.campaign_estimation import (
+    INDUCED,
+    Campaign,
+    CampaignFit,
+    HullPrior,
+    Member,
+    induced,
+    induced_spread,
+)
+from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.effects import effects
-from ferryid.effects.force_model import ForceModel
-from ferryid.errors import FerryIdError
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel
+from ferryid.models import Model
 from ferryid.types import Floats
 from ferryid.vessel.dimensions import dimensions
 from ferryid.vessel.profile import Profile
 
-OWN = "wind"
-"""What every log has its own of, where it can be told: the commonest of what a hull would otherwise take upon itself."""
-
 
 @dataclass(frozen=True)
-class Campaign:
-    """Logs of one vessel and their common hull; `place` gives each path's place in it, for logs that have a say."""
+class CommonHull:
+    """The hull of several logs; `place` gives each path's place among them, for logs that have a say."""
 
-    members: tuple[Member, ...]
-    hull: CampaignHull
+    fit: CampaignFit
     place: Mapping[str, int]
 
     def force_model(self, path: str, plain: ForceModel) -> tuple[ForceModel, Floats]:
-        """Return a log's force model with the hull that the other logs speak for, as `CampaignHull.force_model` does."""
-        return self.hull.force_model(plain, self.place.get(path))
+        """Return a log's force model with the hull that the other logs speak for and the log's own conditions.
+
+        Beside it the standard deviations of the hull's coefficients, shape (26,).
+        """
+        i, n = self.place.get(path), len(COEFFICIENTS)
+        mean, covariance = self.fit.belief(i)
+        modelled = induced(replace(plain, hull=mean[:n]), mean[n:])
+        if i is not None:
+            values, _ = self.fit.campaign.values(self.fit.common, self.fit.own[i])
+            modelled = apply_candidates(modelled, self.fit.campaign.conditions, values)
+        return modelled, np.sqrt(np.diag(covariance))[:n]
 
     def says(self, path: str) -> str:
         """Return a sentence on where the hull comes from that a log is diagnosed with."""
-        others = len(self.members) - (path in self.place)
-        # Told as a ratio of standard deviations, which people have a feeling for; the hull's uncertainty is widened by it.
-        apart = sqrt(self.hull.disagreement)
+        others = len(self.place) - (path in self.place)
+        # As a ratio of standard deviations, which people have a feeling for; the hull's uncertainty is widened by it.
+        apart = sqrt(self.fit.disagreement)
         agree = (
             f"They disagree about it {apart:.1f} times as much as the noise in them explains, and it was taken to be uncertain "
             "accordingly."
@@ -52,8 +65,10 @@ class Campaign:
         return f"The hull is that of {counted(others, 'other log')} of the vessel, lift included. {agree}"
 
 
-def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callable[[str], None]) -> Campaign:
-    """Fit one hull to all logs of a vessel, with a steady wind of its own to each that did not measure it.
+def assemble(
+    logs: Sequence[AveragedLog], profile: Profile, model: Model | None = None
+) -> tuple[Campaign, dict[str, int]] | None:
+    """Return the campaign of several logs, and the place of each path in it; None where they are too few or too short.
 
     Parameters
     ----------
@@ -61,13 +76,8 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
         In the weak form; those with fewer than `INFERENCE.campaign_windows` windows have no say.
     profile
         The vessel.
-    progress
-        Called with the name of the stage.
-
-    Raises
-    ------
-    FerryIdError
-        For fewer than two logs with enough in them.
+    model
+        A model that brings the hull; the profile's where None.
     """
     members: list[Member] = []
     spreads: list[Floats] = []
@@ -76,22 +86,24 @@ def fit_campaign(logs: Sequence[AveragedLog], profile: Profile, progress: Callab
         windows = log.windows
         if len(windows.starts) < INFERENCE.campaign_windows or log.path in place:
             continue
-        plain, spread = prior_force_model(windows.measurements, profile)
+        sha256 = log.screened.measured.survey.recording.sha256
+        plain, spread = prior_force_model(windows.measurements, profile, model, sha256)
         place[log.path] = len(members)
-        members.append(Member(windows, plain, own_candidates(windows, profile)))
+        members.append(Member(windows, plain, conditions_of(windows, profile)))
         spreads.append(spread)
-    if len(members) < 2:
-        raise FerryIdError(
-            f"--together: a common hull needs two logs of {profile.name} with a minute or more of motion each, found "
-            f"{len(members)} of {len(logs)}. Fix: give more logs, or leave out --together"
-        )
-    progress(f"fitting one hull to {counted(len(members), 'log')}")
+    if len(members) < 2 or sum(len(one.windows.starts) for one in members) < INFERENCE.fewest_windows:
+        return None
     length, _, draught = dimensions(profile)
-    induced_size = np.zeros(len(INDUCED)) if profile.hull.has_model else induced_spread(length, draught)
-    return Campaign(tuple(members), fit_campaign_hull(members, np.max(spreads, axis=0), induced_size), place)
+    known = model is not None or profile.hull.has_model
+    size = np.zeros(len(INDUCED)) if known else induced_spread(length, draught)
+    mean = np.concatenate([members[0].plain.hull, np.zeros(len(INDUCED))])
+    return Campaign(tuple(members), HullPrior(mean, np.append(np.max(spreads, axis=0), size))), place
 
 
-def own_candidates(windows: Windows, profile: Profile) -> tuple[Candidate, ...]:
-    """Return what a log is given of its own while the hull is fitted to all."""
-    effect = effects()[OWN]
-    return () if effect.cannot(windows.measurements) else (Candidate(effect, None, effect.parameters_of(profile)),)
+def conditions_of(windows: Windows, profile: Profile) -> tuple[Candidate, ...]:
+    """Return the conditions that a log may have of its own: those that it did not measure."""
+    return tuple(
+        Candidate(one, None, one.parameters_of(profile))
+        for one in effects().values()
+        if one.of_log and not one.cannot(windows.measurements)
+    )

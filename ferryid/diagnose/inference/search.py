@@ -141,7 +141,7 @@ def search(
             rough, found_states = fit_disturbances(problem, beside, disturbances, undisturbed, least)
             # What would stand in for them falls, and what they hid may show.
             kept = prune(rough, fit(rough, beside.candidates, beside.values)) if found_states else chosen
-            if found_states and _has_related_effects(kept, found_states):
+            if found_states and _has_related_effects(problem, kept, found_states):
                 keys_with_states = beside.keys
                 problem, chosen, states = rough, kept, found_states
                 continue
@@ -164,8 +164,10 @@ def refit_with_own_noise(problem: EstimationProblem, made: Fit) -> Fit:
     return fit(fair, made.candidates, made.values, begin=starting_point(fair, made))
 
 
-def _has_related_effects(made: Fit, states: Sequence[DisturbanceState]) -> bool:
+def _has_related_effects(problem: EstimationProblem, made: Fit, states: Sequence[DisturbanceState]) -> bool:
     there = {"", *(candidate.effect.id for candidate in made.candidates)}
+    # In a campaign the wind of a log is known before it is looked at by itself.
+    there |= {"wind"} if problem.plain.air is not None else set()
     return all(state.candidate.effect.about in there for state in states)
 
 

@@ -14,6 +14,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
+from ferryid.diagnose.judging.campaign_conditions import JudgedConditions
 from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes
 from ferryid.diagnose.judging.detection_power import (
@@ -35,7 +36,12 @@ from ferryid.effects.force_model import COEFFICIENTS, UNITS
 from ferryid.types import AXES, Floats
 
 
-def conclude(logs: Sequence[AveragedLog], judged: Sequence[JudgedLog], baseline: Baseline) -> tuple[Diagnosis, ...]:
+def conclude(
+    logs: Sequence[AveragedLog],
+    judged: Sequence[JudgedLog],
+    baseline: Baseline,
+    conditions: JudgedConditions | None = None,
+) -> tuple[Diagnosis, ...]:
     """Return the diagnoses of the logs of a campaign.
 
     Parameters
@@ -46,15 +52,23 @@ def conclude(logs: Sequence[AveragedLog], judged: Sequence[JudgedLog], baseline:
         Those that are long enough.
     baseline
         What they are compared with.
+    conditions
+        Those of the logs of a campaign; None of one log.
     """
     by_path = {one.selected.path: one for one in judged}
     claims = {
-        one.path: by_path[one.path].claims if one.path in by_path else sensor_claims(one.screened.sensors)
+        one.path: (
+            *(() if conditions is None else conditions.claims(one.path)),
+            *(by_path[one.path].claims if one.path in by_path else sensor_claims(one.screened.sensors)),
+        )
         for one in logs
     }
+    noted = () if conditions is None else conditions.notes
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
     return tuple(
-        _concluded(by_path[one.path], campaign) if one.path in by_path else _too_short(one, baseline, campaign)
+        _concluded(by_path[one.path], claims[one.path], campaign, noted)
+        if one.path in by_path
+        else _too_short(one, claims[one.path], baseline, campaign, noted)
         for one in logs
     )
 
@@ -63,10 +77,16 @@ def _lasting(claims: Sequence[Claim]) -> frozenset[Key]:
     return frozenset(one.finding.key for one in claims if one.finding.parameters and lasting(one.finding))
 
 
-def _too_short(log: AveragedLog, baseline: Baseline, campaign: tuple[frozenset[Key], ...]) -> Diagnosis:
+def _too_short(
+    log: AveragedLog,
+    claims: Sequence[Claim],
+    baseline: Baseline,
+    campaign: tuple[frozenset[Key], ...],
+    noted: tuple[str, ...],
+) -> Diagnosis:
     screened = log.screened
     figures = LogFigures(joint=baseline.joint, campaign=campaign, baseline_sensors=baseline.sensors)
-    findings, notes = apply_rules(sensor_claims(screened.sensors), figures)
+    findings, notes = apply_rules(claims, figures)
     profile, window_s = screened.measurements.profile, _window_s(log.windows.weight, log.windows.measurements.step_s)
     short = (
         f"Only {counted(len(log.windows.starts), 'stretch')} of {window_s:.0f} s without a gap: too few for a conclusion. "
@@ -80,20 +100,22 @@ def _too_short(log: AveragedLog, baseline: Baseline, campaign: tuple[frozenset[K
         findings,
         {},
         {},
-        (*survey_notes(screened), short, *notes),
+        (*survey_notes(screened), *noted, short, *notes),
         duration_s=_duration_s(screened),
         left_out=screened.measured.survey.motion.left_out,
         remainder=remainder,
     )
 
 
-def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosis:
+def _concluded(
+    log: JudgedLog, claims: Sequence[Claim], campaign: tuple[frozenset[Key], ...], noted: tuple[str, ...]
+) -> Diagnosis:
     selected, stands = log.selected, log.stands
     estimated = selected.estimated
     screened, problem, kept = estimated.averaged.screened, selected.search.problem, stands.fit
     measurements, survey = screened.measurements, screened.measured.survey
     figures = replace(log.figures, campaign=campaign)
-    findings, rule_notes = apply_rules(log.claims, figures)
+    findings, rule_notes = apply_rules(claims, figures)
     chances, still = detection_powers(problem, kept, selected.steady), unexcited_axes(problem)
     before, after = _scores(problem, log.base, kept, stands.proof)
     ratio = {axis: Estimate(unit="-", **one) for axis, one in after.get("ratio", {}).items()}
@@ -102,6 +124,7 @@ def _concluded(log: JudgedLog, campaign: tuple[frozenset[Key], ...]) -> Diagnosi
     notes = (
         *survey_notes(screened),
         *estimated.expectation.notes,
+        *noted,
         *stands.dropped,
         *rule_notes,
         *log_notes(figures),

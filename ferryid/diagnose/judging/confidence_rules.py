@@ -264,7 +264,8 @@ def about_nothing_sure(finding: Finding, context: Context, _threshold: float) ->
     if context.own.kind != "disturbance":
         return finding, ""
     about = effects()[finding.effect].about
-    sure = {"", *(one.finding.effect for one in context.beside if one.figures.kind == "force" and one.finding.sure)}
+    shown = [one.finding for one in context.beside if one.figures.kind in ("force", "condition")]
+    sure = {"", *(one.effect for one in shown if one.sure)}
     if about in sure or not finding.sure:
         return finding, ""
     return _because(finding, f"the {effects()[about].title.lower()} about which it comes and goes is no sure finding")
@@ -273,7 +274,7 @@ def about_nothing_sure(finding: Finding, context: Context, _threshold: float) ->
 @rule(JUDGING.drowned_share, "of what moves the vessel")
 def noise_drowns_an_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower all findings on forces where the velocity's noise, times damping, is more than this on some axis."""
-    drowned = context.own.kind != "sensor" and drowned_axes(context.log, threshold)
+    drowned = context.own.kind not in ("sensor", "condition") and drowned_axes(context.log, threshold)
     return lowered(finding) if drowned else finding, ""
 
 

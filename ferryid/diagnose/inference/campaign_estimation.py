@@ -1,0 +1,596 @@
+"""Logs of one vessel, estimated together: one hull, properties that all share, and conditions that each log has of its own.
+
+Where a profile has no hull model, one log has to tell the hull's forces and the environment's apart by itself, and often
+cannot: a steady wind on a log with few headings looks like lift and drag. The hull is the same in every log of a vessel, while
+wind and current are not. So everything is estimated at once, by Gauss-Newton steps with each log's own part eliminated:
+
+- the hull's coefficients, with the drag of drift and turning (surge forces with v r and v v) that a hull which lifts pays;
+- what is the vessel's beside them, such as factors on its wind load;
+- conditions of every log, as random effects about a mean of all: logs of one campaign blow in one weather;
+- a steady acceleration of every log along the vessel's axes, another random effect: what trim, thrust curves and formulas are
+  off in the manoeuvres of one log is in none of the others, and must not become its wind.
+
+The spread of each kind of random effect between logs is estimated too (Laird and Ware 1982), so that conditions that all logs
+agree on are believed, and one that the logs hardly determine takes after the others. Gaps are weighed along the vessel's axes,
+on which forces act, by coloured noise that is of one colour in all logs and louder in some.
+
+References
+----------
+Fossen (2021), section 6.5, for cross-flow drag and lift; Laird and Ware (1982), Random-effects models for longitudinal data;
+Gelman et al. (2013), Bayesian Data Analysis, chapter 5, for parameters that groups of data share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ferryid.diagnose.inference.coloured_noise import ColouredNoise, Runs, fit_coloured_noise
+from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.parallel import over
+from ferryid.effects.effect import Parameter
+from ferryid.effects.force_model import COEFFICIENTS, ForceModel
+from ferryid.types import Floats, Ints
+
+INDUCED = ("X_vr", "X_vv")
+"""Drag of drift and turning, beside `COEFFICIENTS`."""
+ROUNDS, STEPS = 10, 3
+"""Most rounds, each with the noise and the spreads that the one before left, and Gauss-Newton steps in a round."""
+SETTLED = 0.05
+"""Change of every spread, as a share of it, below which the rounds end."""
+DIFFERENCE_STEP = 0.02
+"""Of a size, for derivatives."""
+STARTS, BEARINGS = (0.25, 0.6, 1.25), 8
+"""Conditions from which a search begins besides none: lengths in sizes, and directions; a wind has no slope at rest."""
+STEADY_SHARE = 0.1
+"""Of the gaps, in the root mean square: spread of the steady accelerations to begin with."""
+HALVINGS = (1.0, 0.5, 0.25, 0.1)
+SCALE_ROUNDS, SCALE_GAPS = 3, 30.0
+"""Rounds in which colour and loudness of the noise are found, and how many gaps the belief counts for that all are as loud."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One log of a vessel: its windows, its force model without effects, and the conditions that it has of its own."""
+
+    windows: Windows
+    plain: ForceModel
+    conditions: tuple[Candidate, ...] = ()
+
+    @cached_property
+    def turn(self) -> Floats | None:
+        """Matrices from the channels of the gaps to the vessel's axes in every window, shape (J, 3, 3); None where they are."""
+        if not self.windows.channels[0]:
+            return None
+        cos, sin = self.windows.mean(np.column_stack(self.windows.measurements.pointing)).T
+        length = np.maximum(np.hypot(cos, sin), 1e-12)
+        turn = np.zeros((len(cos), 3, 3))
+        turn[:, 0, 0] = turn[:, 1, 1] = cos / length
+        turn[:, 0, 1] = sin / length
+        turn[:, 1, 0] = -turn[:, 0, 1]
+        turn[:, 2, 2] = 1.0
+        return turn
+
+    def along(self, gaps: Floats) -> Floats:
+        """Return gaps, (J, 3) or (J, 3, q), along the vessel's axes."""
+        return gaps if self.turn is None else np.asarray(np.einsum("jab,jb...->ja...", self.turn, gaps))
+
+
+@dataclass(frozen=True)
+class HullPrior:
+    """What is believed of the hull before any log: `COEFFICIENTS` and `INDUCED`, mean and standard deviations, shape (h,)."""
+
+    mean: Floats
+    spread: Floats
+
+    @cached_property
+    def free(self) -> Ints:
+        """Which of them can move."""
+        return np.flatnonzero(self.spread)
+
+
+@dataclass(frozen=True)
+class CampaignNoise:
+    """What is left over: its colour in all logs, and how loud it is in each, shape (L,), about one."""
+
+    colour: ColouredNoise
+    scale: Floats
+
+    def white(self, i: int, gaps: Floats, runs: Runs) -> Floats:
+        """Return whitened gaps of a log, (J, 3) or (J, 3, q)."""
+        return self.colour.white(gaps, runs) / float(self.scale[i])
+
+
+@dataclass(frozen=True)
+class LogPart:
+    """One log at the estimate, whitened: its gaps, shape (J, 3), and their derivatives, shape (J, 3, g + l)."""
+
+    gaps: Floats
+    slopes: Floats
+
+
+@dataclass(frozen=True)
+class Spreads:
+    """Standard deviations between logs: of each condition, in sizes, and of the steady accelerations, shape (3,)."""
+
+    conditions: tuple[float, ...]
+    steady: Floats
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Logs with the belief about their hull: what is estimated together.
+
+    The vector of all logs, shape (g,), holds the hull in spreads, what conditions share, properties, and the conditions'
+    means, in sizes; that of a log, shape (l,), its conditions' departures from these means, in sizes, and its steady
+    acceleration.
+    """
+
+    members: tuple[Member, ...]
+    hull: HullPrior
+    properties: tuple[Candidate, ...] = ()
+
+    @cached_property
+    def conditions(self) -> tuple[Candidate, ...]:
+        """Every condition that some log has, in a fixed order."""
+        found = {one.key: one for member in self.members for one in member.conditions}
+        return tuple(found[key] for key in sorted(found, key=str))
+
+    @cached_property
+    def shared(self) -> list[tuple[int, Parameter]]:
+        """What conditions share: which condition, and the parameter."""
+        return [
+            (k, one)
+            for k, condition in enumerate(self.conditions)
+            for one in condition.parameters
+            if one.name not in condition.effect.of_log
+        ]
+
+    @cached_property
+    def own(self) -> list[tuple[int, Parameter]]:
+        """What every log has of its own: which condition, and the parameter."""
+        return [
+            (k, one)
+            for k, condition in enumerate(self.conditions)
+            for one in condition.parameters
+            if one.name in condition.effect.of_log
+        ]
+
+    @cached_property
+    def lasting(self) -> list[Parameter]:
+        """Parameters of the properties."""
+        return [one for candidate in self.properties for one in candidate.parameters]
+
+    @property
+    def g(self) -> int:
+        """Length of the vector of all logs."""
+        return len(self.hull.mean) + len(self.shared) + len(self.lasting) + len(self.own)
+
+    @property
+    def l(self) -> int:  # noqa: E743
+        """Length of the vector of a log."""
+        return len(self.own) + 3
+
+    @property
+    def means(self) -> slice:
+        """Where the conditions' means stand in the vector of all logs."""
+        return slice(self.g - len(self.own), self.g)
+
+    def values(self, common: Floats, own: Floats) -> tuple[list[Floats], list[Floats]]:
+        """Return the parameters of the conditions of a log and of the properties, in their units and within their limits."""
+        h, s, p = len(self.hull.mean), len(self.shared), len(self.lasting)
+        shares, means = common[h : h + s], common[self.means] + own[: len(self.own)]
+        conditions = []
+        for k, condition in enumerate(self.conditions):
+            mine = iter(means[[j for j, (of, _) in enumerate(self.own) if of == k]].tolist())
+            others = iter(shares[[j for j, (of, _) in enumerate(self.shared) if of == k]].tolist())
+            z = [next(mine) if one.name in condition.effect.of_log else next(others) for one in condition.parameters]
+            conditions.append(_in_units(condition.parameters, np.array(z)))
+        cuts = np.cumsum([len(one.parameters) for one in self.properties])[:-1].tolist()
+        lasting = np.split(common[h + s : h + s + p], cuts) if self.properties else []
+        return conditions, [_in_units(one.parameters, z) for one, z in zip(self.properties, lasting, strict=True)]
+
+    def force_model(self, i: int, common: Floats, own: Floats) -> ForceModel:
+        """Return a log's force model at an estimate, without its steady acceleration."""
+        member, n = self.members[i], len(COEFFICIENTS)
+        hull = self.hull.mean + self.hull.spread * common[: len(self.hull.mean)]
+        conditions, lasting = self.values(common, own)
+        here = {one.key: one for one in member.conditions}
+        candidates = [here[one.key] for one in self.conditions if one.key in here]
+        values = [p for one, p in zip(self.conditions, conditions, strict=True) if one.key in here]
+        modelled = induced(replace(member.plain, hull=hull[:n]), hull[n:])
+        return apply_candidates(modelled, [*candidates, *self.properties], [*values, *lasting])
+
+    def gap(self, i: int, common: Floats, own: Floats) -> Floats:
+        """Return the gaps of a log along the vessel's axes, shape (J, 3)."""
+        member = self.members[i]
+        return member.along(member.windows.gap(self.force_model(i, common, own))) + own[-3:]
+
+    def hull_slopes(self, i: int, common: Floats, own: Floats) -> Floats:
+        """Return derivatives of the gaps of a log by the hull in spreads, shape (J, 3, h)."""
+        member, n = self.members[i], len(COEFFICIENTS)
+        slopes = np.zeros((len(member.windows.starts), 3, len(self.hull.mean)))
+        free = self.hull.free[self.hull.free < n]
+        moves = DIFFERENCE_STEP * self.hull.spread[free]
+        changes = member.windows.hull_changes(self.force_model(i, common, own), free, moves)
+        slopes[:, :, free] = member.along(changes) / DIFFERENCE_STEP
+        rest = self.hull.free[self.hull.free >= n]
+        here = self.gap(i, common, own)
+        for k in rest.tolist():
+            slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - here) / DIFFERENCE_STEP
+        return slopes
+
+    def linearised(self, i: int, common: Floats, own: Floats, hull_slopes: Floats) -> tuple[Floats, Floats]:
+        """Return the gaps of a log and their derivatives by both vectors, shapes (J, 3) and (J, 3, g + l)."""
+        gaps, h, m = self.gap(i, common, own), len(self.hull.mean), len(self.own)
+        slopes = np.zeros((*gaps.shape, self.g + self.l))
+        slopes[:, :, :h] = hull_slopes
+        for k in range(h, self.g - m):
+            slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - gaps) / DIFFERENCE_STEP
+        for k in range(m):
+            # A wind near none has no slope to one side of what it has to the other: both count.
+            ahead, astern = (self.gap(i, common, _moved(own, k, sign)) for sign in (1.0, -1.0))
+            slopes[:, :, self.g - m + k] = slopes[:, :, self.g + k] = (ahead - astern) / (2.0 * DIFFERENCE_STEP)
+        slopes[:, :, -3:] = np.eye(3)
+        return gaps, slopes
+
+    def own_precision(self, spreads: Spreads) -> Floats:
+        """Return what is believed of the vector of a log: inverse variances, shape (l,)."""
+        mine = [spreads.conditions[k] for k, _ in self.own]
+        return np.concatenate([mine, spreads.steady]) ** -2.0
+
+
+@dataclass(frozen=True)
+class CampaignFit:
+    """What several logs say together.
+
+    Attributes
+    ----------
+    campaign
+        What was estimated.
+    common, own
+        The estimate: the vector of all logs, shape (g,), and of each, shape (L, l).
+    spreads
+        Between logs.
+    noise
+        What is left over along the vessel's axes.
+    parts
+        The logs at the estimate.
+    """
+
+    campaign: Campaign
+    common: Floats
+    own: Floats
+    spreads: Spreads
+    noise: CampaignNoise
+    parts: tuple[LogPart, ...]
+
+    @cached_property
+    def normal(self) -> _Eliminated:
+        """Normal equations with the logs' own parts eliminated."""
+        return _Eliminated.of(self)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The hull's coefficients."""
+        return (*COEFFICIENTS, *INDUCED)
+
+    def covariance(self, i: int) -> Floats:
+        """Return the posterior covariance of both vectors of a log, shape (g + l, g + l)."""
+        return self.normal.covariance(i)
+
+    @cached_property
+    def disagreement(self) -> float:
+        """Variance with which the logs differ about what they share, over what their noise explains; 1 where the model holds.
+
+        A log's gradient at the common estimate has its normal matrix as covariance if nothing but noise sets it apart.
+        """
+        apart, expected, logs = 0.0, 0.0, len(self.parts)
+        for H, slope in zip(self.normal.matrices, self.normal.slopes, strict=True):
+            inverse = np.linalg.inv(H + np.eye(len(H)))
+            apart += float(slope @ inverse @ slope)
+            expected += float(np.trace(H @ inverse))
+        return apart / max(expected * (1.0 - 1.0 / logs), 1e-12) if logs > 1 else 1.0
+
+    def belief(self, without: int | None = None) -> tuple[Floats, Floats]:
+        """Return mean, shape (h,), and covariance, shape (h, h), of the hull in the units of its coefficients.
+
+        Parameters
+        ----------
+        without
+            The log that has no part in it; None for what all logs say.
+        """
+        prior, h = np.eye(self.campaign.g), len(self.campaign.hull.mean)
+        A, z = prior + np.sum(self.normal.matrices, axis=0), self.common
+        if without is not None:
+            # At the optimum all gradients and the prior's cancel, so that without one log its own is what is missing.
+            A = A - self.normal.matrices[without]
+            z = z + np.linalg.solve(A, self.normal.slopes[without])
+        # Logs that differ by more than noise know less of the hull than their noise says, but never less than before.
+        known = prior + (A - prior) / max(1.0, self.disagreement)
+        spread = self.campaign.hull.spread
+        return self.campaign.hull.mean + spread * z[:h], np.linalg.inv(known)[:h, :h] * np.outer(spread, spread)
+
+    def condition(self, i: int, k: int) -> tuple[Floats, Floats]:
+        """Return what a log has of a condition, in its unit, and the covariance that is reported of it, shapes (q,) and (q, q).
+
+        The covariance is as much wider as logs differ by more than their noise, and as estimates are elsewhere.
+        """
+        campaign = self.campaign
+        rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
+        parameters = [campaign.own[j][1] for j in rows]
+        mean, size = self.common[campaign.means][rows], np.array([one.size for one in parameters])
+        neutral = np.array([one.neutral for one in parameters])
+        pick = np.zeros((len(rows), campaign.g + campaign.l))
+        for row, j in enumerate(rows):
+            pick[row, campaign.g - len(campaign.own) + j] = pick[row, campaign.g + j] = size[row]
+        factor = INFERENCE.posterior_factor**2 * max(1.0, self.disagreement)
+        return neutral + size * (mean + self.own[i, rows]), factor * pick @ self.covariance(i) @ pick.T
+
+    def force_model(self, i: int) -> ForceModel:
+        """Return a log's force model at the estimate."""
+        return self.campaign.force_model(i, self.common, self.own[i])
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the evidence (Laplace), but for what only the noise decides."""
+        cost = float(self.common @ self.common)
+        precision = self.campaign.own_precision(self.spreads)
+        logarithm = 0.0
+        for own, part, Q in zip(self.own, self.parts, self.normal.own, strict=True):
+            cost += float(np.sum(part.gaps**2) + own @ (precision * own))
+            logarithm += float(np.linalg.slogdet(Q)[1] - np.sum(np.log(precision)))
+        A = np.eye(self.campaign.g) + np.sum(self.normal.matrices, axis=0)
+        return -0.5 * cost - 0.5 * logarithm - 0.5 * float(np.linalg.slogdet(A)[1])
+
+
+@dataclass(frozen=True)
+class _Eliminated:
+    """Normal equations of all logs: of the common vector with each log's own eliminated, and what gives the own back.
+
+    Attributes
+    ----------
+    matrices, slopes
+        By log: what it says of the common vector, shapes (L, g, g) and (L, g).
+    own, back
+        By log: its own normal matrix, shape (l, l), and how its own vector follows the common one, shape (l, g).
+    own_slopes
+        By log, shape (L, l).
+    """
+
+    matrices: Floats
+    slopes: Floats
+    own: tuple[Floats, ...]
+    back: tuple[Floats, ...]
+    own_slopes: Floats
+
+    @classmethod
+    def of(cls, made: CampaignFit) -> _Eliminated:
+        g, precision = made.campaign.g, made.campaign.own_precision(made.spreads)
+        matrices, slopes, own, back, own_slopes = [], [], [], [], []
+        for mine, part in zip(made.own, made.parts, strict=True):
+            J, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel()
+            N, b = J.T @ J, J.T @ w
+            Q, gradient = N[g:, g:] + np.diag(precision), b[g:] + precision * mine
+            factor = cho_factor(Q)
+            follow = cho_solve(factor, N[g:, :g])
+            matrices.append(N[:g, :g] - N[:g, g:] @ follow)
+            slopes.append(b[:g] - follow.T @ gradient)
+            own.append(Q)
+            back.append(follow)
+            own_slopes.append(gradient)
+        return cls(np.stack(matrices), np.stack(slopes), tuple(own), tuple(back), np.stack(own_slopes))
+
+    @cached_property
+    def common_covariance(self) -> Floats:
+        """Posterior covariance of the common vector, shape (g, g)."""
+        A = np.eye(self.matrices.shape[1]) + np.sum(self.matrices, axis=0)
+        return np.asarray(np.linalg.inv(A), dtype=np.float64)
+
+    def covariance(self, i: int) -> Floats:
+        """Return the posterior covariance of the common vector and that of a log, shape (g + l, g + l)."""
+        C, back = self.common_covariance, self.back[i]
+        across = -C @ back.T
+        return np.block([[C, across], [across.T, np.linalg.inv(self.own[i]) + back @ C @ back.T]])
+
+    def step(self, common: Floats) -> tuple[Floats, Floats]:
+        """Return the Gauss-Newton step of the common vector and of each log's own, shapes (g,) and (L, l)."""
+        A = np.eye(len(common)) + np.sum(self.matrices, axis=0)
+        step = -np.linalg.solve(A, common + np.sum(self.slopes, axis=0))
+        own = [
+            -np.linalg.solve(Q, gradient) - back @ step
+            for Q, gradient, back in zip(self.own, self.own_slopes, self.back, strict=True)
+        ]
+        return step, np.stack(own)
+
+
+def induced(force_model: ForceModel, coefficients: Floats) -> ForceModel:
+    """Return the force model with induced drag in it, from coefficients in the order of `INDUCED`; in still water.
+
+    It is an external force at the measured motion.
+    """
+    _, v, r = force_model.measurements.nu.T
+    X_vr, X_vv = coefficients
+    still = np.zeros_like(v)
+    force = np.column_stack([(X_vr * r + X_vv * v) * v, still, still])
+    return replace(force_model, external=force_model.external + force)
+
+
+def induced_spread(length_m: float, draught_m: float, water_density: float = 1000.0) -> Floats:
+    """Return how large the coefficients of `INDUCED` may be, shape (2,): a flat plate's."""
+    plate = 0.5 * water_density * length_m * draught_m
+    return np.array([plate * length_m / 2.0, plate / 2.0])
+
+
+def estimate_campaign(
+    campaign: Campaign, *, noise: CampaignNoise | None = None, begin: CampaignFit | None = None
+) -> CampaignFit:
+    """Estimate what several logs say together.
+
+    Parameters
+    ----------
+    campaign
+        The logs, and what they are believed to have.
+    noise
+        What is left over; estimated where None. Two hypotheses are compared under one noise.
+    begin
+        An estimate of the same conditions and properties, to begin with and to take the spreads from.
+    """
+    if begin is not None:
+        spreads, common, own = begin.spreads, begin.common, begin.own
+    else:
+        spreads, common, own = _first(campaign)
+
+    def solved(common: Floats, own: Floats, spreads: Spreads) -> CampaignFit:
+        left = noise or _noise(campaign, [campaign.gap(i, common, one) for i, one in enumerate(own)])
+        common, own, parts = _solved(campaign, common, own, left, spreads)
+        return CampaignFit(campaign, common, own, spreads, left, parts)
+
+    made = solved(common, own, spreads)
+    for _ in range(ROUNDS if begin is None else 0):
+        spreads, change = _spreads(made)
+        if change < SETTLED:
+            break
+        made = solved(made.common, made.own, spreads)
+    return made
+
+
+def _first(campaign: Campaign) -> tuple[Spreads, Floats, Floats]:
+    """Return spreads and estimates to begin with: the hull without conditions, then what explains most beside it."""
+    common, own = np.zeros(campaign.g), np.zeros((len(campaign.members), campaign.l))
+    gaps = np.vstack([campaign.gap(i, common, one) for i, one in enumerate(own)])
+    steady = STEADY_SHARE * np.sqrt(np.mean(gaps**2, axis=0))
+    spreads = Spreads((1.0,) * len(campaign.conditions), np.maximum(steady, 1e-12))
+    if not campaign.own:
+        return spreads, common, own
+    bare = replace(campaign, members=tuple(replace(one, conditions=()) for one in campaign.members), properties=())
+    made = estimate_campaign(bare)
+    h = len(campaign.hull.mean)
+    common[:h] = made.common[:h]
+    own[:, -3:] = made.own
+    spreads = Spreads(spreads.conditions, made.spreads.steady)
+    found = over(lambda i: _started(campaign, made, i, common, own[i]), range(len(own)))
+    starts = np.stack(found)
+    common[campaign.means] = starts.mean(axis=0)
+    own[:, : len(campaign.own)] = starts - starts.mean(axis=0)
+    return spreads, common, own
+
+
+def _started(campaign: Campaign, bare: CampaignFit, i: int, common: Floats, own: Floats) -> Floats:
+    """Return the conditions of a log to begin with: those that explain most beside a hull and a steady force that may move."""
+    part, g = bare.parts[i], bare.campaign.g
+    runs = campaign.members[i].windows.runs
+    J = part.slopes.reshape(-1, part.slopes.shape[2])
+    precision = np.concatenate([np.ones(g), bare.campaign.own_precision(bare.spreads)])
+    away = np.concatenate([bare.common, bare.own[i]])
+    factor = cho_factor(J.T @ J + np.diag(precision))
+    best, least = np.zeros(len(campaign.own)), np.inf
+    for k in range(len(campaign.conditions)):
+        rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
+        angles = np.arange(BEARINGS) * 2.0 * np.pi / BEARINGS
+        around = [length * np.array([np.cos(one), np.sin(one)]) for length in STARTS for one in angles]
+        chosen = best.copy()
+        for start in [np.zeros(2), *around]:
+            tried = best.copy()
+            tried[rows] = start
+            at = own.copy()
+            at[: len(tried)] = tried
+            w = bare.noise.white(i, campaign.gap(i, common, at), runs).ravel()
+            slope = J.T @ w + precision * away
+            cost = float(w @ w + tried @ tried - slope @ cho_solve(factor, slope))
+            if cost < least:
+                chosen, least = tried, cost
+        best = chosen
+    return best
+
+
+def _noise(campaign: Campaign, gaps: Sequence[Floats]) -> CampaignNoise:
+    runs, count = [], 0
+    for member in campaign.members:
+        runs += [(first + count, end + count) for first, end in member.windows.runs]
+        count += len(member.windows.starts)
+    noise = CampaignNoise(fit_coloured_noise(np.vstack(gaps), runs), np.ones(len(gaps)))
+    for _ in range(SCALE_ROUNDS):
+        squares = [
+            float(np.mean(noise.colour.white(one, member.windows.runs) ** 2))
+            for one, member in zip(gaps, campaign.members, strict=True)
+        ]
+        sizes = np.array([one.size for one in gaps])
+        scale = np.sqrt((np.array(squares) * sizes + SCALE_GAPS) / (sizes + SCALE_GAPS))
+        louder = [one / each for one, each in zip(gaps, scale, strict=True)]
+        noise = CampaignNoise(fit_coloured_noise(np.vstack(louder), runs), scale)
+    return noise
+
+
+def _spreads(made: CampaignFit) -> tuple[Spreads, float]:
+    """Return the spreads that the estimate speaks for (a step of expectation and maximisation), and their largest change."""
+    campaign, before = made.campaign, made.spreads
+    count = len(campaign.own)
+    second = np.stack([own**2 + np.diag(made.covariance(i))[campaign.g :] for i, own in enumerate(made.own)])
+    conditions = []
+    for k, condition in enumerate(campaign.conditions):
+        rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
+        have = [i for i, one in enumerate(campaign.members) if condition.key in {each.key for each in one.conditions}]
+        conditions.append(float(np.sqrt(np.mean(second[np.ix_(have, rows)]))))
+    after = Spreads(tuple(conditions), np.sqrt(np.mean(second[:, count:], axis=0)))
+    pairs = zip((*before.conditions, *before.steady), (*after.conditions, *after.steady), strict=True)
+    return after, max((abs(new - old) / old for old, new in pairs), default=0.0)
+
+
+def _solved(
+    campaign: Campaign, common: Floats, own: Floats, noise: CampaignNoise, spreads: Spreads
+) -> tuple[Floats, Floats, tuple[LogPart, ...]]:
+    """Return better estimates by Gauss-Newton steps, and the logs there."""
+    places = range(len(campaign.members))
+    # The gaps are all but linear in the hull: one derivative will do for all steps.
+    hull_slopes = over(lambda i: campaign.hull_slopes(i, common, own[i]), places)
+    precision = campaign.own_precision(spreads)
+
+    def white(i: int, common: Floats, own: Floats) -> LogPart:
+        gaps, slopes = campaign.linearised(i, common, own[i], hull_slopes[i])
+        runs = campaign.members[i].windows.runs
+        return LogPart(noise.white(i, gaps, runs), noise.white(i, slopes, runs))
+
+    def cost(common: Floats, own: Floats) -> float:
+        logs = over(
+            lambda i: float(
+                np.sum(noise.white(i, campaign.gap(i, common, own[i]), campaign.members[i].windows.runs) ** 2)
+            ),
+            places,
+        )
+        return float(common @ common) + float(np.sum(own**2 * precision)) + sum(logs)
+
+    now = cost(common, own)
+    parts = tuple(over(lambda i: white(i, common, own), places))
+    for _ in range(STEPS):
+        made = CampaignFit(campaign, common, own, spreads, noise, parts)
+        step, own_step = made.normal.step(common)
+        for share in HALVINGS:
+            there = cost(common + share * step, own + share * own_step)
+            if there < now:
+                break
+        else:
+            break
+        gained, now = now - there, there
+        common, own = common + share * step, own + share * own_step
+        parts = tuple(over(partial(white, common=common, own=own), places))
+        if gained < 1e-2:
+            break
+    return common, own, parts
+
+
+def _moved(vector: Floats, k: int, sign: float = 1.0) -> Floats:
+    moved = vector.copy()
+    moved[k] += sign * DIFFERENCE_STEP
+    return moved
+
+
+def _in_units(parameters: Sequence[Parameter], z: Floats) -> Floats:
+    limits = np.array([(one.neutral, one.size, one.low, one.high) for one in parameters])
+    return np.asarray(np.clip(limits[:, 0] + limits[:, 1] * z, limits[:, 2], limits[:, 3]))

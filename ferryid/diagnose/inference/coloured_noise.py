@@ -1,0 +1,103 @@
+"""Coloured noise of many short series: autoregressions of all orders up to one, by Burg's method.
+
+A series is whitened from its first row on: a row with k rows before it by the autoregression of order k. What a bag of some
+seconds says is so used as wholly as what an hour does.
+
+References
+----------
+Burg (1975), Maximum entropy spectral analysis; Kay (1988), Modern spectral estimation, chapter 7, for several segments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ferryid.types import Floats
+
+Runs = Sequence[tuple[int, int]]
+"""Unbroken series of rows, as (first, end)."""
+ORDER = 8
+"""Highest order: windows overlap over three strides, and what moves a vessel slowly lasts for longer."""
+LEAST_VARIANCE = 1e-12
+"""Of the channel's variance, below which a series that predicts itself counts as no noise."""
+
+
+@dataclass(frozen=True)
+class ColouredNoise:
+    """Autoregressions of c channels.
+
+    Attributes
+    ----------
+    coefficients
+        ``coefficients[k]`` predicts a row from the k before it, the last one first, shape (c, k).
+    scale
+        Standard deviation of what is left at every order, shape (orders, c).
+    unmix
+        Inverse Cholesky factor of the correlation between the channels, shape (c, c).
+    """
+
+    coefficients: tuple[Floats, ...]
+    scale: Floats
+    unmix: Floats
+
+    def white(self, gaps: Floats, runs: Runs) -> Floats:
+        """Return whitened gaps, (J, c) or (J, c, q) for q columns at once, in the same shape."""
+        extra = (slice(None),) + (None,) * (gaps.ndim - 2)
+        left = np.array(gaps, dtype=np.float64)
+        top = len(self.coefficients) - 1
+        for first, end in runs:
+            part = gaps[first:end]
+            for k in range(1, top + 1):
+                # Row k has k rows before it; those behind row `top` are predicted by the highest order.
+                if k < top and k < len(part):
+                    for j in range(k):
+                        left[first + k] -= self.coefficients[k][:, j][extra] * part[k - 1 - j]
+            for j in range(top if len(part) > top else 0):
+                left[first + top : end] -= self.coefficients[top][:, j][extra] * part[top - 1 - j : len(part) - 1 - j]
+            order = np.minimum(np.arange(end - first), top)
+            left[first:end] /= self.scale[order][(..., *extra[1:])]
+        return np.asarray(np.einsum("ij,nj...->ni...", self.unmix, left))
+
+
+def fit_coloured_noise(gaps: Floats, runs: Runs, order: int = ORDER) -> ColouredNoise:
+    """Return the noise that gaps, shape (J, c), have if nothing but noise is in them."""
+    c = gaps.shape[1]
+    longest = max((end - first for first, end in runs), default=0)
+    order = max(0, min(order, longest - 1))
+    every = [_burg([gaps[first:end, channel] for first, end in runs], order) for channel in range(c)]
+    coefficients = tuple(np.array([every[channel][0][k] for channel in range(c)]) for k in range(order + 1))
+    scale = np.sqrt(np.array([every[channel][1] for channel in range(c)]).T)
+    left = ColouredNoise(coefficients, scale, np.eye(c)).white(gaps, runs)
+    covariance = left.T @ left / max(len(left), 1)
+    size = np.sqrt(np.diag(covariance))
+    size[size == 0.0] = 1.0
+    # The variance of what is left is as found, the first rows of short series included.
+    correlation = covariance / np.outer(size, size) + 1e-9 * np.eye(c)
+    return ColouredNoise(coefficients, scale * size, np.linalg.inv(np.linalg.cholesky(correlation)))
+
+
+def _burg(series: Sequence[Floats], order: int) -> tuple[list[Floats], list[float]]:
+    """Return coefficients and variances of all orders of one channel, from several series."""
+    forward = [one.copy() for one in series]
+    backward = [one.copy() for one in series]
+    total = sum(float(one @ one) for one in series)
+    variance = max(total / max(sum(map(len, series)), 1), 1e-300)
+    least = LEAST_VARIANCE * variance
+    found, variances = [np.zeros(0)], [variance]
+    for _ in range(order):
+        forward = [one[1:] for one in forward]
+        backward = [one[:-1] for one in backward]
+        across = sum(float(f @ b) for f, b in zip(forward, backward, strict=True))
+        power = sum(float(f @ f + b @ b) for f, b in zip(forward, backward, strict=True))
+        reflection = 2.0 * across / power if power > 0.0 else 0.0
+        before = found[-1]
+        found.append(np.append(before - reflection * before[::-1], reflection))
+        variances.append(max(variances[-1] * (1.0 - reflection**2), least))
+        forward, backward = (
+            [f - reflection * b for f, b in zip(forward, backward, strict=True)],
+            [b - reflection * f for f, b in zip(forward, backward, strict=True)],
+        )
+    return found, variances

@@ -1,0 +1,241 @@
+"""Conditions of single logs, judged over the campaign: confirmed by held-out data, or estimated only.
+
+A condition such as a wind is confirmed where logs that have one of their own are predicted better on stretches that were held
+out, by an interval that excludes zero, better than with the same condition on headings that the vessel did not have, and where
+the evidence speaks for it as it must for any effect. What is not confirmed may still be estimated: it is reported as such.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import exp
+
+import numpy as np
+
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.inference.campaign import CommonHull
+from ferryid.diagnose.inference.campaign_estimation import Campaign, CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.force_errors import mass_of
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.campaign_evidence import (
+    HeldOutLoss,
+    held_out_loss,
+    interval,
+    placebos,
+    with_conditions,
+    without_conditions,
+)
+from ferryid.diagnose.judging.claims import Claim, Figures
+from ferryid.diagnose.judging.finding import Finding, Rival
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects import effects
+from ferryid.types import AXES, Floats
+
+WIDTH = 1.96
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Log-likelihood of held-out blocks gained, all blocks together [nat], with its 95 % block-bootstrap interval."""
+
+    total: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, blocks: Floats) -> Gain:
+        """Return the gain of some blocks, shape (blocks,)."""
+        return cls(float(blocks.sum()), *interval(blocks))
+
+
+@dataclass(frozen=True)
+class ConditionTest:
+    """What speaks for a condition over all logs.
+
+    Attributes
+    ----------
+    effect
+        Its id.
+    fit, none
+        The logs with it and without, under one noise.
+    evidence
+        Logarithm of the evidence over that of no such condition [nat].
+    gain
+        Held-out log-likelihood over that of no such condition.
+    over_placebos
+        The same over conditions that cannot be true, by what they stand on.
+    """
+
+    effect: str
+    fit: CampaignFit
+    none: CampaignFit
+    loss: tuple[HeldOutLoss, HeldOutLoss]
+    evidence: float
+    gain: Gain
+    over_placebos: Mapping[str, Gain]
+
+    @property
+    def confirmed(self) -> bool:
+        """True where held-out data confirm it."""
+        return self.doubt == ""
+
+    @property
+    def estimated(self) -> bool:
+        """True where the evidence speaks for it, confirmed or not."""
+        return self.evidence >= INFERENCE.prior_odds
+
+    @property
+    def doubt(self) -> str:
+        """Why it is not confirmed, as the end of a sentence; empty where it is."""
+        if not self.estimated:
+            return f"the evidence speaks for it by {self.evidence:.0f} nat only"
+        if self.gain.low <= 0.0:
+            return "held-out stretches of the logs are not surely predicted better with it"
+        for place, gain in self.over_placebos.items():
+            if gain.low <= 0.0:
+                return f"held-out stretches are predicted about as well by one on {place}, which cannot be true"
+        return ""
+
+    @property
+    def probability(self) -> float:
+        """Probability over none, by the evidence and the prior odds; a hint's at most where it is not confirmed."""
+        away = min(max(self.evidence - INFERENCE.prior_odds, -700.0), 700.0)
+        probability = 1.0 / (1.0 + exp(-away))
+        return probability if self.confirmed else min(probability, JUDGING.hint_probability)
+
+
+@dataclass(frozen=True)
+class JudgedConditions:
+    """The conditions of a campaign.
+
+    Attributes
+    ----------
+    hull
+        The common hull, and of each log the conditions that are confirmed.
+    tests
+        Every condition that was tested, the likeliest first.
+    """
+
+    hull: CommonHull
+    tests: tuple[ConditionTest, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was tested over all logs, as sentences."""
+        return tuple(_note(one, len(self.hull.place)) for one in self.tests)
+
+    def claims(self, path: str) -> tuple[Claim, ...]:
+        """Return the conditions of a log as findings: what is confirmed, else the likeliest that is estimated."""
+        i = self.hull.place.get(path)
+        if i is None:
+            return ()
+        shown = [one for one in self.tests if one.confirmed] or [one for one in self.tests[:1] if one.estimated]
+        found = [_finding(one, i, self.tests) for one in shown]
+        return tuple(Claim(one, Figures("condition")) for one in found if one is not None)
+
+
+def judge_conditions(campaign: Campaign, place: Mapping[str, int], progress: Callable[[str], None]) -> JudgedConditions:
+    """Judge every condition that the logs may have, and return the hull with those that are confirmed."""
+    names = sorted({one.effect.id for one in campaign.conditions})
+    tests = []
+    for name in names:
+        progress(f"estimating one hull and a {effects()[name].title.lower()} of every log")
+        tests.append(_tested(with_conditions(campaign, frozenset([name])), progress))
+    tests.sort(key=lambda one: -one.evidence)
+    confirmed = [one for one in tests if one.confirmed]
+    if not confirmed:
+        progress("estimating one hull for all logs")
+        return JudgedConditions(CommonHull(estimate_campaign(without_conditions(campaign)), place), tuple(tests))
+    # A second condition must be seen beside the first, which may have stood in for it.
+    best = confirmed[0]
+    kept, fit = [best], best.fit
+    for other in confirmed[1:]:
+        both = with_conditions(campaign, frozenset(one.effect for one in (*kept, other)))
+        made = estimate_campaign(both)
+        alone = estimate_campaign(fit.campaign, noise=made.noise)
+        gain = Gain.of(held_out_loss(made).gain(held_out_loss(alone)))
+        if made.evidence - alone.evidence >= INFERENCE.prior_odds and gain.low > 0.0:
+            kept, fit = [*kept, other], made
+    left = [one for one in tests if one in kept or not one.confirmed]
+    return JudgedConditions(CommonHull(fit, place), tuple(left))
+
+
+def _tested(campaign: Campaign, progress: Callable[[str], None]) -> ConditionTest:
+    made = estimate_campaign(campaign)
+    none = estimate_campaign(without_conditions(campaign), noise=made.noise)
+    evidence = made.evidence - none.evidence
+    loss = held_out_loss(none), held_out_loss(made)
+    gains = loss[1].gain(loss[0])
+    over: dict[str, Gain] = {}
+    # What the evidence does not speak for needs no placebo to fall.
+    if evidence >= INFERENCE.prior_odds:
+        progress("estimating the same on headings that the vessel did not have")
+        for name, placebo in placebos(campaign).items():
+            other = held_out_loss(estimate_campaign(placebo, noise=made.noise)).gain(loss[0])
+            over[name] = Gain.of(gains - other)
+    return ConditionTest(campaign.conditions[0].effect.id, made, none, loss, evidence, Gain.of(gains), over)
+
+
+def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> Finding | None:
+    """Return what a log has of a condition; None where the log cannot distinguish it from none."""
+    fit = test.fit
+    if not any(one.effect.id == test.effect for one in fit.campaign.members[i].conditions):
+        return None
+    value, covariance = fit.condition(i, 0)
+    parameters = [one for _, one in fit.campaign.own]
+    neutral = np.array([one.neutral for one in parameters])
+    away = value - neutral
+    # The posterior outside the contour through none at all.
+    seen = 1.0 - exp(-0.5 * float(away @ np.linalg.solve(covariance, away)))
+    if seen <= JUDGING.hint_probability:
+        return None
+    error = np.sqrt(np.diag(covariance))
+    estimates = {
+        one.name: Estimate(float(at), float(at - WIDTH * e), float(at + WIDTH * e), one.unit)
+        for one, at, e in zip(parameters, value, error, strict=True)
+    }
+    improvement = _improvement(test, i)
+    gained = np.maximum(improvement, 0.0)
+    shares = gained / gained.sum() if gained.any() else np.zeros(3)
+    effect = effects()[test.effect]
+    says = effect.says({name: one.value for name, one in estimates.items()}, None)
+    if not test.confirmed:
+        says = f"{says} It is estimated from all logs together, not confirmed: {test.doubt}."
+    t = fit.campaign.members[i].windows.measurements.t
+    return Finding(
+        effect=test.effect,
+        instance=None,
+        probability=min(seen, test.probability),
+        parameters=estimates,
+        axes=dict(zip(AXES, shares.tolist(), strict=True)),
+        intervals=((float(t[0]), float(t[-1])),),
+        improvement=dict(zip(AXES, improvement.tolist(), strict=True)),
+        held_out=True,
+        rivals=tuple(
+            Rival(one.effect, None, one.evidence - test.evidence) for one in tests if one.effect != test.effect
+        ),
+        says=says,
+    )
+
+
+def _improvement(test: ConditionTest, i: int) -> Floats:
+    """Return the share of the held-out squared force error of a log that a condition removes, by axis, shape (3,)."""
+    M = mass_of(test.fit.campaign.members[i].plain.hull)
+    before, after = (np.mean((one.errors[i] @ M.T) ** 2, axis=0) for one in test.loss)
+    return np.asarray(1.0 - after / np.where(before > 0.0, before, np.inf))
+
+
+def _note(test: ConditionTest, logs: int) -> str:
+    title = effects()[test.effect].title
+    told = (
+        f"{title}, one of every log beside the hull of all {logs}: the logarithm of the evidence changes by "
+        f"{test.evidence:+.0f} nat, the likelihood of held-out stretches by {_range(test.gain)}"
+    )
+    over = "; ".join(f"{_range(gain)} against one on {place}" for place, gain in test.over_placebos.items())
+    told += f" ({over})" if over else ""
+    return f"{told}. {'Confirmed' if test.confirmed else 'Not confirmed'}."
+
+
+def _range(gain: Gain) -> str:
+    return f"{gain.total:+.0f} nat (95 % interval {gain.low:+.0f} to {gain.high:+.0f})"

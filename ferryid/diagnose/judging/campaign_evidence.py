@@ -1,0 +1,132 @@
+"""Whether conditions that several logs are given beside a common hull hold on stretches that neither was fitted to.
+
+A steady wind moves a vessel by little against the rest of a single log, too little to prove it there; the same kind of wind in
+many logs, with one hull for all of them, can be proved together. Blocks of every log are held out in turn, everything is
+estimated from the rest of all logs, and the gain is summed over blocks. Conditions that cannot be true, on headings that the
+vessel did not have, are estimated in their place: what they gain is what any two more parameters would.
+
+A block is held out by an update of the normal equations at the estimate, which is exact where the gaps are linear in what is
+estimated; spreads and noise are those of all logs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ferryid.diagnose.inference.campaign_estimation import Campaign, CampaignFit, Member
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.folds import DRAWS
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.parallel import over
+from ferryid.effects.force_model import ForceModel
+from ferryid.types import Floats, Ints
+
+MIRRORED, EXCHANGED = "the heading mirrored", "another log's heading"
+
+
+@dataclass(frozen=True)
+class HeldOutLoss:
+    """Whitened squares of held-out blocks, shape (blocks,), the log of each, and the errors of every log's windows.
+
+    The errors are accelerations along the vessel's axes, shape (J, 3) for each log.
+    """
+
+    blocks: Floats
+    log: Ints
+    errors: tuple[Floats, ...]
+
+    def gain(self, over: HeldOutLoss) -> Floats:
+        """Return how much log-likelihood each block gains over another hypothesis, shape (blocks,)."""
+        return 0.5 * (over.blocks - self.blocks)
+
+
+def interval(gains: Floats) -> tuple[float, float]:
+    """Return the 95 % block-bootstrap interval of a sum of gains, shape (blocks,)."""
+    drawn = np.random.default_rng(0).integers(0, len(gains), size=(DRAWS, len(gains)))
+    low, high = np.quantile(gains[drawn].sum(axis=1), [0.025, 0.975])
+    return float(low), float(high)
+
+
+def held_out_loss(made: CampaignFit) -> HeldOutLoss:
+    """Return what an estimate leaves of every block if it does not know this block and what overlaps with it."""
+    found = over(lambda i: _log_loss(made, i), range(len(made.parts)))
+    log = np.repeat(np.arange(len(found)), [len(squares) for squares, _ in found])
+    return HeldOutLoss(np.concatenate([one for one, _ in found]), log, tuple(errors for _, errors in found))
+
+
+def _log_loss(made: CampaignFit, i: int) -> tuple[Floats, Floats]:
+    part, campaign = made.parts[i], made.campaign
+    windows, own = campaign.members[i].windows, made.own[i]
+    errors, slopes = campaign.linearised(i, made.common, own, campaign.hull_slopes(i, made.common, own))
+    C = made.covariance(i)
+    stride = max(1, int(np.median(np.diff(windows.starts)))) if len(windows.starts) > 1 else 1
+    # Windows overlap, and the noise's colour reaches back: those within a window's length know the block.
+    purge = -(-len(windows.weight) // stride)
+    length = max(1, round(INFERENCE.block_windows * len(windows.weight) / stride))
+    squares = []
+    for first, end in windows.runs:
+        count = max(1, round((end - first) / length))
+        edges = np.linspace(first, end, count + 1).round().astype(int).tolist()
+        for begin, stop in pairwise(edges):
+            near = slice(max(first, begin - purge), min(end, stop + purge))
+            J, w = part.slopes[near].reshape(-1, C.shape[0]), part.gaps[near].ravel()
+            unknown = np.eye(len(w)) - J @ C @ J.T
+            shift = C @ (J.T @ np.linalg.solve(unknown, w))
+            left = part.gaps[begin:stop] + part.slopes[begin:stop] @ shift
+            squares.append(float(np.sum(left**2)))
+            errors[begin:stop] += slopes[begin:stop] @ shift
+    return np.array(squares), errors
+
+
+def placebos(campaign: Campaign) -> dict[str, Campaign]:
+    """Return the campaign with conditions that cannot be true: on the mirrored heading, and on that of another log."""
+    every = [member.windows.measurements.psi for member in campaign.members]
+    others = [np.resize(every[(i + 1) % len(every)], len(psi)) for i, psi in enumerate(every)]
+    made = {MIRRORED: _turned(campaign, [-psi for psi in every])}
+    if len(every) > 1:
+        made[EXCHANGED] = _turned(campaign, others)
+    return made
+
+
+def _turned(campaign: Campaign, headings: Sequence[Floats]) -> Campaign:
+    members = tuple(
+        replace(member, conditions=tuple(turned(one, psi) for one in member.conditions))
+        for member, psi in zip(campaign.members, headings, strict=True)
+    )
+    return replace(campaign, members=members)
+
+
+def turned(candidate: Candidate, psi: Floats) -> Candidate:
+    """Return a condition that acts as if the vessel had had another heading, shape (n,)."""
+
+    def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+        measurements = force_model.measurements
+        other = replace(measurements, eta=np.column_stack([measurements.eta[:, :2], psi]))
+        acted = candidate.effect.apply(replace(force_model, measurements=other), p, instance)
+        if acted.flow is force_model.flow or acted.flow is None:
+            return replace(force_model, external=acted.external)
+        # Water that meets the other heading from where it would have met this one.
+        cos, sin = np.cos(measurements.psi - psi), np.sin(measurements.psi - psi)
+        north, east = acted.flow.T
+        flow = np.column_stack([cos * north - sin * east, sin * north + cos * east])
+        return replace(force_model, external=acted.external, flow=flow)
+
+    return replace(candidate, effect=replace(candidate.effect, apply=apply))
+
+
+def without_conditions(campaign: Campaign) -> Campaign:
+    """Return the campaign without any condition."""
+    return with_conditions(campaign, frozenset())
+
+
+def with_conditions(campaign: Campaign, effects: frozenset[str]) -> Campaign:
+    """Return the campaign with the conditions of some effects alone."""
+
+    def kept(member: Member) -> Member:
+        return replace(member, conditions=tuple(one for one in member.conditions if one.effect.id in effects))
+
+    return replace(campaign, members=tuple(kept(member) for member in campaign.members))

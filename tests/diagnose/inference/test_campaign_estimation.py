@@ -1,0 +1,172 @@
+"""Several logs, estimated together: the hull is the true one, a log has no part in its own belief, every log has its wind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.data.measurements import window_lengths
+from ferryid.diagnose.inference.campaign import CommonHull
+from ferryid.diagnose.inference.campaign_estimation import (
+    INDUCED,
+    Campaign,
+    CampaignFit,
+    HullPrior,
+    Member,
+    estimate_campaign,
+)
+from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
+from ferryid.diagnose.inference.weak_form import windows
+from ferryid.diagnose.judging.campaign_conditions import judge_conditions
+from ferryid.diagnose.judging.campaign_evidence import without_conditions
+from ferryid.effects import effects
+from ferryid.effects.force_model import ForceModel, hull_of
+from ferryid.types import no_progress
+from ferryid.vessel import load_profile
+from ferryid.vessel.wind import wind_force
+from tests.diagnose.judging.test_held_out import sailed
+
+pytestmark = pytest.mark.slow
+
+FERRY = load_profile("milliampere")
+WIND, CURRENT = (Candidate(effects()[name], None, effects()[name].parameters_of(FERRY)) for name in ("wind", "current"))
+WINDS = ((-2.0, 1.5), (1.5, 2.5), (2.5, -1.0))
+CALM = ((0.0, 0.0),) * 3
+SPREAD = 0.3 * np.abs(hull_of(FERRY))
+
+
+@cache
+def campaign(
+    winds: tuple[tuple[float, float], ...] = WINDS, factor: float = 1.0, conditions: tuple[str, ...] = ("wind",)
+) -> Campaign:
+    """Return logs in some winds; the last was of a vessel whose forces are a factor larger than thought."""
+    members = []
+    wrong = hull_of(FERRY) * np.where(np.arange(len(SPREAD)) % 2, 1.15, 0.85)
+    for number, wind in enumerate(winds):
+        # Each log begins elsewhere in the same forces, so that they are three.
+        measurements = sailed(300.0 + 60.0 * number, np.array(wind))
+        rows = slice(300 * number, None)
+        measurements = replace(
+            measurements,
+            t=measurements.t[rows],
+            eta=measurements.eta[rows],
+            nu_raw=measurements.nu_raw[rows],
+            nu=measurements.nu[rows],
+            parts=measurements.parts[rows] * (factor if number == 2 else 1.0),
+            angles=measurements.angles[rows],
+            usable=measurements.usable[rows],
+        )
+        seen = windows(measurements, *window_lengths(FERRY))
+        thin = seen.measurements
+        still = wind_force(FERRY.wind, np.zeros((len(thin.t), 2)), thin.psi, thin.nu)  # type: ignore[arg-type]
+        chosen = tuple(one for one in (WIND, CURRENT) if one.effect.id in conditions)
+        members.append(Member(seen, ForceModel(thin, wrong, thin.parts, thin.angles, still), chosen))
+    none = np.zeros(len(INDUCED))
+    return Campaign(tuple(members), HullPrior(np.append(wrong, none), np.append(SPREAD, none)))
+
+
+@cache
+def fitted() -> CampaignFit:
+    return estimate_campaign(campaign())
+
+
+def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
+    for i, wind in enumerate(WINDS):
+        value, covariance = fitted().condition(i, 0)
+        assert np.abs(value - wind).max() < 0.35
+        assert (np.abs(value - wind) < 3.0 * np.sqrt(np.diag(covariance))).all()
+
+
+def test_the_common_hull_is_nearer_the_true_one_than_it_was_thought() -> None:
+    mean, covariance = fitted().belief()
+    known = np.sqrt(np.diag(covariance))[: len(SPREAD)] < 0.3 * SPREAD
+    assert known[:5].sum() >= 3
+    before = np.abs(fitted().campaign.hull.mean[: len(SPREAD)] - hull_of(FERRY))
+    after = np.abs(mean[: len(SPREAD)] - hull_of(FERRY))
+    assert after[known].sum() < 0.35 * before[known].sum()
+
+
+def test_a_log_has_no_part_in_what_the_others_say() -> None:
+    alone = replace(campaign(), members=campaign().members[:2])
+    mean, covariance = fitted().belief(without=2)
+    expected, own = estimate_campaign(alone).belief()
+    error = np.sqrt(np.diag(own))[: len(SPREAD)]
+    assert (np.abs(mean - expected)[: len(SPREAD)] <= error).all()
+    told = error > 0.0
+    assert np.sqrt(np.diag(covariance))[: len(SPREAD)][told] == pytest.approx(error[told], rel=0.5)
+    # The log itself would have told more.
+    assert np.linalg.norm(mean - fitted().belief()[0]) > np.linalg.norm(mean - expected)
+
+
+def test_logs_of_one_hull_agree_and_of_another_do_not() -> None:
+    assert fitted().disagreement < 2.0
+    assert estimate_campaign(campaign(factor=1.4)).disagreement > 2.0 * fitted().disagreement
+
+
+def test_a_belief_from_others_brings_the_wind_out_of_one_log() -> None:
+    bare = CommonHull(estimate_campaign(campaign()), {"a": 0, "b": 1, "c": 2})
+    first = campaign().members[0]
+    mean, covariance = bare.fit.belief(without=0)
+    plain = replace(first.plain, hull=mean[: len(SPREAD)])
+    spread = np.sqrt(np.diag(covariance))[: len(SPREAD)]
+    made = fit(estimation_problem(first.windows, plain, spread), [WIND])
+    assert made.values[0][:2] == pytest.approx(WINDS[0], abs=0.35)
+
+
+def test_one_log_more_changes_nothing_where_it_says_nothing() -> None:
+    """A log of a few seconds joins without a word about the hull, and takes after the others in its wind."""
+    first = campaign().members[0]
+    few = replace(first.windows, starts=first.windows.starts[:3], runs=((0, 3),), measured=first.windows.measured[:3])
+    more = replace(campaign(), members=(*campaign().members, replace(first, windows=few)))
+    made = estimate_campaign(more)
+    known = np.sqrt(np.diag(fitted().belief()[1]))
+    moved = np.abs(made.belief()[0] - fitted().belief()[0])
+    assert (moved <= 0.5 * known).all()
+    value, covariance = made.condition(3, 0)
+    assert (np.abs(value - WINDS[0]) < 3.0 * np.sqrt(np.diag(covariance))).all()
+
+
+def test_winds_are_confirmed_over_all_logs_and_a_current_is_not() -> None:
+    judged = judge_conditions(campaign(conditions=("wind", "current")), {"a": 0, "b": 1, "c": 2}, no_progress)
+    confirmed = [one.effect for one in judged.tests if one.confirmed]
+    assert confirmed == ["wind"]
+    (wind,) = (one for one in judged.tests if one.confirmed)
+    assert wind.gain.low > 0.0
+    assert min(one.low for one in wind.over_placebos.values()) > 0.0
+    for path, true in zip("abc", WINDS, strict=True):
+        (claim,) = judged.claims(path)
+        north, east = (claim.finding.parameters[name] for name in ("north", "east"))
+        assert north.low < true[0] < north.high
+        assert east.low < true[1] < east.high
+        assert claim.finding.probability > 0.9
+    assert judged.claims("d") == ()
+    assert any("Confirmed" in note for note in judged.notes)
+
+
+def test_in_calm_logs_nothing_is_confirmed_and_nothing_estimated() -> None:
+    judged = judge_conditions(campaign(CALM, conditions=("wind", "current")), {"a": 0, "b": 1, "c": 2}, no_progress)
+    assert not any(one.estimated for one in judged.tests)
+    assert [judged.claims(path) for path in "abc"] == [(), (), ()]
+    assert judged.hull.fit.campaign.conditions == ()
+
+
+def test_without_conditions_no_log_has_any_of_its_own() -> None:
+    bare = without_conditions(campaign())
+    assert bare.own == []
+    assert estimate_campaign(bare, noise=fitted().noise).evidence < fitted().evidence
+
+
+@pytest.mark.parametrize(
+    ("variances", "told"), [(9.0, "3.0 times as much as the noise"), (0.8, "by no more than the noise")]
+)
+def test_how_far_logs_disagree_is_said_as_people_think_of_it(variances: float, told: str) -> None:
+    hull = cast(CampaignFit, SimpleNamespace(disagreement=variances))
+    says = CommonHull(hull, {"a": 0, "b": 1, "c": 2}).says("a")
+    assert says.startswith("The hull is that of 2 other logs of the vessel")
+    assert told in says
+    assert "variance" not in says
