@@ -17,6 +17,17 @@ def force_errors(windows: Windows, force_model: ForceModel, plain: ForceModel) -
     return np.asarray(velocities.gap(force_model) @ mass_of(plain.hull).T)
 
 
+def position_errors(windows: Windows, force_model: ForceModel, plain: ForceModel) -> Floats | None:
+    """Return the same as the positions and headings show it, shape (J, 3); None where there are none."""
+    if not windows.channels[0]:
+        return None
+    cos, sin = windows.mean(np.column_stack(windows.measurements.pointing)).T
+    length = np.maximum(np.hypot(cos, sin), 1e-12)
+    north, east, turning = windows.gap(force_model).T
+    along = np.column_stack([(cos * north + sin * east) / length, (cos * east - sin * north) / length, turning])
+    return np.asarray(along @ mass_of(plain.hull).T)
+
+
 def mass_of(hull: Floats) -> Floats:
     """Return the mass matrix of coefficients in the order of `COEFFICIENTS`, shape (3, 3)."""
     m11, m22, m23, m32, m33 = hull[:5]

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import polygamma
 
 from ferryid.diagnose.inference.estimation import EstimationProblem
-from ferryid.diagnose.inference.force_errors import force_errors
+from ferryid.diagnose.inference.force_errors import force_errors, position_errors
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.inference.weak_form import Windows, windows
 from ferryid.effects.force_model import ForceModel, Measurements
@@ -51,6 +51,11 @@ class Burst:
         When it is loud [s].
     t, force
         Time [s], shape (m,), and what the band lets through of the force error [N, N, N·m], shape (m, 3).
+    rest
+        Root mean square of the whole force error by axis, shape (3,).
+    in_positions
+        Share of it that positions and headings show too, on the axis that shows most, with its standard error: one of a force,
+        zero of noise that is in the velocities only. None where there are no positions.
     """
 
     low_hz: float
@@ -60,6 +65,8 @@ class Burst:
     intervals: tuple[tuple[float, float], ...]
     t: Floats
     force: Floats
+    rest: Floats
+    in_positions: tuple[float, float] | None
 
 
 def bands_of(
@@ -97,16 +104,19 @@ def bursts_of(problem: EstimationProblem, force_model: ForceModel, measurements:
     """
     short = fine_windows(problem, measurements)
     errors = force_errors(short, force_model, problem.plain)
+    positions = position_errors(short, force_model, problem.plain)
     found = []
     for low, high in pairwise(BURST_HZ):
         block_s = max(BURST_S, BURST_PERIODS / high)
         if high < 0.5 / short.measurements.step_s:
-            found.append(_uneven(short, errors, low, high, block_s))
+            found.append(_uneven(short, errors, positions, low, high, block_s))
     uneven = [one for one in found if one is not None]
     return max(uneven, key=lambda one: one.deviations, default=None)
 
 
-def _uneven(short: Windows, errors: Floats, low_hz: float, high_hz: float, block_s: float) -> Burst | None:
+def _uneven(
+    short: Windows, errors: Floats, positions: Floats | None, low_hz: float, high_hz: float, block_s: float
+) -> Burst | None:
     step_s = short.measurements.step_s
     size = round(block_s / step_s)
     edges, detection_powers, times, forces = [], [], [], []
@@ -138,7 +148,31 @@ def _uneven(short: Windows, errors: Floats, low_hz: float, high_hz: float, block
             spans[-1] = (spans[-1][0], last)
         elif one:
             spans.append((first, last))
-    return Burst(low_hz, high_hz, deviations, axes, tuple(spans), np.concatenate(times), np.concatenate(forces))
+    shown = None
+    if positions is not None:
+        kept = [(a, b) for a, b in short.runs if b - a >= 2 * size]
+        seen = np.concatenate([_passed(positions[a:b], low_hz, high_hz, step_s) for a, b in kept])
+        axis = int(np.argmax(axes))
+        shown = shown_share(np.concatenate(forces)[:, axis], seen[:, axis], size)
+    rest = np.sqrt(np.mean(errors**2, axis=0))
+    return Burst(
+        low_hz, high_hz, deviations, axes, tuple(spans), np.concatenate(times), np.concatenate(forces), rest, shown
+    )
+
+
+def shown_share(errors: Floats, seen: Floats, size: int) -> tuple[float, float]:
+    """Return the share of errors that another sensor shows too, and its standard error from blocks of so many rows.
+
+    A regression of what the other shows, shape (m,), on the errors, shape (m,): the other's own noise, which is in none of the
+    errors, does not bend it.
+    """
+    count = max(1, len(errors) // max(size, 1))
+    across, power = (
+        np.array([float(part.sum()) for part in np.array_split(one, count)]) for one in (errors * seen, errors**2)
+    )
+    total = max(float(power.sum()), 1e-300)
+    share = float(across.sum()) / total
+    return share, float(np.sqrt(np.sum((across - share * power) ** 2))) / total
 
 
 def _passed(values: Floats, low_hz: float, high_hz: float, step_s: float) -> Floats:

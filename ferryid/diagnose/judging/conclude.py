@@ -126,6 +126,7 @@ def _concluded(
         *estimated.expectation.notes,
         *noted,
         *stands.dropped,
+        *log.unknown.notes,
         *rule_notes,
         *log_notes(figures),
         *untested_notes(selected.search.untested),

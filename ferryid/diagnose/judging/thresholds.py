@@ -129,6 +129,12 @@ class JudgingThresholds:
         "held-out gain that needs no axis on which an improvement is significant",
         "convention: five times `gain`; a force that acts seldom vanishes in means over a log",
     )
+    power_in_positions: float = threshold(
+        0.5,
+        "of what the velocities show",
+        "share of what comes and goes in the velocities that the positions must show too, and at most its inverse, of a force",
+        "convention: half; a force moves both, and noise of a sensor is in one of them",
+    )
     power_in_velocities: float = threshold(
         0.3,
         "of the power",

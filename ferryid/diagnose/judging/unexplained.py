@@ -16,9 +16,10 @@ from ferryid.counts import counted
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.candidate_terms import FORCE, Term
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fit, fitted_force_model
-from ferryid.diagnose.inference.folds import Folds, folds_of
+from ferryid.diagnose.inference.folds import Folds, block_s, folds_of
+from ferryid.diagnose.inference.force_errors import force_errors, position_errors
 from ferryid.diagnose.inference.onset_estimation import is_brief
-from ferryid.diagnose.inference.spectra import BURST_HZ, Band, Burst, bursts_of
+from ferryid.diagnose.inference.spectra import BURST_HZ, Band, Burst, bursts_of, shown_share
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_laws import CampaignLaws
 from ferryid.diagnose.judging.claims import Claim, Figures, OtherLogs
@@ -46,11 +47,14 @@ class Unexplained:
         What the errors look like.
     unsteady
         True where they come and go.
+    notes
+        What was seen of them that is no force, as sentences.
     """
 
     claims: tuple[Claim, ...]
     left: Location
     unsteady: bool
+    notes: tuple[str, ...] = ()
 
 
 def find_unexplained(
@@ -85,13 +89,52 @@ def find_unexplained(
     known = bool(problem.filter.processes)
     uneven = bool(left.profiles) and left.profiles[0].statistic >= JUDGING.regime_errors
     burst = bursts_of(refitted, fitted_force_model(refitted.plain, after), measurements)
+    notes: list[str] = []
     if burst is not None and burst.deviations >= JUDGING.burst_deviations:
-        uneven = True
-        if not known:
-            claims.append(Claim(_in_bursts(burst), Figures("bursts")))
+        if _is_force(burst.in_positions):
+            uneven = True
+            if not known:
+                claims.append(Claim(_in_bursts(burst), Figures("bursts")))
+        else:
+            notes.append(_sensor_bursts(burst))
     elif uneven and not known:
-        claims.append(Claim(_unsteady(refitted, left), Figures("unsteady")))
-    return Unexplained(tuple(claims), left, uneven)
+        if _is_force(_in_positions(refitted, after, int(np.argmax(left.shares)))):
+            claims.append(Claim(_unsteady(refitted, left), Figures("unsteady")))
+        else:
+            uneven = False
+    return Unexplained(tuple(claims), left, uneven, tuple(notes))
+
+
+def _is_force(in_positions: tuple[float, float] | None) -> bool:
+    """Return whether positions and velocities show the same: a force moves both alike, and noise is one sensor's."""
+    if in_positions is None:
+        return False
+    share, error = in_positions
+    least = JUDGING.power_in_positions
+    return least <= share <= 1.0 / least and share - 1.96 * error > 0.0
+
+
+def _in_positions(problem: EstimationProblem, kept: Fit, axis: int) -> tuple[float, float] | None:
+    """Return the share of the errors of long windows that positions show too, and its standard error."""
+    force_model = fitted_force_model(problem.plain, kept)
+    seen = position_errors(problem.windows, force_model, problem.plain)
+    if seen is None:
+        return None
+    errors = force_errors(problem.windows, force_model, problem.plain)
+    length = round(block_s(problem.windows) / (np.median(np.diff(problem.windows.middle_s)) + 1e-12))
+    return shown_share(errors[:, axis], seen[:, axis], max(1, length))
+
+
+def _sensor_bursts(burst: Burst) -> str:
+    axis = int(np.argmax(burst.shares))
+    if burst.in_positions is None:
+        seen = "as there are no positions, nothing shows whether it is a force"
+    elif burst.in_positions[0] < JUDGING.power_in_positions:
+        seen = "the positions do not show it, so that it is noise of the velocities"
+    else:
+        seen = f"the positions show {burst.in_positions[0]:.1f} times as much, so that it is noise of the positions"
+    band = f"{burst.low_hz:g} to {burst.high_hz:g} Hz"
+    return f"In the velocities something comes and goes at {band}, most in {AXES[axis]}: {seen}."
 
 
 def find_displaced(problem: EstimationProblem, kept: Fit) -> tuple[int, ...]:
@@ -198,6 +241,7 @@ def _in_bursts(burst: Burst) -> Finding:
     inside = [(burst.t >= first) & (burst.t <= last) for first, last in burst.intervals]
     loud = burst.force[np.any(inside, axis=0), axis] if inside else burst.force[:, axis]
     size = float(np.sqrt(np.mean(loud**2)))
+    share = size / max(float(burst.rest[axis]), 1e-300)
     return Finding(
         effect=UNKNOWN,
         instance=None,
@@ -205,7 +249,8 @@ def _in_bursts(burst: Burst) -> Finding:
         parameters={},
         axes=dict(zip(AXES, burst.shares.tolist(), strict=True)),
         intervals=burst.intervals,
-        says=f"An unsteady disturbance acts in bursts of {band}, most in {AXES[axis]} ({size:.2g} {unit} RMS){when}; no law of "
+        says=f"An unsteady disturbance acts in bursts of {band}, most in {AXES[axis]} ({size:.2g} {unit} RMS, "
+        f"{100.0 * share:.0f} % of all that is left there){when}; no law of "
         "the vessel's motion explains it.",
         evidence={"t": burst.t, "before": burst.force[:, axis]},
         labels={"residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'}, {band} [{unit}]"},

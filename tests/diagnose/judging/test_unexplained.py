@@ -142,6 +142,32 @@ def test_bursts_are_told_by_band_and_time() -> None:
     assert not any(first <= 350.0 <= last for first, last in told.intervals)
 
 
+@pytest.mark.parametrize(
+    ("of", "why"),
+    [("velocities", "noise of the velocities"), ("positions", "noise of the positions"), ("", "no positions")],
+)
+def test_what_one_sensor_alone_shows_is_no_force(of: str, why: str) -> None:
+    burst = np.exp(-(((T - 200.0) / 15.0) ** 2)) + np.exp(-(((T - 500.0) / 15.0) ** 2))
+    shaken = 0.05 * burst * np.sin(2.0 * np.pi * 0.28 * T)
+    whole = sailed(0)
+    noisy = replace(whole, nu_raw=whole.nu_raw + np.outer(shaken, [0.0, 1.0, 0.0]))
+    if of == "positions":
+        # A receiver shakes, and its velocity is smoothed.
+        rates = 4.0 * shaken[:, None] * np.column_stack([-np.sin(whole.psi), np.cos(whole.psi)])
+        moved = np.cumsum(rates, axis=0) * STEP_S
+        noisy = replace(noisy, eta=whole.eta + np.column_stack([moved, np.zeros(len(T))]))
+    if not of:
+        noisy = replace(noisy, eta=np.column_stack([np.full((len(T), 2), np.nan), whole.psi]))
+    cut = windows(noisy, 8.0, 2.0)
+    problem = estimation_problem(cut, *prior_force_model(cut.measurements, FERRY))
+    made = find_unexplained(problem, fit(problem, ()), noisy)
+    assert made.claims == ()
+    assert not made.unsteady
+    (note,) = made.notes
+    assert why in note
+    assert "0.2 to 0.4 Hz, most in sway" in note
+
+
 def test_even_noise_has_no_bursts() -> None:
     strongest = []
     for seed in range(4):
