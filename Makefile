@@ -7,7 +7,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 DEMO ?= ferryid-out
 
-.PHONY: quick test docs evidence size demo picture bench attack faults real rivals thesis proof wavy fixtures wheel-check lint clean
+.PHONY: quick test docs evidence size demo picture bench attack faults real campaign rivals thesis proof wavy fixtures wheel-check lint clean
 
 # On two cores: a worker takes a slow test at a time and the rest by files, so that the fixtures of a file are made once.
 SPREAD = -n 2 --dist loadgroup --no-loadscope-reorder
@@ -60,6 +60,10 @@ attack: $(VENV)/installed
 # Fits and diagnoses of the real recordings, where they lie in ../shared/data; writes reports/real.md and reports/real.
 real: $(VENV)/installed
 	$(BIN)/python -m tests.real
+
+# Campaigns of the same recordings, with the wind withheld and in still air: writes reports/campaign.md.
+campaign: $(VENV)/installed
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.real campaign
 
 # ferryid's estimators beside output error, sparse and stepwise regression: writes reports/rivals.md. TRIALS=N simulates that many
 # trials of each kind; the recordings are left out where they are absent.

@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MAKERS: Mapping[str, tuple[str, ...]] = {
     "reports/attack.md": ("tests/attack",),
     "reports/benchmarks.md": ("tests/bench",),
+    "reports/campaign.md": ("tests/real",),
     "reports/demo/forces.svg": ("cli/cmd_simulate.py", "cli/cmd_fit.py"),
     "reports/proof.md": ("cli/cmd_prove.py",),
     "reports/real.md": ("tests/real",),

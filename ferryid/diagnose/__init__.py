@@ -2,7 +2,7 @@
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import check_withheld
-from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, to_json
+from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, finding_as_json, to_json
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -24,6 +24,7 @@ __all__ = [
     "diagnose",
     "diagnose_and_store",
     "error_ratio",
+    "finding_as_json",
     "keep_to_one_thread",
     "to_json",
     "worse_axes",

@@ -11,7 +11,7 @@ from ferryid.diagnose.inference.baselines import CampaignBaseline, HullBaseline,
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.simulation_baseline import learn_simulation
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline, average, estimate, select
-from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge_conditions
+from ferryid.diagnose.judging.campaign import JudgedCampaign, judge_campaign
 from ferryid.diagnose.judging.conclude import conclude
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.judge import judge
@@ -81,24 +81,24 @@ def diagnose_campaign(
     measured = [measure_log(log, profile, run, withhold=settings.withhold) for log in logs]
     screened = [screen_sensors(log, run.progress) for log in measured]
     averaged = [average(log) for log in screened]
-    baseline, conditions = _baseline(averaged, profile, settings, run)
+    baseline, together = _baseline(averaged, profile, settings, run)
     estimated = [estimate(log, baseline) for log in averaged if log.long_enough]
     selected = [select(log, run.progress) for log in estimated]
     judged = judge(selected, run.progress)
-    return conclude(averaged, judged, baseline, conditions)
+    return conclude(averaged, judged, baseline, together)
 
 
 def _baseline(
     logs: Sequence[AveragedLog], profile: Profile, settings: DiagnosisSettings, run: RunContext
-) -> tuple[Baseline, JudgedConditions | None]:
-    """Return what logs are compared with, and of a campaign the conditions of its logs."""
+) -> tuple[Baseline, JudgedCampaign | None]:
+    """Return what logs are compared with, and what the logs of a campaign say together."""
     if settings.against is not None:
         return SimulationBaseline(learn_simulation(settings.against, profile, run)), None
     assembled = assemble(logs, profile, settings.model)
     if assembled is None:
         return HullBaseline(profile, settings.model), None
-    conditions = judge_conditions(*assembled, run.progress)
-    return CampaignBaseline(profile, conditions.hull, settings.model), conditions
+    together = judge_campaign(*assembled, run.progress)
+    return CampaignBaseline(profile, together.hull, settings.model), together
 
 
 def diagnose(

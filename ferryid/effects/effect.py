@@ -143,6 +143,9 @@ class Effect:
     unsteady
         ``unsteady(force_model)(p)`` returns stochastic disturbances from positive parameters; none where the force model has
         nothing for them to act on. Such an effect changes no force model: it is a state of the filter.
+    doubt
+        ``doubt(values)`` returns why values by name may stand in for something else whatever the data say, as the end of a
+        sentence; empty where they are as they may be.
     of_log
         Of a condition that steadily acts on a whole log: names of the parameters that each log of a vessel has its own of; the
         others are the vessel's. Empty for what is no such condition.
@@ -176,6 +179,7 @@ class Effect:
     profiled: str = ""
     of_sensor: bool = False
     unsteady: Callable[[ForceModel], Processes] | None = None
+    doubt: Callable[[Values], str] = lambda values: ""
     of_log: tuple[str, ...] = ()
     about: str = ""
     regressor: Callable[[ForceModel, Floats, str | None, str], tuple[str, Floats]] | None = None

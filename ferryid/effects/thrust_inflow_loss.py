@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.effects.effect import Effect, Parameter, Values
-from ferryid.effects.force_model import ForceModel, body_current
+from ferryid.effects.force_model import ForceModel, Measurements, body_current
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.types import AXES, Floats
 from ferryid.vessel.profile import Profile
@@ -32,6 +32,12 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
         along = (X * (u - u_c - r * y) + Y * (v - v_c + r * x)) / np.where(size > 0.0, size, 1.0)
         parts[:, k] *= (1.0 - np.clip(p[0] * along, -1.0, 1.0))[:, None]
     return replace(force_model, parts=parts)
+
+
+def cannot(measurements: Measurements) -> str:
+    """Say why the measurements cannot show a loss: an open-water curve has the inflow in it, as has the thrust on the shaft."""
+    with_inflow = all(one.thrust.kind == "open_water" for one in measurements.profile.actuators)
+    return "the open-water curves of all propellers have the inflow in them" if with_inflow else ""
 
 
 def says(values: Values, instance: str | None) -> str:
@@ -62,6 +68,7 @@ EFFECT = Effect(
     apply,
     says,
     scenario,
+    cannot=cannot,
     vessel=True,
     regressor=regressor,
     negligible=EFFECTS.least_inflow,

@@ -41,6 +41,13 @@ def says(values: Values, instance: str | None) -> str:
     )
 
 
+def doubt(values: Values) -> str:
+    """Return that nothing moves before it is pushed."""
+    if values["seconds"] >= 0.0:
+        return ""
+    return "the motion precedes its force, which a force missing from the model causes as easily as a clock"
+
+
 def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     """Return the scenario's delay."""
     return {"sensors": {"navigation": {"delay_s": values["seconds"]}}}
@@ -63,4 +70,5 @@ EFFECT = Effect(
     negligible=EFFECTS.least_delay,
     formula_error=EFFECTS.definition_error,
     regressor=regressor,
+    doubt=doubt,
 )

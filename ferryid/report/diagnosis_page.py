@@ -30,7 +30,8 @@ def render(
     """Return the page on one log or several, and its drawings (SVG) by name; `made` are date, version and command."""
     several = len(diagnoses) > 1
     shared = diagnosis_words.notes_of_all(diagnoses)
-    logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS, shared) for k, one in enumerate(diagnoses, 1)]
+    common = diagnosis_words.findings_of_all(diagnoses)
+    logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS, shared, common) for k, one in enumerate(diagnoses, 1)]
     left = [one.log for one in diagnoses[MAX_LOGS:]]
     page = template("diagnosis.html").render(
         title=title,
@@ -38,6 +39,7 @@ def render(
         headline=diagnosis_words.summary(diagnoses),
         several=several,
         logs=logs,
+        common=[_finding(one, f"all-finding-{k}", False, ()) for k, one in enumerate(common, 1)],
         sign=diagnosis_words.SIGN,
         made=made,
         shared_notes=shared,
@@ -60,10 +62,12 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
     """Return the same for a terminal, short."""
     blocks = [diagnosis_words.summary(diagnoses)] if len(diagnoses) > 1 else []
     shared = diagnosis_words.notes_of_all(diagnoses)
+    common = diagnosis_words.findings_of_all(diagnoses)
+    if common:
+        lines = ["In all logs:", *_listed(common)]
+        blocks.append("\n".join(_folded(line) for line in lines))
     for one in diagnoses:
-        lines = [f"{one.log}: {diagnosis_words.headline(one)}"]
-        for k, finding in enumerate(one.findings, 1):
-            lines += ["", f"{k}. {diagnosis_words.said(finding)}", *(f"   {line}" for line in _lines(finding))]
+        lines = [f"{one.log}: {diagnosis_words.headline(one)}", *_listed(diagnosis_words.findings_of(one, common))]
         rows = diagnosis_errors.force_rows(one)
         if rows:
             lines += ["", f"{'on held-out data':<44}" + "".join(f"{axis:>22}" for axis in AXES)]
@@ -84,6 +88,13 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
     if shared:
         blocks.append("\n".join(_folded(f"note on all logs: {note}") for note in shared))
     return "\n\n".join(blocks)
+
+
+def _listed(findings: Sequence[Finding]) -> list[str]:
+    lines = []
+    for k, finding in enumerate(findings, 1):
+        lines += ["", f"{k}. {diagnosis_words.said(finding)}", *(f"   {line}" for line in _lines(finding))]
+    return lines
 
 
 def _lines(finding: Finding) -> list[str]:
@@ -112,7 +123,9 @@ def _folded(line: str) -> str:
     )
 
 
-def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) -> dict[str, Any]:
+def _log(
+    diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str], common: Sequence[Finding]
+) -> dict[str, Any]:
     force_rows, free_run_rows = diagnosis_errors.force_rows(diagnosis), diagnosis_errors.free_run_rows(diagnosis)
     return {
         "name": diagnosis.log,
@@ -121,7 +134,7 @@ def _log(diagnosis: Diagnosis, prefix: str, drawn: bool, told: Sequence[str]) ->
         "headline": diagnosis_words.headline(diagnosis),
         "findings": [
             _finding(one, f"{prefix}finding-{k}", drawn, diagnosis.left_out)
-            for k, one in enumerate(diagnosis.findings, 1)
+            for k, one in enumerate(diagnosis_words.findings_of(diagnosis, common), 1)
         ],
         "left_out": left_out_table(diagnosis.left_out),
         "names": [diagnosis_words.title(one.effect, one.instance) for one in diagnosis.findings],

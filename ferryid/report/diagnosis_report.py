@@ -11,12 +11,21 @@ from pathlib import Path
 from typing import Any
 
 from ferryid import __version__
-from ferryid.diagnose import SCHEMA, Diagnosis, DiagnosisSettings, campaign_verdict, diagnose_and_store, to_json
+from ferryid.diagnose import (
+    SCHEMA,
+    Diagnosis,
+    DiagnosisSettings,
+    campaign_verdict,
+    diagnose_and_store,
+    finding_as_json,
+    to_json,
+)
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
 from ferryid.models import Model
 from ferryid.models.store import load
 from ferryid.report.diagnosis_page import as_text, render
+from ferryid.report.diagnosis_words import findings_of, findings_of_all
 from ferryid.report.outcome import Report
 from ferryid.types import AXES, RunContext
 from ferryid.vessel import load_profile, parse_profile
@@ -117,18 +126,25 @@ def report(diagnoses: Sequence[Diagnosis], out: Path, command: Sequence[str] = (
 def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
     """Return one object in the form of schema ``ferryid.diagnosis/1``, on one log or several.
 
-    On several, `findings` holds those of all logs, each with its ``log``; errors are pooled over their rows where these are
-    known; and ``logs`` holds the diagnosis of each.
+    On several, `findings` holds those of all logs, each with its ``log``, null for what all of them share; errors are pooled
+    over their rows where these are known; and ``logs`` holds the diagnosis of each.
     """
     if len(diagnoses) == 1:
         return to_json(diagnoses[0])
-    logs = [to_json(one) for one in diagnoses]
+    logs, shared = [to_json(one) for one in diagnoses], findings_of_all(diagnoses)
     return {
         "schema": SCHEMA,
         "log": None,
         "vessel": diagnoses[0].vessel,
         "verdict": campaign_verdict([one.verdict for one in diagnoses]),
-        "findings": [{**finding, "log": one["log"]} for one in logs for finding in one["findings"]],
+        "findings": [
+            *({**finding_as_json(one), "log": None} for one in shared),
+            *(
+                {**finding_as_json(finding), "log": one.log}
+                for one in diagnoses
+                for finding in findings_of(one, shared)
+            ),
+        ],
         "before": {"mse": _pooled(diagnoses, "before"), "free_run": {}},
         "after": {"mse": _pooled(diagnoses, "after"), "free_run": {}},
         "notes": [],

@@ -287,6 +287,20 @@ def about_errors(diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
+def findings_of_all(diagnoses: Sequence[Diagnosis]) -> tuple[Finding, ...]:
+    """Return the findings that every one of several logs has in the same words: what the vessel has, not a log."""
+    if len(diagnoses) < 2:
+        return ()
+    every = [{(one.key, one.says) for one in diagnosis.findings} for diagnosis in diagnoses]
+    return tuple(one for one in diagnoses[0].findings if all((one.key, one.says) in shown for shown in every))
+
+
+def findings_of(diagnosis: Diagnosis, shared: Sequence[Finding] = ()) -> list[Finding]:
+    """Return the findings of a log without those of all logs."""
+    known = {(one.key, one.says) for one in shared}
+    return [one for one in diagnosis.findings if (one.key, one.says) not in known]
+
+
 def notes_of_all(diagnoses: Sequence[Diagnosis]) -> tuple[str, ...]:
     """Return the notes that every one of several logs has."""
     if len(diagnoses) < 2:

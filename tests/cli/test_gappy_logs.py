@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -34,9 +35,9 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def result(run: Run) -> dict:
+def result(run: Run) -> dict[str, Any]:
     assert run.code == 0, run.err
-    return json.loads(run.out)
+    return dict(json.loads(run.out))
 
 
 def counted(text: str) -> bool:
@@ -123,7 +124,7 @@ def test_fit_and_sweep_of_an_archive(ferryid: Command, place: Path) -> None:
 
 def test_diagnoses(ferryid: Command, place: Path) -> None:
     log, out = place / "gaps.mcap", ("--out", place / "out", "--json", "-")
-    found = result(ferryid("diagnose", log, place / "whole.mcap", "--together", *VESSEL, *out))
+    found = result(ferryid("diagnose", log, place / "whole.mcap", *VESSEL, *out))
     assert any(counted(note) for note in found["logs"][0]["notes"])
     assert not any(counted(note) for note in found["logs"][1]["notes"])
     gaps = [stretch for one in found["logs"][0]["left_out"] for stretch in one["intervals"]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,6 @@ import pytest
 
 from ferryid.diagnose.checks import screening
 from ferryid.diagnose.data import measurements
-from ferryid.diagnose.inference.baselines import HullBaseline
 from ferryid.diagnose.judging.diagnosis import Diagnosis, to_json
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_campaign
 from ferryid.effects.thresholds import EFFECTS
@@ -39,21 +39,21 @@ def diagnosed(scenario: Scenario, folder: Path) -> Diagnosis:
     return diagnose([str(log)], load_profile("milliampere"), DiagnosisSettings(), IN_MEMORY)[0]
 
 
-@pytest.mark.parametrize("together", [False, True])
+@pytest.mark.parametrize("each", [False, True])
 def test_every_log_is_read_aligned_and_checked_once(
-    together: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    each: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     counts: Counter[str] = Counter()
     for module, name in ((measurements, "record"), (measurements, "align"), (screening, "examine")):
         stage = getattr(module, name)
 
-        def counted(*args: object, name: str = name, stage=stage, **more: object) -> object:
+        def counted(*args: object, name: str = name, stage: Callable[..., object] = stage, **more: object) -> object:
             counts[name] += 1
             return stage(*args, **more)
 
         monkeypatch.setattr(module, name, counted)
     logs = [str(shutil.copy(SHORT, tmp_path / f"{name}.mcap")) for name in "ab"]
-    settings = DiagnosisSettings(together=together)
+    settings = DiagnosisSettings(each=each)
     made = diagnose(logs, load_profile("milliampere"), settings, IN_MEMORY)
     assert [one.log for one in made] == ["a", "b"]
     assert counts == {"record": 2, "align": 2, "examine": 2}
@@ -62,7 +62,7 @@ def test_every_log_is_read_aligned_and_checked_once(
 def test_one_log_is_a_campaign_of_one() -> None:
     ferry, log = load_profile("milliampere"), str(SHORT)
     (alone,) = diagnose([log], ferry, DiagnosisSettings(), IN_MEMORY)
-    (one,) = diagnose_campaign([log], ferry, HullBaseline(ferry), DiagnosisSettings(), IN_MEMORY)
+    (one,) = diagnose_campaign([log], ferry, DiagnosisSettings(), IN_MEMORY)
     assert to_json(alone) == to_json(one)
 
 

@@ -1,9 +1,9 @@
-"""Real recordings: no environment in a towing tank, defects that raw rows show, and a hidden wind from a common hull."""
+"""Real recordings: no environment in a towing tank, defects that raw rows show, and a withheld wind from a campaign."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +11,17 @@ import pytest
 
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.data.measurements import read_measurements
-from ferryid.diagnose.inference.campaign import fit_campaign
-from ferryid.diagnose.inference.campaign_hull import INDUCED, CampaignHull, fit_campaign_hull
+from ferryid.diagnose.inference.campaign import assemble
+from ferryid.diagnose.inference.campaign_estimation import Campaign
+from ferryid.diagnose.judging.campaign_conditions import judge_conditions
+from ferryid.diagnose.judging.campaign_evidence import MIRRORED
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
 from ferryid.effects import effects
 from ferryid.types import IN_MEMORY, no_progress
 from ferryid.vessel import load_profile
 from tests.diagnose.trials import averaged
-from tests.real.campaign_evidence import MIRRORED, placebos
+from tests.real import esso
+from tests.real.campaign import tanker_with_areas
 
 pytestmark = pytest.mark.slow
 
@@ -28,16 +31,9 @@ ENVIRONMENT = {"wind", "current", "gusts", "waves", "mooring", "shallow_water"}
 
 @pytest.mark.parametrize("run", ["Z_20_10_S", "Z_10_05"])
 def test_no_environment_is_named_in_a_towing_tank(run: str, shared_data: Locate) -> None:
-    tanker = load_profile("kvlcc2-model")
-    esso = load_profile("esso-osaka")
-    assert esso.wind is not None
     # The profile has no wind areas; with some a wind could be named, and must not be.
-    scale = (tanker.hull.length_m / esso.hull.length_m) ** 2
-    areas = replace(
-        esso.wind, frontal_m2=scale * esso.wind.frontal_m2, lateral_m2=scale * esso.wind.lateral_m2, length_m=7.0
-    )
     log = shared_data(f"kvlcc2/HSVA_CPMC_KVLCC2_{run}.dat")
-    found = diagnose([str(log)], replace(tanker, wind=areas), DiagnosisSettings(), IN_MEMORY)[0]
+    found = diagnose([str(log)], tanker_with_areas(), DiagnosisSettings(), IN_MEMORY)[0]
     assert not ENVIRONMENT & {finding.effect for finding in found.findings}
     # One log alone knows too little of the hull to name any force.
     assert not any(finding.sure for finding in found.findings if finding.effect in effects())
@@ -46,7 +42,7 @@ def test_no_environment_is_named_in_a_towing_tank(run: str, shared_data: Locate)
 
 def test_zigzags_of_one_tanker_show_one_law_and_no_log_has_its_own(shared_data: Locate) -> None:
     logs = [str(shared_data(f"kvlcc2/HSVA_CPMC_KVLCC2_Z_{run}.dat")) for run in ("10_05", "20_10_S", "30_05", "35_05")]
-    every = diagnose(logs, load_profile("kvlcc2-model"), DiagnosisSettings(together=True), IN_MEMORY)
+    every = diagnose(logs, load_profile("kvlcc2-model"), DiagnosisSettings(), IN_MEMORY)
     laws = {tuple((term.on, term.quantity) for term in one.law) for made in every for one in made.findings if one.sure}
     # Nothing with a name is sure; the law is the same wherever it is told.
     assert len(laws) == 1
@@ -82,21 +78,35 @@ def test_the_receiver_of_milliampere_is_late(shared_data: Locate) -> None:
     assert late.low < -0.275 < late.high
 
 
-def test_a_common_hull_points_to_the_hidden_wind_and_a_mirrored_one_does_not(shared_data: Locate) -> None:
-    vessel = load_profile("esso-osaka")
-    logs = sorted(str(path) for path in shared_data("esso_osaka/random").glob("*.csv"))
-    joint = fit_campaign(averaged(logs, vessel, withhold=("wind",)), vessel, no_progress)
-    hidden = [read_measurements(log, vessel)[0].wind for log in logs]
-    true = np.array([wind.mean(axis=0) for wind in hidden if wind is not None])
-    mirrored = placebos(joint.members)[MIRRORED]
-    spread, lift = np.split(joint.hull.spread, [-len(INDUCED)])
-    found = np.median(off(joint.hull, true))
-    assert found < 25.0
-    assert np.median(off(fit_campaign_hull(mirrored, spread, lift), true)) > 40.0
+@cache
+def assembled(folder: Path) -> tuple[Campaign, dict[str, int]]:
+    """Return the runs of Esso Osaka in a folder as a campaign, with the wind withheld."""
+    logs = sorted(str(path) for path in folder.glob("*.csv"))
+    made = assemble(averaged(logs, esso.ESSO, withhold=("wind",)), esso.ESSO)
+    assert made is not None
+    return made
 
 
-def off(hull: CampaignHull, true: np.ndarray) -> np.ndarray:
-    """Return how far the winds of all logs point away from the true ones [deg]."""
-    found = np.array([values[0] for values in hull.values])
-    apart = np.degrees(np.arctan2(found[:, 1], found[:, 0]) - np.arctan2(true[:, 1], true[:, 0]))
-    return np.abs((apart + 180.0) % 360.0 - 180.0)
+def test_a_campaign_confirms_the_withheld_wind_and_no_current(shared_data: Locate) -> None:
+    campaign, place = assembled(shared_data("esso_osaka/random"))
+    judged = judge_conditions(campaign, place, no_progress)
+    assert [one.effect for one in judged.tests if one.confirmed] == ["wind"]
+    assert len(place) == 9
+    measured, found = [], []
+    for path in place:
+        (claim,) = judged.claims(path)
+        assert claim.finding.effect == "wind"
+        assert claim.finding.sure
+        wind = read_measurements(path, esso.ESSO)[0].wind
+        assert wind is not None
+        measured.append(wind.mean(axis=0))
+        found.append([claim.finding.parameters[name].value for name in ("north", "east")])
+    apart = esso.bearing(np.array(found)) - esso.bearing(np.array(measured))
+    assert np.median(np.abs((apart + 180.0) % 360.0 - 180.0)) < 15.0
+
+
+def test_no_condition_is_confirmed_on_mirrored_headings(shared_data: Locate) -> None:
+    campaign, place = assembled(shared_data("esso_osaka/random"))
+    judged = judge_conditions(esso.controls(campaign)[MIRRORED], place, no_progress)
+    assert [one.effect for one in judged.tests if one.confirmed] == []
+    assert not any(claim.finding.sure for path in place for claim in judged.claims(path))

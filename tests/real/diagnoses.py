@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,6 +25,7 @@ from ferryid.types import IN_MEMORY
 from ferryid.vessel import load_profile
 from tests.evidence import stamp
 from tests.real import esso, pictures, witnesses
+from tests.real.campaign import wind_table
 from tests.real.places import DATA, FOLDER
 
 KVLCC2 = "kvlcc2/*.dat"
@@ -90,13 +92,13 @@ is truly wrong with these logs. What we would defend before the crew is called *
 
 
 def told(
-    vessel: str, logs: Sequence[str], judge: Judge, *, together: bool = False, withhold: Sequence[str] = ()
+    vessel: str, logs: Sequence[str], judge: Judge, *, each: bool = False, withhold: Sequence[str] = ()
 ) -> tuple[str, tuple[Diagnosis, ...]]:
     """Diagnose logs; return a table of findings with what is to be said of each, and write the figures of forces."""
     made = diagnose(
         logs,
         load_profile(vessel),
-        DiagnosisSettings(together=together, withhold=tuple(withhold)),
+        DiagnosisSettings(each=each, withhold=tuple(withhold)),
         IN_MEMORY,
     )
     lines = ["| log | verdict | finding | probability | |", "|---|---|---|---|---|"]
@@ -108,7 +110,7 @@ def told(
             first = f"{one.log} | {one.verdict}" if k == 0 else " | "
             lines.append(f"| {first} | {says} | {sure} | {word} |")
     lines += ["", *_notes(made)]
-    lines += _figures(vessel + "-together" * together, made)
+    lines += _figures(vessel + "-together" * (len(logs) > 1 and not each), made)
     return "\n".join(lines), made
 
 
@@ -143,14 +145,8 @@ def _figures(name: str, made: Sequence[Diagnosis]) -> list[str]:
 
 def osaka() -> str:
     """Return the section on the tanker model on the pond."""
-    random, members, hidden = esso.study("random", judged=True)
-    zigzag, _, _ = esso.study("zigzag", judged=False)
-    spread = esso.spread_of(members)
-    true, false = (esso.courses(members, hidden, spread, mirrored=way) for way in (False, True))
+    random, zigzag = (esso.study(kind, controlled=False) for kind in esso.KINDS)
     (FOLDER / "diagnosis-esso-osaka-winds.svg").write_text(pictures.winds((random, zigzag)), encoding="utf-8")
-    (FOLDER / "diagnosis-esso-osaka-course.svg").write_text(
-        pictures.course(true, random.names, (3, 4, 5)), encoding="utf-8"
-    )
     profile = load_profile("esso-osaka")
     lags = [witnesses.velocity_lag(read_measurements(path, profile)[0]) for path in esso.logs("random")]
     (FOLDER / "diagnosis-esso-osaka-lag.svg").write_text(pictures.lag(lags, random.names), encoding="utf-8")
@@ -167,44 +163,29 @@ def osaka() -> str:
             return "Doubtful: what belongs to the vessel would show in all of its runs."
         return UNJUDGED
 
-    text, made = told("esso-osaka", esso.logs("random"), judge, together=True, withhold=("wind",))
-    named = sum(any(finding.effect == "wind" for finding in one.findings) for one in made)
-    strength = float(np.median(random.winds[esso.FOUND].strength(random.measured)))
-    right, wrong = esso.correlation(true), esso.correlation(false)
+    text, made = told("esso-osaka", esso.logs("random"), judge, withhold=("wind",))
+    named = sum(any(finding.effect == "wind" and finding.sure for finding in one.findings) for one in made)
     return "\n".join(
         [
             "\n## Esso Osaka on a pond, the wind withheld\n",
-            "The runs measured the wind; it was hidden (`--withhold wind`), and the profile has no hull model. "
-            "One log alone does "
-            "not show it: the hull that has to be fitted beside it takes the wind's force upon itself. So all "
-            "runs of a kind were "
-            "fitted together (`ferryid diagnose LOG... --vessel esso-osaka --withhold wind --together`): one hull, lift "
-            "included, and a steady wind for each run.",
+            "The runs measured the wind; it was hidden (`--withhold wind`), and the profile has no hull model. All runs of a "
+            "kind are a campaign (`ferryid diagnose LOG... --vessel esso-osaka --withhold wind`): one hull, lift included, and "
+            "a steady wind for each run, a random effect about a mean of all runs.",
             "",
             "![Bearing and strength](diagnosis-esso-osaka-winds.svg)",
             "",
-            *_wind_table(random, "Random runs"),
+            "**Random runs.**",
             "",
-            *_wind_table(zigzag, "Zigzags"),
+            *wind_table(random),
             "",
-            "The hidden winds all go much the same way, so that runs agreeing with each other prove little; the "
-            "controls do not "
-            "agree with them. Intervals are those of the fit: they are too narrow for a wind that is as unsteady as this.",
+            "**Zigzags.**",
             "",
-            *_gain_table(random),
+            *wind_table(zigzag),
             "",
-            f"In the random runs the direction is found, and a share of {strength:.2f} of the strength; in the zigzags, two "
-            "minutes on few headings, it is not. A steady wind predicts held-out stretches of the random runs no better than "
-            f"its controls do, and diagnosing them the tool names it in {named} of {len(made)}. The row of the measured mean "
-            "says why: the true mean of the hidden channel would recover only that share of what the channel itself does. The "
-            "rest is in how the wind changes.",
+            "The measured winds all go much the same way, so that runs agreeing with each other prove little. What held-out "
+            "stretches and controls on other headings show is in [campaign.md](../campaign.md).",
             "",
-            f"Let change in the course of time (nodes every {esso.NODES_S:.0f} s, fitted to all runs together), "
-            f"the wind that "
-            f"the motion speaks for follows the hidden one within runs, their means taken out: correlation {right[0]:.2f} "
-            f"north and {right[1]:.2f} east. On mirrored headings it is {wrong[0]:.2f} and {wrong[1]:.2f}.",
-            "",
-            "![In the course of time](diagnosis-esso-osaka-course.svg)",
+            f"Of the random runs, diagnosed together, a wind is named in {named} of {len(made)}.",
             "",
             f"**Sensors.** By correlation of the slope of position and the velocity, velocities are {min(seconds):.1f} to "
             f"{max(seconds):.1f} s later than positions in all {len(seconds)} random runs: a filter in the receiver or after "
@@ -221,49 +202,6 @@ def osaka() -> str:
             text,
         ]
     )
-
-
-def _wind_table(study: esso.Study, title: str) -> list[str]:
-    found = study.winds[esso.FOUND]
-    lines = [
-        f"**{title}** (they differ about the hull by {study.disagreement:.1f} times the variance of their noise)",
-        "",
-        "| run | hidden: north, east [m/s] | its standard deviation | found: north, east, ± one sigma [m/s] | off by [deg] "
-        "| strength, found over hidden |",
-        "|---|---|---|---|---|---|",
-    ]
-    turned, strength = found.turned(study.measured), found.strength(study.measured)
-    for k, name in enumerate(study.names):
-        cells = [
-            name,
-            "{:.2f}, {:.2f}".format(*study.measured[k]),
-            "{:.2f}, {:.2f}".format(*study.unsteady[k]),
-            ", ".join(
-                f"{value:.2f} ± {error:.2f}" for value, error in zip(found.values[k], found.errors[k], strict=True)
-            ),
-            f"{turned[k]:.0f}",
-            f"{strength[k]:.2f}",
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-    lines += ["", "| median over runs | off by [deg] | strength |", "|---|---|---|"]
-    for name, winds in study.winds.items():
-        apart, ratio = (np.median(part(study.measured)) for part in (winds.turned, winds.strength))
-        lines.append(f"| {name} | {apart:.0f} | {ratio:.2f} |")
-    return lines
-
-
-def _gain_table(study: esso.Study) -> list[str]:
-    whole = study.gains[esso.MEASURED].total
-    lines = [
-        "Held-out gain over no wind at all, in log-likelihood summed over runs, with its 95 % block-bootstrap interval:",
-        "",
-        "| wind | gain | interval | share of the measured wind's |",
-        "|---|---|---|---|",
-    ]
-    for name, one in study.gains.items():
-        low, high = one.interval()
-        lines.append(f"| {name} | {one.total:.0f} | {low:.0f} to {high:.0f} | {100.0 * one.total / whole:.0f} % |")
-    return lines
 
 
 def milliampere() -> str:
@@ -373,8 +311,8 @@ def tank() -> str:
             return "Doubtful: nothing says where the carriage measured, but what the hull's model lacks looks the same."
         return UNJUDGED
 
-    alone = told("kvlcc2-model", logs, judge)
-    one_hull, shared = told("kvlcc2-model", logs, judge, together=True)
+    alone = told("kvlcc2-model", logs, judge, each=True)
+    one_hull, shared = told("kvlcc2-model", logs, judge)
     environment = sum(finding.effect in ENVIRONMENT for one in shared for finding in one.findings)
     arms = [
         sum(any(finding.effect == "lever_arm" for finding in one.findings) for one in made)
@@ -389,14 +327,14 @@ def tank() -> str:
             "and a current much alike, which is what makes it a trap.",
             "",
             f"Of wind, current, gusts, waves, moorings and shallow water {environment} are named in {len(logs)} logs, each "
-            f"diagnosed by itself and with one hull from the others. By itself {arms[0]} show an antenna off the origin, with "
-            f"one hull {arms[1]}.",
+            f"diagnosed by itself and all together as a campaign. By itself {arms[0]} show an antenna off the origin, "
+            f"together {arms[1]}.",
             "",
-            "Each by itself:",
+            "Each by itself (`--each`):",
             "",
             alone[0],
             "",
-            "Together (`--together`):",
+            "All together:",
             "",
             one_hull,
         ]
@@ -446,7 +384,7 @@ def pool() -> str:
         + ". Such are longitude and latitude in single precision; a slow boat repeats its position on it without any sample "
         "being old.",
         "",
-        told("vtec-usv", logs, judge)[0],
+        told("vtec-usv", logs, judge, each=True)[0],
         "",
         "**To record next:** one bag of ten minutes instead of ten bags, positions in double precision, and the "
         "orders of the "
@@ -458,5 +396,5 @@ def pool() -> str:
 def _poses(log: str) -> esso.Floats:
     with AnyReader([Path(log)]) as bag:
         chosen = [one for one in bag.connections if one.topic == "/NED_pose"]
-        read = (bag.deserialize(raw, one.msgtype) for one, _, raw in bag.messages(chosen))
+        read: Iterator[Any] = (bag.deserialize(raw, one.msgtype) for one, _, raw in bag.messages(chosen))
         return np.array([(message.x, message.y) for message in read])

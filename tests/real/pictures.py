@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ferryid.effects.force_model import Measurements
 from ferryid.report.figures import STYLE
-from tests.real.esso import FOUND, Course, Study, bearing
+from tests.real.esso import Study, bearing
 from tests.real.witnesses import Lag
 
 Floats = NDArray[np.float64]
@@ -21,12 +21,12 @@ BLUE, ORANGE, GREY = "#0072b2", "#d55e00", "#888888"
 
 
 def winds(studies: Sequence[Study]) -> str:
-    """Draw the bearing and the strength that were found against the hidden ones, run by run."""
+    """Draw bearing and strength as estimated against those that were measured and withheld, run by run."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 3.8), layout="constrained")
         left, right = figure.subplots(1, 2)
         for one, colour, label in zip(studies, (BLUE, ORANGE), ("random runs", "zigzags"), strict=False):
-            found = one.winds[FOUND].values
+            found = one.found.winds
             left.plot(bearing(one.measured), bearing(found), "o", color=colour, label=label)
             right.plot(np.hypot(*one.measured.T), np.hypot(*found.T), "o", color=colour)
         for axes, ends, name in (
@@ -34,25 +34,8 @@ def winds(studies: Sequence[Study]) -> str:
             (right, (0.0, 2.5), "strength [m/s]"),
         ):
             axes.plot(ends, ends, color=GREY, linewidth=0.8)
-            axes.set(xlim=ends, ylim=ends, xlabel=f"{name}, hidden channel", ylabel=f"{name}, found")
+            axes.set(xlim=ends, ylim=ends, xlabel=f"{name}, measured", ylabel=f"{name}, estimated")
         left.legend()
-        return _svg(figure)
-
-
-def course(told: Sequence[Course], names: Sequence[str], shown: Sequence[int]) -> str:
-    """Draw the wind in the course of time, found and hidden, of some runs."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 1.9 * len(shown)), layout="constrained")
-        for row, index in enumerate(shown):
-            one = told[index]
-            for k, way in enumerate(("north", "east")):
-                axes = figure.add_subplot(len(shown), 2, 2 * row + k + 1)
-                axes.plot(one.t, one.hidden[:, k], color=GREY, label="hidden channel, 15 s mean")
-                axes.plot(one.t, one.found[:, k], color=BLUE, label="found from the motion")
-                axes.set_ylabel(f"wind {way} [m/s]")
-                axes.set_title(names[index].removeprefix("random_"), fontsize=8)
-                if row == 0 and k == 0:
-                    axes.legend(fontsize=7)
         return _svg(figure)
 
 

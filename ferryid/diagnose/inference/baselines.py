@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.path_comparison import PathComparison, compare_paths
 from ferryid.diagnose.inference.campaign import CommonHull
+from ferryid.diagnose.inference.campaign_properties import properties_of
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import list_candidates
@@ -106,7 +107,11 @@ class CampaignBaseline:
         sha256 = log.screened.measured.survey.recording.sha256
         plain, _ = prior_force_model(log.windows.measurements, self.profile, self.model, sha256)
         force_model, spread = self.hull.force_model(log.path, plain)
-        library = tuple(one for one in _library(log) if not one.effect.of_log)
+        lasting = {one.key for one in properties_of(self.hull.fit.campaign)}
+        # What only lasts is the campaign's to judge; what may begin in one log is looked for there as well.
+        library = tuple(
+            one for one in _library(log) if not one.effect.of_log and (one.key not in lasting or one.effect.onset)
+        )
         return Expectation(force_model, spread, library, (self.hull.says(log.path),))
 
 

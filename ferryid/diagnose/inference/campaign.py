@@ -18,7 +18,7 @@ from ferryid.diagnose.inference.campaign_estimation import (
     induced,
     induced_spread,
 )
-from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
+from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
@@ -39,16 +39,17 @@ class CommonHull:
     place: Mapping[str, int]
 
     def force_model(self, path: str, plain: ForceModel) -> tuple[ForceModel, Floats]:
-        """Return a log's force model with the hull that the other logs speak for and the log's own conditions.
+        """Return a log's force model: the hull that the other logs speak for, lasting properties, the log's own conditions.
 
         Beside it the standard deviations of the hull's coefficients, shape (26,).
         """
         i, n = self.place.get(path), len(COEFFICIENTS)
         mean, covariance = self.fit.belief(i)
         modelled = induced(replace(plain, hull=mean[:n]), mean[n:])
-        if i is not None:
-            values, _ = self.fit.campaign.values(self.fit.common, self.fit.own[i])
-            modelled = apply_candidates(modelled, self.fit.campaign.conditions, values)
+        campaign = self.fit.campaign
+        own = np.zeros(campaign.l) if i is None else self.fit.own[i]
+        conditions = () if i is None else campaign.members[i].conditions
+        modelled = campaign.acted(modelled, conditions, self.fit.common, own)
         return modelled, np.sqrt(np.diag(covariance))[:n]
 
     def says(self, path: str) -> str:
@@ -97,7 +98,7 @@ def assemble(
     known = model is not None or profile.hull.has_model
     size = np.zeros(len(INDUCED)) if known else induced_spread(length, draught)
     mean = np.concatenate([members[0].plain.hull, np.zeros(len(INDUCED))])
-    return Campaign(tuple(members), HullPrior(mean, np.append(np.max(spreads, axis=0), size))), place
+    return Campaign(tuple(members), HullPrior(mean, np.append(np.max(spreads, axis=0), size), known)), place
 
 
 def conditions_of(windows: Windows, profile: Profile) -> tuple[Candidate, ...]:

@@ -40,10 +40,12 @@ from ferryid.types import Floats, Ints
 
 INDUCED = ("X_vr", "X_vv")
 """Drag of drift and turning, beside `COEFFICIENTS`."""
-ROUNDS, STEPS = 10, 3
-"""Most rounds, each with the noise and the spreads that the one before left, and Gauss-Newton steps in a round."""
-SETTLED = 0.05
-"""Change of every spread, as a share of it, below which the rounds end."""
+ROUNDS = 20
+"""Most rounds: a Gauss-Newton step each, with the noise and the spreads that the one before left."""
+SETTLED, CONVERGED_GAIN = 0.1, 0.1
+"""Change of every spread, as a share of it, and gain of a step below which the rounds end."""
+RELAXATION = 1.8
+"""Factor on the logarithm of a spread's change: expectation and maximisation approach their end slowly, and from one side."""
 DIFFERENCE_STEP = 0.02
 """Of a size, for derivatives."""
 STARTS, BEARINGS = (0.25, 0.6, 1.25), 8
@@ -84,10 +86,14 @@ class Member:
 
 @dataclass(frozen=True)
 class HullPrior:
-    """What is believed of the hull before any log: `COEFFICIENTS` and `INDUCED`, mean and standard deviations, shape (h,)."""
+    """What is believed of the hull before any log: `COEFFICIENTS` and `INDUCED`, mean and standard deviations, shape (h,).
+
+    `known` is False where nobody has modelled it, so that it comes from the logs alone.
+    """
 
     mean: Floats
     spread: Floats
+    known: bool = True
 
     @cached_property
     def free(self) -> Ints:
@@ -200,12 +206,16 @@ class Campaign:
         """Return a log's force model at an estimate, without its steady acceleration."""
         member, n = self.members[i], len(COEFFICIENTS)
         hull = self.hull.mean + self.hull.spread * common[: len(self.hull.mean)]
-        conditions, lasting = self.values(common, own)
-        here = {one.key: one for one in member.conditions}
-        candidates = [here[one.key] for one in self.conditions if one.key in here]
-        values = [p for one, p in zip(self.conditions, conditions, strict=True) if one.key in here]
         modelled = induced(replace(member.plain, hull=hull[:n]), hull[n:])
-        return apply_candidates(modelled, [*candidates, *self.properties], [*values, *lasting])
+        return self.acted(modelled, member.conditions, common, own)
+
+    def acted(self, modelled: ForceModel, conditions: Sequence[Candidate], common: Floats, own: Floats) -> ForceModel:
+        """Return a force model in which properties and a log's conditions act."""
+        values, lasting = self.values(common, own)
+        here = {one.key: one for one in conditions}
+        candidates = [here[one.key] for one in self.conditions if one.key in here]
+        mine = [p for one, p in zip(self.conditions, values, strict=True) if one.key in here]
+        return apply_candidates(modelled, [*candidates, *self.properties], [*mine, *lasting])
 
     def gap(self, i: int, common: Floats, own: Floats) -> Floats:
         """Return the gaps of a log along the vessel's axes, shape (J, 3)."""
@@ -443,32 +453,88 @@ def estimate_campaign(
         An estimate of the same conditions and properties, to begin with and to take the spreads from.
     """
     if begin is not None:
-        spreads, common, own = begin.spreads, begin.common, begin.own
+        spreads, at = begin.spreads, _point(campaign, begin.common, begin.own)
     else:
-        spreads, common, own = _first(campaign)
-
-    def solved(common: Floats, own: Floats, spreads: Spreads) -> CampaignFit:
-        left = noise or _noise(campaign, [campaign.gap(i, common, one) for i, one in enumerate(own)])
-        common, own, parts = _solved(campaign, common, own, left, spreads)
-        return CampaignFit(campaign, common, own, spreads, left, parts)
-
-    made = solved(common, own, spreads)
-    for _ in range(ROUNDS if begin is None else 0):
-        spreads, change = _spreads(made)
-        if change < SETTLED:
+        spreads, at = _first(campaign)
+    made = _fit(campaign, at, noise or _noise(campaign, at.gaps), spreads)
+    for _ in range(ROUNDS):
+        at, gained = _step(made, at)
+        if begin is None:
+            spreads, change = _spreads(made, at.own)
+        else:
+            change = 0.0
+        made = _fit(campaign, at, noise or _noise(campaign, at.gaps), spreads)
+        if change < SETTLED and gained < CONVERGED_GAIN:
             break
-        made = solved(made.common, made.own, spreads)
     return made
 
 
-def _first(campaign: Campaign) -> tuple[Spreads, Floats, Floats]:
+@dataclass(frozen=True)
+class _Point:
+    """Where the logs are linearised: both vectors, and of each log gaps, shape (J, 3), and slopes, shape (J, 3, g + l).
+
+    The hull's slopes are kept: the gaps are all but linear in it.
+    """
+
+    common: Floats
+    own: Floats
+    gaps: list[Floats]
+    slopes: list[Floats]
+    hull: list[Floats]
+
+
+def _point(campaign: Campaign, common: Floats, own: Floats, hull: list[Floats] | None = None) -> _Point:
+    places = range(len(campaign.members))
+    kept = hull or over(lambda i: campaign.hull_slopes(i, common, own[i]), places)
+    gaps, slopes = zip(*over(lambda i: campaign.linearised(i, common, own[i], kept[i]), places), strict=True)
+    return _Point(common, own, list(gaps), list(slopes), kept)
+
+
+def _fit(campaign: Campaign, at: _Point, noise: CampaignNoise, spreads: Spreads) -> CampaignFit:
+    def part(i: int) -> LogPart:
+        runs = campaign.members[i].windows.runs
+        return LogPart(noise.white(i, at.gaps[i], runs), noise.white(i, at.slopes[i], runs))
+
+    parts = tuple(over(part, range(len(campaign.members))))
+    return CampaignFit(campaign, at.common, at.own, spreads, noise, parts)
+
+
+def _step(made: CampaignFit, at: _Point) -> tuple[_Point, float]:
+    """Return where a Gauss-Newton step leads, and how much it gains."""
+    campaign, noise = made.campaign, made.noise
+    precision = campaign.own_precision(made.spreads)
+
+    def cost(common: Floats, own: Floats, gaps: Sequence[Floats]) -> float:
+        squares = [
+            float(np.sum(noise.white(i, one, campaign.members[i].windows.runs) ** 2)) for i, one in enumerate(gaps)
+        ]
+        return float(common @ common) + float(np.sum(own**2 * precision)) + sum(squares)
+
+    now = cost(made.common, made.own, at.gaps)
+    step, own_step = made.normal.step(made.common)
+    for share in HALVINGS:
+        common, own = made.common + share * step, made.own + share * own_step
+        places = range(len(own))
+        there = cost(common, own, over(partial(_gap, campaign, common, own), places))
+        if there < now:
+            # Where a flow or a property changes how the hull's coefficients act, their slopes change with it.
+            bends = any(one.effect.changes_hull for one in (*campaign.conditions, *campaign.properties))
+            return _point(campaign, common, own, None if bends else at.hull), now - there
+    return at, 0.0
+
+
+def _gap(campaign: Campaign, common: Floats, own: Floats, i: int) -> Floats:
+    return campaign.gap(i, common, own[i])
+
+
+def _first(campaign: Campaign) -> tuple[Spreads, _Point]:
     """Return spreads and estimates to begin with: the hull without conditions, then what explains most beside it."""
     common, own = np.zeros(campaign.g), np.zeros((len(campaign.members), campaign.l))
     gaps = np.vstack([campaign.gap(i, common, one) for i, one in enumerate(own)])
     steady = STEADY_SHARE * np.sqrt(np.mean(gaps**2, axis=0))
     spreads = Spreads((1.0,) * len(campaign.conditions), np.maximum(steady, 1e-12))
     if not campaign.own:
-        return spreads, common, own
+        return spreads, _point(campaign, common, own)
     bare = replace(campaign, members=tuple(replace(one, conditions=()) for one in campaign.members), properties=())
     made = estimate_campaign(bare)
     h = len(campaign.hull.mean)
@@ -479,7 +545,7 @@ def _first(campaign: Campaign) -> tuple[Spreads, Floats, Floats]:
     starts = np.stack(found)
     common[campaign.means] = starts.mean(axis=0)
     own[:, : len(campaign.own)] = starts - starts.mean(axis=0)
-    return spreads, common, own
+    return spreads, _point(campaign, common, own)
 
 
 def _started(campaign: Campaign, bare: CampaignFit, i: int, common: Floats, own: Floats) -> Floats:
@@ -528,61 +594,23 @@ def _noise(campaign: Campaign, gaps: Sequence[Floats]) -> CampaignNoise:
     return noise
 
 
-def _spreads(made: CampaignFit) -> tuple[Spreads, float]:
-    """Return the spreads that the estimate speaks for (a step of expectation and maximisation), and their largest change."""
+def _spreads(made: CampaignFit, now: Floats) -> tuple[Spreads, float]:
+    """Return the spreads that the vectors of the logs speak for, shape (L, l), and their largest change.
+
+    It is a step of expectation and maximisation, with the covariances of an estimate near by.
+    """
     campaign, before = made.campaign, made.spreads
     count = len(campaign.own)
-    second = np.stack([own**2 + np.diag(made.covariance(i))[campaign.g :] for i, own in enumerate(made.own)])
+    second = np.stack([own**2 + np.diag(made.covariance(i))[campaign.g :] for i, own in enumerate(now)])
     conditions = []
     for k, condition in enumerate(campaign.conditions):
         rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
         have = [i for i, one in enumerate(campaign.members) if condition.key in {each.key for each in one.conditions}]
         conditions.append(float(np.sqrt(np.mean(second[np.ix_(have, rows)]))))
-    after = Spreads(tuple(conditions), np.sqrt(np.mean(second[:, count:], axis=0)))
-    pairs = zip((*before.conditions, *before.steady), (*after.conditions, *after.steady), strict=True)
-    return after, max((abs(new - old) / old for old, new in pairs), default=0.0)
-
-
-def _solved(
-    campaign: Campaign, common: Floats, own: Floats, noise: CampaignNoise, spreads: Spreads
-) -> tuple[Floats, Floats, tuple[LogPart, ...]]:
-    """Return better estimates by Gauss-Newton steps, and the logs there."""
-    places = range(len(campaign.members))
-    # The gaps are all but linear in the hull: one derivative will do for all steps.
-    hull_slopes = over(lambda i: campaign.hull_slopes(i, common, own[i]), places)
-    precision = campaign.own_precision(spreads)
-
-    def white(i: int, common: Floats, own: Floats) -> LogPart:
-        gaps, slopes = campaign.linearised(i, common, own[i], hull_slopes[i])
-        runs = campaign.members[i].windows.runs
-        return LogPart(noise.white(i, gaps, runs), noise.white(i, slopes, runs))
-
-    def cost(common: Floats, own: Floats) -> float:
-        logs = over(
-            lambda i: float(
-                np.sum(noise.white(i, campaign.gap(i, common, own[i]), campaign.members[i].windows.runs) ** 2)
-            ),
-            places,
-        )
-        return float(common @ common) + float(np.sum(own**2 * precision)) + sum(logs)
-
-    now = cost(common, own)
-    parts = tuple(over(lambda i: white(i, common, own), places))
-    for _ in range(STEPS):
-        made = CampaignFit(campaign, common, own, spreads, noise, parts)
-        step, own_step = made.normal.step(common)
-        for share in HALVINGS:
-            there = cost(common + share * step, own + share * own_step)
-            if there < now:
-                break
-        else:
-            break
-        gained, now = now - there, there
-        common, own = common + share * step, own + share * own_step
-        parts = tuple(over(partial(white, common=common, own=own), places))
-        if gained < 1e-2:
-            break
-    return common, own, parts
+    old = np.array([*before.conditions, *before.steady])
+    ratio = np.array([*conditions, *np.sqrt(np.mean(second[:, count:], axis=0))]) / old
+    new = old * ratio**RELAXATION
+    return Spreads(tuple(new[: len(conditions)].tolist()), new[len(conditions) :]), float(np.abs(ratio - 1.0).max())
 
 
 def _moved(vector: Floats, k: int, sign: float = 1.0) -> Floats:

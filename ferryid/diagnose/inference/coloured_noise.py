@@ -21,6 +21,8 @@ Runs = Sequence[tuple[int, int]]
 """Unbroken series of rows, as (first, end)."""
 ORDER = 8
 """Highest order: windows overlap over three strides, and what moves a vessel slowly lasts for longer."""
+PAIRS = 20
+"""Rows with so many before them that an order needs for each of its coefficients: short series have few for the highest."""
 LEAST_VARIANCE = 1e-12
 """Of the channel's variance, below which a series that predicts itself counts as no noise."""
 
@@ -65,8 +67,8 @@ class ColouredNoise:
 def fit_coloured_noise(gaps: Floats, runs: Runs, order: int = ORDER) -> ColouredNoise:
     """Return the noise that gaps, shape (J, c), have if nothing but noise is in them."""
     c = gaps.shape[1]
-    longest = max((end - first for first, end in runs), default=0)
-    order = max(0, min(order, longest - 1))
+    lengths = [end - first for first, end in runs]
+    order = next((k - 1 for k in range(1, order + 1) if sum(max(n - k, 0) for n in lengths) < PAIRS * k), order)
     every = [_burg([gaps[first:end, channel] for first, end in runs], order) for channel in range(c)]
     coefficients = tuple(np.array([every[channel][0][k] for channel in range(c)]) for k in range(order + 1))
     scale = np.sqrt(np.array([every[channel][1] for channel in range(c)]).T)

@@ -108,10 +108,10 @@ class InferenceThresholds:
         "convention: two and a half minutes for a vessel of 5 m, some manoeuvres",
     )
     campaign_windows: int = threshold(
-        16,
+        2,
         "windows",
-        "shorter logs do not count in a campaign's hull",
-        "derived: four times the order of the autoregression",
+        "shorter logs have no say in a campaign",
+        "derived: of two windows one shows what changed since the other; 16 before, when a log alone started its noise",
     )
     fewest_steps: int = threshold(
         10, "steps", "shorter stretches are left out", "convention: half a window, from which no noise is estimated"

@@ -19,9 +19,9 @@ from ferryid.diagnose.inference.campaign_estimation import Campaign, CampaignFit
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_evidence import (
+    Gain,
     HeldOutLoss,
     held_out_loss,
-    interval,
     placebos,
     with_conditions,
     without_conditions,
@@ -33,20 +33,6 @@ from ferryid.effects import effects
 from ferryid.types import AXES, Floats
 
 WIDTH = 1.96
-
-
-@dataclass(frozen=True)
-class Gain:
-    """Log-likelihood of held-out blocks gained, all blocks together [nat], with its 95 % block-bootstrap interval."""
-
-    total: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, blocks: Floats) -> Gain:
-        """Return the gain of some blocks, shape (blocks,)."""
-        return cls(float(blocks.sum()), *interval(blocks))
 
 
 @dataclass(frozen=True)
@@ -119,11 +105,6 @@ class JudgedConditions:
 
     hull: CommonHull
     tests: tuple[ConditionTest, ...]
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What was tested over all logs, as sentences."""
-        return tuple(_note(one, len(self.hull.place)) for one in self.tests)
 
     def claims(self, path: str) -> tuple[Claim, ...]:
         """Return the conditions of a log as findings: what is confirmed, else the likeliest that is estimated."""
@@ -226,7 +207,8 @@ def _improvement(test: ConditionTest, i: int) -> Floats:
     return np.asarray(1.0 - after / np.where(before > 0.0, before, np.inf))
 
 
-def _note(test: ConditionTest, logs: int) -> str:
+def note(test: ConditionTest, logs: int) -> str:
+    """Return what was tested, as a sentence."""
     title = effects()[test.effect].title
     told = (
         f"{title}, one of every log beside the hull of all {logs}: the logarithm of the evidence changes by "

@@ -51,6 +51,20 @@ def interval(gains: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
+@dataclass(frozen=True)
+class Gain:
+    """Log-likelihood of held-out blocks gained, all blocks together [nat], with its 95 % block-bootstrap interval."""
+
+    total: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, blocks: Floats) -> Gain:
+        """Return the gain of some blocks, shape (blocks,)."""
+        return cls(float(blocks.sum()), *interval(blocks))
+
+
 def held_out_loss(made: CampaignFit) -> HeldOutLoss:
     """Return what an estimate leaves of every block if it does not know this block and what overlaps with it."""
     found = over(lambda i: _log_loss(made, i), range(len(made.parts)))

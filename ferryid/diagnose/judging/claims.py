@@ -12,7 +12,7 @@ from ferryid.diagnose.judging.finding import Finding
 
 Key = tuple[str, str | None]
 """Effect and instance."""
-Kind = Literal["sensor", "force", "condition", "disturbance", "law", "unsteady", "bursts"]
+Kind = Literal["sensor", "force", "condition", "property", "disturbance", "law", "unsteady", "bursts"]
 """What shows a finding: kinematics, the force balance, all logs of a campaign together, the noise model's states, or what is
 left without a name: an empirical law, something unsteady, or bursts."""
 

@@ -14,7 +14,7 @@ from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
-from ferryid.diagnose.judging.campaign_conditions import JudgedConditions
+from ferryid.diagnose.judging.campaign import JudgedCampaign
 from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes
 from ferryid.diagnose.judging.detection_power import (
@@ -40,7 +40,7 @@ def conclude(
     logs: Sequence[AveragedLog],
     judged: Sequence[JudgedLog],
     baseline: Baseline,
-    conditions: JudgedConditions | None = None,
+    together: JudgedCampaign | None = None,
 ) -> tuple[Diagnosis, ...]:
     """Return the diagnoses of the logs of a campaign.
 
@@ -52,18 +52,18 @@ def conclude(
         Those that are long enough.
     baseline
         What they are compared with.
-    conditions
-        Those of the logs of a campaign; None of one log.
+    together
+        What the logs of a campaign say together; None of one log.
     """
     by_path = {one.selected.path: one for one in judged}
     claims = {
         one.path: (
-            *(() if conditions is None else conditions.claims(one.path)),
+            *(() if together is None else together.claims(one.path)),
             *(by_path[one.path].claims if one.path in by_path else sensor_claims(one.screened.sensors)),
         )
         for one in logs
     }
-    noted = () if conditions is None else conditions.notes
+    noted = () if together is None else together.notes
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
     return tuple(
         _concluded(by_path[one.path], claims[one.path], campaign, noted)

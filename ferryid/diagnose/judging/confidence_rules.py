@@ -274,7 +274,7 @@ def about_nothing_sure(finding: Finding, context: Context, _threshold: float) ->
 @rule(JUDGING.drowned_share, "of what moves the vessel")
 def noise_drowns_an_axis(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower all findings on forces where the velocity's noise, times damping, is more than this on some axis."""
-    drowned = context.own.kind not in ("sensor", "condition") and drowned_axes(context.log, threshold)
+    drowned = context.own.kind not in ("sensor", "condition", "property") and drowned_axes(context.log, threshold)
     return lowered(finding) if drowned else finding, ""
 
 
@@ -303,7 +303,9 @@ def out_of_step_beside_disturbance(finding: Finding, context: Context, threshold
 def absent_in_other_logs(finding: Finding, context: Context, threshold: float) -> Outcome:
     """Lower a lasting property of the vessel that fewer of its logs show; a condition is a log's own, and a fault an event."""
     campaign = context.log.campaign
-    if len(campaign) < JUDGING.campaign_logs or not finding.sure or not lasting(finding):
+    # What all logs were weighed for together needs no count of them.
+    pooled = context.own.kind == "property"
+    if len(campaign) < JUDGING.campaign_logs or pooled or not finding.sure or not lasting(finding):
         return finding, ""
     if sum(finding.key in shown for shown in campaign) >= threshold * len(campaign):
         return finding, ""

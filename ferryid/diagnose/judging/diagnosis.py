@@ -134,7 +134,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "log": diagnosis.log,
         "vessel": diagnosis.vessel,
         "verdict": diagnosis.verdict,
-        "findings": [_finding(one) for one in diagnosis.findings],
+        "findings": [finding_as_json(one) for one in diagnosis.findings],
         "before": {"mse": {}, "free_run": {}, **diagnosis.before},
         "after": {"mse": {}, "free_run": {}, **diagnosis.after},
         "notes": list(diagnosis.notes),
@@ -157,7 +157,8 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _finding(one: Finding) -> dict[str, Any]:
+def finding_as_json(one: Finding) -> dict[str, Any]:
+    """Return a finding as it stands in ``ferryid.diagnosis/1``."""
     return {
         "effect": one.effect,
         "instance": one.instance,

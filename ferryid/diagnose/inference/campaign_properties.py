@@ -1,0 +1,150 @@
+"""Lasting properties of a vessel, selected by what all of its logs say together.
+
+Every candidate is first weighed by its gradient where it does not act (Rao's score test, hull and conditions of all logs
+partialled out); the best are then estimated beside everything else, and one after the other is selected as long as the evidence
+speaks for it.
+
+References
+----------
+Rao (1948), Large sample tests of statistical hypotheses concerning several parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ferryid.diagnose.inference.campaign_estimation import (
+    DIFFERENCE_STEP,
+    Campaign,
+    CampaignFit,
+    estimate_campaign,
+)
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.parallel import over
+from ferryid.effects import effects
+from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
+
+INSTRUMENTS = frozenset({"time_delay"})
+"""What is no property of hull or actuators, and yet the same in all logs of a vessel."""
+WEIGHED = 5
+"""Candidates that are estimated in a round, the best by their scores."""
+
+
+@dataclass(frozen=True)
+class ScoredProperty:
+    """A property, estimated beside everything else, and the evidence that it adds."""
+
+    candidate: Candidate
+    fit: CampaignFit
+    gain: float
+
+
+def properties_of(campaign: Campaign) -> list[Candidate]:
+    """Return every lasting property that all logs can show.
+
+    An error of the navigation is seen by forces only beside a hull that is known: one that comes from the same logs takes after
+    it. Kinematics alone shows it before.
+    """
+    profile: Profile = campaign.members[0].windows.measurements.profile
+    return [
+        Candidate(one, instance, one.parameters_of(profile))
+        for one in effects().values()
+        if (one.vessel or one.id in INSTRUMENTS)
+        and one.choose is None
+        and (campaign.hull.known or not one.of_sensor)
+        and not any(one.cannot(member.windows.measurements) for member in campaign.members)
+        for instance in one.instances(profile)
+    ]
+
+
+def select_properties(
+    made: CampaignFit, progress: Callable[[str], None]
+) -> tuple[CampaignFit, tuple[ScoredProperty, ...]]:
+    """Return the estimate with every property that the evidence speaks for, and the rivals of the last one of each round."""
+    rivals: list[ScoredProperty] = []
+    while len(made.campaign.properties) < INFERENCE.most_effects:
+        taken = {one.key for one in made.campaign.properties}
+        left = [one for one in properties_of(made.campaign) if one.key not in taken]
+        progress(f"weighing {len(left)} lasting properties over all logs")
+        scores = over(partial(score, made), left)
+        order = [k for k in np.argsort(scores)[::-1][:WEIGHED].tolist() if scores[k] > 0.0]
+        found = sorted((_estimated(made, left[k]) for k in order), key=lambda one: -one.gain)
+        if not found or found[0].gain < INFERENCE.prior_odds:
+            break
+        best = found[0]
+        rivals += found[1:]
+        # With what it explains gone, the noise is less; the spreads follow.
+        made = estimate_campaign(best.fit.campaign, begin=best.fit)
+    return made, tuple(rivals)
+
+
+def score(made: CampaignFit, candidate: Candidate) -> float:
+    """Return the evidence that a property would add if the gaps were linear in it [nat]."""
+    begun = with_property(made, candidate)
+    columns = range(begun.campaign.g - len(made.campaign.own) - len(candidate.parameters), begun.campaign.g)
+    columns = columns[: len(candidate.parameters)]
+    g, normal = made.campaign.g, made.normal
+    M, across, r = np.eye(len(columns)), np.zeros((g, len(columns))), np.zeros(len(columns))
+    for i, part in enumerate(made.parts):
+        runs = made.campaign.members[i].windows.runs
+        D = made.noise.white(i, _slopes(begun, i, columns), runs).reshape(-1, len(columns))
+        J, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel()
+        with_all = J.T @ D
+        factor = cho_factor(normal.own[i])
+        follow = cho_solve(factor, with_all[g:])
+        M += D.T @ D - with_all[g:].T @ follow
+        across += with_all[:g] - normal.back[i].T @ with_all[g:]
+        r += D.T @ w - follow.T @ normal.own_slopes[i]
+    A = np.eye(g) + np.sum(normal.matrices, axis=0)
+    common = made.common + np.sum(normal.slopes, axis=0)
+    follow = np.linalg.solve(A, across)
+    M -= across.T @ follow
+    r -= follow.T @ common
+    return 0.5 * float(r @ np.linalg.solve(M, r)) - 0.5 * float(np.linalg.slogdet(M)[1])
+
+
+def with_property(made: CampaignFit, candidate: Candidate) -> CampaignFit:
+    """Return an estimate with a property more, which does not act yet."""
+    campaign = replace(made.campaign, properties=(*made.campaign.properties, candidate))
+    place = made.campaign.g - len(made.campaign.own)
+    none = [
+        ((one.neutral if one.start is None else one.start) - one.neutral) / one.size for one in candidate.parameters
+    ]
+    return replace(made, campaign=campaign, common=np.insert(made.common, place, none))
+
+
+def without_property(made: CampaignFit, candidate: Candidate) -> CampaignFit:
+    """Return the estimate without a property, everything else estimated again under the same noise."""
+    first = len(made.campaign.hull.mean) + len(made.campaign.shared)
+    keep = np.ones(made.campaign.g, dtype=np.bool_)
+    for one in made.campaign.properties:
+        if one.key == candidate.key:
+            keep[first : first + len(one.parameters)] = False
+        first += len(one.parameters)
+    rest = tuple(one for one in made.campaign.properties if one.key != candidate.key)
+    begun = replace(made, campaign=replace(made.campaign, properties=rest), common=made.common[keep])
+    return estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
+
+
+def _estimated(made: CampaignFit, candidate: Candidate) -> ScoredProperty:
+    begun = with_property(made, candidate)
+    fit = estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
+    return ScoredProperty(candidate, fit, fit.evidence - made.evidence)
+
+
+def _slopes(begun: CampaignFit, i: int, columns: Sequence[int]) -> Floats:
+    """Return derivatives of the gaps of a log by some of the common vector, shape (J, 3, columns)."""
+    here = begun.campaign.gap(i, begun.common, begun.own[i])
+    slopes = []
+    for k in columns:
+        moved = begun.common.copy()
+        moved[k] += DIFFERENCE_STEP
+        slopes.append((begun.campaign.gap(i, moved, begun.own[i]) - here) / DIFFERENCE_STEP)
+    return np.stack(slopes, axis=2)

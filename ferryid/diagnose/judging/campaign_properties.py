@@ -1,0 +1,179 @@
+"""Lasting properties of a vessel, judged over its campaign: confirmed by held-out data of the logs, or estimated only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import exp
+
+import numpy as np
+
+from ferryid.counts import counted
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit
+from ferryid.diagnose.inference.campaign_properties import ScoredProperty, select_properties, without_property
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.force_errors import mass_of
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
+from ferryid.diagnose.judging.finding import Finding, Rival
+from ferryid.diagnose.judging.thresholds import JUDGING
+from ferryid.effects.effect import Parameter
+from ferryid.types import AXES, Floats
+
+WIDTH = 1.96
+AT_BOUND = 0.01
+"""Of the range of a parameter: nearer to an end of it than this, the search was stopped by the bound."""
+NEAR_RIVAL = 3.0
+"""Evidence [nat] by which a property must be better than another that was tried in its place."""
+
+
+@dataclass(frozen=True)
+class PropertyTest:
+    """What speaks for a property over all logs.
+
+    Attributes
+    ----------
+    candidate
+        The property.
+    estimates
+        Its parameters.
+    evidence
+        Logarithm of the evidence over that of no such property [nat].
+    gain
+        Held-out log-likelihood over that of no such property.
+    holding
+        Logs that are predicted better with it on held-out stretches, of all.
+    improvement
+        Share of the held-out squared force error of all logs that it removes, shape (3,).
+    rivals
+        What was tried in its place, with the evidence over it [nat], below zero.
+    at_bound
+        True where a parameter stands at an end of what is possible.
+    """
+
+    candidate: Candidate
+    estimates: Mapping[str, Estimate]
+    evidence: float
+    gain: Gain
+    holding: tuple[int, int]
+    improvement: Floats
+    rivals: tuple[Rival, ...]
+    at_bound: bool
+
+    @property
+    def doubt(self) -> str:
+        """Why it is not confirmed, as the end of a sentence; empty where it is."""
+        held, logs = self.holding
+        worst = int(np.argmin(self.improvement))
+        if self.evidence < INFERENCE.prior_odds:
+            return f"the evidence speaks for it by {self.evidence:.0f} nat only"
+        if self.gain.low <= 0.0:
+            return "held-out stretches of the logs are not surely predicted better with it"
+        if held < JUDGING.campaign_share * logs:
+            return f"only {held} of {counted(logs, 'log')} are predicted better with it on held-out stretches"
+        if self.at_bound:
+            return "its value stands at the bound of its search"
+        if doubt := self.candidate.effect.doubt({name: one.value for name, one in self.estimates.items()}):
+            return doubt
+        if self.improvement[worst] < -JUDGING.worsening:
+            share = -100.0 * float(self.improvement[worst])
+            return f"it makes the held-out squared force error in {AXES[worst]} {share:.0f} % larger"
+        if self.improvement.max() < JUDGING.least_removed:
+            return (
+                f"on no axis does it remove {100.0 * JUDGING.least_removed:.0f} % of the held-out squared force error"
+            )
+        return ""
+
+    @property
+    def confirmed(self) -> bool:
+        """True where held-out data confirm it."""
+        return self.doubt == ""
+
+    def finding(self, span_s: tuple[float, float]) -> Finding:
+        """Return it as a finding on a log that lasts from and until [s]."""
+        effect = self.candidate.effect
+        says = effect.says({name: one.value for name, one in self.estimates.items()}, self.candidate.instance)
+        held, logs = self.holding
+        says += f" So it is in all {logs} logs together, of which {held} are predicted better with it on held-out stretches."
+        if not self.confirmed:
+            says += f" It is estimated, not confirmed: {self.doubt}."
+        gained = np.maximum(self.improvement, 0.0)
+        shares = gained / gained.sum() if gained.any() else np.zeros(3)
+        away = min(max(self.evidence - INFERENCE.prior_odds, -700.0), 700.0)
+        probability = 1.0 / (1.0 + exp(-away))
+        near = [one for one in self.rivals if one.delta_score > -NEAR_RIVAL]
+        return Finding(
+            effect=effect.id,
+            instance=self.candidate.instance,
+            probability=probability if self.confirmed else min(probability, JUDGING.hint_probability),
+            parameters=self.estimates,
+            axes=dict(zip(AXES, shares.tolist(), strict=True)),
+            intervals=(span_s,),
+            improvement=dict(zip(AXES, self.improvement.tolist(), strict=True)),
+            held_out=True,
+            rivals=self.rivals,
+            unresolved_with=tuple(dict.fromkeys(one.effect for one in near)),
+            says=says,
+        )
+
+
+def judge_properties(made: CampaignFit, progress: Callable[[str], None]) -> tuple[PropertyTest, ...]:
+    """Select lasting properties beside the hull and the conditions of an estimate, and judge each on held-out data."""
+    found, rivals = select_properties(made, progress)
+    return tuple(tested(found, one, rivals) for one in found.campaign.properties)
+
+
+def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredProperty]) -> PropertyTest:
+    """Return what speaks for one of the properties of an estimate."""
+    without = without_property(made, candidate)
+    before, after = held_out_loss(without), held_out_loss(made)
+    gains = after.gain(before)
+    by_log = [float(gains[after.log == i].sum()) for i in range(len(made.parts))]
+    masses = [mass_of(member.plain.hull) for member in made.campaign.members]
+    squares = [
+        np.sum([np.sum((one @ M.T) ** 2, axis=0) for one, M in zip(loss.errors, masses, strict=True)], axis=0)
+        for loss in (before, after)
+    ]
+    value, error = _estimate(made, candidate)
+    evidence = made.evidence - without.evidence
+    others = [
+        Rival(one.candidate.effect.id, one.candidate.instance, min(one.gain - evidence, 0.0))
+        for one in sorted(rivals, key=lambda one: -one.gain)
+        if one.candidate.key not in {each.key for each in made.campaign.properties}
+    ]
+    return PropertyTest(
+        candidate,
+        {
+            one.name: Estimate(float(at), float(at - WIDTH * e), float(at + WIDTH * e), one.unit)
+            for one, at, e in zip(candidate.parameters, value, error, strict=True)
+        },
+        evidence,
+        Gain.of(gains),
+        (sum(one > 0.0 for one in by_log), len(by_log)),
+        np.asarray(1.0 - squares[1] / np.where(squares[0] > 0.0, squares[0], np.inf)),
+        tuple({(one.effect, one.instance): one for one in reversed(others)}.values()),
+        any(_at_bound(one, float(at)) for one, at in zip(candidate.parameters, value, strict=True)),
+    )
+
+
+def _estimate(made: CampaignFit, candidate: Candidate) -> tuple[Floats, Floats]:
+    """Return the parameters of a property and their reported standard deviations, as of `Fit.reported_errors`."""
+    campaign = made.campaign
+    place = [one.key for one in campaign.properties].index(candidate.key)
+    first = len(campaign.hull.mean) + len(campaign.shared)
+    first += sum(len(one.parameters) for one in campaign.properties[:place])
+    rows = slice(first, first + len(candidate.parameters))
+    size = np.array([one.size for one in candidate.parameters])
+    error = size * np.sqrt(np.diag(made.normal.common_covariance)[rows] * max(1.0, made.disagreement))
+    value = campaign.values(made.common, made.own[0])[1][place]
+    away = value - np.array([one.neutral for one in candidate.parameters])
+    sized = np.array([one.unit == candidate.parameters[0].unit for one in candidate.parameters])
+    effect = candidate.effect
+    beyond = np.where(sized, np.hypot(effect.formula_error * away, 0.5 * effect.negligible), 0.0)
+    return value, np.asarray(np.hypot(INFERENCE.posterior_factor * error, beyond))
+
+
+def _at_bound(parameter: Parameter, value: float) -> bool:
+    near = AT_BOUND * (parameter.high - parameter.low)
+    return value <= parameter.low + near or value >= parameter.high - near
