@@ -14,6 +14,7 @@ import pytest
 from ferryid.errors import FerryIdError
 from ferryid.ingest import open_log
 from ferryid.ingest.log import Reader, Series, TableLayout
+from ferryid.ingest.parquet_footer import null_counts
 
 N = 300
 
@@ -183,3 +184,34 @@ def test_texts_in_structs_of_several_row_groups_are_read(tmp_path: Path) -> None
     assert not reader.losses
     for name in ("s.note", "note"):
         assert series.columns[name].tolist() == ["a", "b", ""] * (N // 3)
+
+
+def test_no_bit_of_a_page_header_makes_values_missing_in_silence(tmp_path: Path) -> None:
+    path = tmp_path / "log.parquet"
+    content = written(path, pa.table(columns()), row_group_size=100)
+    metadata = parquet.ParquetFile(path).metadata
+    place = metadata.row_group(1).column(1).data_page_offset
+    true, silent = np.sin(np.arange(N)), list[int]()
+    for bit in range(8 * 40):
+        damaged = content.copy()
+        damaged[place + bit // 8] ^= 1 << bit % 8
+        path.write_bytes(bytes(damaged))
+        try:
+            series, reader = read(path)
+        except FerryIdError:
+            continue
+        if not reader.losses and not np.array_equal(series.columns["u"], true):
+            silent.append(bit)
+    assert silent == []
+
+
+def test_values_that_were_missing_when_the_table_was_written_are_no_damage(tmp_path: Path) -> None:
+    path = tmp_path / "log.parquet"
+    table = pa.table({**columns(), "u": [None if k % 3 else 1.0 for k in range(N)]})
+    written(path, table, row_group_size=100)
+    series, reader = read(path)
+    assert int(np.isnan(series.columns["u"]).sum()) == N - N // 3
+    assert reader.losses == ()
+    assert [one["u"] for one in null_counts(path)] == [66, 67, 67]
+    path.write_bytes(path.read_bytes()[:-20] + bytes(12) + path.read_bytes()[-8:])
+    assert null_counts(path) == [] or len(null_counts(path)) == 3

@@ -13,6 +13,7 @@ from ferryid.counts import counted, verb
 from ferryid.errors import FerryIdError, one_line
 from ferryid.ingest.arrow_columns import column_from_arrow
 from ferryid.ingest.log import Column, Format, Loss, TableLayout, Topic
+from ferryid.ingest.parquet_footer import null_counts
 from ferryid.ingest.table_time import TimePlan, guess_time
 from ferryid.ingest.tables import (
     Rows,
@@ -90,8 +91,11 @@ def _read(
         )
     try:
         # A dotted name selects the member of a struct; the struct comes back and is flattened.
-        columns = _columns(file.read(columns=raw), places, times)
+        table = file.read(columns=raw)
+        columns = _columns(table, places, times)
         _check_count(columns, rows)
+        if any(column.null_count for column in table.columns):
+            _check_missing(table, null_counts(path))
         return columns, ()
     except _failures() as error:
         if file.num_row_groups < 2:
@@ -114,12 +118,14 @@ def _read_groups(
 ) -> tuple[dict[str, Column], tuple[Loss, ...]]:
     """Read the row groups that can be read; the rows of the others are lost."""
     parts: list[dict[str, Column]] = []
-    lost, groups = 0, 0
+    lost, groups, stated = 0, 0, null_counts(path)
     for group in range(file.num_row_groups):
         count = file.metadata.row_group(group).num_rows
         try:
-            columns = _columns(file.read_row_group(group, columns=raw), places, times)
+            table = file.read_row_group(group, columns=raw)
+            columns = _columns(table, places, times)
             _check_count(columns, count)
+            _check_missing(table, stated[group : group + 1])
             parts.append(columns)
         except _failures():
             lost += max(0, count)
@@ -152,6 +158,19 @@ def _check_count(columns: Mapping[str, Column], rows: int) -> None:
     wrong = next((len(values) for values in columns.values() if len(values) != rows), None)
     if wrong is not None:
         raise ValueError(f"{counted(wrong, 'row')} where the file's footer counts {rows}")
+
+
+def _check_missing(table: Any, stated: Sequence[Mapping[str, int]]) -> None:
+    """Refuse columns in which more values are missing than the footer counts in these row groups."""
+    for name in dict.fromkeys(table.schema.names):
+        if not stated or any(name not in group for group in stated):
+            continue
+        missing = sum(
+            column.null_count for field, column in zip(table.schema.names, table.columns, strict=True) if field == name
+        )
+        most = sum(group[name] for group in stated)
+        if missing > most:
+            raise ValueError(f'{counted(missing, "value")} of "{name}" missing where the file\'s footer counts {most}')
 
 
 def _flat(table: Any) -> Any:
