@@ -42,7 +42,7 @@ INDUCED = ("X_vr", "X_vv")
 """Drag of drift and turning, beside `COEFFICIENTS`."""
 ROUNDS = 20
 """Most rounds: a Gauss-Newton step each, with the noise and the spreads that the one before left."""
-SETTLED, CONVERGED_GAIN = 0.1, 0.1
+SETTLED, CONVERGED_GAIN = 0.05, 0.05
 """Change of every spread, as a share of it, and gain of a step below which the rounds end."""
 RELAXATION = 1.8
 """Factor on the logarithm of a spread's change: expectation and maximisation approach their end slowly, and from one side."""
