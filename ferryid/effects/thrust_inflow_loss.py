@@ -36,7 +36,9 @@ def apply(force_model: ForceModel, p: Floats, instance: str | None) -> ForceMode
 
 def cannot(measurements: Measurements) -> str:
     """Say why the measurements cannot show a loss: an open-water curve has the inflow in it, as has the thrust on the shaft."""
-    with_inflow = all(one.thrust.kind == "open_water" for one in measurements.profile.actuators)
+    with_inflow = all(
+        one.thrust is not None and one.thrust.kind == "open_water" for one in measurements.profile.actuators
+    )
     return "the open-water curves of all propellers have the inflow in them" if with_inflow else ""
 
 

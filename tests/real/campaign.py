@@ -224,8 +224,8 @@ def _apart(study: esso.Study) -> list[str]:
 
 def _tests(study: esso.Study) -> list[str]:
     lines = [
-        "| condition | log evidence over none [nat] | held-out gain [nat] | more than on the mirrored heading | more than on "
-        "another log's heading | |",
+        "| condition | log evidence over none [nat] | held-out gain [nat] | over the placebo on the mirrored heading: "
+        "evidence; gain | on another log's heading | |",
         "|---|---|---|---|---|---|",
     ]
     return lines + [
@@ -237,7 +237,8 @@ def _tests(study: esso.Study) -> list[str]:
 
 def _over(test: ConditionTest) -> str:
     places = (MIRRORED, EXCHANGED)
-    return " | ".join(_range(test.over_placebos[one]) if one in test.over_placebos else "not needed" for one in places)
+    made = (test.placebos.get(one) for one in places)
+    return " | ".join("" if one is None else f"{one.evidence:+.0f}; {_range(one.gain)}" for one in made)
 
 
 def _gains(study: esso.Study) -> list[str]:
@@ -249,8 +250,8 @@ def _gains(study: esso.Study) -> list[str]:
 
 def _controls(study: esso.Study) -> list[str]:
     lines = [
-        "| control | condition | log evidence over none [nat] | held-out gain [nat] | more than on its own mirrored heading | "
-        "more than on another log's heading | named in | hint in |",
+        "| control | condition | log evidence over none [nat] | held-out gain [nat] | over its own placebo on the mirrored "
+        "heading: evidence; gain | on another log's heading | named in | hint in |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, control in study.controls.items():

@@ -30,6 +30,9 @@ from ferryid.types import Floats
 from ferryid.vessel.dimensions import dimensions
 from ferryid.vessel.profile import Profile
 
+SAME = 1e-3
+"""Of the standard deviation of the measured accelerations: two logs that are nearer than this in all windows are one."""
+
 
 @dataclass(frozen=True)
 class CommonHull:
@@ -83,9 +86,10 @@ def assemble(
     members: list[Member] = []
     spreads: list[Floats] = []
     place: dict[str, int] = {}
+    again = {path for path, _ in repeated(logs)}
     for log in logs:
         windows = log.windows
-        if len(windows.starts) < INFERENCE.campaign_windows or log.path in place:
+        if len(windows.starts) < INFERENCE.campaign_windows or log.path in place or log.path in again:
             continue
         sha256 = log.screened.measured.survey.recording.sha256
         plain, spread = prior_force_model(windows.measurements, profile, model, sha256)
@@ -99,6 +103,25 @@ def assemble(
     size = np.zeros(len(INDUCED)) if known else induced_spread(length, draught)
     mean = np.concatenate([members[0].plain.hull, np.zeros(len(INDUCED))])
     return Campaign(tuple(members), HullPrior(mean, np.append(np.max(spreads, axis=0), size), known)), place
+
+
+def repeated(logs: Sequence[AveragedLog]) -> list[tuple[str, str]]:
+    """Return the paths of logs that hold the motion of another before them, in whatever format, and that other's path."""
+    found: list[tuple[str, str]] = []
+    for k, log in enumerate(logs):
+        for other in logs[:k]:
+            if log.path != other.path and _same(log.windows, other.windows):
+                found.append((log.path, other.path))
+                break
+    return found
+
+
+def _same(one: Windows, other: Windows) -> bool:
+    """Return whether two logs measured the same to a thousandth of what it varies by; clocks may differ."""
+    if len(one.starts) != len(other.starts) or len(one.starts) == 0:
+        return False
+    scale = np.std(one.measured, axis=0)
+    return bool((np.abs(one.measured - other.measured).max(axis=0) <= SAME * np.maximum(scale, 1e-12)).all())
 
 
 def conditions_of(windows: Windows, profile: Profile) -> tuple[Candidate, ...]:

@@ -48,6 +48,8 @@ RELAXATION = 1.8
 """Factor on the logarithm of a spread's change: expectation and maximisation approach their end slowly, and from one side."""
 DIFFERENCE_STEP = 0.02
 """Of a size, for derivatives."""
+KEPT_SLOPES = 0.02
+"""Longest step of a hull's coefficient, in spreads, after which the slopes of the step before still serve."""
 STARTS, BEARINGS = (0.25, 0.6, 1.25), 8
 """Conditions from which a search begins besides none: lengths in sizes, and directions; a wind has no slope at rest."""
 STEADY_SHARE = 0.1
@@ -473,7 +475,7 @@ def estimate_campaign(
 class _Point:
     """Where the logs are linearised: both vectors, and of each log gaps, shape (J, 3), and slopes, shape (J, 3, g + l).
 
-    The hull's slopes are kept: the gaps are all but linear in it.
+    The hull's slopes are kept for steps that are short: the gaps are all but linear in it.
     """
 
     common: Floats
@@ -517,8 +519,9 @@ def _step(made: CampaignFit, at: _Point) -> tuple[_Point, float]:
         places = range(len(own))
         there = cost(common, own, over(partial(_gap, campaign, common, own), places))
         if there < now:
-            # Where a flow or a property changes how the hull's coefficients act, their slopes change with it.
+            # The gaps bend with the masses, and where a flow or a property changes how the hull's coefficients act.
             bends = any(one.effect.changes_hull for one in (*campaign.conditions, *campaign.properties))
+            bends = bends or float(np.abs(share * step[: len(campaign.hull.mean)]).max()) > KEPT_SLOPES
             return _point(campaign, common, own, None if bends else at.hull), now - there
     return at, 0.0
 

@@ -72,6 +72,8 @@ def select_properties(
     while len(made.campaign.properties) < INFERENCE.most_effects:
         taken = {one.key for one in made.campaign.properties}
         left = [one for one in properties_of(made.campaign) if one.key not in taken]
+        # What is compared has the same noise and has settled under it.
+        made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
         progress(f"weighing {len(left)} lasting properties over all logs")
         scores = over(partial(score, made), left)
         order = [k for k in np.argsort(scores)[::-1][:WEIGHED].tolist() if scores[k] > 0.0]

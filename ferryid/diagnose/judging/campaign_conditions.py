@@ -1,8 +1,10 @@
 """Conditions of single logs, judged over the campaign: confirmed by held-out data, or estimated only.
 
 A condition such as a wind is confirmed where logs that have one of their own are predicted better on stretches that were held
-out, by an interval that excludes zero, better than with the same condition on headings that the vessel did not have, and where
-the evidence speaks for it as it must for any effect. What is not confirmed may still be estimated: it is reported as such.
+out, by an interval that excludes zero, where the evidence speaks for it as it must for any effect, and where both speak for it
+against the same condition on headings that the vessel did not have. A condition and its placebo have as many parameters each,
+so that the difference of their evidence is the logarithm of their odds; it is divided as variances are widened elsewhere. What
+is not confirmed may still be estimated: it is reported as such.
 """
 
 from __future__ import annotations
@@ -36,6 +38,20 @@ WIDTH = 1.96
 
 
 @dataclass(frozen=True)
+class PlaceboTest:
+    """A condition against the same one where it cannot be true: held-out log-likelihood, and evidence [nat]."""
+
+    gain: Gain
+    evidence: float
+
+    @property
+    def beaten(self) -> bool:
+        """True where both speak for the condition."""
+        odds = self.evidence / INFERENCE.posterior_factor**2
+        return self.gain.total > 0.0 and odds >= JUDGING.placebo_evidence
+
+
+@dataclass(frozen=True)
 class ConditionTest:
     """What speaks for a condition over all logs.
 
@@ -49,8 +65,8 @@ class ConditionTest:
         Logarithm of the evidence over that of no such condition [nat].
     gain
         Held-out log-likelihood over that of no such condition.
-    over_placebos
-        The same over conditions that cannot be true, by what they stand on.
+    placebos
+        Conditions that cannot be true, by the headings that they stand on.
     """
 
     effect: str
@@ -59,7 +75,7 @@ class ConditionTest:
     loss: tuple[HeldOutLoss, HeldOutLoss]
     evidence: float
     gain: Gain
-    over_placebos: Mapping[str, Gain]
+    placebos: Mapping[str, PlaceboTest]
 
     @property
     def confirmed(self) -> bool:
@@ -68,19 +84,20 @@ class ConditionTest:
 
     @property
     def estimated(self) -> bool:
-        """True where the evidence speaks for it, confirmed or not."""
-        return self.evidence >= INFERENCE.prior_odds
+        """True where the evidence speaks for it, against placebos too, confirmed or not."""
+        against = all(one.evidence > 0.0 for one in self.placebos.values())
+        return self.evidence >= INFERENCE.prior_odds and against
 
     @property
     def doubt(self) -> str:
         """Why it is not confirmed, as the end of a sentence; empty where it is."""
-        if not self.estimated:
+        if self.evidence < INFERENCE.prior_odds:
             return f"the evidence speaks for it by {self.evidence:.0f} nat only"
         if self.gain.low <= 0.0:
             return "held-out stretches of the logs are not surely predicted better with it"
-        for place, gain in self.over_placebos.items():
-            if gain.low <= 0.0:
-                return f"held-out stretches are predicted about as well by one on {place}, which cannot be true"
+        for place, placebo in self.placebos.items():
+            if not placebo.beaten:
+                return f"one on {place}, which cannot be true, explains about as much"
         return ""
 
     @property
@@ -148,14 +165,15 @@ def _tested(campaign: Campaign, progress: Callable[[str], None]) -> ConditionTes
     evidence = made.evidence - none.evidence
     loss = held_out_loss(none), held_out_loss(made)
     gains = loss[1].gain(loss[0])
-    over: dict[str, Gain] = {}
+    against: dict[str, PlaceboTest] = {}
     # What the evidence does not speak for needs no placebo to fall.
     if evidence >= INFERENCE.prior_odds:
         progress("estimating the same on headings that the vessel did not have")
         for name, placebo in placebos(campaign).items():
-            other = held_out_loss(estimate_campaign(placebo, noise=made.noise)).gain(loss[0])
-            over[name] = Gain.of(gains - other)
-    return ConditionTest(campaign.conditions[0].effect.id, made, none, loss, evidence, Gain.of(gains), over)
+            other = estimate_campaign(placebo, noise=made.noise)
+            over = gains - held_out_loss(other).gain(loss[0])
+            against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence)
+    return ConditionTest(campaign.conditions[0].effect.id, made, none, loss, evidence, Gain.of(gains), against)
 
 
 def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> Finding | None:
@@ -209,15 +227,15 @@ def _improvement(test: ConditionTest, i: int) -> Floats:
 
 def note(test: ConditionTest, logs: int) -> str:
     """Return what was tested, as a sentence."""
-    title = effects()[test.effect].title
+    title, found = effects()[test.effect].title, "confirmed" if test.confirmed else "not confirmed"
     told = (
-        f"{title}, one of every log beside the hull of all {logs}: the logarithm of the evidence changes by "
-        f"{test.evidence:+.0f} nat, the likelihood of held-out stretches by {_range(test.gain)}"
+        f"{title} of each log, estimated with one hull for all {logs}: {found}. "
+        f"Over none, evidence {test.evidence:+.0f} nat, likelihood of held-out stretches {_range(test.gain)}"
     )
-    over = "; ".join(f"{_range(gain)} against one on {place}" for place, gain in test.over_placebos.items())
-    told += f" ({over})" if over else ""
-    return f"{told}. {'Confirmed' if test.confirmed else 'Not confirmed'}."
+    for place, one in test.placebos.items():
+        told += f"; over one on {place}, evidence {one.evidence:+.0f} nat, held out {_range(one.gain)}"
+    return f"{told}."
 
 
 def _range(gain: Gain) -> str:
-    return f"{gain.total:+.0f} nat (95 % interval {gain.low:+.0f} to {gain.high:+.0f})"
+    return f"{gain.total:+.0f} nat ({gain.low:+.0f} to {gain.high:+.0f})"

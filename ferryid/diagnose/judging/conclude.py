@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose.checks.screening import ScreenedLog
 from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.inference.campaign import repeated
 from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted_force_model
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
@@ -64,12 +66,22 @@ def conclude(
         for one in logs
     }
     noted = () if together is None else together.notes
+    same = dict(repeated(logs))
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
     return tuple(
-        _concluded(by_path[one.path], claims[one.path], campaign, noted)
+        _concluded(by_path[one.path], claims[one.path], campaign, (*_copied(same.get(one.path)), *noted))
         if one.path in by_path
-        else _too_short(one, claims[one.path], baseline, campaign, noted)
+        else _too_short(one, claims[one.path], baseline, campaign, (*_copied(same.get(one.path)), *noted))
         for one in logs
+    )
+
+
+def _copied(other: str | None) -> tuple[str, ...]:
+    """Return that a log is another's copy, and has no say of its own."""
+    if other is None:
+        return ()
+    return (
+        f"It holds the motion of {PurePath(other).name}: it is the same recording, and counts once among the logs.",
     )
 
 

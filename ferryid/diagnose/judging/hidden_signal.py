@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import atan2, degrees, hypot
 
 import numpy as np
 
@@ -51,8 +52,24 @@ def _beside(signal: str, values: Floats, measurements: Measurements, findings: S
     shown = ", ".join(_says(name, value, units) for name, value in measured.items())
     found_values = ", ".join(_says(name, one.value, units) for name, one in found.items())
     result = f"found: {found_values}" if found_values else "nothing of it was found"
-    says = f"The {signal} was hidden. Measured {when}: {shown}; {result}."
+    says = f"The {signal} was hidden. Measured {when}: {shown}; {result}{_compared(found, measured)}."
     return Withheld(signal, found, measured, says)
+
+
+def _compared(found: Mapping[str, Estimate], measured: Mapping[str, float]) -> str:
+    """Return how far a flow points away from the measured one, and its strength over it, as the end of a sentence."""
+    if not all(name in one for name in ("north", "east") for one in (found, measured)):
+        return ""
+    north, east = found["north"].value, found["east"].value
+    strength = hypot(measured["north"], measured["east"])
+    if strength == 0.0:
+        return ""
+    apart = degrees(atan2(east, north) - atan2(measured["east"], measured["north"]))
+    off = abs((apart + 180.0) % 360.0 - 180.0)
+    inside = sum(found[name].low <= measured[name] <= found[name].high for name in ("north", "east"))
+    held = {0: "neither", 1: "one", 2: "both"}[inside]
+    ratio = hypot(north, east) / strength
+    return f", {off:.0f} degrees off at {ratio:.2f} of its strength; intervals hold {held} of the components"
 
 
 def _says(name: str, value: float, units: Mapping[str, str]) -> str:

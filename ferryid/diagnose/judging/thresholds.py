@@ -129,6 +129,12 @@ class JudgingThresholds:
         "held-out gain that needs no axis on which an improvement is significant",
         "convention: five times `gain`; a force that acts seldom vanishes in means over a log",
     )
+    placebo_evidence: float = threshold(
+        3.0,
+        "nat",
+        "evidence over a placebo, divided by the posterior factor squared, that a condition of a campaign must have",
+        "tuned on real recordings: odds of twenty to one, where an interval of held-out gains had been asked for",
+    )
     power_in_positions: float = threshold(
         0.5,
         "of what the velocities show",

@@ -1,0 +1,91 @@
+"""Lasting properties over a campaign: a weak thruster is the vessel's, whatever the bags, and a sound vessel has none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.inference.campaign_estimation import Campaign, Member, estimate_campaign
+from ferryid.diagnose.inference.campaign_properties import properties_of, score, select_properties
+from ferryid.diagnose.inference.weak_form import Windows
+from ferryid.diagnose.judging.campaign import judge_campaign
+from ferryid.types import no_progress
+from tests.diagnose.inference.test_campaign_estimation import CALM, campaign
+
+pytestmark = pytest.mark.slow
+
+BAG_WINDOWS = 7
+"""Of eight seconds every two: a bag of twenty seconds."""
+
+
+def bags(whole: Campaign) -> Campaign:
+    """Return a campaign cut into bags of twenty seconds."""
+    members: list[Member] = []
+    for member in whole.members:
+        seen = member.windows
+        for first in range(0, len(seen.starts) - BAG_WINDOWS, BAG_WINDOWS + 3):
+            rows = slice(first, first + BAG_WINDOWS)
+            cut = Windows(
+                seen.measurements,
+                seen.starts[rows],
+                ((0, BAG_WINDOWS),),
+                seen.weight,
+                seen.measured[rows],
+                seen.channels,
+            )
+            members.append(replace(member, windows=cut))
+    return replace(whole, members=tuple(members))
+
+
+@cache
+def weakened(factor: float) -> Campaign:
+    """Return calm logs whose first thruster gave less than is believed of it, and its part of the force changes."""
+    whole = campaign(CALM, conditions=())
+
+    def believed(member: Member) -> Member:
+        force = member.plain.parts.sum(axis=1)
+        share = (0.5 + 0.4 * np.sin(member.windows.measurements.t / 13.0))[:, None]
+        parts = np.stack([share * force / factor, (1.0 - share) * force], axis=1)
+        return replace(member, plain=replace(member.plain, parts=parts))
+
+    return replace(whole, members=tuple(believed(member) for member in whole.members))
+
+
+@pytest.mark.parametrize("cut", [False, True], ids=["three logs", "bags of twenty seconds"])
+def test_a_weak_thruster_is_found_over_all_logs(cut: bool) -> None:
+    whole = bags(weakened(0.8)) if cut else weakened(0.8)
+    places = {str(i): i for i in range(len(whole.members))}
+    judged = judge_campaign(whole, places, no_progress)
+    assert [one.candidate.key for one in judged.properties if one.confirmed] == [("thruster_gain", "thruster1")]
+    (found,) = (one for one in judged.properties if one.confirmed)
+    factor = found.estimates["factor"]
+    assert factor.value == pytest.approx(0.8, abs=0.03)
+    assert factor.low < 0.8 < factor.high
+    assert found.gain.low > 0.0
+    said = {claim.finding.says for path in places for claim in judged.claims(path)}
+    assert len(said) == 1
+    assert f"in all {len(places)} logs together" in said.pop()
+
+
+def test_a_sound_vessel_has_no_property() -> None:
+    made, _ = select_properties(estimate_campaign(weakened(1.0)), no_progress)
+    assert made.campaign.properties == ()
+
+
+def test_scores_rank_as_fits_do() -> None:
+    made = estimate_campaign(weakened(0.8))
+    scores = {one.key: score(made, one) for one in properties_of(made.campaign)}
+    assert max(scores, key=lambda key: scores[key]) == ("thruster_gain", "thruster1")
+    assert scores["thruster_gain", "thruster1"] > 20.0
+    assert scores["thruster_lag", None] < 0.5 * scores["thruster_gain", "thruster1"]
+
+
+def test_errors_of_the_navigation_need_a_known_hull() -> None:
+    known = campaign()
+    guessed = replace(known, hull=replace(known.hull, known=False))
+    assert {"lever_arm", "heading_bias"} <= {one.effect.id for one in properties_of(known)}
+    assert not {"lever_arm", "heading_bias"} & {one.effect.id for one in properties_of(guessed)}
+    assert np.isfinite(score(estimate_campaign(known), properties_of(known)[0]))
