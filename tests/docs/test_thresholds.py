@@ -23,6 +23,8 @@ NO_DECISION = {
         signals.sampling GRAVITY
         signals.kalman WINDOW_PER_TIME
         effects.payload WATER WATERPLANE
+        diagnose.judging.campaign_conditions WIDTH
+        diagnose.judging.campaign_properties WIDTH
         identify.adaptive.averaging NORMAL_95
         identify.free_run_checks _DEGREES
         identify.split _GOLDEN
@@ -40,6 +42,7 @@ NO_DECISION = {
         regression.cross_validation.block_sums OUT
     """,
     "shapes of formulas, and priors of parameters": """
+        diagnose.inference.campaign_estimation SCALE_GAPS
         effects.shallow_water EDGE_M
         effects.thruster_interaction SHARPNESS
         effects.waves USUAL_HZ USUAL_M
@@ -47,6 +50,8 @@ NO_DECISION = {
     """,
     "rounding, overflow and division by zero": """
         signals.grid EXACT_S
+        diagnose.inference.campaign SAME
+        diagnose.inference.coloured_noise LEAST_VARIANCE
         identify.acceptance _ROUNDING _NOTHING
         identify.physical_checks _ROUNDING
         identify.adaptive.averaging _SUM
@@ -68,6 +73,7 @@ NO_DECISION = {
         diagnose.checks.spans LENGTH_S STRIDE_S RATE_HZ
         diagnose.checks.kinematics DERIVATIVE_S
         diagnose.inference.autoregression ORDER
+        diagnose.inference.coloured_noise ORDER PAIRS
         diagnose.inference.weak_form STEPS_A_WINDOW FORCES_HZ
         diagnose.inference.spectra WINDOW_RATIO BURST_HZ BURST_S BURST_PERIODS BANDS_HZ
         compare.replay JUDGED_S
@@ -82,7 +88,9 @@ NO_DECISION = {
         diagnose.checks.azimuth_resolution TURNS
         diagnose.checks.contradiction SHIFTS_S MOST_ACTUATORS
         diagnose.checks.kinematics SIZE TINY STEPS
-        diagnose.inference.campaign_hull ROUNDS STEPS LONGEST_STEP DIFFERENCE_STEP START_SIZE
+        diagnose.inference.campaign_estimation ROUNDS SETTLED CONVERGED_GAIN RELAXATION DIFFERENCE_STEP KEPT_SLOPES
+        diagnose.inference.campaign_estimation STARTS BEARINGS STEADY_SHARE HALVINGS SCALE_ROUNDS
+        diagnose.inference.campaign_properties WEIGHED
         diagnose.inference.change_points LEVELS
         diagnose.inference.estimation MAX_ITERATIONS HULL_SLOPE_ITERATIONS CONVERGED_GAIN HULL_DIFFERENCE DAMPINGS
         diagnose.inference.estimation PARAMETER_DIFFERENCE LONGEST_STEP

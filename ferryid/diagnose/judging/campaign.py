@@ -42,8 +42,8 @@ class JudgedCampaign:
         i = self.hull.place.get(path)
         if i is None:
             return ()
-        t = self.hull.fit.campaign.members[i].windows.measurements.t
-        lasting = (one.finding((float(t[0]), float(t[-1]))) for one in self.properties)
+        windows = self.hull.fit.campaign.members[i].windows
+        lasting = (one.finding(windows) for one in self.properties)
         return (*self.conditions.claims(path), *(Claim(one, Figures("property")) for one in lasting))
 
 

@@ -4,7 +4,8 @@ A condition such as a wind is confirmed where logs that have one of their own ar
 out, by an interval that excludes zero, where the evidence speaks for it as it must for any effect, and where both speak for it
 against the same condition on headings that the vessel did not have. A condition and its placebo have as many parameters each,
 so that the difference of their evidence is the logarithm of their odds; it is divided as variances are widened elsewhere. What
-is not confirmed may still be estimated: it is reported as such.
+a placebo explains as well is hull or formulas that are off, and must be the smaller part. What is not confirmed may still be
+estimated: it is reported as such.
 """
 
 from __future__ import annotations
@@ -39,16 +40,32 @@ WIDTH = 1.96
 
 @dataclass(frozen=True)
 class PlaceboTest:
-    """A condition against the same one where it cannot be true: held-out log-likelihood, and evidence [nat]."""
+    """A condition against the same one where it cannot be true.
+
+    Attributes
+    ----------
+    gain
+        Held-out log-likelihood over the placebo.
+    evidence
+        Logarithm of the evidence over the placebo [nat].
+    share
+        Of the condition's evidence over none, what the placebo has too: where hull and formulas are off, both gain by that.
+    """
 
     gain: Gain
     evidence: float
+    share: float
+
+    @property
+    def own(self) -> bool:
+        """True where most of what the condition explains is its own."""
+        return self.share <= JUDGING.placebo_part
 
     @property
     def beaten(self) -> bool:
-        """True where both speak for the condition."""
+        """True where evidence and held-out data speak for the condition, and most of what it explains is its own."""
         odds = self.evidence / INFERENCE.posterior_factor**2
-        return self.gain.total > 0.0 and odds >= JUDGING.placebo_evidence
+        return self.gain.total > 0.0 and odds >= JUDGING.placebo_evidence and self.own
 
 
 @dataclass(frozen=True)
@@ -85,7 +102,7 @@ class ConditionTest:
     @property
     def estimated(self) -> bool:
         """True where the evidence speaks for it, against placebos too, confirmed or not."""
-        against = all(one.evidence > 0.0 for one in self.placebos.values())
+        against = all(one.own for one in self.placebos.values())
         return self.evidence >= INFERENCE.prior_odds and against
 
     @property
@@ -172,7 +189,8 @@ def _tested(campaign: Campaign, progress: Callable[[str], None]) -> ConditionTes
         for name, placebo in placebos(campaign).items():
             other = estimate_campaign(placebo, noise=made.noise)
             over = gains - held_out_loss(other).gain(loss[0])
-            against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence)
+            share = (other.evidence - none.evidence) / evidence
+            against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share)
     return ConditionTest(campaign.conditions[0].effect.id, made, none, loss, evidence, Gain.of(gains), against)
 
 
@@ -201,7 +219,8 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
     says = effect.says({name: one.value for name, one in estimates.items()}, None)
     if not test.confirmed:
         says = f"{says} It is estimated from all logs together, not confirmed: {test.doubt}."
-    t = fit.campaign.members[i].windows.measurements.t
+    windows = fit.campaign.members[i].windows
+    t = windows.measurements.t
     return Finding(
         effect=test.effect,
         instance=None,
@@ -215,6 +234,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
             Rival(one.effect, None, one.evidence - test.evidence) for one in tests if one.effect != test.effect
         ),
         says=says,
+        evidence={"t": windows.middle_s},
     )
 
 

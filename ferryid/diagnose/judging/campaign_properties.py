@@ -15,6 +15,7 @@ from ferryid.diagnose.inference.campaign_properties import ScoredProperty, selec
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
 from ferryid.diagnose.judging.finding import Finding, Rival
 from ferryid.diagnose.judging.thresholds import JUDGING
@@ -90,8 +91,8 @@ class PropertyTest:
         """True where held-out data confirm it."""
         return self.doubt == ""
 
-    def finding(self, span_s: tuple[float, float]) -> Finding:
-        """Return it as a finding on a log that lasts from and until [s]."""
+    def finding(self, windows: Windows) -> Finding:
+        """Return it as a finding on the log of these windows."""
         effect = self.candidate.effect
         says = effect.says({name: one.value for name, one in self.estimates.items()}, self.candidate.instance)
         held, logs = self.holding
@@ -102,6 +103,7 @@ class PropertyTest:
         shares = gained / gained.sum() if gained.any() else np.zeros(3)
         away = min(max(self.evidence - INFERENCE.prior_odds, -700.0), 700.0)
         probability = 1.0 / (1.0 + exp(-away))
+        t = windows.measurements.t
         near = [one for one in self.rivals if one.delta_score > -NEAR_RIVAL]
         return Finding(
             effect=effect.id,
@@ -109,12 +111,13 @@ class PropertyTest:
             probability=probability if self.confirmed else min(probability, JUDGING.hint_probability),
             parameters=self.estimates,
             axes=dict(zip(AXES, shares.tolist(), strict=True)),
-            intervals=(span_s,),
+            intervals=((float(t[0]), float(t[-1])),),
             improvement=dict(zip(AXES, self.improvement.tolist(), strict=True)),
             held_out=True,
             rivals=self.rivals,
             unresolved_with=tuple(dict.fromkeys(one.effect for one in near)),
             says=says,
+            evidence={"t": windows.middle_s},
         )
 
 

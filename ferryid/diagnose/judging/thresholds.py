@@ -135,6 +135,12 @@ class JudgingThresholds:
         "evidence over a placebo, divided by the posterior factor squared, that a condition of a campaign must have",
         "tuned on real recordings: odds of twenty to one, where an interval of held-out gains had been asked for",
     )
+    placebo_part: float = threshold(
+        0.5,
+        "of the evidence for a condition",
+        "most that a placebo may have too",
+        "convention: half; after a wind was confirmed in a towing tank whose placebo explained four fifths of it",
+    )
     power_in_positions: float = threshold(
         0.5,
         "of what the velocities show",
