@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from ferryid.diagnose.checks.screening import screen_sensors
 from ferryid.diagnose.data.measurements import measure_log
@@ -76,16 +77,33 @@ def diagnose_campaign(
     Raises
     ------
     FerryIdError
-        For logs that cannot be used.
+        Where no log can be used. Of several, those that cannot are left out, and the notes name them.
     """
-    measured = [measure_log(log, profile, run, withhold=settings.withhold) for log in logs]
-    screened = [screen_sensors(log, run.progress) for log in measured]
-    averaged = [average(log) for log in screened]
+    averaged, left_out = _averaged(logs, profile, settings, run)
     baseline, together = _baseline(averaged, profile, settings, run)
     estimated = [estimate(log, baseline) for log in averaged if log.long_enough]
     selected = [select(log, run.progress) for log in estimated]
     judged = judge(selected, run.progress)
-    return conclude(averaged, judged, baseline, together)
+    return conclude(averaged, judged, baseline, together, left_out)
+
+
+def _averaged(
+    logs: Sequence[str], profile: Profile, settings: DiagnosisSettings, run: RunContext
+) -> tuple[list[AveragedLog], tuple[str, ...]]:
+    """Return the logs that can be used, measured, screened and averaged, and why each of the others cannot."""
+    found, errors = list[AveragedLog](), list[FerryIdError]()
+    for log in logs:
+        try:
+            measured = measure_log(log, profile, run, withhold=settings.withhold)
+            found.append(average(screen_sensors(measured, run.progress)))
+        except FerryIdError as error:
+            # A path that leads nowhere is a slip of the pen, no log that cannot be used.
+            if not (Path(log).exists() or all(Path(part).exists() for part in log.split("+"))):
+                raise
+            errors.append(error)
+    if not found:
+        raise errors[0]
+    return found, tuple(f"Left out of the campaign: {error}" for error in errors)
 
 
 def _baseline(

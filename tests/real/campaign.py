@@ -19,7 +19,7 @@ from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, Gain
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
-from ferryid.types import IN_MEMORY
+from ferryid.types import AXES, IN_MEMORY
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
@@ -244,7 +244,13 @@ def _over(test: ConditionTest) -> str:
 def _gains(study: esso.Study) -> list[str]:
     whole = study.gains[esso.MEASURED].total
     rows = {"estimated, steady in every run": study.found.wind.gain, **study.gains}
-    lines = ["| wind | held-out gain [nat] | of the measured wind's |", "|---|---|---|"]
+    factors = ", ".join(f"{axis} {one:.2f}" for axis, one in zip(AXES, study.found.factors, strict=True))
+    lines = [
+        f"Factors on the profile's wind load that are estimated for all runs: {factors}.",
+        "",
+        "| wind | held-out gain [nat] | of the measured wind's |",
+        "|---|---|---|",
+    ]
     return lines + [f"| {name} | {_range(one)} | {100.0 * one.total / whole:.0f} % |" for name, one in rows.items()]
 
 

@@ -34,6 +34,7 @@ AREAS = ESSO.wind
 KINDS = ("random", "zigzag")
 WIND = "wind"
 MEASURED, MEAN = "the measured wind", "its mean over the run"
+SCALED = " with the estimated load factors"
 
 
 def logs(kind: str) -> list[str]:
@@ -66,6 +67,12 @@ class Judged:
     def wind(self) -> ConditionTest:
         """The wind's test."""
         return next(one for one in self.tests if one.effect == WIND)
+
+    @property
+    def factors(self) -> Floats:
+        """Factors on the wind load of all runs that are estimated beside the winds: surge, sway, yaw."""
+        fit = self.wind.fit
+        return fit.campaign.values(fit.common, fit.own[0])[0][0][2:]
 
     @property
     def has_wind(self) -> Flags:
@@ -101,7 +108,8 @@ class Study:
     controls
         What it makes of the same runs with conditions that cannot be true, by what they stand on; empty where not asked for.
     gains
-        Held-out gain of the wind as it was measured over none, and of its mean, under the noise of the estimate; likewise.
+        Held-out gain of the wind as it was measured over none, and of its mean, under the noise of the estimate, with the
+        profile's coefficients and with the estimate's factors on the load; likewise.
     """
 
     names: tuple[str, ...]
@@ -133,7 +141,8 @@ def study(kind: str, *, controlled: bool = True) -> Study:
         found=found,
         controls={name: judged(one, place) for name, one in controls(campaign).items() if controlled},
         gains={
-            name: gain_of(campaign, winds, found.wind)
+            name + of: gain_of(campaign, winds, factors, found.wind)
+            for of, factors in (("", np.ones(3)), (SCALED, found.factors))
             for name, winds in ((MEASURED, hidden), (MEAN, steady))
             if controlled
         },
@@ -195,9 +204,9 @@ def acting(candidate: Candidate, heading: Callable[[Floats], Floats]) -> Candida
     return replace(candidate, effect=replace(candidate.effect, apply=apply))
 
 
-def gain_of(campaign: Campaign, winds: list[Floats], test: ConditionTest) -> Gain:
+def gain_of(campaign: Campaign, winds: list[Floats], factors: Floats, test: ConditionTest) -> Gain:
     """Return the held-out gain over none of known winds, shape (n, 2) of each run, under the noise of a test's estimate."""
-    members = tuple(blown(member, wind) for member, wind in zip(campaign.members, winds, strict=True))
+    members = tuple(blown(member, wind, factors) for member, wind in zip(campaign.members, winds, strict=True))
     made = estimate_campaign(replace(campaign, members=members), noise=test.fit.noise)
     return Gain.of(held_out_loss(made).gain(test.loss[0]))
 
@@ -213,11 +222,14 @@ def hidden_wind(path: str, member: Member) -> Floats:
     return corrected.wind
 
 
-def blown(member: Member, wind: Floats) -> Member:
-    """Return a run without conditions of its own, in whose force model a wind blows, shape (n, 2)."""
-    measurements = member.windows.measurements
-    load = wind_force(AREAS, wind, measurements.psi, measurements.nu)
-    return replace(member, plain=replace(member.plain, external=load), conditions=())
+def blown(member: Member, wind: Floats, factors: Floats) -> Member:
+    """Return a run without conditions of its own, in whose force model a wind blows, shape (n, 2).
+
+    `factors` are those on the load beyond that of still air, shape (3,).
+    """
+    still = member.plain.external
+    load = wind_force(AREAS, wind, member.windows.measurements.psi, member.windows.measurements.nu)
+    return replace(member, plain=replace(member.plain, external=still + factors * (load - still)), conditions=())
 
 
 def bearing(wind: Floats) -> Floats:

@@ -4,8 +4,8 @@ A condition such as a wind is confirmed where logs that have one of their own ar
 out, by an interval that excludes zero, where the evidence speaks for it as it must for any effect, and where both speak for it
 against the same condition on headings that the vessel did not have. A condition and its placebo have as many parameters each,
 so that the difference of their evidence is the logarithm of their odds; it is divided as variances are widened elsewhere. What
-a placebo explains as well is hull or formulas that are off, and must be the smaller part. What is not confirmed may still be
-estimated: it is reported as such.
+a placebo explains as well may be a hull that is guessed from the same logs, and must then be the smaller part. What is not
+confirmed may still be estimated: it is reported as such.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class PlaceboTest:
     evidence
         Logarithm of the evidence over the placebo [nat].
     share
-        Of the condition's evidence over none, what the placebo has too: where hull and formulas are off, both gain by that.
+        Of the condition's evidence over none, what the placebo has too: where a hull that is guessed from the same logs is off,
+        both gain by that. A hull that is known leaves no such part, and it is zero.
     """
 
     gain: Gain
@@ -189,7 +190,7 @@ def _tested(campaign: Campaign, progress: Callable[[str], None]) -> ConditionTes
         for name, placebo in placebos(campaign).items():
             other = estimate_campaign(placebo, noise=made.noise)
             over = gains - held_out_loss(other).gain(loss[0])
-            share = (other.evidence - none.evidence) / evidence
+            share = 0.0 if campaign.hull.known else (other.evidence - none.evidence) / evidence
             against[name] = PlaceboTest(Gain.of(over), made.evidence - other.evidence, share)
     return ConditionTest(campaign.conditions[0].effect.id, made, none, loss, evidence, Gain.of(gains), against)
 

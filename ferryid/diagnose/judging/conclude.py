@@ -43,6 +43,7 @@ def conclude(
     judged: Sequence[JudgedLog],
     baseline: Baseline,
     together: JudgedCampaign | None = None,
+    left_out: tuple[str, ...] = (),
 ) -> tuple[Diagnosis, ...]:
     """Return the diagnoses of the logs of a campaign.
 
@@ -56,6 +57,8 @@ def conclude(
         What they are compared with.
     together
         What the logs of a campaign say together; None of one log.
+    left_out
+        Why other logs of it could not be used, as sentences.
     """
     by_path = {one.selected.path: one for one in judged}
     claims = {
@@ -65,7 +68,7 @@ def conclude(
         )
         for one in logs
     }
-    noted = () if together is None else together.notes
+    noted = (*left_out, *(() if together is None else together.notes))
     same = dict(repeated(logs))
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
     return tuple(

@@ -1,0 +1,94 @@
+"""Several logs of one vessel on the command line: a campaign, what it leaves out, and each log by itself."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ferryid.simulate import parse_scenario, simulate, write_log
+from tests.cli.conftest import Run
+from tests.cli.test_every_command import conforms
+
+pytestmark = pytest.mark.slow
+
+VESSEL = ("--vessel", "milliampere")
+SHORT = Path(__file__).resolve().parents[2] / "fixtures" / "short.mcap"
+SCENARIO = """schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = { kind = "four-corner", dwell_s = 20 }
+controller = { delta = 0.7, sigma = 0.7 }
+environment = { wind = { north_mps = -3.0, east_mps = 2.0 } }
+sensors = { imu_rate_hz = 0.0, camera_rate_hz = 0.0 }
+"""
+
+Command = Callable[..., Run]
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Three logs in one wind that no anemometer measures."""
+    folder, made = tmp_path_factory.mktemp("campaign"), []
+    for seed in (1, 2, 3):
+        scenario = parse_scenario(SCENARIO, f"bag{seed}")
+        silent = replace(scenario, sensors=replace(scenario.sensors, wind_rate_hz=0.0))
+        made.append(folder / f"bag{seed}.mcap")
+        write_log(simulate(silent, seed), made[-1])
+    return made
+
+
+def result(run: Run) -> dict[str, Any]:
+    assert run.code == 0, run.err
+    return dict(json.loads(run.out))
+
+
+def test_a_wind_is_named_in_every_log_of_a_campaign(ferryid: Command, bags: list[Path], tmp_path: Path) -> None:
+    made = result(ferryid("diagnose", *bags, *VESSEL, "--out", tmp_path, "--json", "-"))
+    conforms(json.dumps(made))
+    assert [one["log"] for one in made["logs"]] == ["bag1", "bag2", "bag3"]
+    for one in made["logs"]:
+        (wind,) = (finding for finding in one["findings"] if finding["effect"] == "wind")
+        assert wind["probability"] > 0.9
+        for name, true in (("north", -3.0), ("east", 2.0)):
+            assert wind["parameters"][name]["low"] < true < wind["parameters"][name]["high"]
+            assert wind["parameters"][name]["value"] == pytest.approx(true, abs=0.4)
+        assert any("estimated with one hull for all 3: confirmed" in note for note in one["notes"])
+
+
+def test_each_log_by_itself_has_no_word_of_the_others(ferryid: Command, bags: list[Path], tmp_path: Path) -> None:
+    made = result(ferryid("diagnose", *bags[:2], *VESSEL, "--each", "--out", tmp_path, "--json", "-"))
+    assert not any("for all" in note or "other log" in note for one in made["logs"] for note in one["notes"])
+
+
+def test_what_cannot_be_used_is_left_out_and_the_rest_goes_on(
+    ferryid: Command, bags: list[Path], tmp_path: Path
+) -> None:
+    copy = shutil.copy(bags[0], tmp_path / "copy.mcap")
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("time,temperature\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    run = ferryid("diagnose", *bags[:2], copy, foreign, *VESSEL, "--out", tmp_path)
+    assert run.code == 0, run.err
+    text = " ".join(run.out.split())
+    assert "Left out of the campaign:" in text
+    assert "foreign.csv" in text
+    assert "It holds the motion of bag1.mcap: it is the same recording, and counts once" in text
+    assert "one hull for all 2: confirmed" in text
+
+
+def test_a_path_that_leads_nowhere_is_refused(ferryid: Command, bags: list[Path], tmp_path: Path) -> None:
+    run = ferryid("diagnose", *bags[:2], tmp_path / "nowhere.mcap", *VESSEL, "--out", tmp_path)
+    assert run.code == 2
+    assert "nowhere.mcap: no such file" in run.err
+
+
+def test_logs_of_which_none_can_be_used_are_refused(ferryid: Command, tmp_path: Path) -> None:
+    for name in "ab":
+        (tmp_path / f"{name}.csv").write_text("time,temperature\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    run = ferryid("diagnose", tmp_path / "a.csv", tmp_path / "b.csv", *VESSEL, "--out", tmp_path)
+    assert run.code == 2
+    assert run.err.count("Fix:") == 1
