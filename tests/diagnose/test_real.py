@@ -12,7 +12,7 @@ import pytest
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.data.measurements import read_measurements
 from ferryid.diagnose.inference.campaign import assemble
-from ferryid.diagnose.inference.campaign_estimation import Campaign
+from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.judging.campaign_conditions import judge_conditions
 from ferryid.diagnose.judging.campaign_evidence import MIRRORED
 from ferryid.diagnose.judging.finding import UNKNOWN

@@ -88,7 +88,8 @@ NO_DECISION = {
         diagnose.checks.azimuth_resolution TURNS
         diagnose.checks.contradiction SHIFTS_S MOST_ACTUATORS
         diagnose.checks.kinematics SIZE TINY STEPS
-        diagnose.inference.campaign_estimation ROUNDS SETTLED CONVERGED_GAIN RELAXATION DIFFERENCE_STEP KEPT_SLOPES
+        diagnose.inference.campaign_estimation ROUNDS SETTLED CONVERGED_GAIN RELAXATION KEPT_SLOPES
+        diagnose.inference.campaign_model DIFFERENCE_STEP
         diagnose.inference.campaign_estimation STARTS BEARINGS STEADY_SHARE HALVINGS SCALE_ROUNDS
         diagnose.inference.campaign_properties WEIGHED
         diagnose.inference.change_points LEVELS

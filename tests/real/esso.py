@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.campaign import assemble
-from ferryid.diagnose.inference.campaign_estimation import Campaign, Member, estimate_campaign
+from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
+from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_conditions import WIDTH, ConditionTest, JudgedConditions, judge_conditions

@@ -9,15 +9,8 @@ from math import sqrt
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.diagnose.inference.campaign_estimation import (
-    INDUCED,
-    Campaign,
-    CampaignFit,
-    HullPrior,
-    Member,
-    induced,
-    induced_spread,
-)
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit
+from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, Member, induced, induced_spread
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.stages import AveragedLog

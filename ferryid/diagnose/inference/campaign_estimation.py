@@ -29,25 +29,19 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from ferryid.diagnose.inference.campaign_model import Campaign, Spreads
 from ferryid.diagnose.inference.coloured_noise import ColouredNoise, Runs, fit_coloured_noise
-from ferryid.diagnose.inference.estimation import Candidate, apply_candidates
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.parallel import over
-from ferryid.effects.effect import Parameter
-from ferryid.effects.force_model import COEFFICIENTS, ForceModel
-from ferryid.types import Floats, Ints
+from ferryid.effects.force_model import ForceModel
+from ferryid.types import Floats
 
-INDUCED = ("X_vr", "X_vv")
-"""Drag of drift and turning, beside `COEFFICIENTS`."""
 ROUNDS = 20
 """Most rounds: a Gauss-Newton step each, with the noise and the spreads that the one before left."""
 SETTLED, CONVERGED_GAIN = 0.05, 0.05
 """Change of every spread, as a share of it, and gain of a step below which the rounds end."""
 RELAXATION = 1.8
 """Factor on the logarithm of a spread's change: expectation and maximisation approach their end slowly, and from one side."""
-DIFFERENCE_STEP = 0.02
-"""Of a size, for derivatives."""
 KEPT_SLOPES = 0.02
 """Longest step of a hull's coefficient, in spreads, after which the slopes of the step before still serve."""
 STARTS, BEARINGS = (0.25, 0.6, 1.25), 8
@@ -57,50 +51,6 @@ STEADY_SHARE = 0.1
 HALVINGS = (1.0, 0.5, 0.25, 0.1)
 SCALE_ROUNDS, SCALE_GAPS = 3, 30.0
 """Rounds in which colour and loudness of the noise are found, and how many gaps the belief counts for that all are as loud."""
-
-
-@dataclass(frozen=True)
-class Member:
-    """One log of a vessel: its windows, its force model without effects, and the conditions that it has of its own."""
-
-    windows: Windows
-    plain: ForceModel
-    conditions: tuple[Candidate, ...] = ()
-
-    @cached_property
-    def turn(self) -> Floats | None:
-        """Matrices from the channels of the gaps to the vessel's axes in every window, shape (J, 3, 3); None where they are."""
-        if not self.windows.channels[0]:
-            return None
-        cos, sin = self.windows.mean(np.column_stack(self.windows.measurements.pointing)).T
-        length = np.maximum(np.hypot(cos, sin), 1e-12)
-        turn = np.zeros((len(cos), 3, 3))
-        turn[:, 0, 0] = turn[:, 1, 1] = cos / length
-        turn[:, 0, 1] = sin / length
-        turn[:, 1, 0] = -turn[:, 0, 1]
-        turn[:, 2, 2] = 1.0
-        return turn
-
-    def along(self, gaps: Floats) -> Floats:
-        """Return gaps, (J, 3) or (J, 3, q), along the vessel's axes."""
-        return gaps if self.turn is None else np.asarray(np.einsum("jab,jb...->ja...", self.turn, gaps))
-
-
-@dataclass(frozen=True)
-class HullPrior:
-    """What is believed of the hull before any log: `COEFFICIENTS` and `INDUCED`, mean and standard deviations, shape (h,).
-
-    `known` is False where nobody has modelled it, so that it comes from the logs alone.
-    """
-
-    mean: Floats
-    spread: Floats
-    known: bool = True
-
-    @cached_property
-    def free(self) -> Ints:
-        """Which of them can move."""
-        return np.flatnonzero(self.spread)
 
 
 @dataclass(frozen=True)
@@ -121,141 +71,6 @@ class LogPart:
 
     gaps: Floats
     slopes: Floats
-
-
-@dataclass(frozen=True)
-class Spreads:
-    """Standard deviations between logs: of each condition, in sizes, and of the steady accelerations, shape (3,)."""
-
-    conditions: tuple[float, ...]
-    steady: Floats
-
-
-@dataclass(frozen=True)
-class Campaign:
-    """Logs with the belief about their hull: what is estimated together.
-
-    The vector of all logs, shape (g,), holds the hull in spreads, what conditions share, properties, and the conditions'
-    means, in sizes; that of a log, shape (l,), its conditions' departures from these means, in sizes, and its steady
-    acceleration.
-    """
-
-    members: tuple[Member, ...]
-    hull: HullPrior
-    properties: tuple[Candidate, ...] = ()
-
-    @cached_property
-    def conditions(self) -> tuple[Candidate, ...]:
-        """Every condition that some log has, in a fixed order."""
-        found = {one.key: one for member in self.members for one in member.conditions}
-        return tuple(found[key] for key in sorted(found, key=str))
-
-    @cached_property
-    def shared(self) -> list[tuple[int, Parameter]]:
-        """What conditions share: which condition, and the parameter."""
-        return [
-            (k, one)
-            for k, condition in enumerate(self.conditions)
-            for one in condition.parameters
-            if one.name not in condition.effect.of_log
-        ]
-
-    @cached_property
-    def own(self) -> list[tuple[int, Parameter]]:
-        """What every log has of its own: which condition, and the parameter."""
-        return [
-            (k, one)
-            for k, condition in enumerate(self.conditions)
-            for one in condition.parameters
-            if one.name in condition.effect.of_log
-        ]
-
-    @cached_property
-    def lasting(self) -> list[Parameter]:
-        """Parameters of the properties."""
-        return [one for candidate in self.properties for one in candidate.parameters]
-
-    @property
-    def g(self) -> int:
-        """Length of the vector of all logs."""
-        return len(self.hull.mean) + len(self.shared) + len(self.lasting) + len(self.own)
-
-    @property
-    def l(self) -> int:  # noqa: E743
-        """Length of the vector of a log."""
-        return len(self.own) + 3
-
-    @property
-    def means(self) -> slice:
-        """Where the conditions' means stand in the vector of all logs."""
-        return slice(self.g - len(self.own), self.g)
-
-    def values(self, common: Floats, own: Floats) -> tuple[list[Floats], list[Floats]]:
-        """Return the parameters of the conditions of a log and of the properties, in their units and within their limits."""
-        h, s, p = len(self.hull.mean), len(self.shared), len(self.lasting)
-        shares, means = common[h : h + s], common[self.means] + own[: len(self.own)]
-        conditions = []
-        for k, condition in enumerate(self.conditions):
-            mine = iter(means[[j for j, (of, _) in enumerate(self.own) if of == k]].tolist())
-            others = iter(shares[[j for j, (of, _) in enumerate(self.shared) if of == k]].tolist())
-            z = [next(mine) if one.name in condition.effect.of_log else next(others) for one in condition.parameters]
-            conditions.append(_in_units(condition.parameters, np.array(z)))
-        cuts = np.cumsum([len(one.parameters) for one in self.properties])[:-1].tolist()
-        lasting = np.split(common[h + s : h + s + p], cuts) if self.properties else []
-        return conditions, [_in_units(one.parameters, z) for one, z in zip(self.properties, lasting, strict=True)]
-
-    def force_model(self, i: int, common: Floats, own: Floats) -> ForceModel:
-        """Return a log's force model at an estimate, without its steady acceleration."""
-        member, n = self.members[i], len(COEFFICIENTS)
-        hull = self.hull.mean + self.hull.spread * common[: len(self.hull.mean)]
-        modelled = induced(replace(member.plain, hull=hull[:n]), hull[n:])
-        return self.acted(modelled, member.conditions, common, own)
-
-    def acted(self, modelled: ForceModel, conditions: Sequence[Candidate], common: Floats, own: Floats) -> ForceModel:
-        """Return a force model in which properties and a log's conditions act."""
-        values, lasting = self.values(common, own)
-        here = {one.key: one for one in conditions}
-        candidates = [here[one.key] for one in self.conditions if one.key in here]
-        mine = [p for one, p in zip(self.conditions, values, strict=True) if one.key in here]
-        return apply_candidates(modelled, [*candidates, *self.properties], [*mine, *lasting])
-
-    def gap(self, i: int, common: Floats, own: Floats) -> Floats:
-        """Return the gaps of a log along the vessel's axes, shape (J, 3)."""
-        member = self.members[i]
-        return member.along(member.windows.gap(self.force_model(i, common, own))) + own[-3:]
-
-    def hull_slopes(self, i: int, common: Floats, own: Floats) -> Floats:
-        """Return derivatives of the gaps of a log by the hull in spreads, shape (J, 3, h)."""
-        member, n = self.members[i], len(COEFFICIENTS)
-        slopes = np.zeros((len(member.windows.starts), 3, len(self.hull.mean)))
-        free = self.hull.free[self.hull.free < n]
-        moves = DIFFERENCE_STEP * self.hull.spread[free]
-        changes = member.windows.hull_changes(self.force_model(i, common, own), free, moves)
-        slopes[:, :, free] = member.along(changes) / DIFFERENCE_STEP
-        rest = self.hull.free[self.hull.free >= n]
-        here = self.gap(i, common, own)
-        for k in rest.tolist():
-            slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - here) / DIFFERENCE_STEP
-        return slopes
-
-    def linearised(self, i: int, common: Floats, own: Floats, hull_slopes: Floats) -> tuple[Floats, Floats]:
-        """Return the gaps of a log and their derivatives by both vectors, shapes (J, 3) and (J, 3, g + l)."""
-        gaps, h, m = self.gap(i, common, own), len(self.hull.mean), len(self.own)
-        slopes = np.zeros((*gaps.shape, self.g + self.l))
-        slopes[:, :, :h] = hull_slopes
-        for k in range(h, self.g - m):
-            slopes[:, :, k] = (self.gap(i, _moved(common, k), own) - gaps) / DIFFERENCE_STEP
-        for k in range(m):
-            # A wind near none has no slope to one side of what it has to the other: both count.
-            ahead, astern = (self.gap(i, common, _moved(own, k, sign)) for sign in (1.0, -1.0))
-            slopes[:, :, self.g - m + k] = slopes[:, :, self.g + k] = (ahead - astern) / (2.0 * DIFFERENCE_STEP)
-        slopes[:, :, -3:] = np.eye(3)
-        return gaps, slopes
-
-    def own_precision(self, spreads: Spreads) -> Floats:
-        """Return what is believed of the vector of a log: inverse variances, shape (l,)."""
-        mine = [spreads.conditions[k] for k, _ in self.own]
-        return np.concatenate([mine, spreads.steady]) ** -2.0
 
 
 @dataclass(frozen=True)
@@ -287,11 +102,6 @@ class CampaignFit:
     def normal(self) -> _Eliminated:
         """Normal equations with the logs' own parts eliminated."""
         return _Eliminated.of(self)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The hull's coefficients."""
-        return (*COEFFICIENTS, *INDUCED)
 
     def covariance(self, i: int) -> Floats:
         """Return the posterior covariance of both vectors of a log, shape (g + l, g + l)."""
@@ -420,24 +230,6 @@ class _Eliminated:
             for Q, gradient, back in zip(self.own, self.own_slopes, self.back, strict=True)
         ]
         return step, np.stack(own)
-
-
-def induced(force_model: ForceModel, coefficients: Floats) -> ForceModel:
-    """Return the force model with induced drag in it, from coefficients in the order of `INDUCED`; in still water.
-
-    It is an external force at the measured motion.
-    """
-    _, v, r = force_model.measurements.nu.T
-    X_vr, X_vv = coefficients
-    still = np.zeros_like(v)
-    force = np.column_stack([(X_vr * r + X_vv * v) * v, still, still])
-    return replace(force_model, external=force_model.external + force)
-
-
-def induced_spread(length_m: float, draught_m: float, water_density: float = 1000.0) -> Floats:
-    """Return how large the coefficients of `INDUCED` may be, shape (2,): a flat plate's."""
-    plate = 0.5 * water_density * length_m * draught_m
-    return np.array([plate * length_m / 2.0, plate / 2.0])
 
 
 def estimate_campaign(
@@ -614,14 +406,3 @@ def _spreads(made: CampaignFit, now: Floats) -> tuple[Spreads, float]:
     ratio = np.array([*conditions, *np.sqrt(np.mean(second[:, count:], axis=0))]) / old
     new = old * ratio**RELAXATION
     return Spreads(tuple(new[: len(conditions)].tolist()), new[len(conditions) :]), float(np.abs(ratio - 1.0).max())
-
-
-def _moved(vector: Floats, k: int, sign: float = 1.0) -> Floats:
-    moved = vector.copy()
-    moved[k] += sign * DIFFERENCE_STEP
-    return moved
-
-
-def _in_units(parameters: Sequence[Parameter], z: Floats) -> Floats:
-    limits = np.array([(one.neutral, one.size, one.low, one.high) for one in parameters])
-    return np.asarray(np.clip(limits[:, 0] + limits[:, 1] * z, limits[:, 2], limits[:, 3]))

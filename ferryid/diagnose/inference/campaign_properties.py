@@ -18,12 +18,8 @@ from functools import partial
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ferryid.diagnose.inference.campaign_estimation import (
-    DIFFERENCE_STEP,
-    Campaign,
-    CampaignFit,
-    estimate_campaign,
-)
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_model import DIFFERENCE_STEP, Campaign
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.parallel import over

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from ferryid.diagnose.inference.campaign import CommonHull
-from ferryid.diagnose.inference.campaign_estimation import Campaign
+from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge_conditions, note
 from ferryid.diagnose.judging.campaign_properties import PropertyTest, judge_properties, tested
 from ferryid.diagnose.judging.claims import Claim, Figures

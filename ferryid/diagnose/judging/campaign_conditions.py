@@ -18,7 +18,8 @@ import numpy as np
 
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import CommonHull
-from ferryid.diagnose.inference.campaign_estimation import Campaign, CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.force_errors import mass_of
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.campaign_evidence import (

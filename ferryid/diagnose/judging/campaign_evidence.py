@@ -17,7 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ferryid.diagnose.inference.campaign_estimation import Campaign, CampaignFit, Member
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit
+from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.folds import DRAWS
 from ferryid.diagnose.inference.thresholds import INFERENCE

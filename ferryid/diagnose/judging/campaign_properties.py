@@ -23,10 +23,6 @@ from ferryid.effects.effect import Parameter
 from ferryid.types import AXES, Floats
 
 WIDTH = 1.96
-AT_BOUND = 0.01
-"""Of the range of a parameter: nearer to an end of it than this, the search was stopped by the bound."""
-NEAR_RIVAL = 3.0
-"""Evidence [nat] by which a property must be better than another that was tried in its place."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +100,7 @@ class PropertyTest:
         away = min(max(self.evidence - INFERENCE.prior_odds, -700.0), 700.0)
         probability = 1.0 / (1.0 + exp(-away))
         t = windows.measurements.t
-        near = [one for one in self.rivals if one.delta_score > -NEAR_RIVAL]
+        near = [one for one in self.rivals if one.delta_score > -JUDGING.unresolved_evidence]
         return Finding(
             effect=effect.id,
             instance=self.candidate.instance,
@@ -178,5 +174,5 @@ def _estimate(made: CampaignFit, candidate: Candidate) -> tuple[Floats, Floats]:
 
 
 def _at_bound(parameter: Parameter, value: float) -> bool:
-    near = AT_BOUND * (parameter.high - parameter.low)
+    near = JUDGING.at_bound * (parameter.high - parameter.low)
     return value <= parameter.low + near or value >= parameter.high - near

@@ -141,6 +141,12 @@ class JudgingThresholds:
         "most that a placebo may have too",
         "convention: half; after a wind was confirmed in a towing tank whose placebo explained four fifths of it",
     )
+    at_bound: float = threshold(
+        0.01,
+        "of the range of a parameter",
+        "nearer to an end of it than this, a search was stopped by the bound",
+        "convention: a hundredth",
+    )
     power_in_positions: float = threshold(
         0.5,
         "of what the velocities show",

@@ -12,14 +12,8 @@ import pytest
 
 from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.campaign import CommonHull
-from ferryid.diagnose.inference.campaign_estimation import (
-    INDUCED,
-    Campaign,
-    CampaignFit,
-    HullPrior,
-    Member,
-    estimate_campaign,
-)
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPrior, Member
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_conditions import judge_conditions, note

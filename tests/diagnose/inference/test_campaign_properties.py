@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from ferryid.diagnose.inference.campaign_estimation import Campaign, Member, estimate_campaign
+from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
+from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.campaign_properties import properties_of, score, select_properties
 from ferryid.diagnose.inference.weak_form import Windows
 from ferryid.diagnose.judging.campaign import judge_campaign
