@@ -44,9 +44,12 @@ def test_a_simulation_too_short_to_learn_from(ferryid, fixtures: Path, tmp_path:
 def test_one_bad_log_among_two_is_named(ferryid, fixtures: Path, tmp_path: Path) -> None:
     empty = tmp_path / "empty.mcap"
     empty.write_bytes(b"")
-    run = ferryid("diagnose", fixtures / "short.mcap", empty, "--vessel", "milliampere", "--out", tmp_path / "out")
-    refused(run, "empty.mcap")
-    assert not (tmp_path / "out" / "reports").exists()
+    words = ("diagnose", fixtures / "short.mcap", empty, "--vessel", "milliampere", "--out", tmp_path / "out")
+    run = ferryid(*words)
+    assert run.code == 0, run.err
+    assert "Left out of the campaign:" in run.out
+    assert "empty.mcap" in run.out
+    refused(ferryid(*words, "--each"), "empty.mcap")
 
 
 @pytest.mark.slow

@@ -152,8 +152,12 @@ def osaka() -> str:
     (FOLDER / "diagnosis-esso-osaka-lag.svg").write_text(pictures.lag(lags, random.names), encoding="utf-8")
     seconds = [one.seconds for one in lags]
     by_log = dict(zip(random.names, seconds, strict=True))
+    measured = dict(zip(random.names, random.measured, strict=True))
 
     def judge(one: Diagnosis, finding: Finding) -> str:
+        if finding.effect == "wind":
+            parts = zip(("north", "east"), measured[one.log].tolist(), strict=True)
+            return " ".join(agrees(finding.parameters[way], value, 0.0) for way, value in parts)
         if finding.effect == "clock_offset":
             # Positive where positions are late; the witness is good to a row either way.
             return agrees(finding.parameters["seconds"], -by_log[one.log], 0.1)
