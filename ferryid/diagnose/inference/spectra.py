@@ -51,8 +51,8 @@ class Burst:
         When it is loud [s].
     t, force
         Time [s], shape (m,), and what the band lets through of the force error [N, N, N·m], shape (m, 3).
-    rest
-        Root mean square of the whole force error by axis, shape (3,).
+    whole
+        The force error of all frequencies on the same rows, shape (m, 3) [N, N, N·m].
     in_positions
         Share of it that positions and headings show too, on the axis that shows most, with its standard error: one of a force,
         zero of noise that is in the velocities only. None where there are no positions.
@@ -65,7 +65,7 @@ class Burst:
     intervals: tuple[tuple[float, float], ...]
     t: Floats
     force: Floats
-    rest: Floats
+    whole: Floats
     in_positions: tuple[float, float] | None
 
 
@@ -148,15 +148,14 @@ def _uneven(
             spans[-1] = (spans[-1][0], last)
         elif one:
             spans.append((first, last))
-    shown = None
+    shown, kept = None, [(a, b) for a, b in short.runs if b - a >= 2 * size]
     if positions is not None:
-        kept = [(a, b) for a, b in short.runs if b - a >= 2 * size]
         seen = np.concatenate([_passed(positions[a:b], low_hz, high_hz, step_s) for a, b in kept])
         axis = int(np.argmax(axes))
         shown = shown_share(np.concatenate(forces)[:, axis], seen[:, axis], size)
-    rest = np.sqrt(np.mean(errors**2, axis=0))
+    whole = np.concatenate([errors[a:b] for a, b in kept])
     return Burst(
-        low_hz, high_hz, deviations, axes, tuple(spans), np.concatenate(times), np.concatenate(forces), rest, shown
+        low_hz, high_hz, deviations, axes, tuple(spans), np.concatenate(times), np.concatenate(forces), whole, shown
     )
 
 

@@ -111,7 +111,7 @@ class ConditionTest:
     def doubt(self) -> str:
         """Why it is not confirmed, as the end of a sentence; empty where it is."""
         if self.evidence < INFERENCE.prior_odds:
-            return f"the evidence speaks for it by {self.evidence:.0f} nat only"
+            return f"its evidence over none is {self.evidence:.0f} nat only"
         if self.gain.low <= 0.0:
             return "held-out stretches of the logs are not surely predicted better with it"
         for place, placebo in self.placebos.items():

@@ -64,7 +64,7 @@ class PropertyTest:
         held, logs = self.holding
         worst = int(np.argmin(self.improvement))
         if self.evidence < INFERENCE.prior_odds:
-            return f"the evidence speaks for it by {self.evidence:.0f} nat only"
+            return f"its evidence over none is {self.evidence:.0f} nat only"
         if self.gain.low <= 0.0:
             return "held-out stretches of the logs are not surely predicted better with it"
         if held < JUDGING.campaign_share * logs:

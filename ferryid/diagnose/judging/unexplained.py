@@ -239,9 +239,9 @@ def _in_bursts(burst: Burst) -> Finding:
     when = f", strongest at {', '.join(spans)}{more}" if spans else ""
     unit = FORCE[axis]
     inside = [(burst.t >= first) & (burst.t <= last) for first, last in burst.intervals]
-    loud = burst.force[np.any(inside, axis=0), axis] if inside else burst.force[:, axis]
-    size = float(np.sqrt(np.mean(loud**2)))
-    share = size / max(float(burst.rest[axis]), 1e-300)
+    rows = np.any(inside, axis=0) if inside else np.ones(len(burst.t), dtype=np.bool_)
+    size, whole = (float(np.sqrt(np.mean(one[rows, axis] ** 2))) for one in (burst.force, burst.whole))
+    share = size / max(whole, 1e-300)
     return Finding(
         effect=UNKNOWN,
         instance=None,
@@ -250,7 +250,7 @@ def _in_bursts(burst: Burst) -> Finding:
         axes=dict(zip(AXES, burst.shares.tolist(), strict=True)),
         intervals=burst.intervals,
         says=f"An unsteady disturbance acts in bursts of {band}, most in {AXES[axis]} ({size:.2g} {unit} RMS, "
-        f"{100.0 * share:.0f} % of all that is left there){when}; no law of "
+        f"{100.0 * share:.0f} % of all that is left then){when}; no law of "
         "the vessel's motion explains it.",
         evidence={"t": burst.t, "before": burst.force[:, axis]},
         labels={"residual": f"{AXES[axis]} {'moment' if axis == 2 else 'force'}, {band} [{unit}]"},
