@@ -92,7 +92,8 @@ class PropertyTest:
         effect = self.candidate.effect
         says = effect.says({name: one.value for name, one in self.estimates.items()}, self.candidate.instance)
         held, logs = self.holding
-        says += f" So it is in all {counted(logs, 'log')} together, of which {held} are predicted better with it on held-out stretches."
+        says += f" So it is in all {counted(logs, 'log')} together, of which {held} are predicted better with it on held-out"
+        says += " stretches."
         if not self.confirmed:
             says += f" It is estimated, not confirmed: {self.doubt}."
         gained = np.maximum(self.improvement, 0.0)
