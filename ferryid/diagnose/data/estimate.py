@@ -13,3 +13,8 @@ class Estimate:
     low: float
     high: float
     unit: str
+
+    @classmethod
+    def normal(cls, value: float, error: float, unit: str) -> Estimate:
+        """Return an estimate whose error is normal, with this standard deviation."""
+        return cls(value, value - 1.96 * error, value + 1.96 * error, unit)

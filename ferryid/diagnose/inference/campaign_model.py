@@ -33,24 +33,6 @@ class Member:
     plain: ForceModel
     conditions: tuple[Candidate, ...] = ()
 
-    @cached_property
-    def turn(self) -> Floats | None:
-        """Matrices from the channels of the gaps to the vessel's axes in every window, shape (J, 3, 3); None where they are."""
-        if not self.windows.channels[0]:
-            return None
-        cos, sin = self.windows.mean(np.column_stack(self.windows.measurements.pointing)).T
-        length = np.maximum(np.hypot(cos, sin), 1e-12)
-        turn = np.zeros((len(cos), 3, 3))
-        turn[:, 0, 0] = turn[:, 1, 1] = cos / length
-        turn[:, 0, 1] = sin / length
-        turn[:, 1, 0] = -turn[:, 0, 1]
-        turn[:, 2, 2] = 1.0
-        return turn
-
-    def along(self, gaps: Floats) -> Floats:
-        """Return gaps, (J, 3) or (J, 3, q), along the vessel's axes."""
-        return gaps if self.turn is None else np.asarray(np.einsum("jab,jb...->ja...", self.turn, gaps))
-
 
 @dataclass(frozen=True)
 class HullPrior:
@@ -168,7 +150,7 @@ class Campaign:
     def gap(self, i: int, common: Floats, own: Floats) -> Floats:
         """Return the gaps of a log along the vessel's axes, shape (J, 3)."""
         member = self.members[i]
-        return member.along(member.windows.gap(self.force_model(i, common, own))) + own[-3:]
+        return member.windows.along_vessel(member.windows.gap(self.force_model(i, common, own))) + own[-3:]
 
     def hull_slopes(self, i: int, common: Floats, own: Floats) -> Floats:
         """Return derivatives of the gaps of a log by the hull in spreads, shape (J, 3, h)."""
@@ -177,7 +159,7 @@ class Campaign:
         free = self.hull.free[self.hull.free < n]
         moves = DIFFERENCE_STEP * self.hull.spread[free]
         changes = member.windows.hull_changes(self.force_model(i, common, own), free, moves)
-        slopes[:, :, free] = member.along(changes) / DIFFERENCE_STEP
+        slopes[:, :, free] = member.windows.along_vessel(changes) / DIFFERENCE_STEP
         rest = self.hull.free[self.hull.free >= n]
         here = self.gap(i, common, own)
         for k in rest.tolist():

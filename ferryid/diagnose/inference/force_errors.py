@@ -21,11 +21,7 @@ def position_errors(windows: Windows, force_model: ForceModel, plain: ForceModel
     """Return the same as the positions and headings show it, shape (J, 3); None where there are none."""
     if not windows.channels[0]:
         return None
-    cos, sin = windows.mean(np.column_stack(windows.measurements.pointing)).T
-    length = np.maximum(np.hypot(cos, sin), 1e-12)
-    north, east, turning = windows.gap(force_model).T
-    along = np.column_stack([(cos * north + sin * east) / length, (cos * east - sin * north) / length, turning])
-    return np.asarray(along @ mass_of(plain.hull).T)
+    return np.asarray(windows.along_vessel(windows.gap(force_model)) @ mass_of(plain.hull).T)
 
 
 def mass_of(hull: Floats) -> Floats:

@@ -14,6 +14,7 @@ Shinbrot (1957); Messenger and Bortz (2021), Weak SINDy, for the choice of test 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,24 @@ class Windows:
         turned = rates[:, :, None].copy()
         to_ground(turned, *self.measurements.pointing)
         return turned[:, :, 0]
+
+    @cached_property
+    def turn(self) -> Floats | None:
+        """Matrices from the channels to the vessel's axes in every window, shape (J, 3, 3); None where they are the same."""
+        if not self.channels[0]:
+            return None
+        cos, sin = self.mean(np.column_stack(self.measurements.pointing)).T
+        length = np.maximum(np.hypot(cos, sin), 1e-12)
+        turn = np.zeros((len(cos), 3, 3))
+        turn[:, 0, 0] = turn[:, 1, 1] = cos / length
+        turn[:, 0, 1] = sin / length
+        turn[:, 1, 0] = -turn[:, 0, 1]
+        turn[:, 2, 2] = 1.0
+        return turn
+
+    def along_vessel(self, gaps: Floats) -> Floats:
+        """Return gaps on the channels, (J, 3) or (J, 3, q), along the vessel's axes."""
+        return gaps if self.turn is None else np.asarray(np.einsum("jab,jb...->ja...", self.turn, gaps))
 
     def hull_changes(self, force_model: ForceModel, places: Ints, moves: Floats) -> Floats:
         """Return by how much `gap` changes if coefficients of the hull move one by one, shape (J, channels, q).

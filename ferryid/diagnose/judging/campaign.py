@@ -11,6 +11,11 @@ from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge
 from ferryid.diagnose.judging.campaign_properties import PropertyTest, judge_properties, tested
 from ferryid.diagnose.judging.claims import Claim, Figures
 
+NO_MODEL = (
+    "No model is stored of a campaign: ferryid fit makes one of these logs, and ferryid diagnose --each one with the findings "
+    "of each."
+)
+
 
 @dataclass(frozen=True)
 class JudgedCampaign:
@@ -35,7 +40,8 @@ class JudgedCampaign:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was tested over all logs, as sentences."""
-        return tuple(note(one, len(self.hull.place)) for one in self.conditions.tests)
+        tests = (note(one, len(self.hull.place)) for one in self.conditions.tests)
+        return (*tests, NO_MODEL)
 
     def claims(self, path: str) -> tuple[Claim, ...]:
         """Return what all logs together say of one of them, as findings."""

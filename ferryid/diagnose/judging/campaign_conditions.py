@@ -36,8 +36,6 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.types import AXES, Floats
 
-WIDTH = 1.96
-
 
 @dataclass(frozen=True)
 class PlaceboTest:
@@ -211,7 +209,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         return None
     error = np.sqrt(np.diag(covariance))
     estimates = {
-        one.name: Estimate(float(at), float(at - WIDTH * e), float(at + WIDTH * e), one.unit)
+        one.name: Estimate.normal(float(at), float(e), one.unit)
         for one, at, e in zip(parameters, value, error, strict=True)
     }
     improvement = _improvement(test, i)

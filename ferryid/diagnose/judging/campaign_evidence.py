@@ -20,7 +20,7 @@ import numpy as np
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.estimation import Candidate
-from ferryid.diagnose.inference.folds import DRAWS
+from ferryid.diagnose.inference.folds import draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel
@@ -47,8 +47,7 @@ class HeldOutLoss:
 
 def interval(gains: Floats) -> tuple[float, float]:
     """Return the 95 % block-bootstrap interval of a sum of gains, shape (blocks,)."""
-    drawn = np.random.default_rng(0).integers(0, len(gains), size=(DRAWS, len(gains)))
-    low, high = np.quantile(gains[drawn].sum(axis=1), [0.025, 0.975])
+    low, high = np.quantile(draws(np.arange(len(gains))) @ gains, [0.025, 0.975])
     return float(low), float(high)
 
 

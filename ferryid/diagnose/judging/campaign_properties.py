@@ -22,8 +22,6 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects.effect import Parameter
 from ferryid.types import AXES, Floats
 
-WIDTH = 1.96
-
 
 @dataclass(frozen=True)
 class PropertyTest:
@@ -145,7 +143,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredPrope
     return PropertyTest(
         candidate,
         {
-            one.name: Estimate(float(at), float(at - WIDTH * e), float(at + WIDTH * e), one.unit)
+            one.name: Estimate.normal(float(at), float(e), one.unit)
             for one, at, e in zip(candidate.parameters, value, error, strict=True)
         },
         evidence,
