@@ -1,0 +1,48 @@
+"""A campaign on page, terminal and in JSON: what all logs share stands once, what is one log's stays with it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.report.diagnosis_page import as_text
+from ferryid.report.diagnosis_report import report
+from tests.report.test_diagnosis import conforms, diagnosis, gain, wind
+
+SHARED = "thruster1 gives 85 % of the force that its speed promises."
+
+
+def campaign() -> list[Diagnosis]:
+    """Return two logs of one weak thruster, each with a figure of a wind in the same words."""
+    weak = replace(gain(), onset_s=None, evidence={"t": gain().evidence["t"]}, labels={})
+    return [replace(diagnosis("partly_explained", log), findings=(wind(), weak)) for log in ("first", "second")]
+
+
+def test_what_all_logs_share_stands_once(tmp_path: Path) -> None:
+    made = report(campaign(), tmp_path)
+    text, page = as_text(campaign()), made.report.read_text(encoding="utf-8")
+    assert text.count(SHARED) == page.count(SHARED) == 1
+    assert text.index("In all logs:") < text.index(SHARED) < text.index("first:")
+    assert page.index("<h2>In all logs</h2>") < page.index(SHARED) < page.index('id="log-1"')
+    data = json.loads((made.report.parent / "diagnosis.json").read_text(encoding="utf-8"))
+    conforms(data)
+    assert [(one["effect"], one["log"]) for one in data["findings"]] == [
+        ("thruster_gain", None),
+        ("wind", "first"),
+        ("wind", "second"),
+    ]
+    # The diagnosis of each log is whole.
+    assert [len(one["findings"]) for one in data["logs"]] == [2, 2]
+
+
+def test_what_has_a_figure_stays_with_its_log(tmp_path: Path) -> None:
+    made = report(campaign(), tmp_path)
+    assert as_text(campaign()).count(wind().says) == 2
+    for log in (1, 2):
+        assert (made.report.parent / f"{log}-finding-1-evidence.svg").exists()
+
+
+def test_a_single_log_shares_nothing() -> None:
+    assert "In all logs" not in as_text(campaign()[:1])
