@@ -102,6 +102,11 @@ def find_unexplained(
             claims.append(Claim(_unsteady(refitted, left), Figures("unsteady")))
         else:
             uneven = False
+            axis = AXES[int(np.argmax(left.shares))]
+            notes.append(
+                f"In the velocities the error comes and goes, most in {axis}, and the positions do not show the same: "
+                "it may be noise of a sensor."
+            )
     return Unexplained(tuple(claims), left, uneven, tuple(notes))
 
 
