@@ -104,7 +104,7 @@ def find_unexplained(
             uneven = False
             axis = AXES[int(np.argmax(left.shares))]
             notes.append(
-                f"In the velocities the error comes and goes, most in {axis}, and the positions do not show the same: "
+                f"In the velocities the error comes and goes, most in {axis}, and no position shows the same: "
                 "it may be noise of a sensor."
             )
     return Unexplained(tuple(claims), left, uneven, tuple(notes))
