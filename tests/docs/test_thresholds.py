@@ -23,8 +23,6 @@ NO_DECISION = {
         signals.sampling GRAVITY
         signals.kalman WINDOW_PER_TIME
         effects.payload WATER WATERPLANE
-        diagnose.judging.campaign_conditions WIDTH
-        diagnose.judging.campaign_properties WIDTH
         identify.adaptive.averaging NORMAL_95
         identify.free_run_checks _DEGREES
         identify.split _GOLDEN

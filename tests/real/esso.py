@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from ferryid.diagnose.checks import examine
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
@@ -17,7 +18,7 @@ from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.weak_form import windows
-from ferryid.diagnose.judging.campaign_conditions import WIDTH, ConditionTest, JudgedConditions, judge_conditions
+from ferryid.diagnose.judging.campaign_conditions import ConditionTest, JudgedConditions, judge_conditions
 from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, Gain, held_out_loss, turned
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import no_progress
@@ -91,7 +92,7 @@ class Judged:
 
     def inside(self, measured: Floats) -> Flags:
         """Return which measured components lie in the 95 % intervals, shape (runs, 2)."""
-        return np.asarray(np.abs(self.winds - measured) < WIDTH * self.errors)
+        return np.asarray(np.abs(self.winds - measured) < norm.ppf(0.975) * self.errors)
 
 
 @dataclass(frozen=True)
