@@ -165,12 +165,17 @@ def _lines(text: str) -> list[str]:
 
 def _header(text: str) -> list[str]:
     first = next(iter(_lines(text)), "")
-    return _cells(first)
+    return _cells(first, _separator(first))
 
 
-def _cells(line: str) -> list[str]:
+def _separator(header: str) -> str:
+    """Return what separates the cells of a table with this header: a semicolon where spreadsheets write decimal commas."""
+    return ";" if ";" in header and "," not in header else ","
+
+
+def _cells(line: str, separator: str = ",") -> list[str]:
     try:
-        return [cell.strip() for cell in next(csv.reader([line]), [])]
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
     except csv.Error:  # a cell of more than 128 KiB
         return []
 
@@ -183,12 +188,13 @@ def _refuse_without_log(path: Path, lines: Sequence[str]) -> None:
     FerryIdError
         With the columns found.
     """
-    header = _cells(lines[0]) if lines else []
+    separator = _separator(lines[0]) if lines else ","
+    header = _cells(lines[0], separator) if lines else []
     if (len(header) < 2 and ",".join(header).lower() not in _LIKE_LOG) or any(
         _placed_log(path, cell) for cell in header
     ):
         return
-    rows = [_cells(line) for line in lines[1:20]]
+    rows = [_cells(line, separator) for line in lines[1:20]]
     names_logs = any(_placed_log(path, cell) for row in rows for cell in row)
     of_manifest = set(COLUMNS) & set(header) and not any(_is_number(cell) for row in rows for cell in row[1:])
     if rows and (names_logs or of_manifest):
@@ -229,7 +235,8 @@ def _table(path: Path, text: str, vessel: str | None, tell: Callable[[str], None
     unused = [name for name in header if name not in COLUMNS]
     if unused:
         tell(f"{path}: columns that are not used: {', '.join(unused)}")
-    rows = csv.reader(line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    rows = csv.reader(lines, delimiter=_separator(lines[0]))
     for number, cells in enumerate(_parsed(path, rows), 1):
         if number == 1:
             continue

@@ -80,6 +80,15 @@ def test_a_table_with_vessel_date_and_note(season: Path) -> None:
     ]
 
 
+def test_a_table_with_semicolons(season: Path) -> None:
+    (season / "list.csv").write_text('log;note\na.mcap;"calm, warm; dry"\nb.mcap;\n', encoding="utf-8")
+    entries = entries_of(["season/list.csv"], "milliampere", lambda line: None)
+    assert [(one.log, one.note) for one in entries] == [
+        ("season/a.mcap", "calm, warm; dry"),
+        ("season/b.mcap", ""),
+    ]
+
+
 def test_a_log_in_text_form_is_no_list(season: Path) -> None:
     for name, text in (("log.txt", "0 1 2\n1 2 3\n"), ("log.csv", "time [s],u [m/s]\n0,1\n")):
         (season / name).write_text(text, encoding="utf-8")
@@ -101,6 +110,10 @@ def test_a_log_in_text_form_is_no_list(season: Path) -> None:
             r'a manifest needs the column "log" .*, found the columns file, vessel\. Fix: rename the column "file"',
         ),
         ("date,vessel\n2024-05-17,x\n", r"a manifest needs .*, found the columns date, vessel\. Fix: add the column"),
+        (
+            "file;vessel\na.mcap;x\n",
+            r'a manifest needs the column "log" .*, found the columns file, vessel\. Fix: rename',
+        ),
         ("path\na.mcap\n", r'a manifest needs .* found the columns path\. Fix: rename the column "path" to log'),
         ('log,note\na.mcap,"' + "x" * 140_000 + '"\n', r"the manifest cannot be read, field larger"),
         ("log\n" + "x" * 5000 + "\n", r"names what cannot be a file .* Fix: correct the path"),
