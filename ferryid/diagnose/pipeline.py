@@ -175,9 +175,9 @@ def diagnose_and_store(
     if name:
         check_name(name)
     found = diagnose(logs, profile, settings, run)
-    # Of logs that share one hull, and of a simulation, no model comes.
     learner = None
-    if (settings.each or len(logs) < 2) and settings.against is None:
+    # Of a simulation no model comes.
+    if settings.against is None:
         seen = without_withheld(profile, settings.withhold)
-        learner = Learner(tuple(logs), seen, settings.model, run)
+        learner = Learner(tuple(one.path for one in found if not one.copy), seen, settings.model, run)
     return store_updated_model(found, profile, settings.model, run.out, name=name, learner=learner)

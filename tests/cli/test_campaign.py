@@ -47,7 +47,9 @@ def result(run: Run) -> dict[str, Any]:
     return dict(json.loads(run.out))
 
 
-def test_a_wind_is_named_in_every_log_of_a_campaign(ferryid: Command, bags: list[Path], tmp_path: Path) -> None:
+def test_a_wind_is_named_in_every_log_of_a_campaign_and_kept_in_its_model(
+    ferryid: Command, bags: list[Path], tmp_path: Path
+) -> None:
     made = result(ferryid("diagnose", *bags, *VESSEL, "--out", tmp_path, "--json", "-"))
     conforms(json.dumps(made))
     assert [one["log"] for one in made["logs"]] == ["bag1", "bag2", "bag3"]
@@ -58,6 +60,21 @@ def test_a_wind_is_named_in_every_log_of_a_campaign(ferryid: Command, bags: list
             assert wind["parameters"][name]["low"] < true < wind["parameters"][name]["high"]
             assert wind["parameters"][name]["value"] == pytest.approx(true, abs=0.4)
         assert any("estimated with one hull for all 3: confirmed" in note for note in one["notes"])
+    model = json.loads(Path(made["model"]).read_text("utf-8"))
+    assert [one["name"] for one in model["training"]] == ["bag1", "bag2", "bag3"]
+    for one, log in zip(model["conditions"], made["logs"], strict=True):
+        (stored,) = (effect for effect in one["effects"] if effect["effect"] == "wind")
+        (wind,) = (finding for finding in log["findings"] if finding["effect"] == "wind")
+        assert {name: stored["parameters"][name]["value"] for name in ("north", "east")} == {
+            name: wind["parameters"][name]["value"] for name in ("north", "east")
+        }
+    # Its wind acts in the log in which it blew, and predicts it better than the profile's hull does.
+    evaluated = result(ferryid("evaluate", made["model"], bags[0], "--out", tmp_path, "--json", "-"))
+    (log,) = evaluated["logs"]
+    assert [one["effect"] for one in log["effects"]["conditions"]] == ["wind"]
+    (left_out,) = log["effects"]["left_out"]
+    assert left_out == "Steady wind of bag2 and 1 other log does not act here: conditions are those of one log."
+    assert log["mse"]["model"]["sway"] < 0.5 * log["mse"]["base"]["sway"]
 
 
 def test_each_log_by_itself_has_no_word_of_the_others(ferryid: Command, bags: list[Path], tmp_path: Path) -> None:

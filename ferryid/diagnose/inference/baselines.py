@@ -90,7 +90,7 @@ class CampaignBaseline:
     hull: CommonHull
     model: Model | None = None
     joint: bool = True
-    updates_model: bool = False  # The lift of a common hull is in no model file.
+    updates_model: bool = True
 
     @property
     def hull_known(self) -> bool:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from ferryid.diagnose.inference.campaign import CommonHull
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.judging.campaign_conditions import JudgedConditions, judge_conditions, note
 from ferryid.diagnose.judging.campaign_properties import PropertyTest, judge_properties, tested
 from ferryid.diagnose.judging.claims import Claim, Figures
-
-NO_MODEL = (
-    "No model is stored of a campaign: ferryid fit makes one of these logs, and ferryid diagnose --each one with the findings "
-    "of each."
-)
+from ferryid.diagnose.judging.posterior import HullPosterior
+from ferryid.effects.force_model import COEFFICIENTS
 
 
 @dataclass(frozen=True)
@@ -37,11 +35,19 @@ class JudgedCampaign:
         """The common hull, with what is confirmed beside it."""
         return self.conditions.hull
 
+    @cached_property
+    def hull_posterior(self) -> HullPosterior | None:
+        """What all logs say of a hull that was known before; None of a guessed one, which has drag that no model file has."""
+        prior, h = self.hull.fit.campaign.hull, len(COEFFICIENTS)
+        if not prior.known:
+            return None
+        mean, covariance = self.hull.fit.belief()
+        return HullPosterior(prior.mean[:h], prior.spread[:h], mean[:h], covariance[:h, :h])
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What was tested over all logs, as sentences."""
-        tests = (note(one, len(self.hull.place)) for one in self.conditions.tests)
-        return (*tests, NO_MODEL)
+        return tuple(note(one, len(self.hull.place)) for one in self.conditions.tests)
 
     def claims(self, path: str) -> tuple[Claim, ...]:
         """Return what all logs together say of one of them, as findings."""

@@ -17,6 +17,7 @@ from ferryid.diagnose.inference.estimation import EstimationProblem, Fit, fitted
 from ferryid.diagnose.inference.force_errors import force_errors, mass_of
 from ferryid.diagnose.inference.stages import AveragedLog, Baseline
 from ferryid.diagnose.judging.campaign import JudgedCampaign
+from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
 from ferryid.diagnose.judging.claims import Claim, Key, LogFigures
 from ferryid.diagnose.judging.confidence_rules import apply_rules, lasting, log_notes
 from ferryid.diagnose.judging.detection_power import (
@@ -72,11 +73,28 @@ def conclude(
     same = dict(repeated(logs))
     campaign = tuple(_lasting(claims[one.path]) for one in logs) if baseline.joint else ()
     return tuple(
-        _concluded(by_path[one.path], claims[one.path], campaign, (*_copied(same.get(one.path)), *noted))
-        if one.path in by_path
-        else _too_short(one, claims[one.path], baseline, campaign, (*_copied(same.get(one.path)), *noted))
+        _with_origin(
+            _concluded(by_path[one.path], claims[one.path], campaign, (*_copied(same.get(one.path)), *noted))
+            if one.path in by_path
+            else _too_short(one, claims[one.path], baseline, campaign, (*_copied(same.get(one.path)), *noted)),
+            one,
+            together,
+            same.get(one.path),
+        )
         for one in logs
     )
+
+
+def _with_origin(
+    diagnosis: Diagnosis, log: AveragedLog, together: JudgedCampaign | None, copied: str | None
+) -> Diagnosis:
+    """Return a diagnosis with the path of its log, and with what the log teaches as one of a campaign."""
+    diagnosis = replace(diagnosis, path=log.path, copy=copied is not None)
+    if together is None:
+        return diagnosis
+    survey = log.screened.measured.survey
+    posterior = campaign_posterior(together, log.path, diagnosis.posterior, diagnosis.findings, survey)
+    return replace(diagnosis, posterior=posterior)
 
 
 def _copied(other: str | None) -> tuple[str, ...]:

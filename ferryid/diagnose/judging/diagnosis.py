@@ -91,8 +91,7 @@ class Diagnosis:
         The simulation that a recording was compared with, as
         `ferryid.diagnose.inference.simulation_baseline.simulation_as_json` gives it, or empty.
     posterior
-        What a model can learn from it; None where it found no force left out, was held against a simulation, or shares
-        the hull of other logs.
+        What a model can learn from it; None where it found no force left out, or was held against a simulation.
     located
         Where and when the recording and the model differ.
     moved
@@ -105,6 +104,10 @@ class Diagnosis:
         Rows of the log that are not used, by reason.
     learned
         What a fit learned beside the findings; None where nothing was to be learned.
+    path
+        Of the log, as it was given.
+    copy
+        True for a log that holds the motion of another one before it.
     """
 
     log: str
@@ -125,6 +128,8 @@ class Diagnosis:
     remainder: Remainder = field(default_factory=Remainder)
     left_out: tuple[LeftOut, ...] = ()
     learned: Learned | None = None
+    path: str = ""
+    copy: bool = False
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -145,6 +145,9 @@ class Learner:
                 found, after, verdict, best = other, second, new, second
                 what = "A correction learned beside the effects on the hull as it was before the diagnosis"
         stored = diagnosed
+        if stored is not None and stored.scores is None:
+            # Of logs that are too short for figures of their own.
+            stored = replace(stored, scores=_scores(before, known, found.outcome))
         if verdict.accepted:
             stored = replace(found.model, accepted=True, scores=_scores(before, after, found.outcome))
         over_fit = _over(best, fitted)

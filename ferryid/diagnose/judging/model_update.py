@@ -15,7 +15,7 @@ from ferryid import __version__
 from ferryid.counts import counted
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.learning import Learner
-from ferryid.diagnose.judging.posterior import Posterior
+from ferryid.diagnose.judging.posterior import HullPosterior, Posterior
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.effects import effects
 from ferryid.effects.force_model import COEFFICIENTS, UNITS
@@ -66,6 +66,12 @@ def store_updated_model(
         made, learned = learner.learn(made, name)
         notes = (*notes, learned.says)
         diagnoses = [replace(one, learned=learned) for one in diagnoses]
+        if made is not None and not (learned.accepted or made.hull or made.terms or profile.hull.has_model):
+            # Effects without a hull predict nothing.
+            made = None
+    if made is not None and made.scores is None:
+        # Nothing was judged.
+        made = None
     path = None
     if made is not None:
         with alone(out / "models"):
@@ -91,14 +97,11 @@ def update_model(
     if not logs:
         return None, ()
     vessel, notes = _properties(logs, profile)
-    verdict, scores = _scores([one for one in diagnoses if one.posterior is not None], logs)
+    judged = [one for one in diagnoses if one.posterior is not None and one.before.get("mse")]
+    # Logs that are short have no figures of their own.
+    verdict, scores = _scores(judged) if judged else (None, None)
     start = blank_model(profile, name) if model is None else replace(model, name=name)
-    hull, covariance = _hull(logs)
-    if model is not None and model.vessel_effects:
-        # The force model that was refitted had these effects in it, which multiply coefficients and come on top again.
-        known = ModelForces(model)
-        factor = np.divide(known.altered_hull(), known.hull, out=np.ones_like(hull), where=known.hull != 0.0)
-        hull, covariance = hull / factor, covariance / np.outer(factor, factor)
+    refitted = [one.hull for one in logs if one.hull is not None]
     diagnosed_from = profile.name if model is None else model.label
     made = replace(
         start,
@@ -109,23 +112,35 @@ def update_model(
         ranges=start.ranges or _spanned([one.ranges for one in logs]),
         training=_trained(start, logs),
         scores=scores,
-        accepted=verdict.accepted and bool(vessel),
-        hull=_quantities(hull, covariance),
+        accepted=verdict is not None and verdict.accepted and bool(vessel),
+        hull=_refitted(refitted, model) if len(refitted) == len(logs) else start.hull,
         vessel_effects=_composed(start.vessel_effects, vessel, profile),
         conditions=_added(start.conditions, logs),
     )
     return made, notes
 
 
-def _hull(logs: Sequence[Posterior]) -> tuple[Floats, Floats]:
+def _refitted(logs: Sequence[HullPosterior], model: Model | None) -> dict[str, Quantity]:
+    """Return the hull that all logs speak for, beside the effects that the examined model has."""
+    hull, covariance = _hull(logs)
+    if model is not None and model.vessel_effects:
+        # The force model that was refitted had these effects in it, which multiply coefficients and come on top again.
+        known = ModelForces(model)
+        factor = np.divide(known.altered_hull(), known.hull, out=np.ones_like(hull), where=known.hull != 0.0)
+        hull, covariance = hull / factor, covariance / np.outer(factor, factor)
+    return _quantities(hull, covariance)
+
+
+def _hull(logs: Sequence[HullPosterior]) -> tuple[Floats, Floats]:
     """Return the hull that all logs together speak for, and its covariance; what was believed before counts once.
 
     The posterior of each log is a Gaussian; what the log adds to what was believed before is the difference of their
     precisions, and those of several logs add up.
     """
     free = logs[0].spread > 0.0
-    hull, covariance = logs[0].hull.copy(), logs[0].covariance.copy()
-    if len(logs) == 1:
+    hull, covariance = logs[0].mean.copy(), logs[0].covariance.copy()
+    if all(one is logs[0] for one in logs):
+        # One log, or one estimate from all of them.
         return hull, covariance
     place = np.ix_(free, free)
     prior = np.diag(logs[0].spread[free] ** -2.0)
@@ -134,7 +149,7 @@ def _hull(logs: Sequence[Posterior]) -> tuple[Floats, Floats]:
         own = np.diag(one.spread[free] ** -2.0)
         after = np.linalg.inv(one.covariance[place])
         precision += after - own
-        weighed += after @ one.hull[free] - own @ one.before[free]
+        weighed += after @ one.mean[free] - own @ one.before[free]
     covariance[place] = np.linalg.inv(precision)
     hull[free] = covariance[place] @ weighed
     return hull, covariance
@@ -193,8 +208,10 @@ def _together(found: Sequence[StoredEffect]) -> StoredEffect:
 
     Where the logs differ by more than their intervals say, the interval of the mean is widened by as much; Birge (1932).
     """
-    if len(found) == 1:
-        return found[0]
+    sources = tuple(source for stored in found for source in stored.sources)
+    if all(one.parameters == found[0].parameters for one in found):
+        # One log, or one estimate from all of them.
+        return replace(found[0], sources=sources)
     parameters = {}
     for name, one in found[0].parameters.items():
         several = [stored.parameters[name] for stored in found]
@@ -205,7 +222,6 @@ def _together(found: Sequence[StoredEffect]) -> StoredEffect:
         excess = float(np.sum(weight * (values - mean) ** 2)) / (len(found) - 1)
         end = 1.96 * sqrt(max(1.0, excess) / float(np.sum(weight)))
         parameters[name] = Quantity(mean, mean - end, mean + end, one.unit)
-    sources = tuple(source for stored in found for source in stored.sources)
     return replace(found[0], parameters=parameters, sources=sources)
 
 
@@ -257,7 +273,7 @@ def _spanned(several: Sequence[Mapping[str, tuple[float, float]]]) -> dict[str, 
     return {name: (min(one[name][0] for one in several), max(one[name][1] for one in several)) for name in several[0]}
 
 
-def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[Acceptance, ModelScores]:
+def _scores(diagnoses: Sequence[Diagnosis]) -> tuple[Acceptance, ModelScores]:
     """Return held-out force errors without and with the findings, pooled over logs, as a model file has its scores."""
     weights = np.array([float(one.before.get("rows", 0)) for one in diagnoses])
     weights = weights / weights.sum() if weights.sum() > 0.0 else np.full(len(diagnoses), 1.0 / len(diagnoses))
@@ -271,7 +287,7 @@ def _scores(diagnoses: Sequence[Diagnosis], logs: Sequence[Posterior]) -> tuple[
     scores = ModelScores(
         ForceScores(before, after, unknown, unknown, ratio, verdict.normalised_mse),
         rows=sum(int(one.before.get("rows", 0)) for one in diagnoses),
-        seconds=sum(float(str(log.training["seconds"])) for log in logs),
+        seconds=sum(float(str(one.posterior.training["seconds"])) for one in diagnoses if one.posterior),
         split="blocks",
         split_notes=("Of windows of the weak form, held out in contiguous blocks; with the conditions of each log.",),
     )

@@ -22,6 +22,24 @@ IN_THE_HULL = "hull_parameters"
 
 
 @dataclass(frozen=True)
+class HullPosterior:
+    """What is believed of the hull's coefficients.
+
+    Attributes
+    ----------
+    before, spread
+        Mean and standard deviations before the log, shape (26,) each.
+    mean, covariance
+        After it, shapes (26,) and (26, 26).
+    """
+
+    before: Floats
+    spread: Floats
+    mean: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True)
 class Posterior:
     """What one log teaches.
 
@@ -31,24 +49,19 @@ class Posterior:
         The log, as a model file lists what it was trained on.
     ranges
         Ranges of validity.
-    before, spread
-        What was believed of the hull's coefficients before the log, shape (26,) each.
-    hull, covariance
-        What is believed of them now, shapes (26,) and (26, 26).
     vessel, conditions
         Properties of the vessel and conditions of the log, in the order in which they act.
+    hull
+        The hull as the log refitted it; None where it is for a fit to all logs to estimate.
     notes
         What did not enter and why, as sentences.
     """
 
     training: Mapping[str, object]
     ranges: Mapping[str, tuple[float, float]]
-    before: Floats
-    spread: Floats
-    hull: Floats
-    covariance: Floats
     vessel: tuple[StoredEffect, ...]
     conditions: tuple[StoredEffect, ...]
+    hull: HullPosterior | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -84,7 +97,6 @@ def posterior_of(
     if len(accepted) < len(kept.candidates):
         kept = fit(problem, [kept.candidates[i] for i in accepted], [kept.values[i] for i in accepted])
     motion, recording = survey.motion, survey.recording
-    before, spread, hull, covariance = _hull(problem, kept)
     stored = []
     for i, candidate in enumerate(kept.candidates):
         if candidate.effect.id != IN_THE_HULL:
@@ -106,7 +118,7 @@ def posterior_of(
                 nan if one.name in unreported else error
                 for one, error in zip(candidate.parameters, kept.reported_errors(i).tolist(), strict=True)
             ]
-            stored.append((lasts, _stored(candidate, kept.values[i], errors, finding.parameters, source)))
+            stored.append((lasts, stored_effect(candidate, kept.values[i], errors, finding.parameters, source)))
     for state in states:
         candidate = state.candidate
         if candidate.key in reported and reported[candidate.key].sure:
@@ -118,27 +130,35 @@ def posterior_of(
                 for name, one in state.estimates.items()
             }
             stored.append((False, StoredEffect(*candidate.key, found, (source,))))
-    rows = motion.valid
     return Posterior(
-        training={
-            "name": motion.log,
-            "files": [str(file).rpartition("/")[2] for file in recording.files],
-            "sha256": recording.sha256,
-            "seconds": float(rows.sum() / motion.rate_hz),
-            "rows": int(rows.sum()),
-        },
-        ranges=validity_ranges(motion.nu[rows], motion.nu_dot[rows]),
-        before=before,
-        spread=spread,
-        hull=hull,
-        covariance=covariance,
+        training=trained(survey),
+        ranges=ranges_of(survey),
         vessel=tuple(one for vessel, one in stored if vessel),
         conditions=tuple(one for vessel, one in stored if not vessel),
+        hull=_hull(problem, kept),
         notes=tuple(notes),
     )
 
 
-def _stored(
+def trained(survey: Survey) -> dict[str, object]:
+    """Return a log as a model file lists what it was trained on."""
+    motion, recording = survey.motion, survey.recording
+    return {
+        "name": motion.log,
+        "files": [str(file).rpartition("/")[2] for file in recording.files],
+        "sha256": recording.sha256,
+        "seconds": float(motion.valid.sum() / motion.rate_hz),
+        "rows": int(motion.valid.sum()),
+    }
+
+
+def ranges_of(survey: Survey) -> Mapping[str, tuple[float, float]]:
+    """Return the ranges of validity of what a log teaches."""
+    rows = survey.motion.valid
+    return validity_ranges(survey.motion.nu[rows], survey.motion.nu_dot[rows])
+
+
+def stored_effect(
     candidate: Candidate, values: Floats, errors: Sequence[float], reported: Mapping[str, Estimate], source: Source
 ) -> StoredEffect:
     """Return an effect with its intervals: those that were told, or of these errors, unknown (NaN) where they are."""
@@ -152,8 +172,8 @@ def _stored(
     return StoredEffect(candidate.effect.id, candidate.instance, parameters, (source,))
 
 
-def _hull(problem: EstimationProblem, kept: Fit) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the hull's coefficients and their spread before, the same and their covariance after a fit.
+def _hull(problem: EstimationProblem, kept: Fit) -> HullPosterior:
+    """Return what is believed of the hull before and after a fit.
 
     The covariance is that of the linearised posterior, effects included. Factors on single coefficients, where the hull model
     was found wrong, are multiplied in.
@@ -177,4 +197,4 @@ def _hull(problem: EstimationProblem, kept: Fit) -> tuple[Floats, Floats, Floats
                 spread[k] = float(np.hypot(spread[k], one.size * problem.plain.hull[k]))
                 hull[k] *= factor
             column += 1
-    return problem.plain.hull, spread, hull, into @ posterior @ into.T
+    return HullPosterior(problem.plain.hull, spread, hull, into @ posterior @ into.T)

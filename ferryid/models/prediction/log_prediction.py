@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ferryid.counts import counted
 from ferryid.effects import effects
 from ferryid.effects.measurements import measurements_of_motion, payload_and_damping
 from ferryid.errors import FerryIdError
@@ -14,7 +15,7 @@ from ferryid.models.forces.estimator import ForceLaw, base_estimator, model_esti
 from ferryid.models.forces.model_forces import ModelForces, force_law
 from ferryid.models.model import Model
 from ferryid.models.prediction.free_run import FreeRun, run_free
-from ferryid.models.stored_effect import StoredEffect
+from ferryid.models.stored_effect import Conditions, StoredEffect
 from ferryid.signals.prepare import Prepared
 from ferryid.signals.smooth import central_difference, measure, smooth_measured
 from ferryid.signals.track import Motion
@@ -154,14 +155,21 @@ def predict_with_effects(
         conditions=tuple(one for one in found.acting if id(one) not in own),
         idle=(
             *(f"{effects()[one.effect].title} of the model does not act here: {reason}." for one, reason in found.idle),
-            *(
-                f"{_named(other.effects)} of {other.log} {'does' if len(other.effects) == 1 else 'do'} not act here: "
-                "conditions are those of one log."
-                for other in model.conditions
-                if other.sha256 != sha256
-            ),
+            *_of_other_logs(model.conditions, sha256),
         ),
     )
+
+
+def _of_other_logs(conditions: Sequence[Conditions], sha256: str) -> Iterator[str]:
+    """Return the conditions of other logs than this one, as sentences: logs that have the same ones in one."""
+    logs: dict[str, list[str]] = {}
+    for other in conditions:
+        if other.sha256 != sha256:
+            logs.setdefault(_named(other.effects), []).append(other.log)
+    for named, several in logs.items():
+        where = several[0] if len(several) == 1 else f"{several[0]} and {counted(len(several) - 1, 'other log')}"
+        acts = "do" if " and " in named else "does"
+        yield f"{named} of {where} {acts} not act here: conditions are those of one log."
 
 
 def _named(stored: Sequence[StoredEffect]) -> str:

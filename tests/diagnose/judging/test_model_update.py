@@ -273,7 +273,7 @@ def test_logs_that_agree_are_weighed_and_those_that_do_not_are_told(folder: Path
     # The hull of both is surer than that of either.
     k = 0
     width = made.hull["m11"].high - made.hull["m11"].low
-    assert width < 2 * 1.96 * min(np.sqrt(part.covariance[k, k]) for part in (one, two))
+    assert width < 2 * 1.96 * min(np.sqrt(part.hull.covariance[k, k]) for part in (one, two))
 
     def moved(part: Posterior, value: float) -> Posterior:
         quantity = replace(part.vessel[0].parameters["surge"], value=value, low=value - 0.05, high=value + 0.05)
@@ -290,6 +290,25 @@ def test_logs_that_agree_are_weighed_and_those_that_do_not_are_told(folder: Path
     assert made is not None
     wide = made.vessel_effects[0].parameters["surge"]
     assert wide.high - wide.low > 0.1 / np.sqrt(2.0) * 1.2
+
+
+def test_one_estimate_from_all_logs_counts_once(folder: Path, fouled: str) -> None:
+    one, _ = taught(fouled, "fouling")
+    assert one.hull is not None
+    # As of a campaign, in which every log has the hull and the property of all.
+    two = replace(one, training={**one.training, "sha256": "another"})
+    made, notes = update_model(told(one, two), FERRY, None, "ferry")
+    assert made is not None
+    assert notes == ()
+    (growth,) = made.vessel_effects
+    assert growth.parameters == one.vessel[0].parameters
+    assert len(growth.sources) == 2
+    end = 1.96 * np.sqrt(one.hull.covariance[0, 0])
+    assert made.hull["m11"].high - made.hull["m11"].value == pytest.approx(end)
+    # Without a hull of its own it leaves the one that was examined.
+    made, _ = update_model(told(replace(one, hull=None), replace(two, hull=None)), FERRY, None, "ferry")
+    assert made is not None
+    assert made.hull == {}
 
 
 def test_what_is_doubtful_or_nothing_makes_no_model(fouled: str, folder: Path) -> None:
