@@ -43,6 +43,7 @@ def render(
         sign=diagnosis_words.SIGN,
         made=made,
         shared_notes=shared,
+        shared_model=diagnosis_words.model_of_all(diagnoses),
         axes=list(zip(AXES, UNITS, strict=True)),
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
     )
@@ -83,10 +84,12 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
         hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
         remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, shared))]
         lines += ["", *remarks] if remarks else []
-        lines += ["", diagnosis_words.new_model(one)] if one.model else [""]
+        lines += ["", diagnosis_words.new_model(one)] if one.model and len(diagnoses) == 1 else [""]
         blocks.append("\n".join(_folded(line) for line in lines))
     if shared:
         blocks.append("\n".join(_folded(f"note on all logs: {note}") for note in shared))
+    if model := diagnosis_words.model_of_all(diagnoses):
+        blocks.append(_folded(model))
     return "\n\n".join(blocks)
 
 

@@ -237,6 +237,14 @@ def new_model(diagnosis: Diagnosis) -> str:
     return f"{what} {label}, which is {diagnosis.model}; use it with: ferryid evaluate {label} LOG{where}"
 
 
+def model_of_all(diagnoses: Sequence[Diagnosis]) -> str:
+    """Return the same of the one model that several logs lead to; empty of one log, and where there is none."""
+    stored = [one for one in diagnoses if one.model]
+    if len(diagnoses) < 2 or not stored:
+        return ""
+    return new_model(next((one for one in stored if one.posterior), stored[0]))
+
+
 def summary(diagnoses: Sequence[Diagnosis]) -> str:
     """Return the verdict in one sentence, of one log or of several."""
     if len(diagnoses) == 1:
