@@ -61,4 +61,6 @@ EFFECT = Effect(
     changes_hull=True,
     negligible=EFFECTS.least_current,
     of_log=("north", "east"),
+    absent_in=("tank",),
+    rare_in=("pond",),
 )

@@ -149,6 +149,9 @@ class Effect:
     of_log
         Of a condition that steadily acts on a whole log: names of the parameters that each log of a vessel has its own of; the
         others are the vessel's. Empty for what is no such condition.
+    absent_in, rare_in
+        Settings of a profile (`ferryid.vessel.profile.SETTINGS`) in which there is no such thing, so that it is not tested, and
+        in which it is less likely than elsewhere.
     about
         Id of the effect about which an unsteady one comes and goes, and beside which it is looked for.
     regressor
@@ -181,9 +184,22 @@ class Effect:
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values], str] = lambda values: ""
     of_log: tuple[str, ...] = ()
+    absent_in: tuple[str, ...] = ()
+    rare_in: tuple[str, ...] = ()
     about: str = ""
     regressor: Callable[[ForceModel, Floats, str | None, str], tuple[str, Floats]] | None = None
     simulated: Simulated | None = None
+
+    def untestable(self, measurements: Measurements) -> str:
+        """Return why it is not looked for, as the end of a sentence; empty where it is."""
+        setting = measurements.profile.setting
+        if setting in self.absent_in:
+            return f"the profile has the setting {setting}"
+        return self.cannot(measurements)
+
+    def log_rarity(self, profile: Profile) -> float:
+        """Return by how much its log prior odds are lower in the profile's setting than elsewhere [nat]."""
+        return EFFECTS.rarity if profile.setting in self.rare_in else 0.0
 
     @property
     def order(self) -> int:

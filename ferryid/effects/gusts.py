@@ -55,4 +55,15 @@ def scenario(values: Values, instance: str | None) -> dict[str, Any]:
     return {"environment": {"wind": {"gust_std_mps": values["std"], "gust_time_s": values["time_constant"]}}}
 
 
-EFFECT = Effect("gusts", "Gusts", parameters_of, apply, says, scenario, cannot=cannot, unsteady=unsteady, about="wind")
+EFFECT = Effect(
+    "gusts",
+    "Gusts",
+    parameters_of,
+    apply,
+    says,
+    scenario,
+    cannot=cannot,
+    unsteady=unsteady,
+    about="wind",
+    absent_in=("tank",),
+)

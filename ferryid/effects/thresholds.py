@@ -29,6 +29,12 @@ class EffectThresholds:
         "distance from the model's coefficient that the interval of a hull coefficient must keep to be reported",
         "convention: about two standard deviations of `hull_spread`",
     )
+    rarity: float = threshold(
+        3.0,
+        "nat",
+        "how much lower the log prior odds of an effect are in a setting in which it is rare, such as a current in a pond",
+        "convention: odds of 1 : 20",
+    )
     formula_error: float = threshold(
         0.1,
         "of what the effect changes",

@@ -138,4 +138,5 @@ EFFECT = Effect(
     regressor=regressor,
     formula_error=EFFECTS.load_error,
     of_log=("north", "east"),
+    absent_in=("tank",),
 )

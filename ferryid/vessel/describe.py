@@ -14,7 +14,8 @@ def describe(profile: Profile) -> str:
 
 
 def _heading(profile: Profile) -> list[str]:
-    return [f"{profile.name}: {profile.title}", f"Source: {profile.source}", f"File: {profile.path}", ""]
+    setting = [f"Setting: {profile.setting}"] if profile.setting else []
+    return [f"{profile.name}: {profile.title}", f"Source: {profile.source}", *setting, f"File: {profile.path}", ""]
 
 
 def _hull(profile: Profile) -> list[str]:

@@ -15,7 +15,7 @@ from ferryid.vessel.faults import Fault, TableReader
 from ferryid.vessel.parse_actuators import parse_actuators
 from ferryid.vessel.parse_hull import parse_hull, parse_wind
 from ferryid.vessel.parse_signals import parse_signals
-from ferryid.vessel.profile import Profile
+from ferryid.vessel.profile import SETTINGS, Profile
 from ferryid.vessel.toml_lines import key_lines, too_deep
 
 SCHEMA = "ferryid.vessel/1"
@@ -127,6 +127,7 @@ def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
         top.fault(f'"name" cannot be "{name}". Fix: use letters, digits, ".", "-" and "_" only', "name")
     title = top.text("title", default=name)
     source = top.text("source", required=True)
+    setting = top.text("setting", options=SETTINGS)
     hull = parse_hull(top.table("hull", required=True, needs="without it there is no base model"))
     wind = parse_wind(top.table("wind"))
     actuators = parse_actuators(top, hull)
@@ -150,6 +151,7 @@ def _parse(text: str, where: str) -> tuple[Profile | None, list[Fault]]:
         path=where,
         text=text,
         sha256=hashlib.sha256(text.encode()).hexdigest(),
+        setting=setting,
     )
     return profile, faults
 

@@ -119,11 +119,16 @@ class Signal:
     mount_m: tuple[float, float] = (0.0, 0.0)
 
 
+SETTINGS = ("tank", "pond", "harbour", "sea")
+"""Where logs may be recorded: a towing tank or pool indoors, a pond, sheltered and open water."""
+
+
 @dataclass(frozen=True)
 class Profile:
     """A vessel and where its signals live in a log; read from one TOML file by `ferryid.vessel.load_profile`.
 
-    `text` is the TOML source, which a model file embeds; `sha256` is its hash.
+    `text` is the TOML source, which a model file embeds; `sha256` is its hash. `setting` is one of `SETTINGS`: where the logs
+    were recorded; empty where that is not known.
     """
 
     name: str
@@ -137,6 +142,7 @@ class Profile:
     path: str
     text: str
     sha256: str
+    setting: str = ""
 
     @property
     def measures_sway(self) -> bool:

@@ -274,7 +274,10 @@ def _range(gain: Gain) -> str:
 
 
 def tanker_with_areas() -> Profile:
-    """Return KVLCC2 with wind areas, scaled from those of Esso Osaka: with none no wind could be named."""
+    """Return KVLCC2 with wind areas, scaled from those of Esso Osaka, and as if nobody knew that it was in a tank.
+
+    Otherwise no wind or current could be named.
+    """
     tanker, other = load_profile("kvlcc2-model"), load_profile("esso-osaka")
     assert other.wind is not None
     scale = (tanker.hull.length_m / other.hull.length_m) ** 2
@@ -284,7 +287,7 @@ def tanker_with_areas() -> Profile:
         lateral_m2=scale * other.wind.lateral_m2,
         length_m=tanker.hull.length_m,
     )
-    return replace(tanker, wind=areas)
+    return replace(tanker, wind=areas, setting="")
 
 
 def tank() -> str:

@@ -169,7 +169,8 @@ class CampaignFit:
             cost += float(np.sum(part.gaps**2) + own @ (precision * own))
             logarithm += float(np.linalg.slogdet(Q)[1] - np.sum(np.log(precision)))
         A = np.eye(self.campaign.g) + np.sum(self.normal.matrices, axis=0)
-        return -0.5 * cost - 0.5 * logarithm - 0.5 * float(np.linalg.slogdet(A)[1])
+        rarity = sum(one.log_alternatives for one in (*self.campaign.conditions, *self.campaign.properties))
+        return -0.5 * cost - 0.5 * logarithm - 0.5 * float(np.linalg.slogdet(A)[1]) - rarity
 
 
 @dataclass(frozen=True)

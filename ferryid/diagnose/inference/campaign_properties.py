@@ -50,12 +50,12 @@ def properties_of(campaign: Campaign) -> list[Candidate]:
     """
     profile: Profile = campaign.members[0].windows.measurements.profile
     return [
-        Candidate(one, instance, one.parameters_of(profile))
+        Candidate(one, instance, one.parameters_of(profile), log_alternatives=one.log_rarity(profile))
         for one in effects().values()
         if (one.vessel or one.id in INSTRUMENTS)
         and one.choose is None
         and (campaign.hull.known or not one.of_sensor)
-        and not any(one.cannot(member.windows.measurements) for member in campaign.members)
+        and not any(one.untestable(member.windows.measurements) for member in campaign.members)
         for instance in one.instances(profile)
     ]
 

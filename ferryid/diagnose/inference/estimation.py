@@ -36,7 +36,7 @@ LONGEST_STEP = 4.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect in one instance; `log_alternatives` as in `ferryid.effects.effect.Choice`.
+    """An effect in one instance; `log_alternatives` as in `ferryid.effects.effect.Choice`, with `Effect.log_rarity`.
 
     It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end).
     """
@@ -355,7 +355,9 @@ def choose_parameters(problem: EstimationProblem, beside: Fit, candidate: Candid
         return candidate
     prior_hull = fitted_force_model(problem.plain, replace(beside, hull=problem.plain.hull)).hull
     made = candidate.effect.choose(fitted_force_model(problem.plain, beside), prior_hull, problem.white)
-    return replace(candidate, parameters=made.parameters, log_alternatives=made.log_alternatives)
+    # Of one that is rare, and chosen from alternatives.
+    rarity = candidate.effect.log_rarity(problem.plain.measurements.profile)
+    return replace(candidate, parameters=made.parameters, log_alternatives=made.log_alternatives + rarity)
 
 
 def fitted_force_model(plain: ForceModel, made: Fit) -> ForceModel:

@@ -89,12 +89,16 @@ def list_candidates(measurements: Measurements) -> tuple[list[Candidate], dict[s
     """Return every effect that the measurements can show, and why it cannot show the others."""
     candidates, untested = [], {}
     for effect in effects().values():
-        reason = effect.cannot(measurements)
+        reason = effect.untestable(measurements)
         if reason:
             untested[effect.id] = reason
             continue
         parameters = effect.parameters_of(measurements.profile)
-        candidates += [Candidate(effect, instance, parameters) for instance in effect.instances(measurements.profile)]
+        rarity = effect.log_rarity(measurements.profile)
+        candidates += [
+            Candidate(effect, instance, parameters, log_alternatives=rarity)
+            for instance in effect.instances(measurements.profile)
+        ]
     return candidates, untested
 
 

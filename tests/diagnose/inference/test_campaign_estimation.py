@@ -76,6 +76,13 @@ def test_every_log_keeps_its_own_wind_beside_the_common_hull() -> None:
         assert (np.abs(value - wind) < 3.0 * np.sqrt(np.diag(covariance))).all()
 
 
+def test_a_condition_that_is_rare_needs_more_evidence() -> None:
+    made = fitted()
+    rare = tuple(replace(one, conditions=(replace(WIND, log_alternatives=3.0),)) for one in made.campaign.members)
+    less = replace(made, campaign=replace(made.campaign, members=rare))
+    assert made.evidence - less.evidence == pytest.approx(3.0)
+
+
 def test_the_common_hull_is_nearer_the_true_one_than_it_was_thought() -> None:
     mean, covariance = fitted().belief()
     known = np.sqrt(np.diag(covariance))[: len(SPREAD)] < 0.3 * SPREAD
