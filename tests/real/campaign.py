@@ -11,15 +11,18 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ferryid.compare import evaluate
 from ferryid.diagnose.judging.campaign_conditions import ConditionTest
 from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, Gain
 from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose
-from ferryid.types import AXES, IN_MEMORY
+from ferryid.models.store import load
+from ferryid.types import AXES, IN_MEMORY, RunContext
 from ferryid.vessel import load_profile
 from ferryid.vessel.profile import Profile
 from tests.evidence import stamp
@@ -94,8 +97,9 @@ def command() -> str:
             check=False,
         )
         assert made.returncode == 0, made.stderr
-        found = json.loads((Path(out) / "found.json").read_text(encoding="utf-8"))["logs"]
-    seconds = time.monotonic() - began
+        seconds = time.monotonic() - began
+        whole = json.loads((Path(out) / "found.json").read_text(encoding="utf-8"))
+        found, stored = whole["logs"], _stored(whole, out)
     lines = ["| log | verdict | named | hints |", "|---|---|---|---|"]
     for one in found:
         sure, less = (
@@ -113,8 +117,41 @@ def command() -> str:
             f"report included, and names a wind in {winds} of {len(found)}.",
             "",
             *lines,
+            "",
+            *stored,
         ]
     )
+
+
+def _stored(found: dict[str, Any], out: str) -> list[str]:
+    """Return what the stored model is worth: on held-out windows, and in free runs of zigzags that it did not see."""
+    learned, model = found["learned"], found["model"]
+    if model is None:
+        return [f"No model is stored. {learned['says']}"]
+    lines = [f"One model is stored, with the wind of {len(found['logs'])} logs. {learned['says']}"]
+    if learned["over_fit"]:
+        over = ", ".join(f"{axis} {learned['over_fit'][axis]:.2f}" for axis in AXES)
+        lines += [
+            "",
+            f"Its squared prediction error over that of the model of `ferryid fit` on the same held-out windows: {over}.",
+        ]
+    run = evaluate(load(model, Path(out)), esso.logs("zigzag"), RunContext(Path(out)))
+    horizons = run["logs"][0]["free_run"]["base"]["horizons_s"]
+    ratios = [
+        np.array(one["free_run"]["model"]["position_m"], dtype=float)
+        / np.array(one["free_run"]["base"]["position_m"], dtype=float)
+        for one in run["logs"]
+    ]
+    median = ", ".join(
+        f"{value:.2f} after {horizon:g} s"
+        for value, horizon in zip(np.nanmedian(ratios, axis=0), horizons, strict=True)
+    )
+    lines += [
+        "",
+        f"Free runs of the {len(ratios)} zigzags, which it did not see: position error over the base model's, median of the runs: "
+        f"{median}.",
+    ]
+    return lines
 
 
 def _sure(probability: float) -> bool:
