@@ -148,8 +148,8 @@ def _stored(found: dict[str, Any], out: str) -> list[str]:
     )
     lines += [
         "",
-        f"Free runs of the {len(ratios)} zigzags, which it did not see: position error over the base model's, median of the runs: "
-        f"{median}.",
+        f"Free runs of the {len(ratios)} zigzags, which it did not see: position error over the base model's, "
+        f"median of the runs: {median}.",
     ]
     return lines
 
