@@ -194,7 +194,7 @@ class Effect:
         """Return why it is not looked for, as the end of a sentence; empty where it is."""
         setting = measurements.profile.setting
         if setting in self.absent_in:
-            return f"the profile has the setting {setting}"
+            return f"the profile's setting is a {setting}"
         return self.cannot(measurements)
 
     def log_rarity(self, profile: Profile) -> float:

@@ -33,7 +33,7 @@ def averaged(setting: str) -> Windows:
 def test_what_a_setting_does_not_have_is_not_looked_for(setting: str, absent: set[str]) -> None:
     candidates, untested = list_candidates(averaged(setting).measurements)
     assert absent.isdisjoint(one.effect.id for one in candidates)
-    said = {effect for effect, reason in untested.items() if reason == "the profile has the setting tank"}
+    said = {effect for effect, reason in untested.items() if reason == "the profile's setting is a tank"}
     assert said == absent
     own = {one.effect.id for one in conditions_of(averaged(setting), replace(FERRY, setting=setting))}
     assert own == {"wind", "current"} - absent
