@@ -103,7 +103,7 @@ class ConditionTest:
     def estimated(self) -> bool:
         """True where the evidence speaks for it, against placebos too, confirmed or not."""
         against = all(one.own for one in self.placebos.values())
-        return self.evidence >= INFERENCE.prior_odds and against
+        return self.evidence >= INFERENCE.prior_odds and against and bool(self.placebos)
 
     @property
     def doubt(self) -> str:
@@ -112,6 +112,8 @@ class ConditionTest:
             return f"its evidence over none is {self.evidence:.0f} nat only"
         if self.gain.low <= 0.0:
             return "held-out stretches of the logs are not surely predicted better with it"
+        if not self.placebos:
+            return "all logs were on like headings, on which a force of the hull looks the same"
         for place, placebo in self.placebos.items():
             if not placebo.beaten:
                 return f"one on {place}, which cannot be true, explains about as much"

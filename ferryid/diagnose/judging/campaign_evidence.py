@@ -22,6 +22,7 @@ from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.folds import draws
 from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
 from ferryid.effects.force_model import ForceModel
 from ferryid.types import Floats, Ints
@@ -97,13 +98,23 @@ def _log_loss(made: CampaignFit, i: int) -> tuple[Floats, Floats]:
 
 
 def placebos(campaign: Campaign) -> dict[str, Campaign]:
-    """Return the campaign with conditions that cannot be true: on the mirrored heading, and on that of another log."""
+    """Return the campaign with conditions that cannot be true: on the mirrored heading, and on that of another log.
+
+    Headings that are all but the vessel's own, as those of logs of one manoeuvre, make none.
+    """
     every = [member.windows.measurements.psi for member in campaign.members]
     others = [np.resize(every[(i + 1) % len(every)], len(psi)) for i, psi in enumerate(every)]
-    made = {MIRRORED: _turned(campaign, [-psi for psi in every])}
-    if len(every) > 1:
-        made[EXCHANGED] = _turned(campaign, others)
-    return made
+    headings = {MIRRORED: [-psi for psi in every], EXCHANGED: others}
+    return {
+        name: _turned(campaign, found) for name, found in headings.items() if _turn(every, found) > JUDGING.placebo_turn
+    }
+
+
+def _turn(headings: Sequence[Floats], others: Sequence[Floats]) -> float:
+    """Return how far headings of several logs [rad] point away from others, root mean square [deg]."""
+    apart = np.concatenate([one - other for one, other in zip(headings, others, strict=True)])
+    away = (apart[np.isfinite(apart)] + np.pi) % (2.0 * np.pi) - np.pi
+    return float(np.degrees(np.sqrt(np.mean(away**2)))) if away.size else 0.0
 
 
 def _turned(campaign: Campaign, headings: Sequence[Floats]) -> Campaign:

@@ -141,6 +141,12 @@ class JudgingThresholds:
         "most that a placebo may have too",
         "convention: half; after a wind was confirmed in a towing tank whose placebo explained four fifths of it",
     )
+    placebo_turn: float = threshold(
+        30.0,
+        "deg",
+        "least turn from the vessel's own headings, root mean square, of headings that make a placebo",
+        "convention: a wind that points 30 degrees elsewhere is another wind",
+    )
     at_bound: float = threshold(
         0.01,
         "of the range of a parameter",

@@ -17,7 +17,7 @@ from ferryid.diagnose.inference.campaign_model import INDUCED, Campaign, HullPri
 from ferryid.diagnose.inference.estimation import Candidate, estimation_problem, fit
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.campaign_conditions import judge_conditions, note
-from ferryid.diagnose.judging.campaign_evidence import without_conditions
+from ferryid.diagnose.judging.campaign_evidence import EXCHANGED, MIRRORED, placebos, without_conditions
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
 from ferryid.types import no_progress
@@ -147,6 +147,26 @@ def test_winds_are_confirmed_over_all_logs_and_a_current_is_not() -> None:
         assert claim.finding.probability > 0.9
     assert judged.claims("d") == ()
     assert ": confirmed." in note(wind, 3)
+
+
+def test_like_headings_make_no_placebo() -> None:
+    made = campaign()
+    first = made.members[0]
+    assert set(placebos(made)) == {MIRRORED, EXCHANGED}
+    # Twice the same manoeuvre: the other log's heading is its own.
+    assert set(placebos(replace(made, members=(first, first)))) == {MIRRORED}
+    eta = first.windows.measurements.eta.copy()
+    eta[:, 2] = 0.1
+    straight = replace(first, windows=replace(first.windows, measurements=replace(first.windows.measurements, eta=eta)))
+    assert placebos(replace(made, members=(straight, straight))) == {}
+
+
+def test_without_a_placebo_nothing_is_confirmed_and_nothing_estimated() -> None:
+    (wind, *_) = judge_conditions(campaign(), {str(i): i for i in range(3)}, no_progress).tests
+    assert wind.confirmed
+    bare = replace(wind, placebos={})
+    assert bare.doubt == "all logs were on like headings, on which a force of the hull looks the same"
+    assert not bare.estimated
 
 
 def test_in_calm_logs_nothing_is_confirmed_and_nothing_estimated() -> None:
