@@ -95,6 +95,8 @@ def test_what_cannot_be_used_is_left_out_and_the_rest_goes_on(
     assert "foreign.csv" in text
     assert "It holds the motion of bag1.mcap: it is the same recording, and counts once" in text
     assert "one hull for all 2: confirmed" in text
+    model = json.loads((tmp_path / "models" / "milliampere" / "1.json").read_text("utf-8"))
+    assert [one["name"] for one in model["training"]] == [one["log"] for one in model["conditions"]] == ["bag1", "bag2"]
 
 
 def test_a_path_that_leads_nowhere_is_refused(ferryid: Command, bags: list[Path], tmp_path: Path) -> None:

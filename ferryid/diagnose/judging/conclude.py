@@ -92,6 +92,9 @@ def _with_origin(
     diagnosis = replace(diagnosis, path=log.path, copy=copied is not None)
     if together is None:
         return diagnosis
+    if copied is not None:
+        # What it teaches, the other log has taught.
+        return replace(diagnosis, posterior=None)
     survey = log.screened.measured.survey
     posterior = campaign_posterior(together, log.path, diagnosis.posterior, diagnosis.findings, survey)
     return replace(diagnosis, posterior=posterior)
