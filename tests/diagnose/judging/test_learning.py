@@ -174,7 +174,14 @@ def test_a_hull_that_is_right_learns_nothing(folder: Path) -> None:
     log = sailed(folder, "right", TWELVE, 3)
     model = replace(blank_model(FERRY, "right"), hull=hull_of_ferry())
     stored, learned = Learner((log,), FERRY, None, RunContext(folder), QUICK).learn(model, "right")
-    assert stored is model
+    assert stored is not None
+    assert stored.terms == ()
+    assert stored.hull == model.hull
+    # Nobody had judged it: it gets the figures of the held-out windows, which are those of the profile's hull.
+    assert stored.scores is not None
+    assert stored.scores.force.normalised_mse == pytest.approx(1.0, abs=0.05)
+    judged = replace(model, scores=stored.scores)
+    assert Learner((log,), FERRY, None, RunContext(folder), QUICK).learn(judged, "right")[0] is judged
     assert not learned.accepted
     assert "A correction learned on top of the findings was not accepted" in learned.says
     assert learned.reasons[0].startswith("Rejected: ")
