@@ -120,7 +120,7 @@ def _same(one: Windows, other: Windows) -> bool:
 def conditions_of(windows: Windows, profile: Profile) -> tuple[Candidate, ...]:
     """Return the conditions that a log may have of its own: those that it did not measure."""
     return tuple(
-        Candidate(one, None, one.parameters_of(profile), log_alternatives=one.log_rarity(profile))
+        Candidate.of(one, None, profile)
         for one in effects().values()
         if one.of_log and not one.untestable(windows.measurements)
     )

@@ -50,7 +50,7 @@ def properties_of(campaign: Campaign) -> list[Candidate]:
     """
     profile: Profile = campaign.members[0].windows.measurements.profile
     return [
-        Candidate(one, instance, one.parameters_of(profile), log_alternatives=one.log_rarity(profile))
+        Candidate.of(one, instance, profile)
         for one in effects().values()
         if (one.vessel or one.id in INSTRUMENTS)
         and one.choose is None

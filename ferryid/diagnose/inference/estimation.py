@@ -19,6 +19,7 @@ from ferryid.effects.effect import HELD, Effect, Parameter
 from ferryid.effects.force_model import ForceModel
 from ferryid.effects.wording import titled
 from ferryid.types import Floats
+from ferryid.vessel.profile import Profile
 
 MAX_ITERATIONS = 24
 HULL_SLOPE_ITERATIONS = 4
@@ -47,6 +48,11 @@ class Candidate:
     onset_s: float = 0.0
     offset_s: float = inf
     log_alternatives: float = 0.0
+
+    @classmethod
+    def of(cls, effect: Effect, instance: str | None, profile: Profile) -> Candidate:
+        """Return an effect with the parameters and the prior odds that it has on a vessel."""
+        return cls(effect, instance, effect.parameters_of(profile), log_alternatives=effect.log_rarity(profile))
 
     @property
     def times(self) -> tuple[str, ...]:

@@ -93,12 +93,8 @@ def list_candidates(measurements: Measurements) -> tuple[list[Candidate], dict[s
         if reason:
             untested[effect.id] = reason
             continue
-        parameters = effect.parameters_of(measurements.profile)
-        rarity = effect.log_rarity(measurements.profile)
-        candidates += [
-            Candidate(effect, instance, parameters, log_alternatives=rarity)
-            for instance in effect.instances(measurements.profile)
-        ]
+        profile = measurements.profile
+        candidates += [Candidate.of(effect, instance, profile) for instance in effect.instances(profile)]
     return candidates, untested
 
 

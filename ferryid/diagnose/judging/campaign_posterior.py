@@ -7,7 +7,6 @@ with what was found taken off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import nan
 
 from ferryid.diagnose.data.measurements import Survey
@@ -43,24 +42,35 @@ def campaign_posterior(
     """
     reported = {(one.effect, one.instance): one for one in findings if one.sure}
     fit, i = together.hull.fit, together.hull.place.get(path)
-    vessel = [] if own is None else list(own.vessel)
-    conditions = [] if own is None else list(own.conditions)
+    conditions, vessel = list[StoredEffect](), list[StoredEffect]()
     if i is not None:
-        values, lasting = fit.campaign.values(fit.common, fit.own[i])
         here = {one.key for one in fit.campaign.members[i].conditions}
-        for kept, candidates, found in (
-            (conditions, fit.campaign.conditions, values),
-            (vessel, fit.campaign.properties, lasting),
-        ):
-            for candidate, p in zip(candidates, found, strict=True):
-                finding = reported.get(candidate.key)
-                if finding is not None and (candidate.key in here or kept is vessel):
-                    kept.append(_stored(candidate, p, finding, survey))
+        values, lasting = fit.campaign.values(fit.common, fit.own[i])
+        conditions = [
+            _stored(one, p, reported[one.key], survey)
+            for one, p in zip(fit.campaign.conditions, values, strict=True)
+            if one.key in here and one.key in reported
+        ]
+        vessel = [
+            _stored(one, p, reported[one.key], survey)
+            for one, p in zip(fit.campaign.properties, lasting, strict=True)
+            if one.key in reported
+        ]
+    if own is not None:
+        # What all logs say of a property stands above what one of them says.
+        shared = {one.key for one in vessel}
+        conditions += own.conditions
+        vessel += [one for one in own.vessel if one.key not in shared]
     if not vessel and not conditions:
         return None
-    if own is not None:
-        return replace(own, vessel=tuple(vessel), conditions=tuple(conditions), hull=together.hull_posterior)
-    return Posterior(trained(survey), ranges_of(survey), tuple(vessel), tuple(conditions), together.hull_posterior)
+    return Posterior(
+        trained(survey),
+        ranges_of(survey),
+        tuple(vessel),
+        tuple(conditions),
+        together.hull_posterior,
+        () if own is None else own.notes,
+    )
 
 
 def _stored(candidate: Candidate, values: Floats, finding: Finding, survey: Survey) -> StoredEffect:

@@ -70,7 +70,7 @@ def store_updated_model(
             # Effects without a hull predict nothing.
             made = None
     if made is not None and made.scores is None:
-        # Nothing was judged.
+        # Neither the diagnoses nor a fit could judge it.
         made = None
     path = None
     if made is not None:

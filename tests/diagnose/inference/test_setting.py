@@ -11,9 +11,9 @@ import pytest
 from ferryid.diagnose.data.measurements import window_lengths
 from ferryid.diagnose.inference.campaign import conditions_of
 from ferryid.diagnose.inference.estimation import estimation_problem, fit
+from ferryid.diagnose.inference.prior import prior_force_model
 from ferryid.diagnose.inference.search import list_candidates
 from ferryid.diagnose.inference.weak_form import Windows, windows
-from ferryid.effects.force_model import ForceModel, hull_of
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.errors import FerryIdError
 from ferryid.vessel import load_profile
@@ -43,14 +43,7 @@ def test_a_current_in_a_pond_needs_more_evidence() -> None:
     evidence = {}
     for setting in ("", "pond"):
         seen = averaged(setting)
-        plain = ForceModel(
-            seen.measurements,
-            hull_of(FERRY),
-            seen.measurements.parts,
-            seen.measurements.angles,
-            np.zeros((len(seen.measurements.t), 3)),
-        )
-        problem = estimation_problem(seen, plain, 0.1 * np.abs(hull_of(FERRY)))
+        problem = estimation_problem(seen, *prior_force_model(seen.measurements, FERRY))
         for candidate in list_candidates(seen.measurements)[0]:
             if candidate.effect.id in ("current", "payload"):
                 evidence[candidate.effect.id, setting] = fit(problem, [candidate]).evidence

@@ -1,0 +1,99 @@
+"""What a log of a campaign teaches: its own conditions of all logs' estimate, the hull of all, and nothing twice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isnan
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.data.measurements import Survey
+from ferryid.diagnose.inference.campaign import CommonHull
+from ferryid.diagnose.inference.stages import AveragedLog
+from ferryid.diagnose.judging.campaign import JudgedCampaign
+from ferryid.diagnose.judging.campaign_conditions import JudgedConditions
+from ferryid.diagnose.judging.campaign_posterior import campaign_posterior
+from ferryid.diagnose.judging.conclude import _with_origin
+from ferryid.diagnose.judging.diagnosis import Diagnosis
+from ferryid.diagnose.judging.posterior import Posterior
+from ferryid.models import Quantity, Source, StoredEffect
+from tests.diagnose.inference.test_campaign_estimation import WINDS, fitted
+from tests.diagnose.judging.findings import found
+
+pytestmark = pytest.mark.slow
+
+
+def campaign() -> JudgedCampaign:
+    place = {f"log{i}": i for i in range(len(WINDS))}
+    return JudgedCampaign(JudgedConditions(CommonHull(fitted(), place), ()), ())
+
+
+def survey() -> Survey:
+    rows = np.ones(4, dtype=bool)
+    motion = SimpleNamespace(log="log", valid=rows, rate_hz=2.0, nu=np.ones((4, 3)), nu_dot=np.ones((4, 3)))
+    return cast(Survey, SimpleNamespace(motion=motion, recording=SimpleNamespace(sha256="ab", files=("log.mcap",))))
+
+
+def wind(probability: float = 0.99) -> Any:
+    told = {name: Estimate(1.0, 0.5, 1.5, "m/s") for name in ("north", "east")}
+    return replace(found("wind", probability), parameters=told)
+
+
+def test_a_log_has_its_own_wind_and_the_hull_of_all() -> None:
+    together = campaign()
+    for i, true in enumerate(WINDS):
+        made = campaign_posterior(together, f"log{i}", None, [wind()], survey())
+        assert made is not None
+        (stored,) = made.conditions
+        assert [stored.parameters[name].value for name in ("north", "east")] == pytest.approx(true, abs=0.35)
+        # Factors on the load are not reported and have no interval.
+        assert isnan(stored.parameters["C_X"].low)
+        assert made.vessel == ()
+        assert made.hull is together.hull_posterior
+        assert made.training["seconds"] == 2.0
+    assert together.hull_posterior is not None
+    mean, covariance = fitted().belief()
+    np.testing.assert_array_equal(together.hull_posterior.mean, mean[:26])
+    np.testing.assert_array_equal(together.hull_posterior.covariance, covariance[:26, :26])
+
+
+def test_a_hint_and_a_log_without_a_say_teach_nothing() -> None:
+    assert campaign_posterior(campaign(), "log0", None, [wind(0.4)], survey()) is None
+    assert campaign_posterior(campaign(), "too short", None, [wind()], survey()) is None
+
+
+def test_what_one_log_alone_shows_is_kept_beside_it() -> None:
+    gain = StoredEffect(
+        "thruster_gain", "thruster1", {"factor": Quantity(0.8, 0.7, 0.9, "-")}, (Source("log", "ab", 0.9),)
+    )
+    own = Posterior({}, {}, (gain,), (), notes=("A doubt.",))
+    made = campaign_posterior(campaign(), "log1", own, [wind()], survey())
+    assert made is not None
+    assert made.vessel == (gain,)
+    assert [one.effect for one in made.conditions] == ["wind"]
+    assert made.notes == ("A doubt.",)
+
+
+def test_a_guessed_hull_is_not_kept() -> None:
+    guessed = replace(fitted(), campaign=replace(fitted().campaign, hull=replace(fitted().campaign.hull, known=False)))
+    together = JudgedCampaign(JudgedConditions(CommonHull(guessed, {"log0": 0}), ()), ())
+    made = campaign_posterior(together, "log0", None, [wind()], survey())
+    assert made is not None
+    assert made.hull is None
+
+
+def test_a_copy_of_a_log_teaches_nothing() -> None:
+    own = Posterior({}, {}, (), (StoredEffect("payload", None, {}, ()),))
+    diagnosis = Diagnosis("log1", "milliampere", "explained", (wind(),), {}, {}, posterior=own)
+    log = cast(
+        AveragedLog, SimpleNamespace(path="log1", screened=SimpleNamespace(measured=SimpleNamespace(survey=survey())))
+    )
+    alone, copy = (_with_origin(diagnosis, log, campaign(), other) for other in (None, "log0"))
+    assert alone.posterior is not None
+    assert not alone.copy
+    assert copy.posterior is None
+    assert copy.copy
