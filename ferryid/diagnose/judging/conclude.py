@@ -32,6 +32,7 @@ from ferryid.diagnose.judging.free_runs import FreeRuns
 from ferryid.diagnose.judging.held_out import HeldOutEvidence, Improvement
 from ferryid.diagnose.judging.hidden_signal import compare_hidden_signals
 from ferryid.diagnose.judging.judge import JudgedLog, sensor_claims
+from ferryid.diagnose.judging.likeness import likeness_of
 from ferryid.diagnose.judging.locate import locate
 from ferryid.diagnose.judging.posterior import posterior_of
 from ferryid.diagnose.judging.verdict import Remainder, verdict_of
@@ -186,6 +187,7 @@ def _concluded(
         left_out=survey.motion.left_out,
         posterior=posterior_of(problem, kept, selected.search.states, findings, survey) if updates else None,
         remainder=remainder,
+        likeness=likeness_of(problem, log.base, selected.steady),
     )
 
 

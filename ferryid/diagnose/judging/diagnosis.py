@@ -9,6 +9,7 @@ from typing import Any
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.learning import Learned
+from ferryid.diagnose.judging.likeness import Likeness
 from ferryid.diagnose.judging.locate import Location, plain_location
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.verdict import Remainder
@@ -108,6 +109,8 @@ class Diagnosis:
         Of the log, as it was given.
     copy
         True for a log that holds the motion of another one before it.
+    likeness
+        How alike the effects look in it; None of a log that is too short.
     """
 
     log: str
@@ -130,6 +133,7 @@ class Diagnosis:
     learned: Learned | None = None
     path: str = ""
     copy: bool = False
+    likeness: Likeness | None = None
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -158,6 +162,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.moved is None else {"hull_moved": vars(diagnosis.moved)}),
         **({} if diagnosis.duration_s is None else {"duration_s": diagnosis.duration_s}),
         "left_out": [asdict(one) for one in diagnosis.left_out],
+        **({} if diagnosis.likeness is None else {"likeness": diagnosis.likeness.to_json()}),
         **({} if diagnosis.learned is None else {"learned": diagnosis.learned.to_json()}),
     }
 

@@ -92,6 +92,23 @@ SHOWS = {
     "heading_bias": "straight runs ahead and astern at several headings",
 }
 """What a log has to hold to show an effect by itself."""
+SENSORS = {
+    "wind": "an anemometer",
+    "gusts": "an anemometer",
+    "current": "a log of the velocity through the water",
+    "payload": "a weighed load or draught marks",
+    "thruster_gain": "feedback of each thruster's speed or torque",
+    "azimuth_offset": "feedback of each thruster's angle",
+    "azimuth_resolution": "feedback of each thruster's angle",
+    "thruster_lag": "feedback of each thruster's speed",
+    "time_delay": "time stamps of one clock for navigation and thrusters",
+    "mooring": "a load cell in the line",
+    "shallow_water": "an echo sounder",
+    "lever_arm": "a surveyed place of the antenna",
+    "heading_bias": "a second antenna or a compass that was swung",
+    "yaw_rate_scale": "a second gyro",
+}
+"""What measures an effect itself, or what it depends on."""
 OTHERWISE = "a calibration run that excites every axis at many headings"
 
 

@@ -117,6 +117,24 @@ class JudgingThresholds:
         "cosine between what an effect and a term do to a log above which they are the same explanation",
         "tuned on cases of `ferryid prove`: a law on one thruster's force displaced that thruster's lower gain",
     )
+    alike: float = threshold(
+        0.9,
+        "-",
+        "likeness of two effects in a log from which they are named as a pair that it hardly separates",
+        "convention: less than half of a response, 0.44, is left to tell it from the other",
+    )
+    visible: float = threshold(
+        1.0,
+        "standard deviations of the noise",
+        "norm of an effect's response at usual size below which it is not compared with others",
+        "derived: noise alone is as large",
+    )
+    faint_direction: float = threshold(
+        0.1,
+        "of the strongest direction",
+        "response to a combination of an effect's parameters below which that is not what the effect looks like",
+        "convention: a tenth; a weak combination would need ten times the usual size to look like another effect",
+    )
     law_expected_gain: float = threshold(
         4.0,
         "nat",
