@@ -5,6 +5,7 @@ from ferryid.diagnose.data.measurements import check_withheld
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, finding_as_json, to_json
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
+from ferryid.diagnose.judging.likeness import Likeness, Pair
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
@@ -18,6 +19,8 @@ __all__ = [
     "DiagnosisSettings",
     "Estimate",
     "Finding",
+    "Likeness",
+    "Pair",
     "Profiled",
     "campaign_verdict",
     "check_withheld",

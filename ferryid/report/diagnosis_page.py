@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, campaign_verdict
 from ferryid.models.prediction import FreeRun
-from ferryid.report import diagnosis_errors, diagnosis_figures, diagnosis_words, figures
+from ferryid.report import diagnosis_errors, diagnosis_figures, diagnosis_words, figures, likeness
 from ferryid.report.html import template
 from ferryid.report.left_out import left_out_table
 from ferryid.signals.track import LeftOut
@@ -53,6 +53,7 @@ def render(
         for figure in (
             *log["figures"],
             *log["free_run_figures"],
+            *log["likeness"].get("figures", ()),
             *(one for finding in log["findings"] for one in finding["figures"]),
         )
     }
@@ -83,6 +84,7 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
                 lines.append(f"{row['name']:<44}" + "".join(f"{cell:>22}" for cell in row["cells"][: len(names)]))
         hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
         remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, shared))]
+        remarks += filter(None, [likeness.line(one.likeness)])
         lines += ["", *remarks] if remarks else []
         lines += ["", diagnosis_words.new_model(one)] if one.model and len(diagnoses) == 1 else [""]
         blocks.append("\n".join(_folded(line) for line in lines))
@@ -166,6 +168,7 @@ def _log(
             for one in diagnosis.withheld
         ],
         "notes": diagnosis_words.notes_of(diagnosis, told),
+        "likeness": likeness.section(diagnosis.likeness, f"{prefix}likeness", drawn),
         "drawn": drawn and any(one.evidence for one in diagnosis.findings),
         "fitted": diagnosis_errors.fitted(diagnosis),
         "about_errors": diagnosis_words.about_errors(diagnosis),

@@ -44,18 +44,6 @@ class InferenceThresholds:
         "best candidates of a round that are compared under the noise that each leaves",
         "convention: bounds the time of a search",
     )
-    visible_response: float = threshold(
-        4.0,
-        "standard deviations",
-        "least response of an effect of usual size that counts as visible",
-        "derived: half its square is the log evidence, which then reaches `prior_odds`",
-    )
-    resolved_evidence: float = threshold(
-        3.0,
-        "nat",
-        "log evidence between two effects of usual size below which they count as alike in a log",
-        "derived: as `unresolved_evidence` of rivals; an effect that is just visible is alike to one of a likeness above 0.79",
-    )
     void_share: float = threshold(
         0.02,
         "of the measured acceleration",
