@@ -9,10 +9,10 @@ import matplotlib as mpl
 from ferryid.counts import counted
 from ferryid.diagnose import Likeness, Pair
 from ferryid.effects.wording import listed
-from ferryid.report.figures import MEASURED, STYLE, margins, svg_text
+from ferryid.report.figures import MEASURED, STYLE, WIDTH, margins, svg_text
 
-CELL, NAMES, BAR = 0.27, 2.55, 0.75
-"""Inches of a cell, of the names beside the map, and of the scale and its label."""
+CELL, NAMES, BAR, BELOW = 0.27, 2.55, 0.75, 0.3
+"""Inches of a cell, of the names beside the map, of the scale and its label, and of the numbers below."""
 WRITTEN = 0.3
 """Likeness from which a cell shows its number."""
 DARK = 0.6
@@ -25,9 +25,11 @@ def heat_map(likeness: Likeness) -> str:
     """Draw the likeness of every two effects, with how visible each is."""
     effects, q = likeness.effects, len(likeness.effects)
     with mpl.rc_context({**STYLE, "axes.grid": False}):
-        height = 0.6 + CELL * max(q, 6) + 0.3
+        height = BELOW + CELL * max(q, 6) + 0.1
         figure = margins(height, left=NAMES)
-        ax = figure.add_axes((NAMES / 6.0, 0.6 / height, (6.0 - NAMES - BAR - 0.1) / 6.0, CELL * max(q, 6) / height))
+        ax = figure.add_axes(
+            (NAMES / WIDTH, BELOW / height, (WIDTH - NAMES - BAR - 0.1) / WIDTH, CELL * max(q, 6) / height)
+        )
         mesh = ax.pcolormesh(likeness.matrix, cmap="Blues", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.6)
         for i in range(q):
             for j in range(q):
@@ -35,7 +37,7 @@ def heat_map(likeness: Likeness) -> str:
                 if i != j and value >= WRITTEN:
                     colour = "white" if value > DARK else MEASURED
                     text = f"{min(value, 0.99):.2f}".lstrip("0")
-                    ax.text(j + 0.5, i + 0.5, text, ha="center", va="center", color=colour, fontsize=7)
+                    ax.text(j + 0.5, i + 0.5, text, ha="center", va="center", color=colour, fontsize=6)
         places = [k + 0.5 for k in range(q)]
         ax.set_yticks(places, [f"{k}  {one.title}, {_size(one.visibility)}" for k, one in enumerate(effects, 1)])
         ax.set_xticks(places, [str(k) for k in range(1, q + 1)])
@@ -43,7 +45,7 @@ def heat_map(likeness: Likeness) -> str:
         ax.invert_yaxis()
         for side in ax.spines.values():
             side.set_visible(False)
-        beside = figure.add_axes(((6.0 - BAR) / 6.0, 0.6 / height, 0.12 / 6.0, CELL * max(q, 6) / height))
+        beside = figure.add_axes(((WIDTH - BAR) / WIDTH, BELOW / height, 0.12 / WIDTH, CELL * max(q, 6) / height))
         figure.colorbar(mesh, cax=beside, label="likeness [-]")
         beside.tick_params(labelsize=8)
         return svg_text(figure)
@@ -86,13 +88,11 @@ def line(likeness: Likeness | None) -> str:
 
 def _sentence(likeness: Likeness) -> str:
     if not likeness.pairs:
-        return (
-            f"This log separates every two of {counted(len(likeness.effects), 'effect')} that it shows at usual size."
-        )
+        return f"This log separates every two of the {counted(len(likeness.effects), 'effect')} that it shows at their usual size."
     return (
-        f"Of {counted(len(likeness.effects), 'effect')} that this log shows at usual size, it hardly separates "
-        f"{counted(len(likeness.pairs), 'pair')}. What is left is the signal-to-noise ratio with which the less visible of the "
-        "two can be told from the other."
+        f"Of the {counted(len(likeness.effects), 'effect')} that this log shows at their usual size, it hardly separates "
+        f"{counted(len(likeness.pairs), 'pair')}. What is left is the signal-to-noise ratio of what distinguishes the less "
+        "visible one of the two from the other."
     )
 
 

@@ -1,6 +1,6 @@
 """How alike effects look in a log: the angle between what they do to the prediction errors, and how visible each is.
 
-Two effects that change the prediction errors in the same proportions cannot be told apart by any estimator, whatever their
+Two effects that change the prediction errors in the same proportions cannot be separated by any estimator, whatever their
 size; this holds before anything is fitted, and depends on the manoeuvres and the sensors alone. Coefficients of the hull are
 refitted beside every effect, so that what they can imitate within their prior does not count.
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import sqrt
 from typing import Any
 
@@ -72,7 +72,7 @@ class Pair:
     likeness
         Cosine of the smallest principal angle between their responses: 1 where they cannot be separated.
     apart
-        What is left of the less visible one to tell it from the other: its visibility times the sine of that angle, in units
+        What distinguishes the less visible one from the other: its visibility times the sine of that angle, in units
         of the noise.
     manoeuvre
         What to record so that they separate.
@@ -216,7 +216,7 @@ def likeness_matrix(responses: Sequence[Floats], apart: Apart) -> Floats:
     every = np.hstack(responses)
     gram = every.T @ apart(every)
     ends = np.cumsum([0, *(one.shape[1] for one in responses)])
-    parts = [slice(first, end) for first, end in zip(ends[:-1], ends[1:], strict=True)]
+    parts = [slice(first, end) for first, end in pairwise(ends.tolist())]
     frames = [_frame(gram[part, part]) for part in parts]
     matrix = np.eye(len(responses))
     for i, j in combinations(range(len(responses)), 2):
@@ -233,7 +233,7 @@ def _frame(gram: Floats) -> Floats:
 
 
 def side_by_side(matrix: Floats) -> list[int]:
-    """Return an order in which what is alike lies side by side: the two most alike, then at either end what is most alike it."""
+    """Return an order in which what is alike lies side by side: from the most alike two, at either end the next."""
     if len(matrix) < 3:
         return list(range(len(matrix)))
     off = matrix - 2.0 * np.eye(len(matrix))
