@@ -121,7 +121,7 @@ class JudgingThresholds:
         0.9,
         "-",
         "likeness of two effects in a log from which they are named as a pair that it hardly separates",
-        "convention: less than half of a response, 0.44, is left to tell it from the other",
+        "convention: less than half of a response, 0.44, distinguishes it from the other",
     )
     visible: float = threshold(
         1.0,
