@@ -1,8 +1,9 @@
 """Diagnosis of missing physics: what a model left out of a recording, and what shows it."""
 
+from ferryid.diagnose.data.course import Course, MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import check_withheld
-from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, finding_as_json, to_json
+from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, Withheld, finding_as_json, to_json
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
 from ferryid.diagnose.judging.likeness import Likeness, Pair
@@ -15,13 +16,16 @@ __all__ = [
     "JUDGING",
     "SCHEMA",
     "UNKNOWN",
+    "Course",
     "Diagnosis",
     "DiagnosisSettings",
     "Estimate",
     "Finding",
     "Likeness",
+    "MeasuredCourse",
     "Pair",
     "Profiled",
+    "Withheld",
     "campaign_verdict",
     "check_withheld",
     "diagnose",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Effect, Parameter, Values
+from ferryid.effects.effect import Effect, Parameter, Turbulence, Values
 from ferryid.effects.force_model import ForceModel, Measurements
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.effects.wording import bearing
@@ -61,6 +61,7 @@ EFFECT = Effect(
     changes_hull=True,
     negligible=EFFECTS.least_current,
     of_log=("north", "east"),
+    turbulence=Turbulence(EFFECTS.current_turbulence, EFFECTS.least_current_std, EFFECTS.current_length),
     absent_in=("tank",),
     rare_in=("pond",),
 )

@@ -75,6 +75,33 @@ class Process:
     frequency_hz: float = 0.0
 
 
+@dataclass(frozen=True)
+class Turbulence:
+    """How a flow over ground changes about its mean: each horizontal component a first-order Gauss-Markov process.
+
+    Attributes
+    ----------
+    intensity
+        Standard deviation over the mean speed.
+    least_std_mps
+        Standard deviation in the weakest flow [m/s].
+    length_m
+        Distance over which it is carried by the mean flow within its time constant [m].
+    """
+
+    intensity: float
+    least_std_mps: float
+    length_m: float
+
+    def std(self, speed_mps: float) -> float:
+        """Return the standard deviation of each component at a mean speed [m/s]."""
+        return max(self.intensity * speed_mps, self.least_std_mps)
+
+    def time_constant_s(self, speed_mps: float) -> float:
+        """Return the time constant at a mean speed [s]; a flow without a mean carries it by its own changes."""
+        return self.length_m / max(speed_mps, self.std(speed_mps))
+
+
 Processes = Callable[[Floats], tuple[Process, ...]]
 """What disturbances are by their parameters."""
 
@@ -149,6 +176,8 @@ class Effect:
     of_log
         Of a condition that steadily acts on a whole log: names of the parameters that each log of a vessel has its own of; the
         others are the vessel's. Empty for what is no such condition.
+    turbulence
+        How such a condition changes within a log; None for one that is taken as steady.
     absent_in, rare_in
         Settings of a profile (`ferryid.vessel.profile.SETTINGS`) in which there is no such thing, so that it is not tested, and
         in which it is less likely than elsewhere.
@@ -184,6 +213,7 @@ class Effect:
     unsteady: Callable[[ForceModel], Processes] | None = None
     doubt: Callable[[Values], str] = lambda values: ""
     of_log: tuple[str, ...] = ()
+    turbulence: Turbulence | None = None
     absent_in: tuple[str, ...] = ()
     rare_in: tuple[str, ...] = ()
     about: str = ""

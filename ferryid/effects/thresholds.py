@@ -116,6 +116,36 @@ class EffectThresholds:
         "most of a log that lies in it with every side one cell of the grid further out",
         "convention: what is nearly everywhere is the hull's damping, or its fouling; 0.7 before",
     )
+    wind_turbulence: float = threshold(
+        0.3,
+        "of the mean speed",
+        "standard deviation of each component of a wind about its mean",
+        "derived: 1 / ln(z / z0) of EN 1991-1-4, 1.5 m above open country of roughness 0.05 m",
+    )
+    least_wind_std: float = threshold(
+        0.5, "m/s", "the same of the weakest wind", "convention: Hanna (1983), light winds wander by as much"
+    )
+    wind_length: float = threshold(
+        30.0,
+        "m",
+        "length of a gust, over the mean speed its time constant",
+        "derived: EN 1991-1-4, B.1, 2 m above open country, 27 m",
+    )
+    current_turbulence: float = threshold(
+        0.1,
+        "of the mean speed",
+        "standard deviation of each component of a current about its mean",
+        "convention: Thomson et al. (2012), tidal channels, 8 to 11 %",
+    )
+    least_current_std: float = threshold(
+        0.02, "m/s", "the same of the weakest current", "convention: twice `least_current`"
+    )
+    current_length: float = threshold(
+        15.0,
+        "m",
+        "length of an eddy, over the mean speed its time constant",
+        "convention: Thomson et al. (2012), of the order of the depth",
+    )
     beyond_side: float = threshold(
         0.02,
         "of the log",

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Values
+from ferryid.effects.effect import Choice, Effect, Parameter, Residual, Turbulence, Values
 from ferryid.effects.force_model import ForceModel, Measurements, wind_load
 from ferryid.effects.linear_evidence import hull_jacobian, profiled_loss
 from ferryid.effects.thresholds import EFFECTS
@@ -138,5 +138,6 @@ EFFECT = Effect(
     regressor=regressor,
     formula_error=EFFECTS.load_error,
     of_log=("north", "east"),
+    turbulence=Turbulence(EFFECTS.wind_turbulence, EFFECTS.least_wind_std, EFFECTS.wind_length),
     absent_in=("tank",),
 )

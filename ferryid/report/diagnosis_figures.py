@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ferryid.diagnose import Diagnosis, Finding, Profiled
+from ferryid.diagnose import Course, Diagnosis, Finding, MeasuredCourse, Profiled
 from ferryid.report.figures import (
     BASE,
     MEASURED,
@@ -78,6 +78,23 @@ def in_frequency(finding: Finding) -> str:
         ax.set_ylabel(finding.labels.get("residual", "left over"))
         plain_log(ax, x=True, y=True)
         legend_above(figure, ax, 2)
+        return svg_text(figure)
+
+
+def over_time(course: Course, measured: MeasuredCourse | None = None) -> str:
+    """Draw the components of a flow over time with their 95 % bands, beside what a withheld sensor measured."""
+    with mpl.rc_context(STYLE):
+        figure, axes = canvas(len(course.value), 1.9 * len(course.value) + 0.8)
+        for ax, (name, value) in zip(axes, course.value.items(), strict=True):
+            half = course.half(name)
+            ax.fill_between(course.t, value - half, value + half, color=NEW, alpha=0.18, linewidth=0, label="95 % band")
+            ax.plot(course.t, value, color=NEW, label="estimated")
+            if measured is not None:
+                ax.plot(course.t, measured.value[name], color=MEASURED, linewidth=1.0, label="measured, withheld")
+            ax.axhline(0.0, color="#888888", linewidth=0.7)
+            ax.set_ylabel(f"{name} [m/s]")
+        axes[-1].set_xlabel("time [s]")
+        legend_above(figure, axes[0], 3)
         return svg_text(figure)
 
 

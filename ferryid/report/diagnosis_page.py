@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ferryid.counts import counted
-from ferryid.diagnose import Diagnosis, Finding, campaign_verdict
+from ferryid.diagnose import Diagnosis, Finding, Withheld, campaign_verdict
 from ferryid.models.prediction import FreeRun
 from ferryid.report import diagnosis_errors, diagnosis_figures, diagnosis_words, figures, likeness
 from ferryid.report.html import template
@@ -138,7 +138,7 @@ def _log(
         "verdict": diagnosis.verdict,
         "headline": diagnosis_words.headline(diagnosis),
         "findings": [
-            _finding(one, f"{prefix}finding-{k}", drawn, diagnosis.left_out)
+            _finding(one, f"{prefix}finding-{k}", drawn, diagnosis.left_out, diagnosis.withheld)
             for k, one in enumerate(diagnosis_words.findings_of(diagnosis, common), 1)
         ],
         "left_out": left_out_table(diagnosis.left_out),
@@ -177,7 +177,9 @@ def _log(
     }
 
 
-def _finding(finding: Finding, file: str, drawn: bool, left_out: Sequence[LeftOut]) -> dict[str, Any]:
+def _finding(
+    finding: Finding, file: str, drawn: bool, left_out: Sequence[LeftOut], withheld: Sequence[Withheld] = ()
+) -> dict[str, Any]:
     shown = []
     if drawn and diagnosis_figures.compared(finding):
         what = finding.labels.get("regressor", "") if "regressor" in finding.evidence else ""
@@ -200,6 +202,19 @@ def _finding(finding: Finding, file: str, drawn: bool, left_out: Sequence[LeftOu
             else "What is left over; shaded: when it acts most, and what is left out of the log."
         )
         shown.append({"file": f"{file}-time", "svg": diagnosis_figures.in_time(finding, left_out), "caption": caption})
+    if drawn and finding.course is not None:
+        measured = next((one.course for one in withheld if one.signal == finding.effect), None)
+        beside = (
+            "; black: what the withheld sensor measured, averaged over the same times" if measured is not None else ""
+        )
+        shown.append(
+            {
+                "file": f"{file}-course",
+                "svg": diagnosis_figures.over_time(finding.course, measured),
+                "caption": "Its course over the log, estimated together with the hull: where it flows to, with "
+                f"the 95 % band{beside}.",
+            }
+        )
     if drawn and diagnosis_figures.spectral(finding):
         shown.append(
             {

@@ -176,8 +176,8 @@ def wind_table(study: esso.Study) -> list[str]:
         "their noise; reported errors are widened by it.",
         "",
         "| run | measured: north, east [m/s] | over time | estimate ± standard error [m/s] | off by [deg] | strength, "
-        "estimate over measured | components in the interval | wind |",
-        "|---|---|---|---|---|---|---|---|",
+        "estimate over measured | components in the interval | correlation over time | measured rows in the band | wind |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for k, name in enumerate(study.names):
         cells = [
@@ -188,9 +188,19 @@ def wind_table(study: esso.Study) -> list[str]:
             f"{off[k]:.0f}",
             f"{strength[k]:.2f}",
             f"{inside[k].sum()} of 2",
+            f"{study.over_time[k].correlation:.2f}" if study.over_time else "",
+            f"{100.0 * study.over_time[k].inside:.0f} %" if study.over_time else "",
             "named" if found.has_wind[k] else "hint" if "wind" in found.hinted[k] else "",
         ]
         lines.append(f"| {' | '.join(cells)} |")
+    if study.over_time:
+        correlation = float(np.median([one.correlation for one in study.over_time]))
+        inside = float(np.mean([one.inside for one in study.over_time]))
+        lines += [
+            "",
+            f"Over time, the estimated course correlates with the withheld measurement by {correlation:.2f} in the median, and "
+            f"its 95 % band holds {100.0 * inside:.0f} % of the measured rows.",
+        ]
     return lines
 
 

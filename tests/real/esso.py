@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from ferryid.diagnose.checks import examine
+from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.measurements import read_measurements, window_lengths
 from ferryid.diagnose.inference.campaign import assemble
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
@@ -70,6 +71,15 @@ class Judged:
         """The wind's test."""
         return next(one for one in self.tests if one.effect == WIND)
 
+    def over_time(self, hidden: list[Floats]) -> list[MeasuredCourse]:
+        """Return the course of each run beside the measured wind; none where no wind is confirmed."""
+        found = []
+        for course, member, wind in zip(self.wind.courses, self.wind.fit.campaign.members, hidden, strict=False):
+            measurements = member.windows.measurements
+            rows = measurements.usable
+            found.append(MeasuredCourse.beside(course, measurements.t[rows], wind[rows]))
+        return found
+
     @property
     def factors(self) -> Floats:
         """Factors on the wind load of all runs that are estimated beside the winds: surge, sway, yaw."""
@@ -109,6 +119,8 @@ class Study:
         What the tool makes of the campaign.
     controls
         What it makes of the same runs with conditions that cannot be true, by what they stand on; empty where not asked for.
+    over_time
+        The course of the wind in each run beside the measured one; none where no wind is confirmed.
     gains
         Held-out gain of the wind as it was measured over none, and of its mean, under the noise of the estimate, with the
         profile's coefficients and with the estimate's factors on the load; likewise.
@@ -119,6 +131,7 @@ class Study:
     unsteady: Floats
     found: Judged
     controls: Mapping[str, Judged]
+    over_time: list[MeasuredCourse]
     gains: Mapping[str, Gain]
 
     def of(self, kind: str) -> Flags:
@@ -142,6 +155,7 @@ def study(kind: str, *, controlled: bool = True) -> Study:
         unsteady=np.array([rows.std(axis=0) for rows in usable]),
         found=found,
         controls={name: judged(one, place) for name, one in controls(campaign).items() if controlled},
+        over_time=found.over_time(hidden),
         gains={
             name + of: gain_of(campaign, winds, factors, found.wind)
             for of, factors in (("", np.ones(3)), (SCALED, found.factors))
@@ -154,8 +168,8 @@ def study(kind: str, *, controlled: bool = True) -> Study:
 def judged(campaign: Campaign, place: Mapping[str, int]) -> Judged:
     """Return what the tool makes of a campaign."""
     made = judge_conditions(campaign, place, no_progress)
-    fit = next(one for one in made.tests if one.effect == WIND).fit
-    parts = [fit.condition(i, 0) for i in range(len(campaign.members))]
+    test = next(one for one in made.tests if one.effect == WIND)
+    parts = [test.condition(i) for i in range(len(campaign.members))]
     return Judged(
         tests=made.tests,
         winds=np.array([value for value, _ in parts]),

@@ -1,5 +1,6 @@
 """What is measured from a log."""
 
+from ferryid.diagnose.data.course import Course, MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import (
     MeasuredLog,
@@ -11,7 +12,9 @@ from ferryid.diagnose.data.measurements import (
 )
 
 __all__ = [
+    "Course",
     "Estimate",
+    "MeasuredCourse",
     "MeasuredLog",
     "Survey",
     "check_withheld",

@@ -12,12 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from math import exp
 
 import numpy as np
 
+from ferryid.diagnose.data.course import Course
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.inference.campaign import CommonHull
+from ferryid.diagnose.inference.campaign_course import estimate_courses
 from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.force_errors import mass_of
@@ -93,6 +96,16 @@ class ConditionTest:
     evidence: float
     gain: Gain
     placebos: Mapping[str, PlaceboTest]
+
+    @cached_property
+    def courses(self) -> tuple[Course, ...]:
+        """Of a flow that is confirmed and changes within logs, its course in each; empty of others."""
+        turbulence = effects()[self.effect].turbulence
+        return estimate_courses(self.fit, 0, turbulence) if self.confirmed and turbulence is not None else ()
+
+    def condition(self, i: int) -> tuple[Floats, Floats]:
+        """Return what a log has of it, of a flow with a course its mean, and the covariance, shapes (q,) and (q, q)."""
+        return (self.courses[i].mean, self.courses[i].covariance) if self.courses else self.fit.condition(i, 0)
 
     @property
     def confirmed(self) -> bool:
@@ -201,7 +214,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
     fit = test.fit
     if not any(one.effect.id == test.effect for one in fit.campaign.members[i].conditions):
         return None
-    value, covariance = fit.condition(i, 0)
+    value, covariance = test.condition(i)
     parameters = [one for _, one in fit.campaign.own]
     neutral = np.array([one.neutral for one in parameters])
     away = value - neutral
@@ -237,6 +250,7 @@ def _finding(test: ConditionTest, i: int, tests: tuple[ConditionTest, ...]) -> F
         ),
         says=says,
         evidence={"t": windows.middle_s},
+        course=test.courses[i] if test.courses else None,
     )
 
 

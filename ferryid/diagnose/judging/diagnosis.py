@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from math import isfinite
 from typing import Any
 
+from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.finding import Finding
 from ferryid.diagnose.judging.learning import Learned
@@ -45,13 +47,15 @@ class Withheld:
     """What the diagnosis found of a signal that it was not shown, beside what the sensor had measured.
 
     `found` and `measured` are by the names of the effect's parameters; `measured` is the mean over the log, of a payload
-    over the time that it was aboard, in the unit of `found`.
+    over the time that it was aboard, in the unit of `found`. `course` is what was measured of a flow over time, beside the
+    course of the finding; None where that has none.
     """
 
     signal: str
     found: Mapping[str, Estimate]
     measured: Mapping[str, float]
     says: str
+    course: MeasuredCourse | None = None
 
 
 @dataclass(frozen=True)
@@ -153,6 +157,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
                 "found": {name: vars(estimate) for name, estimate in one.found.items()},
                 "measured": dict(one.measured),
                 "says": one.says,
+                **({} if one.course is None else {"over_time": _over_time(one.course)}),
             }
             for one in diagnosis.withheld
         ],
@@ -165,6 +170,12 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.likeness is None else {"likeness": diagnosis.likeness.to_json()}),
         **({} if diagnosis.learned is None else {"learned": diagnosis.learned.to_json()}),
     }
+
+
+def _over_time(course: MeasuredCourse) -> dict[str, Any]:
+    measured = {name: [float(x) if isfinite(x) else None for x in values] for name, values in course.value.items()}
+    correlation = course.correlation if isfinite(course.correlation) else None
+    return {"correlation": correlation, "inside": course.inside, "measured": measured}
 
 
 def finding_as_json(one: Finding) -> dict[str, Any]:
@@ -180,6 +191,7 @@ def finding_as_json(one: Finding) -> dict[str, Any]:
             "onset": one.onset_s,
             "offset": one.offset_s,
             "regime": one.regime,
+            **({} if one.course is None else {"course": one.course.to_json()}),
             **({} if one.band_hz is None else {"band_hz": list(one.band_hz)}),
             **({"law": [{**vars(term), "coefficient": vars(term.coefficient)} for term in one.law]} if one.law else {}),
         },

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ferryid.diagnose.data.course import Course
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.types import Floats
@@ -73,6 +74,8 @@ class Finding:
 
         Of what comes and goes by chance, one row a frequency: ``frequency`` [Hz], ascending; ``before``, the power spectrum of
         what is left over on the axis on which it acts most; ``explained``, the one that it has by its parameters.
+    course
+        A flow over time, of one that changes within the log.
     band_hz
         Frequencies that hold most of it [Hz], where that is told.
     law
@@ -99,6 +102,7 @@ class Finding:
     says: str
     evidence: Mapping[str, Floats] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
+    course: Course | None = None
     band_hz: tuple[float, float] | None = None
     law: tuple[LawTerm, ...] = ()
 

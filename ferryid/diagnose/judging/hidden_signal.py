@@ -7,6 +7,7 @@ from math import atan2, degrees, hypot
 
 import numpy as np
 
+from ferryid.diagnose.data.course import MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.payload import aboard
 from ferryid.diagnose.judging.diagnosis import Withheld
@@ -53,7 +54,14 @@ def _beside(signal: str, values: Floats, measurements: Measurements, findings: S
     found_values = ", ".join(_says(name, one.value, units) for name, one in found.items())
     result = f"found: {found_values}" if found_values else "nothing of it was found"
     says = f"The {signal} was hidden. Measured {when}: {shown}; {result}{_compared(found, measured)}."
-    return Withheld(signal, found, measured, says)
+    if finding is None or finding.course is None:
+        return Withheld(signal, found, measured, says)
+    course = MeasuredCourse.beside(finding.course, t[rows], values[rows])
+    says += (
+        f" Over time, the estimated course and the measured one correlate by {course.correlation:.2f}, and the 95 % band holds "
+        f"{100.0 * course.inside:.0f} % of what was measured."
+    )
+    return Withheld(signal, found, measured, says, course)
 
 
 def _compared(found: Mapping[str, Estimate], measured: Mapping[str, float]) -> str:
