@@ -88,7 +88,8 @@ def line(likeness: Likeness | None) -> str:
 
 def _sentence(likeness: Likeness) -> str:
     if not likeness.pairs:
-        return f"This log separates every two of the {counted(len(likeness.effects), 'effect')} that it shows at their usual size."
+        shown = counted(len(likeness.effects), "effect")
+        return f"This log separates every two of the {shown} that it shows at their usual size."
     return (
         f"Of the {counted(len(likeness.effects), 'effect')} that this log shows at their usual size, it hardly separates "
         f"{counted(len(likeness.pairs), 'pair')}. What is left is the signal-to-noise ratio of what distinguishes the less "
