@@ -80,18 +80,18 @@ def line(likeness: Likeness | None) -> str:
     """Return the pairs that a log hardly separates as one sentence for a terminal; empty where there are none."""
     if likeness is None or not likeness.pairs:
         return ""
-    pairs = [f"{_names(likeness, one)} ({one.likeness:.2f})" for one in likeness.pairs[:IN_TEXT]]
+    pairs = [f"{_names(likeness, one)} ({one.likeness:.3f})" for one in likeness.pairs[:IN_TEXT]]
     more = len(likeness.pairs) - IN_TEXT
     pairs += [f"{counted(more, 'other pair')}"] if more > 0 else []
     return f"Alike in this log (1: cannot be separated): {listed(pairs)}."
 
 
 def _sentence(likeness: Likeness) -> str:
+    effects = counted(len(likeness.effects), "effect")
     if not likeness.pairs:
-        shown = counted(len(likeness.effects), "effect")
-        return f"This log separates every two of the {shown} that it shows at their usual size."
+        return f"This log separates every two of the {effects} that it shows at their usual size."
     return (
-        f"Of the {counted(len(likeness.effects), 'effect')} that this log shows at their usual size, it hardly separates "
+        f"Of the {effects} that this log shows at their usual size, it hardly separates "
         f"{counted(len(likeness.pairs), 'pair')}. What is left is the signal-to-noise ratio of what distinguishes the less "
         "visible one of the two from the other."
     )

@@ -53,7 +53,7 @@ def test_where_everything_is_separated_it_is_said() -> None:
 
 def test_text_and_json_have_the_pairs(tmp_path: Path) -> None:
     one = replace(diagnosis("explained"), likeness=LIKE)
-    assert "Alike in this log (1: cannot be separated): steady wind and current (0.97)." in as_text((one,))
+    assert "Alike in this log (1: cannot be separated): steady wind and current (0.970)." in as_text((one,))
     plain = report((one,), tmp_path).json
     conforms(plain)
     assert plain["likeness"]["pairs"][0]["second"] == {"effect": "current", "instance": None}
