@@ -23,6 +23,7 @@ NO_DECISION = {
         signals.sampling GRAVITY
         signals.kalman WINDOW_PER_TIME
         effects.payload WATER WATERPLANE
+        diagnose.data.course NORMAL
         identify.adaptive.averaging NORMAL_95
         identify.free_run_checks _DEGREES
         identify.split _GOLDEN
@@ -87,6 +88,7 @@ NO_DECISION = {
         diagnose.checks.contradiction SHIFTS_S MOST_ACTUATORS
         diagnose.checks.kinematics SIZE TINY STEPS
         diagnose.inference.campaign_estimation ROUNDS SETTLED CONVERGED_GAIN RELAXATION KEPT_SLOPES
+        diagnose.inference.campaign_course KNOTS_A_MEMORY MOST_KNOTS
         diagnose.inference.campaign_model DIFFERENCE_STEP
         diagnose.inference.campaign_estimation STARTS BEARINGS STEADY_SHARE HALVINGS SCALE_ROUNDS
         diagnose.inference.campaign_properties WEIGHED
