@@ -79,7 +79,7 @@ def diagnose_campaign(
     FerryIdError
         Where no log can be used. Of several, those that cannot are left out, and the notes name them.
     """
-    averaged, left_out = _averaged(logs, profile, settings, run)
+    averaged, left_out = average_logs(logs, profile, settings, run)
     baseline, together = _baseline(averaged, profile, settings, run)
     estimated = [estimate(log, baseline) for log in averaged if log.long_enough]
     selected = [select(log, run.progress) for log in estimated]
@@ -87,7 +87,7 @@ def diagnose_campaign(
     return conclude(averaged, judged, baseline, together, left_out)
 
 
-def _averaged(
+def average_logs(
     logs: Sequence[str], profile: Profile, settings: DiagnosisSettings, run: RunContext
 ) -> tuple[list[AveragedLog], tuple[str, ...]]:
     """Return the logs that can be used, measured, screened and averaged, and why each of the others cannot."""

@@ -27,11 +27,15 @@ DIFFERENCE_STEP = 0.02
 
 @dataclass(frozen=True)
 class Member:
-    """One log of a vessel: its windows, its force model without effects, and the conditions that it has of its own."""
+    """One log of a vessel: its windows, its force model without effects, and the conditions that it has of its own.
+
+    Where groups of logs are compared, `group` is its group's name: properties of another group do not act in it.
+    """
 
     windows: Windows
     plain: ForceModel
     conditions: tuple[Candidate, ...] = ()
+    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -137,15 +141,19 @@ class Campaign:
         member, n = self.members[i], len(COEFFICIENTS)
         hull = self.hull.mean + self.hull.spread * common[: len(self.hull.mean)]
         modelled = induced(replace(member.plain, hull=hull[:n]), hull[n:])
-        return self.acted(modelled, member.conditions, common, own)
+        return self.acted(modelled, member.conditions, common, own, member.group)
 
-    def acted(self, modelled: ForceModel, conditions: Sequence[Candidate], common: Floats, own: Floats) -> ForceModel:
-        """Return a force model in which properties and a log's conditions act."""
+    def acted(
+        self, modelled: ForceModel, conditions: Sequence[Candidate], common: Floats, own: Floats, group: str = ""
+    ) -> ForceModel:
+        """Return a force model in which a log's conditions and the properties of all logs and of its group act."""
         values, lasting = self.values(common, own)
         here = {one.key: one for one in conditions}
         candidates = [here[one.key] for one in self.conditions if one.key in here]
         mine = [p for one, p in zip(self.conditions, values, strict=True) if one.key in here]
-        return apply_candidates(modelled, [*candidates, *self.properties], [*mine, *lasting])
+        pairs = zip(self.properties, lasting, strict=True)
+        act = [(one, p) for one, p in pairs if one.group in ("", group)]
+        return apply_candidates(modelled, [*candidates, *(one for one, _ in act)], [*mine, *(p for _, p in act)])
 
     def gap(self, i: int, common: Floats, own: Floats) -> Floats:
         """Return the gaps of a log along the vessel's axes, shape (J, 3)."""

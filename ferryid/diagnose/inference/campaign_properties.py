@@ -123,10 +123,10 @@ def without_property(made: CampaignFit, candidate: Candidate) -> CampaignFit:
     first = len(made.campaign.hull.mean) + len(made.campaign.shared)
     keep = np.ones(made.campaign.g, dtype=np.bool_)
     for one in made.campaign.properties:
-        if one.key == candidate.key:
+        if one == candidate:
             keep[first : first + len(one.parameters)] = False
         first += len(one.parameters)
-    rest = tuple(one for one in made.campaign.properties if one.key != candidate.key)
+    rest = tuple(one for one in made.campaign.properties if one != candidate)
     begun = replace(made, campaign=replace(made.campaign, properties=rest), common=made.common[keep])
     return estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
 

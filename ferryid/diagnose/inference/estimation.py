@@ -39,7 +39,8 @@ LONGEST_STEP = 4.0
 class Candidate:
     """An effect in one instance; `log_alternatives` as in `ferryid.effects.effect.Choice`, with `Effect.log_rarity`.
 
-    It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end).
+    It acts from `onset_s` (0: from the start of the log) until `offset_s` (infinite: to its end), in a campaign in the logs of
+    one group, or of all where `group` is empty.
     """
 
     effect: Effect
@@ -48,6 +49,7 @@ class Candidate:
     onset_s: float = 0.0
     offset_s: float = inf
     log_alternatives: float = 0.0
+    group: str = ""
 
     @classmethod
     def of(cls, effect: Effect, instance: str | None, profile: Profile) -> Candidate:

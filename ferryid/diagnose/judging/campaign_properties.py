@@ -158,7 +158,7 @@ def tested(made: CampaignFit, candidate: Candidate, rivals: Sequence[ScoredPrope
 def _estimate(made: CampaignFit, candidate: Candidate) -> tuple[Floats, Floats]:
     """Return the parameters of a property and their reported standard deviations, as of `Fit.reported_errors`."""
     campaign = made.campaign
-    place = [one.key for one in campaign.properties].index(candidate.key)
+    place = campaign.properties.index(candidate)
     first = len(campaign.hull.mean) + len(campaign.shared)
     first += sum(len(one.parameters) for one in campaign.properties[:place])
     rows = slice(first, first + len(candidate.parameters))

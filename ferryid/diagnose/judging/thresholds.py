@@ -256,6 +256,12 @@ class JudgingThresholds:
         "gap between two logs' values of a parameter, beyond disjoint intervals, that is a contradiction",
         "convention: a quarter; smaller gaps do not matter in a model",
     )
+    common_regime: float = threshold(
+        0.5,
+        "of the rows",
+        "share of one group's velocities within the range of the other's below which the groups moved unlike",
+        "convention: half; a hull model that is off then appears as a difference between the groups",
+    )
     detection_chance: float = threshold(
         0.5,
         "-",

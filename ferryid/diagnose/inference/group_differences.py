@@ -1,0 +1,359 @@
+"""In which lasting properties two groups of logs of one vessel differ: one hull for both, and effects that act in one group.
+
+Both groups are one campaign. A difference is a property that acts in the logs of one group only, beside everything that all logs
+share, so that its parameters are those of one group relative to the other: a factor of 0.8 is four fifths of the force that the
+other group's logs have, whatever that is.
+
+A property that scatters from log to log, as where the hull model is off in other ways in every manoeuvre, differs between any two
+groups. So the same property is a random effect of each log, beside the difference, with a standard deviation that is not known:
+log i has z_i = d g_i + b_i with b_i from N(0, s²), in sizes. Gaps are linear in all of these near the estimate, b_i is eliminated
+from the normal equations of its log, and evidence and posterior are averaged over s by its evidence and its prior (none, or, with
+the prior odds of any effect, one of a grid).
+
+References
+----------
+Laird and Ware (1982), Random-effects models for longitudinal data; Hoeting et al. (1999), Bayesian model averaging: a tutorial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import exp
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ferryid.diagnose.inference.campaign_estimation import CampaignFit, estimate_campaign
+from ferryid.diagnose.inference.campaign_model import DIFFERENCE_STEP, Campaign
+from ferryid.diagnose.inference.campaign_properties import (
+    INSTRUMENTS,
+    WEIGHED,
+    properties_of,
+    with_property,
+    without_property,
+)
+from ferryid.diagnose.inference.estimation import Candidate
+from ferryid.diagnose.inference.thresholds import INFERENCE
+from ferryid.diagnose.parallel import over
+from ferryid.effects import effects
+from ferryid.effects.effect import Effect
+from ferryid.effects.force_model import ForceModel
+from ferryid.types import Floats
+
+GROUPS = ("A", "B")
+"""The logs that are named first, and those that they are compared with."""
+LOADS = frozenset({"payload"})
+"""What is a condition of a log and, as a load aboard, may be one of a group."""
+OF_HULL = frozenset({"fouling"})
+"""What a single log shows beside a hull model alone, and groups beside the hull that they share."""
+ALL_THRUSTERS = "all"
+"""Instance of a change of force that all actuators have in common, as by a weak battery."""
+SCATTERS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+"""Standard deviations between logs that are averaged over beside none, in sizes of a parameter."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A difference between groups, estimated beside everything else.
+
+    Attributes
+    ----------
+    candidate
+        The effect, and the group in whose logs it acts.
+    values, errors
+        Its parameters in their units, and their standard deviations with the scatter between logs, shape (p,).
+    evidence
+        Logarithm of the evidence over that of no such difference, both averaged over the scatter between logs [nat].
+    scatter
+        Standard deviation between logs, in sizes, averaged over.
+    smallest
+        Distance from neutral that would have been seen with an even chance, in their units, shape (p,); infinite for none.
+    """
+
+    candidate: Candidate
+    values: Floats
+    errors: Floats
+    evidence: float
+    scatter: float
+    smallest: Floats
+
+
+@dataclass(frozen=True)
+class Contender:
+    """What was tried in place of a difference that was selected, and its evidence less that of the selected one [nat]."""
+
+    candidate: Candidate
+    behind: float
+
+
+def in_groups(campaign: Campaign, names: Sequence[str]) -> Campaign:
+    """Return a campaign whose logs belong to groups, one name each."""
+    members = tuple(replace(one, group=name) for one, name in zip(campaign.members, names, strict=True))
+    return replace(campaign, members=members)
+
+
+def differences_of(campaign: Campaign) -> list[Candidate]:
+    """Return every difference that all logs can show.
+
+    One whose neutral value is an end of what is possible, as a lag or a load, may act in either group.
+    """
+    profile = campaign.members[0].windows.measurements.profile
+    found = []
+    for one in effects().values():
+        lasts = one.vessel or one.id in INSTRUMENTS or one.id in LOADS
+        if not lasts or one.choose is not None or one.unsteady is not None or _untestable(one, campaign):
+            continue
+        for instance in one.instances(profile):
+            candidate = Candidate.of(one, instance, profile)
+            if candidate.parameters:
+                found += [replace(candidate, group=group) for group in _groups(candidate)]
+    return [*found, *_all_thrusters(campaign)]
+
+
+def _groups(candidate: Candidate) -> tuple[str, ...]:
+    first = candidate.parameters[0]
+    return GROUPS if first.neutral in (first.low, first.high) else GROUPS[1:]
+
+
+def _untestable(effect: Effect, campaign: Campaign) -> bool:
+    every = [member.windows.measurements for member in campaign.members]
+    if effect.id in OF_HULL:
+        return any(one.profile.setting in effect.absent_in for one in every)
+    return any(effect.untestable(one) for one in every)
+
+
+def _all_thrusters(campaign: Campaign) -> list[Candidate]:
+    profile = campaign.members[0].windows.measurements.profile
+    if len(profile.actuators) < 2:
+        return []
+    gain = replace(effects()["thruster_gain"], apply=_scaled)
+    return [replace(Candidate.of(gain, ALL_THRUSTERS, profile), group=GROUPS[1])]
+
+
+def _scaled(force_model: ForceModel, p: Floats, instance: str | None) -> ForceModel:
+    return replace(force_model, parts=force_model.parts * p[0])
+
+
+def select_differences(
+    made: CampaignFit, progress: Callable[[str], None]
+) -> tuple[CampaignFit, tuple[tuple[Candidate, tuple[Contender, ...]], ...]]:
+    """Return the estimate with every difference that the evidence favours, and what contended with each.
+
+    What all logs share is selected beside them, so that a property of both groups is not taken for a difference.
+    """
+    contenders: dict[Candidate, tuple[Contender, ...]] = {}
+    while len(made.campaign.properties) < INFERENCE.most_effects:
+        taken = made.campaign.properties
+        left = [one for one in (*differences_of(made.campaign), *properties_of(made.campaign)) if one not in taken]
+        # What is compared has the same noise and has settled under it.
+        made = estimate_campaign(made.campaign, noise=made.noise, begin=made)
+        progress(f"weighing {len(left)} differences between the groups")
+        weighed = over(partial(compare_near, made), left)
+        order = sorted((one for one in weighed if _possible(one)), key=lambda one: -one.evidence)[:WEIGHED]
+        tried = []
+        for one in order:
+            if one.evidence > 0.0:
+                fit = _estimated(made, one.candidate)
+                tried.append((compare_estimated(fit, one.candidate, made).evidence, one.candidate, fit))
+        tried.sort(key=lambda one: -one[0])
+        if not tried or tried[0][0] < INFERENCE.prior_odds:
+            break
+        contenders[tried[0][1]] = tuple(Contender(one, gain - tried[0][0]) for gain, one, _ in tried[1:])
+        # With what it explains gone, the noise is less.
+        made = estimate_campaign(tried[0][2].campaign, begin=tried[0][2])
+    for one in made.campaign.properties:
+        # A later one may explain what an earlier one stood in for.
+        if len(made.campaign.properties) > 1:
+            without = without_property(made, one)
+            if compare_estimated(made, one, without).evidence < INFERENCE.prior_odds:
+                made = without
+    found = [one for one in made.campaign.properties if one.group]
+    return made, tuple((one, contenders.get(one, ())) for one in found)
+
+
+def _possible(one: Comparison) -> bool:
+    first = one.candidate.parameters[0]
+    away = float(one.values[0]) - first.neutral
+    return not (first.neutral == first.low and away < 0.0) and not (first.neutral == first.high and away > 0.0)
+
+
+def _estimated(made: CampaignFit, candidate: Candidate) -> CampaignFit:
+    begun = with_property(made, candidate)
+    return estimate_campaign(begun.campaign, noise=made.noise, begin=begun)
+
+
+def compare_near(made: CampaignFit, candidate: Candidate) -> Comparison:
+    """Return what a difference would be beside an estimate that lacks it, if the gaps were linear in it."""
+    slopes = _slopes(made, candidate, _in_sizes(candidate, candidate.start))
+    grams = [_gram(made, i, one, _acts(made.campaign, i, candidate)) for i, one in enumerate(slopes)]
+    p = len(candidate.parameters)
+    with_it, without = _averaged(made, grams, p, True), _averaged(made, grams, p, False)
+    neutral = np.array([one.neutral for one in candidate.parameters])
+    evidence = with_it.evidence - without.evidence - candidate.log_alternatives
+    return _comparison(made, candidate, neutral, with_it, evidence)
+
+
+def compare_estimated(made: CampaignFit, candidate: Candidate, without: CampaignFit) -> Comparison:
+    """Return what a difference of an estimate is, against an estimate without it under the same noise."""
+    campaign = made.campaign
+    first = len(campaign.hull.mean) + len(campaign.shared)
+    for one in campaign.properties:
+        if one == candidate:
+            break
+        first += len(one.parameters)
+    rows = slice(first, first + len(candidate.parameters))
+    slopes = _slopes(without, candidate, made.common[rows])
+    p = len(candidate.parameters)
+    with_it = _averaged(made, [_gram(made, i, one) for i, one in enumerate(slopes)], p, False, rows)
+    beside = _averaged(without, [_gram(without, i, one) for i, one in enumerate(slopes)], p, False)
+    value = campaign.values(made.common, made.own[0])[1][campaign.properties.index(candidate)]
+    # How much the scatter adds is linear, what the estimates leave is not.
+    evidence = made.evidence - without.evidence
+    evidence += (with_it.evidence - with_it.steady) - (beside.evidence - beside.steady)
+    return _comparison(made, candidate, value, with_it, evidence)
+
+
+def _comparison(
+    made: CampaignFit, candidate: Candidate, at: Floats, found: _Averaged, evidence: float
+) -> Comparison:
+    size = np.array([one.size for one in candidate.parameters])
+    away = np.abs(at + size * found.shift - [one.neutral for one in candidate.parameters])
+    # One log each has no scatter to be seen: they differ as logs do.
+    apart = 1.0 if scatter_shows(made.campaign) else max(1.0, made.disagreement)
+    widened = INFERENCE.posterior_factor * size * np.sqrt(found.variance * apart)
+    errors = np.hypot(widened, candidate.effect.formula_error * away)
+    known = np.maximum(1.0 / np.maximum(found.variance, 1e-12) - 1.0, 0.0)
+    least = np.sqrt((1.0 + known) * (2.0 * INFERENCE.prior_odds + np.log1p(known))) / np.maximum(known, 1e-12)
+    smallest = np.where(known > 1.0, size * least, np.inf)
+    return Comparison(candidate, at + size * found.shift, errors, evidence, found.scatter, smallest)
+
+
+def scatter_shows(campaign: Campaign) -> bool:
+    """Return whether some group has two logs, so that a scatter between logs differs from a difference between groups."""
+    return len(campaign.members) > len(GROUPS)
+
+
+def _acts(campaign: Campaign, i: int, candidate: Candidate) -> bool:
+    return candidate.group in ("", campaign.members[i].group)
+
+
+def _in_sizes(candidate: Candidate, values: Floats) -> Floats:
+    neutral = np.array([one.neutral for one in candidate.parameters])
+    return np.asarray((values - neutral) / [one.size for one in candidate.parameters])
+
+
+def _slopes(made: CampaignFit, candidate: Candidate, z: Floats) -> list[Floats]:
+    """Return derivatives of the gaps of every log by a property as if it acted there, whitened, shape (J, 3, p) each."""
+    everywhere = with_property(made, replace(candidate, group=""))
+    first = made.campaign.g - len(made.campaign.own)
+    common = everywhere.common.copy()
+    common[first : first + len(z)] = z
+
+    def slopes(i: int) -> Floats:
+        here = everywhere.campaign.gap(i, common, made.own[i])
+        columns = []
+        for k in range(len(z)):
+            moved = common.copy()
+            moved[first + k] += DIFFERENCE_STEP
+            columns.append((everywhere.campaign.gap(i, moved, made.own[i]) - here) / DIFFERENCE_STEP)
+        return made.noise.white(i, np.stack(columns, axis=2), made.campaign.members[i].windows.runs)
+
+    return over(slopes, range(len(made.parts)))
+
+
+@dataclass(frozen=True)
+class _Gram:
+    """Normal equations of a log with its own part eliminated: of common vector, difference and scatter, and their gradient."""
+
+    matrix: Floats
+    slope: Floats
+
+
+def _gram(made: CampaignFit, i: int, columns: Floats, acts: bool | None = None) -> _Gram:
+    """Return those of a log; the difference has columns of its own where it is not part of the common vector."""
+    g, part = made.campaign.g, made.parts[i]
+    J, w = part.slopes.reshape(-1, part.slopes.shape[2]), part.gaps.ravel()
+    D = columns.reshape(-1, columns.shape[2])
+    K = np.hstack([J[:, :g], *(() if acts is None else (acts * D,)), D])
+    across = K.T @ J[:, g:]
+    factor = cho_factor(made.normal.own[i])
+    matrix = K.T @ K - across @ cho_solve(factor, across.T)
+    return _Gram(matrix, K.T @ w - across @ cho_solve(factor, made.normal.own_slopes[i]))
+
+
+@dataclass(frozen=True)
+class _Averaged:
+    """A model averaged over the scatter between logs.
+
+    Attributes
+    ----------
+    evidence, steady
+        Logarithm of the evidence, but for what all models about an estimate have in common, and the same without scatter.
+    shift, variance
+        Of the difference, from where it is linear, in sizes, shape (p,).
+    scatter
+        Its standard deviation between logs, in sizes.
+    """
+
+    evidence: float
+    steady: float
+    shift: Floats
+    variance: Floats
+    scatter: float
+
+
+def _averaged(
+    made: CampaignFit, grams: Sequence[_Gram], p: int, beside: bool, rows: slice | None = None
+) -> _Averaged:
+    """Average a model over the scatter between logs.
+
+    Parameters
+    ----------
+    made
+        The estimate about which the gaps are linear.
+    grams
+        Of its logs.
+    p
+        Parameters of the difference.
+    beside
+        Whether it has a difference that the estimate lacks, in the columns after the common vector.
+    rows
+        Where the difference stands in the common vector, if there.
+    """
+    g = made.campaign.g
+    wide = len(grams[0].slope) - p
+    used = np.arange(wide if beside else g)
+    scattered = np.arange(wide, wide + p)
+    kept = rows if rows is not None else slice(g, g + p) if beside else slice(0, 0)
+    priors = {0.0: 1.0}
+    if scatter_shows(made.campaign):
+        # A scatter is as rare as any other effect.
+        rare = exp(-INFERENCE.prior_odds)
+        priors = {0.0: 1.0 - rare, **dict.fromkeys(SCATTERS, rare / len(SCATTERS))}
+    logs, shifts, variances = [], [], []
+    centre = np.zeros(len(used))
+    centre[:g] = made.common
+    for scatter in priors:
+        A, r, logarithm = np.eye(len(used)), centre.copy(), 0.0
+        for one in grams:
+            H, h = one.matrix[np.ix_(used, used)], one.slope[used]
+            if scatter > 0.0:
+                B = one.matrix[np.ix_(scattered, scattered)] + np.eye(p) / scatter**2
+                across, mine = one.matrix[np.ix_(used, scattered)], one.slope[scattered]
+                follow = np.linalg.solve(B, np.column_stack([across.T, mine]))
+                H, h = H - across @ follow[:, :-1], h - across @ follow[:, -1]
+                logarithm += 0.5 * float(mine @ follow[:, -1]) - 0.5 * float(np.linalg.slogdet(B * scatter**2)[1])
+            A, r = A + H, r + h
+        move = np.linalg.solve(A, r)
+        logs.append(logarithm + 0.5 * float(r @ move) - 0.5 * float(np.linalg.slogdet(A)[1]))
+        shifts.append(-move[kept])
+        variances.append(np.diag(np.linalg.inv(A))[kept])
+    weights = np.log(list(priors.values())) + np.array(logs)
+    top = float(weights.max())
+    share = np.exp(weights - top)
+    evidence, share = top + float(np.log(share.sum())), share / share.sum()
+    shift = share @ np.array(shifts)
+    variance = share @ (np.array(variances) + (np.array(shifts) - shift) ** 2)
+    return _Averaged(evidence, logs[0], shift, variance, float(share @ np.array(list(priors))))
