@@ -3,29 +3,15 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperCommand
 
 from ferryid.cli.options import OUT, Json, MaybeVessel, Out
 from ferryid.cli.output import emit, progress
+from ferryid.cli.several import several_after
 
-
-class Command(TyperCommand):
-    """Takes several logs after one ``--on``, as ``--on a.bag b.bag``."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Repeat ``--on`` before every word that follows it, up to the next option."""
-        written: list[str] = []
-        follows = False
-        for word in args:
-            if word.startswith("-"):
-                follows = word.partition("=")[0] == "--on"
-            elif follows and written[-1] != "--on":
-                written.append("--on")
-            written.append(word)
-        return super().parse_args(ctx, written)
+Command = several_after("--on")
 
 
 def command(

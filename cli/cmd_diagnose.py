@@ -9,6 +9,9 @@ import typer
 
 from ferryid.cli.options import OUT, Json, Logs, MaybeVessel, Out, Verify
 from ferryid.cli.output import emit, progress
+from ferryid.cli.several import several_after
+
+Command = several_after("--versus")
 
 
 def command(
@@ -25,6 +28,12 @@ def command(
         bool, typer.Option("--each", help="Diagnose every log by itself; else several logs are one campaign.")
     ] = False,
     together: Annotated[bool, typer.Option("--together", hidden=True)] = False,
+    versus: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Logs to compare the others with, one or several: in which properties and loads they differ."
+        ),
+    ] = None,
     withhold: Annotated[
         list[str] | None, typer.Option(help="A signal to hide, such as wind, and to compare afterwards; repeatable.")
     ] = None,
@@ -38,13 +47,21 @@ def command(
     """Say which physics a model left out of recordings, and what shows it.
 
     Several logs of one vessel are a campaign: one hull is estimated from all of them, and conditions such as a wind are
-    confirmed over all.
+    confirmed over all. With --versus, the logs before and after it are two groups with one hull, and the differences between
+    the groups are the result.
     """
     from ferryid import api
     from ferryid.diagnose import DiagnosisSettings
 
     settings = DiagnosisSettings(None, against, each and not together, tuple(withhold or ()))
     words = ("ferryid", *sys.argv[1:])
+    if versus:
+        outcome = api.compare_groups(
+            logs, versus, vessel, out, model=model, settings=settings, name=name, command=words, verify=verify,
+            progress=progress,
+        )  # fmt: skip
+        emit(outcome, json)
+        return
     outcome = api.diagnose(
         logs, vessel, out, model=model, settings=settings, name=name, command=words, verify=verify, progress=progress
     )

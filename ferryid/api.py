@@ -306,6 +306,45 @@ def diagnose(
     return outcome
 
 
+def compare_groups(
+    logs: Logs,
+    versus: Logs,
+    vessel: str | Path | Profile | None = None,
+    out: str | Path = OUT,
+    *,
+    model: str | None = None,
+    settings: DiagnosisSettings | None = None,
+    name: str = "",
+    command: Sequence[str] = (),
+    verify: bool = False,
+    progress: Progress = _quiet,
+) -> Report:
+    """Estimate in which properties and loads two groups of recordings of one vessel differ: ``diagnose LOGS --versus VERSUS``.
+
+    Parameters
+    ----------
+    logs, versus
+        Recordings of the vessel, group A and group B; differences are those of B relative to A.
+    vessel, out, model, command, verify
+        As of `diagnose`.
+    settings
+        Signals to withhold; neither ``against`` nor ``each`` goes with two groups.
+    name
+        Refused where not empty: no model comes of a comparison.
+    """
+    from ferryid.diagnose import DiagnosisSettings
+    from ferryid.report.diagnosis_report import patient
+    from ferryid.report.versus_report import compare_and_report
+
+    out = Path(out)
+    profile, examined = patient(vessel, model, out)
+    settings = replace(settings or DiagnosisSettings(), model=examined)
+    run = _context(out, progress, verify)
+    outcome = compare_and_report(_paths(logs), _paths(versus), profile, settings, run, name=name, command=command)
+    progress("")
+    return outcome
+
+
 def batch(
     logs: Logs,
     out: str | Path = OUT,

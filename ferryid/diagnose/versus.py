@@ -9,19 +9,18 @@ from typing import Any
 
 from ferryid.counts import counted
 from ferryid.diagnose.inference.campaign import assemble, repeated
-from ferryid.diagnose.inference.campaign_model import Campaign
 from ferryid.diagnose.inference.group_differences import GROUPS, in_groups
 from ferryid.diagnose.inference.stages import AveragedLog
 from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.group_differences import (
     Difference,
     JudgedGroups,
-    LoadDifference,
     judge_groups,
     notes_of,
     smallest_note,
     summary,
 )
+from ferryid.diagnose.judging.group_loads import LoadDifference
 from ferryid.diagnose.pipeline import DiagnosisSettings, average_logs
 from ferryid.errors import FerryIdError
 from ferryid.types import RunContext

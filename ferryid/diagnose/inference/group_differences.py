@@ -1,14 +1,14 @@
 """In which lasting properties two groups of logs of one vessel differ: one hull for both, and effects that act in one group.
 
-Both groups are one campaign. A difference is a property that acts in the logs of one group only, beside everything that all logs
-share, so that its parameters are those of one group relative to the other: a factor of 0.8 is four fifths of the force that the
-other group's logs have, whatever that is.
+Both groups are one campaign. A difference is a property that acts in the logs of one group only, beside everything that all
+logs share, so that its parameters are those of one group relative to the other: a factor of 0.8 is four fifths of the force
+that the other group's logs have, whatever that is.
 
-A property that scatters from log to log, as where the hull model is off in other ways in every manoeuvre, differs between any two
-groups. So the same property is a random effect of each log, beside the difference, with a standard deviation that is not known:
-log i has z_i = d g_i + b_i with b_i from N(0, s²), in sizes. Gaps are linear in all of these near the estimate, b_i is eliminated
-from the normal equations of its log, and evidence and posterior are averaged over s by its evidence and its prior (none, or, with
-the prior odds of any effect, one of a grid).
+A property that scatters from log to log, as where the hull model is off in other ways in every manoeuvre, differs between any
+two groups. So the same property is a random effect of each log, beside the difference, with a standard deviation that is not
+known: log i has z_i = d g_i + b_i with b_i from N(0, s²), in sizes. Gaps are linear in all of these near the estimate, b_i is
+eliminated from the normal equations of its log, and evidence and posterior are averaged over s by its evidence and its prior
+(none, or, with the prior odds of any effect, one of a grid).
 
 References
 ----------
@@ -163,11 +163,11 @@ def select_differences(
         contenders[tried[0][1]] = tuple(Contender(one, gain - tried[0][0]) for gain, one, _ in tried[1:])
         # With what it explains gone, the noise is less.
         made = estimate_campaign(tried[0][2].campaign, begin=tried[0][2])
-    for one in made.campaign.properties:
+    for earlier in made.campaign.properties:
         # A later one may explain what an earlier one stood in for.
         if len(made.campaign.properties) > 1:
-            without = without_property(made, one)
-            if compare_estimated(made, one, without).evidence < INFERENCE.prior_odds:
+            without = without_property(made, earlier)
+            if compare_estimated(made, earlier, without).evidence < INFERENCE.prior_odds:
                 made = without
     found = [one for one in made.campaign.properties if one.group]
     return made, tuple((one, contenders.get(one, ())) for one in found)
@@ -215,9 +215,7 @@ def compare_estimated(made: CampaignFit, candidate: Candidate, without: Campaign
     return _comparison(made, candidate, value, with_it, evidence)
 
 
-def _comparison(
-    made: CampaignFit, candidate: Candidate, at: Floats, found: _Averaged, evidence: float
-) -> Comparison:
+def _comparison(made: CampaignFit, candidate: Candidate, at: Floats, found: _Averaged, evidence: float) -> Comparison:
     size = np.array([one.size for one in candidate.parameters])
     away = np.abs(at + size * found.shift - [one.neutral for one in candidate.parameters])
     # One log each has no scatter to be seen: they differ as logs do.
@@ -304,9 +302,7 @@ class _Averaged:
     scatter: float
 
 
-def _averaged(
-    made: CampaignFit, grams: Sequence[_Gram], p: int, beside: bool, rows: slice | None = None
-) -> _Averaged:
+def _averaged(made: CampaignFit, grams: Sequence[_Gram], p: int, beside: bool, rows: slice | None = None) -> _Averaged:
     """Average a model over the scatter between logs.
 
     Parameters

@@ -27,15 +27,14 @@ from ferryid.diagnose.inference.group_differences import (
     select_differences,
 )
 from ferryid.diagnose.inference.thresholds import INFERENCE
-from ferryid.diagnose.judging.campaign_conditions import ConditionTest, judge_conditions
+from ferryid.diagnose.judging.campaign_conditions import judge_conditions
 from ferryid.diagnose.judging.campaign_evidence import Gain, held_out_loss
 from ferryid.diagnose.judging.experiment_design import manoeuvre
 from ferryid.diagnose.judging.finding import Rival
+from ferryid.diagnose.judging.group_loads import LoadDifference, load_differences
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
-from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
-from ferryid.types import Floats
 
 
 @dataclass(frozen=True)
@@ -124,47 +123,6 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class LoadDifference:
-    """A mean wind or current of group B less that of group A, north and east.
-
-    Attributes
-    ----------
-    effect
-        Its id.
-    mean
-        By group, of its logs.
-    estimates
-        The difference, by parameter.
-    measured
-        True where it was measured, and is not estimated from the motion.
-    doubt
-        Why the condition itself is not confirmed, as the end of a sentence; empty where it is.
-    """
-
-    effect: str
-    mean: Mapping[str, Mapping[str, float]]
-    estimates: Mapping[str, Estimate]
-    measured: bool = False
-    doubt: str = ""
-
-    @property
-    def differs(self) -> bool:
-        """True where some interval excludes zero."""
-        return any(one.low > 0.0 or one.high < 0.0 for one in self.estimates.values())
-
-    @property
-    def says(self) -> str:
-        """The difference as a sentence."""
-        parts = ", ".join(
-            f"{name} {one.value:+.2f} {one.unit} ({one.low:+.2f} to {one.high:+.2f})"
-            for name, one in self.estimates.items()
-        )
-        how = "measured" if self.measured else "estimated"
-        text = f"{effects()[self.effect].title}, {how}, mean of B less that of A: {parts}."
-        return f"{text} It is estimated, not confirmed: {self.doubt}." if self.doubt else text
-
-
-@dataclass(frozen=True)
 class JudgedGroups:
     """What two groups of logs differ in.
 
@@ -244,7 +202,8 @@ def _rivals(candidate: Candidate, contenders: Sequence[Contender]) -> tuple[Riva
 
 
 def _doubt(one: Difference) -> str:
-    assert one.gain is not None and one.by_group is not None
+    assert one.gain is not None
+    assert one.by_group is not None
     if one.evidence < INFERENCE.prior_odds:
         return f"its evidence over none is {one.evidence:.0f} nat only, as logs of one group scatter"
     if one.gain.low <= 0.0:
@@ -252,7 +211,11 @@ def _doubt(one: Difference) -> str:
     for group, gain in one.by_group.items():
         if gain.high < 0.0:
             return f"held-out stretches of group {group} are predicted worse with it"
-    if any(_at_bound(each, one.estimates[each.name].value) for each in one.candidate.parameters if each.name in one.estimates):
+    if any(
+        _at_bound(each, one.estimates[each.name].value)
+        for each in one.candidate.parameters
+        if each.name in one.estimates
+    ):
         return "its value stands at the bound of its search"
     values = {name: each.value for name, each in one.estimates.items()}
     if doubt := one.candidate.effect.doubt(values):
@@ -292,72 +255,13 @@ def _difference(made: CampaignFit, one: Comparison, near: bool) -> Difference:
     return Difference(candidate, estimates, one.evidence, one.scatter * size, smallest)
 
 
-def load_differences(tests: Sequence[ConditionTest], campaign: Campaign) -> tuple[LoadDifference, ...]:
-    """Return the mean of every condition of group B less that of group A, as measured and as estimated.
-
-    What the evidence over all logs does not favour is left out.
-    """
-    found = [_measured(name, campaign) for name in ("wind", "current")]
-    found += [_estimated(one) for one in tests if one.confirmed or one.estimated]
-    return tuple(one for one in found if one is not None)
-
-
-def _estimated(test: ConditionTest) -> LoadDifference | None:
-    fit = test.fit
-    campaign = fit.campaign
-    groups = np.array([member.group for member in campaign.members])
-    parameters = [one for _, one in campaign.own]
-    size = np.array([one.size for one in parameters])
-    q = len(parameters)
-    # Weights of the logs' own parts in the difference; what all logs have in common cancels.
-    weights = (groups == GROUPS[1]) / max(1, np.sum(groups == GROUPS[1])) - (groups == GROUPS[0]) / max(
-        1, np.sum(groups == GROUPS[0])
-    )
-    back = -sum(w * one[:q] for w, one in zip(weights, fit.normal.back, strict=True))
-    own = sum(w**2 * np.linalg.inv(one)[:q, :q] for w, one in zip(weights, fit.normal.own, strict=True))
-    covariance = back @ fit.normal.common_covariance @ back.T + own
-    factor = INFERENCE.posterior_factor**2 * max(1.0, fit.disagreement)
-    error = size * np.sqrt(factor * np.diag(covariance))
-    neutral = np.array([one.neutral for one in parameters])
-    each = neutral + size * (fit.common[campaign.means] + fit.own[:, :q])
-    mean = {
-        group: dict(zip([one.name for one in parameters], each[groups == group].mean(axis=0).tolist(), strict=True))
-        for group in GROUPS
-    }
-    estimates = {
-        one.name: Estimate.normal(mean[GROUPS[1]][one.name] - mean[GROUPS[0]][one.name], float(e), one.unit)
-        for one, e in zip(parameters, error, strict=True)
-    }
-    return LoadDifference(test.effect, mean, estimates, doubt=test.doubt)
-
-
-def _measured(name: str, campaign: Campaign) -> LoadDifference | None:
-    """Return what sensors measured; None where some log has none, or a group has no two logs to scatter."""
-    every: dict[str, list[Floats]] = {group: [] for group in GROUPS}
-    for member in campaign.members:
-        seen = getattr(member.windows.measurements, name)
-        if seen is None:
-            return None
-        every[member.group].append(np.nanmean(seen[member.windows.measurements.usable], axis=0))
-    if any(len(one) < 2 for one in every.values()):
-        return None
-    axes = ("north", "east")
-    means = {group: np.mean(one, axis=0) for group, one in every.items()}
-    error = np.sqrt(sum(np.var(one, axis=0, ddof=1) / len(one) for one in every.values()))
-    apart = means[GROUPS[1]] - means[GROUPS[0]]
-    return LoadDifference(
-        name,
-        {group: dict(zip(axes, one.tolist(), strict=True)) for group, one in means.items()},
-        {one: Estimate.normal(float(apart[k]), float(error[k]), "m/s") for k, one in enumerate(axes)},
-        measured=True,
-    )
-
-
 def notes_of(judged: JudgedGroups, campaign: Campaign) -> tuple[str, ...]:
     """Return what a reader must know of the comparison, as sentences."""
     found = []
     if judged.apart > 1.0:
-        found.append(f"The logs disagree about what they share {judged.apart:.1f} times as much as the noise in them explains.")
+        found.append(
+            f"The logs disagree about what they share {judged.apart:.1f} times as much as the noise in them explains."
+        )
     if not scatter_shows(campaign):
         found.append(
             "With one log in each group, a difference between the groups cannot be separated from one between any two logs."

@@ -1,0 +1,26 @@
+"""Options that take several words, up to the next option."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typer.core import TyperCommand
+
+
+def several_after(option: str) -> type[TyperCommand]:
+    """Return a command that takes several words after one option, as ``--on a.bag b.bag``."""
+
+    class Command(TyperCommand):
+        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+            """Repeat the option before every word that follows it, up to the next option."""
+            written: list[str] = []
+            follows = False
+            for word in args:
+                if word.startswith("-"):
+                    follows = word.partition("=")[0] == option
+                elif follows and written[-1] != option:
+                    written.append(option)
+                written.append(word)
+            return super().parse_args(ctx, written)
+
+    return Command

@@ -1,0 +1,167 @@
+"""Differences between two groups of logs as text, page and JSON: what ``ferryid diagnose --versus`` leaves."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from ferryid import __version__
+from ferryid.counts import counted
+from ferryid.diagnose import JUDGING, DiagnosisSettings
+from ferryid.diagnose.judging.group_differences import Difference
+from ferryid.diagnose.versus import Versus, compare_groups, versus_json
+from ferryid.errors import FerryIdError
+from ferryid.files import dump_json, finite, replacing
+from ferryid.report.html import template
+from ferryid.report.outcome import Report
+from ferryid.report.versus_figures import intervals
+from ferryid.types import RunContext
+from ferryid.vessel.profile import Profile
+
+
+def compare_and_report(
+    logs: Sequence[str],
+    versus: Sequence[str],
+    profile: Profile,
+    settings: DiagnosisSettings,
+    run: RunContext,
+    *,
+    name: str = "",
+    command: Sequence[str] = (),
+) -> Report:
+    """Compare two groups of logs and write page, figure and JSON.
+
+    Parameters
+    ----------
+    logs, versus, profile, settings, run
+        As of `ferryid.diagnose.versus.compare_groups`.
+    name
+        Of a model: refused where not empty.
+    command
+        The words that the comparison was asked for with.
+
+    Raises
+    ------
+    FerryIdError
+        For input that cannot be used, and a folder that cannot be written.
+    """
+    if name:
+        raise FerryIdError(f'diagnose: --versus stores no model, found --name "{name}". Fix: leave out one of the two')
+    found = compare_groups(logs, versus, profile, settings, run)
+    run.progress("writing the report")
+    page, drawings = render(found, command)
+    folder = run.out / "reports" / _folder(found)
+    file = folder / "report.html"
+    plain = {**finite(versus_json(found)), "report": str(file)}
+    with replacing(folder) as temporary:
+        temporary.mkdir()
+        (temporary / file.name).write_text(page, encoding="utf-8", errors="backslashreplace")
+        for key, drawing in drawings.items():
+            (temporary / f"{key}.svg").write_text(drawing, encoding="utf-8", errors="backslashreplace")
+        (temporary / "versus.json").write_text(dump_json(plain), encoding="utf-8")
+    return Report(plain, f"{as_text(found)}\nreport  {file}", file)
+
+
+def as_text(found: Versus) -> str:
+    """Return a comparison of groups as a terminal shows it."""
+    lines = [f"{found.vessel}: {' against '.join(_group_line(found, group) for group in reversed(found.groups))}", ""]
+    lines.append(found.summary)
+    for one in found.judged.differences:
+        lines.append(f"  {probability(one)}  {one.says}")
+        if rivals := unresolved(one):
+            lines.append(f"    {rivals}")
+    if found.judged.loads:
+        lines += ["", "Loads"]
+        lines += [f"  {one.says}" for one in found.judged.loads]
+    if found.judged.compared:
+        lines += ["", "Within what these logs resolve, estimate and 95 % interval"]
+        lines += [f"  {one.says}" for one in found.judged.compared]
+    lines += ["", *(f"note: {one}" for one in (*found.notes, found.smallest) if one)]
+    return "\n".join(lines)
+
+
+def probability(one: Difference) -> str:
+    """Return how likely a difference is."""
+    if one.doubt:
+        return "hint"
+    return "above 0.99" if one.probability > 0.99 else f"{one.probability:.2f}"
+
+
+def unresolved(one: Difference) -> str:
+    """Return what a difference cannot be separated from, and the manoeuvre that would; empty where there is none."""
+    if not one.unresolved_with:
+        return ""
+    names = " and ".join(each.replace("_", " ") for each in one.unresolved_with)
+    within = f"within {JUDGING.unresolved_evidence:g} nat"
+    return f"Not separable from {names}, {within}; what separates them: {one.separating_manoeuvre}."
+
+
+def _group_line(found: Versus, group: str) -> str:
+    logs = found.groups[group]
+    return f"{group} ({counted(len(logs), 'log')}, {sum(one.duration_s for one in logs):.0f} s)"
+
+
+def render(found: Versus, command: Sequence[str] = ()) -> tuple[str, dict[str, str]]:
+    """Return the page, and its drawings (SVG) by name."""
+    drawings = {"differences": intervals(found)}
+    rows = [_row(one, True) for one in found.judged.differences] + [_row(one, False) for one in found.judged.compared]
+    page = template("versus.html").render(
+        vessel=found.vessel,
+        made={
+            "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+            "version": __version__,
+            "command": shlex.join(command),
+        },
+        summary=found.summary,
+        differences=[
+            {
+                "probability": probability(one),
+                "says": one.says,
+                "unresolved": unresolved(one),
+                "held_out": _held_out(one),
+            }
+            for one in found.judged.differences
+        ],
+        loads=[one.says for one in found.judged.loads],
+        svg=drawings["differences"],
+        rows=rows,
+        groups=found.groups,
+        notes=found.notes,
+        smallest=found.smallest,
+    )
+    return page, drawings
+
+
+def _held_out(one: Difference) -> str:
+    if one.gain is None or one.by_group is None:
+        return ""
+    parts = ", ".join(f"group {group} {gain.total:+.0f} nat" for group, gain in one.by_group.items())
+    return (
+        f"Evidence over none {one.evidence:+.0f} nat; log-likelihood of held-out stretches {one.gain.total:+.0f} nat "
+        f"({one.gain.low:+.0f} to {one.gain.high:+.0f}), of which {parts}."
+    )
+
+
+def _row(one: Difference, selected: bool) -> dict[str, Any]:
+    return {
+        "title": one.title,
+        "group": f"{one.group} relative to {one.other}",
+        "parameters": [one.said(each) for each in one.candidate.parameters if each.name in one.estimates],
+        "smallest": [
+            "not seen at any size" if least is None else f"{name.replace('_', ' ')} {least:.2g}"
+            for name, least in one.smallest.items()
+        ],
+        "evidence": f"{one.evidence:+.0f}",
+        "selected": selected and not one.doubt,
+        "verdict": ("hint" if one.doubt else "differs") if selected else "no difference seen",
+    }
+
+
+def _folder(found: Versus) -> str:
+    first, second = (found.groups[group] for group in found.groups)
+    parts = ["diagnosis", first[0].name, *([f"and-{len(first) - 1}-more"] if len(first) > 1 else [])]
+    parts += ["versus", second[0].name, *([f"and-{len(second) - 1}-more"] if len(second) > 1 else [])]
+    return re.sub(r"[^\w.+-]+", "_", "-".join(parts))
