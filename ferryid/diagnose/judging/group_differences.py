@@ -34,7 +34,9 @@ from ferryid.diagnose.judging.finding import Rival
 from ferryid.diagnose.judging.group_loads import LoadDifference, load_differences
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.parallel import over
+from ferryid.effects import effects
 from ferryid.effects.effect import Parameter
+from ferryid.effects.wording import listed
 
 
 @dataclass(frozen=True)
@@ -313,8 +315,10 @@ def smallest_note(judged: JudgedGroups) -> str:
 def summary(judged: JudgedGroups) -> str:
     """Return the verdict in a line."""
     sure, hints = judged.sure, len(judged.differences) - len(judged.sure)
+    loads = [f"the mean {effects()[one.effect].title.lower()}" for one in judged.loads if one.differs and not one.doubt]
+    also = f" They differ in {listed(loads)}." if loads else ""
     if not judged.differences:
-        return "No difference found between the groups."
+        return f"No difference of the vessel found between the groups.{also}"
     parts = [*([f"{counted(len(sure), 'difference')} confirmed"] if sure else [])]
     parts += [f"{counted(hints, 'difference')} estimated, not confirmed"] if hints else []
-    return f"{' and '.join(parts)} between the groups."
+    return f"{' and '.join(parts)} between the groups.{also}"

@@ -15,6 +15,9 @@ from ferryid.diagnose.judging.campaign_conditions import ConditionTest
 from ferryid.effects import effects
 from ferryid.types import Floats
 
+BONFERRONI = 2.241 / 1.96
+"""Half an interval of two at 95 % together over half a single one's at 95 %, of a normal distribution."""
+
 
 @dataclass(frozen=True)
 class LoadDifference:
@@ -42,8 +45,8 @@ class LoadDifference:
 
     @property
     def differs(self) -> bool:
-        """True where some interval excludes zero."""
-        return any(one.low > 0.0 or one.high < 0.0 for one in self.estimates.values())
+        """True where one of the two components differs from zero at 95 %, by Bonferroni's inequality."""
+        return any(abs(one.value) > BONFERRONI * 0.5 * (one.high - one.low) for one in self.estimates.values())
 
     @property
     def says(self) -> str:
