@@ -165,8 +165,11 @@ def judge_groups(campaign: Campaign, progress: Callable[[str], None]) -> JudgedG
     conditions = judge_conditions(campaign, place, progress)
     made, found = select_differences(conditions.hull.fit, progress)
     if made.campaign.properties:
+        before = made.campaign.conditions
         conditions = judge_conditions(replace(campaign, properties=made.campaign.properties), place, progress)
-        made = conditions.hull.fit
+        # An estimate that a search arrived at is nearer to the best one than one that begins at none.
+        if conditions.hull.fit.campaign.conditions != before:
+            made = conditions.hull.fit
     progress("testing the differences on held-out stretches")
     judged = [_judged(made, one, contenders) for one, contenders in found]
     judged.sort(key=lambda one: (bool(one.doubt), -one.evidence))
