@@ -33,6 +33,7 @@ __all__ = [
     "batch",
     "check_vessel",
     "compare",
+    "compare_groups",
     "diagnose",
     "evaluate",
     "export",

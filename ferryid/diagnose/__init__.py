@@ -6,11 +6,13 @@ from ferryid.diagnose.data.measurements import check_withheld
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, Withheld, finding_as_json, to_json
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
+from ferryid.diagnose.judging.group_differences import Difference
 from ferryid.diagnose.judging.likeness import Likeness, Pair
 from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
+from ferryid.diagnose.versus import Versus, compare_groups, versus_json
 
 __all__ = [
     "JUDGING",
@@ -19,20 +21,24 @@ __all__ = [
     "Course",
     "Diagnosis",
     "DiagnosisSettings",
+    "Difference",
     "Estimate",
     "Finding",
     "Likeness",
     "MeasuredCourse",
     "Pair",
     "Profiled",
+    "Versus",
     "Withheld",
     "campaign_verdict",
     "check_withheld",
+    "compare_groups",
     "diagnose",
     "diagnose_and_store",
     "error_ratio",
     "finding_as_json",
     "keep_to_one_thread",
     "to_json",
+    "versus_json",
     "worse_axes",
 ]

@@ -6,8 +6,7 @@ from typing import Any
 
 import matplotlib as mpl
 
-from ferryid.diagnose.judging.group_differences import Difference
-from ferryid.diagnose.versus import Versus
+from ferryid.diagnose import Difference, Versus
 from ferryid.report.figures import BASE, MEASURED, NEW, STYLE, margins, svg_text
 
 REACH = 3.0

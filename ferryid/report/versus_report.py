@@ -10,9 +10,7 @@ from typing import Any
 
 from ferryid import __version__
 from ferryid.counts import counted
-from ferryid.diagnose import JUDGING, DiagnosisSettings
-from ferryid.diagnose.judging.group_differences import Difference
-from ferryid.diagnose.versus import Versus, compare_groups, versus_json
+from ferryid.diagnose import JUDGING, DiagnosisSettings, Difference, Versus, compare_groups, versus_json
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
 from ferryid.report.html import template
