@@ -26,6 +26,7 @@ NO_DECISION = {
         diagnose.data.course NORMAL
         identify.adaptive.averaging NORMAL_95
         identify.free_run_checks _DEGREES
+        diagnose.judging.group_loads BONFERRONI
         identify.split _GOLDEN
     """,
     "indices, labels, exponents and neutral values": """
@@ -42,6 +43,7 @@ NO_DECISION = {
     """,
     "shapes of formulas, and priors of parameters": """
         diagnose.inference.campaign_estimation SCALE_GAPS
+        diagnose.inference.group_differences SCATTERS
         effects.shallow_water EDGE_M
         effects.thruster_interaction SHARPNESS
         effects.waves USUAL_HZ USUAL_M
