@@ -1,0 +1,75 @@
+"""``ferryid diagnose A... --versus B...``: text, JSON and page, and input that cannot be compared."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from ferryid import api
+from ferryid.simulate import parse_scenario, simulate, write_log
+from tests.cli.conftest import Run
+from tests.cli.test_diagnose_input import refused
+from tests.cli.test_every_command import conforms
+
+VESSEL = ("--vessel", "milliampere")
+SCENARIO = """schema = "ferryid.scenario/1"
+vessel = "milliampere"
+path = {{ kind = "four-corner", dwell_s = 20 }}
+controller = {{ delta = 0.7, sigma = 0.7 }}
+sensors = {{ imu_rate_hz = 0.0, camera_rate_hz = 0.0 }}
+{effects}
+"""
+WEAK = '[[effects]]\neffect = "thruster_gain"\ninstance = "thruster1"\nparameters = { factor = 0.8 }\n'
+
+Command = Callable[..., Run]
+
+
+@pytest.mark.slow
+def test_two_groups_and_several_logs_after_one_option(ferryid: Command, tmp_path: Path) -> None:
+    logs = []
+    for seed, effects in enumerate(("", "", WEAK, WEAK), 1):
+        scenario = parse_scenario(SCENARIO.format(effects=effects), f"bag{seed}")
+        silent = replace(scenario, sensors=replace(scenario.sensors, wind_rate_hz=0.0))
+        logs.append(tmp_path / f"bag{seed}.mcap")
+        write_log(simulate(silent, seed), logs[-1])
+    run = ferryid("diagnose", *logs[:2], "--versus", *logs[2:], *VESSEL, "--out", tmp_path / "out", "--json", "-")
+    assert run.code == 0, run.err
+    found = conforms(run.out)
+    assert {group: [one["log"] for one in of] for group, of in found["groups"].items()} == {
+        "A": ["bag1", "bag2"],
+        "B": ["bag3", "bag4"],
+    }
+    assert found["verdict"] == "different"
+    (weak,) = (one for one in found["differences"] if one["confirmed"])
+    assert (weak["effect"], weak["instance"], weak["group"]) == ("thruster_gain", "thruster1", "B")
+    assert weak["parameters"]["factor"]["low"] < 0.8 < weak["parameters"]["factor"]["high"]
+    page = Path(found["report"]).read_text(encoding="utf-8")
+    assert "<svg" in page
+    assert weak["says"] in page
+    # The typed call leaves the same.
+    again = api.compare_groups(logs[:2], logs[2:], "milliampere", tmp_path / "api")
+    assert {**again.json, "report": ""} == {**json.loads(run.out), "report": ""}
+    assert weak["says"] in again.text
+
+
+@pytest.mark.parametrize(
+    ("options", "parts"),
+    [
+        (("--versus", "short.mcap"), ("short.mcap: stands on both sides of --versus",)),
+        (("--versus", "short.bag", "--each"), ("found both --versus and --each",)),
+        (("--versus", "short.bag", "--against", "short.csv"), ("found both --versus and --against",)),
+        (("--versus", "short.bag", "--name", "new"), ("--versus stores no model",)),
+        (("--versus", "absent.mcap"), ("absent.mcap", "no such file")),
+        (("--versus", "short.csv"), ()),
+    ],
+)
+def test_groups_that_cannot_be_compared(
+    ferryid: Command, fixtures: Path, tmp_path: Path, options: tuple[str, ...], parts: tuple[str, ...]
+) -> None:
+    words = [str(fixtures / word) if "." in word else word for word in options]
+    refused(ferryid("diagnose", fixtures / "short.mcap", *words, *VESSEL, "--out", tmp_path), *parts)
+    assert not (tmp_path / "reports").exists()

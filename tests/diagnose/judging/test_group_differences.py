@@ -1,0 +1,106 @@
+"""Two groups of logs of one vessel: a thruster that is weak in one is named, and nothing else; alike groups differ in nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
+from ferryid.diagnose.inference.campaign_model import Campaign, Member
+from ferryid.diagnose.inference.group_differences import compare_near, differences_of, in_groups
+from ferryid.diagnose.judging.group_differences import JudgedGroups, judge_groups, smallest_note, summary
+from ferryid.types import no_progress
+from tests.diagnose.inference.test_campaign_properties import weakened
+
+pytestmark = pytest.mark.slow
+
+WEAK = ("thruster_gain", "thruster1")
+
+
+def groups(factors: Sequence[float], names: Sequence[str]) -> Campaign:
+    """Return halves of three logs, in whose groups the first thruster gives these parts of its force."""
+    members: list[Member] = []
+    for i, factor in enumerate(factors):
+        member = weakened(factor).members[i]
+        seen, middle = member.windows, len(member.windows.starts) // 2
+        for rows in (slice(0, middle), slice(middle, None)):
+            count = len(seen.starts[rows])
+            cut = replace(seen, starts=seen.starts[rows], runs=((0, count),), measured=seen.measured[rows])
+            members.append(replace(member, windows=cut))
+    of = [name for name in names for _ in range(2)]
+    return in_groups(replace(weakened(1.0), members=tuple(members)), of)
+
+
+@cache
+def judged(factors: tuple[float, ...], known: bool = True) -> JudgedGroups:
+    campaign = groups(factors, ("A", "A", "B"))
+    return judge_groups(replace(campaign, hull=replace(campaign.hull, known=known)), no_progress)
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["hull known", "no hull model"])
+def test_a_thruster_that_is_weak_in_one_group_is_named_and_nothing_else(known: bool) -> None:
+    found = judged((1.0, 1.0, 0.8), known)
+    assert [(one.candidate.key, one.group, one.doubt) for one in found.differences] == [(WEAK, "B", "")]
+    (one,) = found.sure
+    factor = one.estimates["factor"]
+    assert factor.low < 0.8 < factor.high
+    assert factor.value == pytest.approx(0.8, abs=0.03)
+    assert one.probability > 0.99
+    assert one.gain is not None
+    assert one.gain.low > 0.0
+    assert found.verdict == "different"
+    assert one.says.startswith("Thruster force (thruster1), B relative to A: factor 0.")
+    assert "differ" in summary(found)
+
+
+def test_groups_that_are_alike_differ_in_nothing_and_show_what_would_have_been_seen() -> None:
+    found = judged((1.0, 1.0, 1.0))
+    assert found.differences == ()
+    assert found.verdict == "alike"
+    (gain,) = (one for one in found.compared if one.candidate.key == WEAK)
+    least = gain.smallest["factor"]
+    assert least is not None
+    assert 0.0 < least < 0.2
+    assert gain.estimates["factor"].low < 1.0 < gain.estimates["factor"].high
+    assert "Thruster force (thruster1), factor" in smallest_note(found)
+
+
+def test_what_both_groups_have_is_no_difference() -> None:
+    found = judged((0.8, 0.8, 0.8))
+    assert found.differences == ()
+    # Whichever thruster it is: with a hull that moves, the other one stronger is the same.
+    assert {one.effect.id for one in found.shared} == {"thruster_gain"}
+
+
+def test_logs_of_one_group_that_scatter_make_no_difference() -> None:
+    """One log of A is as weak as that of B: what differs is the log, not the group."""
+    found = judged((1.0, 0.8, 0.8))
+    assert WEAK not in [one.candidate.key for one in found.sure]
+
+
+def test_a_difference_acts_in_its_group_alone() -> None:
+    campaign = groups((1.0, 1.0, 0.8), ("A", "A", "B"))
+    (weak,) = (one for one in differences_of(campaign) if one.key == WEAK)
+    acting = replace(campaign, properties=(weak,))
+    common, own = np.zeros(acting.g), np.zeros(acting.l)
+    # Four fifths, in usual sizes from none.
+    common[len(acting.hull.mean)] = (0.8 - 1.0) / weak.parameters[0].size
+    moved = [
+        not np.array_equal(acting.gap(i, common, own), acting.gap(i, np.zeros(acting.g), own))
+        for i in range(len(acting.members))
+    ]
+    assert moved == [one.group == "B" for one in acting.members]
+
+
+def test_the_smallest_difference_seen_shrinks_with_more_logs() -> None:
+    every = groups((1.0, 1.0, 1.0), ("A", "A", "B"))
+    least = []
+    for many in (replace(every, members=every.members[::2]), every):
+        made = estimate_campaign(many)
+        (weak,) = (one for one in differences_of(many) if one.key == WEAK)
+        least.append(float(compare_near(made, weak).smallest[0]))
+    assert least[1] < least[0]
