@@ -18,6 +18,7 @@ from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.inference.group_differences import (
     ALL_THRUSTERS,
     GROUPS,
+    OF_HULL,
     Comparison,
     Contender,
     compare_estimated,
@@ -197,7 +198,7 @@ def _judged(made: CampaignFit, candidate: Candidate, contenders: Sequence[Conten
     groups = np.array([made.campaign.members[i].group for i in after.log])
     by_group = {group: Gain.of(gains[groups == group]) for group in GROUPS}
     found = replace(found, gain=Gain.of(gains), by_group=by_group, rivals=_rivals(candidate, contenders))
-    return replace(found, doubt=_doubt(found))
+    return replace(found, doubt=_doubt(found, made.campaign.hull.known))
 
 
 def _rivals(candidate: Candidate, contenders: Sequence[Contender]) -> tuple[Rival, ...]:
@@ -206,7 +207,7 @@ def _rivals(candidate: Candidate, contenders: Sequence[Contender]) -> tuple[Riva
     return tuple(sorted(kept.values(), key=lambda one: -one.delta_score))
 
 
-def _doubt(one: Difference) -> str:
+def _doubt(one: Difference, hull_known: bool) -> str:
     assert one.gain is not None
     assert one.by_group is not None
     if one.evidence < INFERENCE.prior_odds:
@@ -225,9 +226,10 @@ def _doubt(one: Difference) -> str:
     values = {name: each.value for name, each in one.estimates.items()}
     if doubt := one.candidate.effect.doubt(values):
         return doubt
-    first = one.candidate.parameters[0]
-    if first.name in one.estimates and not _excludes(one):
+    if not _excludes(one):
         return "no interval excludes that there is none"
+    if one.candidate.effect.id in OF_HULL and not hull_known:
+        return "the damping that it multiplies is known from the same logs only"
     return ""
 
 
