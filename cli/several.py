@@ -6,6 +6,8 @@ from typing import Any
 
 from typer.core import TyperCommand
 
+from ferryid.errors import FerryIdError
+
 
 def several_after(option: str) -> type[TyperCommand]:
     """Return a command that takes several words after one option, as ``--on a.bag b.bag``."""
@@ -15,7 +17,9 @@ def several_after(option: str) -> type[TyperCommand]:
             """Repeat the option before every word that follows it, up to the next option."""
             written: list[str] = []
             follows = False
-            for word in args:
+            for place, word in enumerate(args):
+                if word == option and (args[place + 1 : place + 2] or ["-"])[0].startswith("-"):
+                    raise FerryIdError(f"{option}: no log follows it. Fix: name one or more after it")
                 if word.startswith("-"):
                     follows = word.partition("=")[0] == option
                 elif follows and written[-1] != option:

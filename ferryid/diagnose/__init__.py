@@ -12,9 +12,10 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
-from ferryid.diagnose.versus import Versus, compare_groups, versus_json
+from ferryid.diagnose.versus import GROUPS, Versus, compare_groups, versus_json
 
 __all__ = [
+    "GROUPS",
     "JUDGING",
     "SCHEMA",
     "UNKNOWN",

@@ -103,15 +103,19 @@ def compare_groups(
             )
         notes.append(f"Group {name_of[path]}: {path} holds the motion of {other} and counts once.")
     assembled = assemble(averaged, profile, settings.model)
-    place = {} if assembled is None else assembled[1]
+    if assembled is None:
+        total = sum(len(one.windows.starts) for one in averaged)
+        raise FerryIdError(
+            f"diagnose: the groups are too short to compare, found {counted(total, 'window')} in both and need "
+            f"{INFERENCE.fewest_windows}. Fix: give more or longer logs"
+        )
+    place = assembled[1]
     for group in GROUPS:
         if not any(name_of[path] == group for path in place):
-            total = sum(len(one.windows.starts) for one in averaged)
             raise FerryIdError(
-                f"diagnose: no log of group {group} is long enough to compare, found {counted(total, 'window')} in both groups "
-                f"and need {INFERENCE.fewest_windows}, {INFERENCE.campaign_windows} of them in a log. Fix: give longer logs"
+                f"diagnose: no log of group {group} is long enough to compare, each needs "
+                f"{counted(INFERENCE.campaign_windows, 'window')}. Fix: give longer logs"
             )
-    assert assembled is not None
     campaign = in_groups(assembled[0], [name_of[path] for path in place])
     judged = judge_groups(campaign, run.progress)
     groups = {

@@ -10,7 +10,7 @@ from typing import Any
 
 from ferryid import __version__
 from ferryid.counts import counted
-from ferryid.diagnose import JUDGING, DiagnosisSettings, Difference, Versus, compare_groups, versus_json
+from ferryid.diagnose import GROUPS, JUDGING, DiagnosisSettings, Difference, Versus, compare_groups, versus_json
 from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
 from ferryid.report.html import template
@@ -75,7 +75,7 @@ def as_text(found: Versus) -> str:
         lines += ["", "Loads"]
         lines += [f"  {one.says}" for one in found.judged.loads]
     if found.judged.compared:
-        lines += ["", "Within what these logs resolve, estimate and 95 % interval"]
+        lines += ["", "Not favoured by the evidence: estimate and 95 % interval"]
         lines += [f"  {one.says}" for one in found.judged.compared]
     lines += ["", *(f"note: {one}" for one in (*found.notes, found.smallest) if one)]
     return "\n".join(lines)
@@ -145,8 +145,7 @@ def _held_out(one: Difference) -> str:
 
 def _row(one: Difference, selected: bool) -> dict[str, Any]:
     return {
-        "title": one.title,
-        "group": f"{one.group} relative to {one.other}",
+        "title": one.title if one.group == GROUPS[1] else f"{one.title}, {one.group} relative to {one.other}",
         "parameters": [one.said(each) for each in one.candidate.parameters if each.name in one.estimates],
         "smallest": [
             "not seen at any size" if least is None else f"{name.replace('_', ' ')} {least:.2g}"

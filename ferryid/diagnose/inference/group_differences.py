@@ -224,7 +224,8 @@ def _comparison(made: CampaignFit, candidate: Candidate, at: Floats, found: _Ave
     errors = np.hypot(widened, candidate.effect.formula_error * away)
     known = np.maximum(1.0 / np.maximum(found.variance, 1e-12) - 1.0, 0.0)
     least = np.sqrt((1.0 + known) * (2.0 * INFERENCE.prior_odds + np.log1p(known))) / np.maximum(known, 1e-12)
-    smallest = np.where(known > 1.0, size * least, np.inf)
+    # The evidence must favour it, and the interval exclude none.
+    smallest = np.where(known > 1.0, np.maximum(size * least, 1.96 * widened), np.inf)
     return Comparison(candidate, at + size * found.shift, errors, evidence, found.scatter, smallest)
 
 

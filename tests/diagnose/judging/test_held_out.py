@@ -20,6 +20,7 @@ from ferryid.effects.effect import HELD
 from ferryid.effects.force_model import ForceModel, Measurements, hull_of
 from ferryid.effects.thresholds import EFFECTS
 from ferryid.vessel import load_profile
+from ferryid.vessel.profile import Hull
 from ferryid.vessel.wind import wind_force
 from tests.vessel.hull_matrices import forward
 
@@ -29,7 +30,7 @@ FERRY = load_profile("milliampere")
 WIND = np.array([-2.0, 1.5])
 
 
-def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005) -> Measurements:
+def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005, hull: Hull = FERRY.hull) -> Measurements:
     """Integrate the ferry by scipy under a force of many periods, and measure it with white noise."""
 
     def tau(t: float) -> np.ndarray:
@@ -50,7 +51,7 @@ def sailed(seconds: float, wind: np.ndarray, noise: float = 0.005) -> Measuremen
         load = wind_force(areas, wind[None], psi, nu)
         c, s = np.cos(state[2]), np.sin(state[2])
         moved = [c * state[3] - s * state[4], s * state[3] + c * state[4], state[5]]
-        return np.concatenate([moved, forward(FERRY.hull, nu, tau(t)[None] + load)[0]])
+        return np.concatenate([moved, forward(hull, nu, tau(t)[None] + load)[0]])
 
     t = np.arange(0.0, seconds, 0.2)
     path = solve_ivp(rates, (0.0, seconds), np.zeros(6), t_eval=t, rtol=1e-8, atol=1e-8).y.T
