@@ -3,6 +3,7 @@
 from ferryid.diagnose.data.course import Course, MeasuredCourse
 from ferryid.diagnose.data.estimate import Estimate
 from ferryid.diagnose.data.measurements import check_withheld
+from ferryid.diagnose.inference.group_differences import GROUPS
 from ferryid.diagnose.judging.diagnosis import SCHEMA, Diagnosis, Withheld, finding_as_json, to_json
 from ferryid.diagnose.judging.error_profiles import Profiled
 from ferryid.diagnose.judging.finding import UNKNOWN, Finding
@@ -12,7 +13,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
-from ferryid.diagnose.versus import GROUPS, Versus, compare_groups, versus_json
+from ferryid.diagnose.versus import Versus, compare_groups, versus_json
 
 __all__ = [
     "GROUPS",

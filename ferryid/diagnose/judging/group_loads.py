@@ -92,9 +92,12 @@ def _estimated(test: ConditionTest) -> LoadDifference | None:
         group: dict(zip([one.name for one in parameters], each[groups == group].mean(axis=0).tolist(), strict=True))
         for group in GROUPS
     }
+    apart = np.array([mean[GROUPS[1]][one.name] - mean[GROUPS[0]][one.name] for one in parameters])
+    # What the formula of the load may be off, as of any reported estimate.
+    error = np.hypot(error, effects()[test.effect].formula_error * np.abs(apart))
     estimates = {
-        one.name: Estimate.normal(mean[GROUPS[1]][one.name] - mean[GROUPS[0]][one.name], float(e), one.unit)
-        for one, e in zip(parameters, error, strict=True)
+        one.name: Estimate.normal(float(at), float(e), one.unit)
+        for one, at, e in zip(parameters, apart, error, strict=True)
     }
     return LoadDifference(test.effect, mean, estimates, doubt=test.doubt)
 

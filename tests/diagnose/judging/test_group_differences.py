@@ -1,4 +1,4 @@
-"""Two groups of logs of one vessel: a thruster that is weak in one is named, and nothing else; alike groups differ in nothing."""
+"""Two groups of logs of one vessel: a thruster weak in one is named, and nothing else; alike groups differ in nothing."""
 
 from __future__ import annotations
 
