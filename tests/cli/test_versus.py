@@ -23,7 +23,7 @@ controller = {{ delta = 0.7, sigma = 0.7 }}
 sensors = {{ imu_rate_hz = 0.0, camera_rate_hz = 0.0 }}
 {effects}
 """
-WEAK = '[[effects]]\neffect = "thruster_gain"\ninstance = "thruster1"\nparameters = { factor = 0.8 }\n'
+WEAK = '[[thrusters.faults]]\nthruster = "thruster1"\nfactor = 0.8\n'
 
 Command = Callable[..., Run]
 

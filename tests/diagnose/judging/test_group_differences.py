@@ -12,6 +12,7 @@ import pytest
 from ferryid.diagnose.inference.campaign_estimation import estimate_campaign
 from ferryid.diagnose.inference.campaign_model import Campaign, Member
 from ferryid.diagnose.inference.group_differences import compare_near, differences_of, in_groups
+from ferryid.diagnose.inference.thresholds import INFERENCE
 from ferryid.diagnose.judging.group_differences import JudgedGroups, judge_groups, smallest_note, summary
 from ferryid.types import no_progress
 from tests.diagnose.inference.test_campaign_properties import weakened
@@ -78,8 +79,17 @@ def test_what_both_groups_have_is_no_difference() -> None:
 
 def test_logs_of_one_group_that_scatter_make_no_difference() -> None:
     """One log of A is as weak as that of B: what differs is the log, not the group."""
-    found = judged((1.0, 0.8, 0.8))
-    assert WEAK not in [one.candidate.key for one in found.sure]
+    found = {}
+    for factors in ((1.0, 1.0, 1.0), (1.0, 0.8, 0.8)):
+        campaign = groups(factors, ("A", "A", "B"))
+        (weak,) = (one for one in differences_of(campaign) if one.key == WEAK)
+        found[factors] = compare_near(estimate_campaign(campaign), weak)
+    alike, scattered = found.values()
+    assert alike.scatter < 0.01
+    assert scattered.scatter > 0.1
+    # Half of what the logs differ by is no difference of the groups.
+    assert scattered.errors[0] > 0.05
+    assert scattered.evidence < INFERENCE.prior_odds
 
 
 def test_a_difference_acts_in_its_group_alone() -> None:
