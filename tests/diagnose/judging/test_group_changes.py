@@ -23,9 +23,11 @@ from ferryid.diagnose.inference.group_differences import (
 )
 from ferryid.diagnose.inference.weak_form import windows
 from ferryid.diagnose.judging.group_differences import JudgedGroups, judge_groups, notes_of, smallest_note, summary
+from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.versus import GroupLog, Versus, versus_json
 from ferryid.effects import effects
 from ferryid.effects.force_model import ForceModel, hull_of
+from ferryid.effects.fouling import SECOND_ORDER
 from ferryid.report.versus_report import as_text, render
 from ferryid.types import no_progress
 from ferryid.vessel.hull import payload_mass
@@ -42,10 +44,16 @@ CALM = (0.0, 0.0)
 
 @cache
 def member(
-    number: int, factors: tuple[float, float] = (1.0, 1.0), load: float = 0.0, wind: tuple[float, float] = CALM
+    number: int,
+    factors: tuple[float, float] = (1.0, 1.0),
+    load: float = 0.0,
+    wind: tuple[float, float] = CALM,
+    fouled: float = 1.0,
 ) -> Member:
     """Return a log of two thrusters that give a share of what is believed of them, with a load 0.4 m forward."""
-    hull = replace(FERRY.hull, M=FERRY.hull.M + payload_mass(np.array([load, 0.4])))
+    second = {name for axis in SECOND_ORDER for name in axis}
+    D = {name: value * (fouled if name in second else 1.0) for name, value in FERRY.hull.D.items()}
+    hull = replace(FERRY.hull, M=FERRY.hull.M + payload_mass(np.array([load, 0.4])), D=D)
     whole = sailed(150.0 + 40.0 * number, np.array(wind), 0.02, hull)
     rows = slice(200 * number, None)
     names = ("t", "eta", "nu_raw", "nu", "parts", "angles", "usable")
@@ -103,12 +111,22 @@ def test_all_thrusters_alike_are_one_difference() -> None:
     assert found.estimates["factor"].low < 0.75 < found.estimates["factor"].high
 
 
-def test_fouling_between_groups_needs_no_hull_model_and_stays_a_hint_without_one() -> None:
+def test_fouling_between_groups_needs_no_hull_model() -> None:
     bare = replace(FERRY, hull=replace(FERRY.hull, D={}))
     clean = member(0)
     seen = replace(clean.windows, measurements=replace(clean.windows.measurements, profile=bare))
     found = differences_of(groups([replace(clean, windows=seen)], [member(1)], known=False))
     assert "fouling" in {one.effect.id for one in found}
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_fouling_is_confirmed_beside_a_known_hull_and_a_hint_beside_none(known: bool) -> None:
+    judged = judge_groups(groups([member(0)], [member(1, fouled=2.0)], known), no_progress)
+    (found,) = judged.differences
+    assert found.candidate.effect.id == "fouling"
+    assert found.doubt == ("" if known else "the damping that it multiplies is known from the same logs only")
+    assert (found.probability > JUDGING.hint_probability) == known
+    assert judged.verdict == ("different" if known else "perhaps")
 
 
 def test_a_wind_in_one_group_is_a_load_and_no_difference_of_the_vessel() -> None:
