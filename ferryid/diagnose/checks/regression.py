@@ -47,7 +47,15 @@ class Solution:
         return self.score(index, neutral) > float(stdtrit(self.freedom, 1.0 - 0.5 * CHECKS.false_alarm))
 
 
-def step(Z: Floats, J: Floats, e: Floats, place: NDArray[np.int64], size: Floats, away: Floats) -> Solution | None:
+def step(
+    Z: Floats,
+    J: Floats,
+    e: Floats,
+    place: NDArray[np.int64],
+    size: Floats,
+    away: Floats,
+    independent: int = CHECKS.independent_strides,
+) -> Solution | None:
     """Return the change p for which ``e + J p`` has nothing of the instruments in it; None where there is too little data.
 
     The errors are the larger of two: from sums over blocks, which hold whatever the noise is like but trust a few strong
@@ -65,8 +73,10 @@ def step(Z: Floats, J: Floats, e: Floats, place: NDArray[np.int64], size: Floats
         How large a parameter can be thought to be, shape (q,): what the data do not tell stays within it.
     away
         How far the parameters are from their neutral values already, shape (q,).
+    independent
+        Residuals so many strides apart are taken as independent.
     """
-    block = np.unique(place // CHECKS.independent_strides, return_inverse=True)[1]
+    block = np.unique(place // independent, return_inverse=True)[1]
     count, (m, c, q) = int(block.max(initial=-1)) + 1, J.shape
     freedom = count - q
     if freedom < 3:
@@ -85,14 +95,14 @@ def step(Z: Floats, J: Floats, e: Floats, place: NDArray[np.int64], size: Floats
     all_Z, all_left, known = np.zeros((len(whole), c, q)), np.zeros((len(whole), c)), np.zeros(len(whole))
     all_Z[row], all_left[row], known[row] = Z, left, 1.0
     even = np.zeros((q, q))
-    for lag in range(min(CHECKS.independent_strides, len(whole) - 1)):
+    for lag in range(min(independent, len(whole) - 1)):
         pairs = c * float(known[lag:] @ known[: len(whole) - lag])
         if pairs == 0.0:
             continue
         covariance = (
             float(np.sum(all_left[lag:] * all_left[: len(whole) - lag]))
             / pairs
-            * (1.0 - lag / CHECKS.independent_strides)
+            * (1.0 - lag / independent)
         )
         product = np.einsum("ncq,ncp->qp", all_Z[lag:], all_Z[: len(whole) - lag])
         even += covariance * (product if lag == 0 else product + product.T)

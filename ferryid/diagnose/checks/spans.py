@@ -85,11 +85,16 @@ def spans(measurements: Measurements, needed: Floats) -> tuple[Spans, Floats]:
     Floats
         Measurements, zero where not finite, shape (n', c).
     """
-    every = max(1, round(1.0 / (RATE_HZ * measurements.step_s)))
+    return spans_of(float(measurements.t[0]), measurements.step_s, measurements.usable, needed)
+
+
+def spans_of(first_s: float, step_s: float, usable: NDArray[np.bool_], needed: Floats) -> tuple[Spans, Floats]:
+    """Return the same of columns on any uniform grid, which starts at a time and has a step [s]."""
+    every = max(1, round(1.0 / (RATE_HZ * step_s)))
     n = len(needed) // every
     thin = needed[: n * every].reshape(n, every, -1).mean(axis=1)
-    good = measurements.usable[: n * every].reshape(n, every).all(axis=1) & np.isfinite(thin).all(axis=1)
-    dt = measurements.step_s * every
+    good = usable[: n * every].reshape(n, every).all(axis=1) & np.isfinite(thin).all(axis=1)
+    dt = step_s * every
     m = max(8, round(LENGTH_S / dt))
     x = (np.arange(m) + 0.5) / m
     T = m * dt
@@ -102,6 +107,6 @@ def spans(measurements: Measurements, needed: Floats) -> tuple[Spans, Floats]:
     stride = max(1, round(STRIDE_S / dt))
     starts = np.arange(0, n - m + 1, stride, dtype=np.int64)
     starts = starts[until[starts + m] - until[starts] == m]
-    middle_s = measurements.t[0] + (starts + 0.5 * m) * dt - 0.5 * measurements.step_s
+    middle_s = first_s + (starts + 0.5 * m) * dt - 0.5 * step_s
     found = Spans(starts, middle_s, scale * weight, scale * slope, scale * bend, dt, stride)
     return found, np.where(good[:, None], np.where(np.isfinite(thin), thin, 0.0), 0.0)
