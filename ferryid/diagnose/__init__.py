@@ -13,6 +13,7 @@ from ferryid.diagnose.judging.thresholds import JUDGING
 from ferryid.diagnose.judging.verdict import campaign_verdict, error_ratio, worse_axes
 from ferryid.diagnose.parallel import keep_to_one_thread
 from ferryid.diagnose.pipeline import DiagnosisSettings, diagnose, diagnose_and_store
+from ferryid.diagnose.second_sources import Comparison, SecondSources
 from ferryid.diagnose.versus import Versus, compare_groups, versus_json
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "JUDGING",
     "SCHEMA",
     "UNKNOWN",
+    "Comparison",
     "Course",
     "Diagnosis",
     "DiagnosisSettings",
@@ -30,6 +32,7 @@ __all__ = [
     "MeasuredCourse",
     "Pair",
     "Profiled",
+    "SecondSources",
     "Versus",
     "Withheld",
     "campaign_verdict",

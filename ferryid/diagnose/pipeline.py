@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ferryid.diagnose.checks.screening import screen_sensors
@@ -18,6 +18,7 @@ from ferryid.diagnose.judging.diagnosis import Diagnosis
 from ferryid.diagnose.judging.judge import judge
 from ferryid.diagnose.judging.learning import Learner, without_withheld
 from ferryid.diagnose.judging.model_update import store_updated_model
+from ferryid.diagnose.second_sources import compare_second_sources
 from ferryid.errors import FerryIdError
 from ferryid.models import Model
 from ferryid.models.store import check_name
@@ -84,7 +85,9 @@ def diagnose_campaign(
     estimated = [estimate(log, baseline) for log in averaged if log.long_enough]
     selected = [select(log, run.progress) for log in estimated]
     judged = judge(selected, run.progress)
-    return conclude(averaged, judged, baseline, together, left_out)
+    found = conclude(averaged, judged, baseline, together, left_out)
+    sources = compare_second_sources([log.screened.measured for log in averaged], settings.withhold, run.progress)
+    return tuple(replace(one, sources=sources) for one in found)
 
 
 def average_logs(

@@ -12,7 +12,7 @@ import numpy as np
 from ferryid.counts import counted
 from ferryid.diagnose import Diagnosis, Finding, Withheld, campaign_verdict
 from ferryid.models.prediction import FreeRun
-from ferryid.report import diagnosis_errors, diagnosis_figures, diagnosis_words, figures, likeness
+from ferryid.report import diagnosis_errors, diagnosis_figures, diagnosis_words, figures, likeness, second_sources
 from ferryid.report.html import template
 from ferryid.report.left_out import left_out_table
 from ferryid.signals.track import LeftOut
@@ -31,6 +31,7 @@ def render(
     several = len(diagnoses) > 1
     shared = diagnosis_words.notes_of_all(diagnoses)
     common = diagnosis_words.findings_of_all(diagnoses)
+    together = second_sources.of_all(diagnoses)
     logs = [_log(one, f"{k}-" if several else "", k <= MAX_LOGS, shared, common) for k, one in enumerate(diagnoses, 1)]
     left = [one.log for one in diagnoses[MAX_LOGS:]]
     page = template("diagnosis.html").render(
@@ -43,6 +44,7 @@ def render(
         sign=diagnosis_words.SIGN,
         made=made,
         shared_notes=shared,
+        shared_sources=second_sources.section(together) if together else {},
         shared_model=diagnosis_words.model_of_all(diagnoses),
         axes=list(zip(AXES, UNITS, strict=True)),
         omitted=f"Not drawn, but part of every number: {', '.join(left)}." if left else "",
@@ -65,6 +67,7 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
     blocks = [diagnosis_words.summary(diagnoses)] if len(diagnoses) > 1 else []
     shared = diagnosis_words.notes_of_all(diagnoses)
     common = diagnosis_words.findings_of_all(diagnoses)
+    together = second_sources.of_all(diagnoses)
     if common:
         lines = ["In all logs:", *_listed(common)]
         blocks.append("\n".join(_folded(line) for line in lines))
@@ -85,11 +88,15 @@ def as_text(diagnoses: Sequence[Diagnosis]) -> str:
         hidden = [f"withheld {one_hidden.signal}: {one_hidden.says}" for one_hidden in one.withheld]
         remarks = [*hidden, *(f"note: {note}" for note in diagnosis_words.notes_of(one, shared))]
         remarks += filter(None, [likeness.line(one.likeness)])
+        remarks += [] if together else second_sources.lines(one.sources)
+        remarks += second_sources.repair_lines(one)
         lines += ["", *remarks] if remarks else []
         lines += ["", diagnosis_words.new_model(one)] if one.model and len(diagnoses) == 1 else [""]
         blocks.append("\n".join(_folded(line) for line in lines))
     if shared:
         blocks.append("\n".join(_folded(f"note on all logs: {note}") for note in shared))
+    if together and (instruments := second_sources.lines(together)):
+        blocks.append("\n".join(_folded(line) for line in instruments))
     if model := diagnosis_words.model_of_all(diagnoses):
         blocks.append(_folded(model))
     return "\n\n".join(blocks)
@@ -168,6 +175,8 @@ def _log(
             for one in diagnosis.withheld
         ],
         "notes": diagnosis_words.notes_of(diagnosis, told),
+        "sources": second_sources.section(diagnosis.sources),
+        "repairs": second_sources.repairs(diagnosis),
         "likeness": likeness.section(diagnosis.likeness, f"{prefix}likeness", drawn),
         "drawn": drawn and any(one.evidence for one in diagnosis.findings),
         "fitted": diagnosis_errors.fitted(diagnosis),

@@ -24,6 +24,7 @@ from ferryid.errors import FerryIdError
 from ferryid.files import dump_json, finite, replacing
 from ferryid.models import Model
 from ferryid.models.store import load
+from ferryid.report import second_sources
 from ferryid.report.diagnosis_page import as_text, render
 from ferryid.report.diagnosis_words import findings_of, findings_of_all
 from ferryid.report.outcome import Report
@@ -132,6 +133,10 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
     if len(diagnoses) == 1:
         return to_json(diagnoses[0])
     logs, shared = [to_json(one) for one in diagnoses], findings_of_all(diagnoses)
+    together = second_sources.of_all(diagnoses)
+    if together is not None:
+        for one in logs:
+            one.pop("second_sources", None)
     return {
         "schema": SCHEMA,
         "log": None,
@@ -149,6 +154,7 @@ def as_json(diagnoses: Sequence[Diagnosis]) -> dict[str, Any]:
         "after": {"mse": _pooled(diagnoses, "after"), "free_run": {}},
         "notes": [],
         "withheld": [],
+        **({"second_sources": together.to_json()} if together else {}),
         **({} if diagnoses[0].learned is None else {"learned": diagnoses[0].learned.to_json()}),
         # What several logs teach is one model.
         "model": next((one.model for one in diagnoses if one.model), None),

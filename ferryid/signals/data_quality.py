@@ -81,6 +81,30 @@ def remarks(recording: Recording, repairs: Sequence[str] = ()) -> list[str]:
     return list(dict.fromkeys(told))
 
 
+_NO_REPAIR = ("no header", "times are those", "time guessed", "receive times are used")
+"""How notes on times begin that state which times are used, and nothing that was repaired."""
+
+
+def repair_sentences(recording: Recording, taken_out: Sequence[str]) -> tuple[str, ...]:
+    """Return what was repaired of a log while it was read and aligned, as sentences, each once.
+
+    Parameters
+    ----------
+    recording
+        Signals at their own rates.
+    taken_out
+        Samples that were taken out or interpolated: of `ferryid.signals.faults.find_faults`.
+    """
+    told = [loss_sentence(loss) for loss in recording.losses if not loss.costs_messages]
+    read = {one.name: one.note.split("; ") for one in recording.topics if one.name in recording.streams}
+    noted = {}
+    for topic, stream in recording.streams.items():
+        clock = stream.clock
+        notes = [*read.get(topic, ()), *clock.notes, *_of_clock(stream), *clock_notes(clock.out_of_order, 0)]
+        noted[topic] = [note for note in notes if note and not note.startswith(_NO_REPAIR)]
+    return tuple(dict.fromkeys((*told, *grouped_notes(noted), *taken_out)))
+
+
 def left_out_sentences(recording: Recording, left_out: Sequence[LeftOut], used: Flags) -> tuple[str, ...]:
     """Return what of a log could not be read, and which rows are not used because of times, gaps or faults, as sentences.
 

@@ -13,9 +13,12 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[2]
 HOME = ROOT / "ferryid" / "diagnose"
-ORDER = ("parallel", "data", "checks", "inference", "judging", "pipeline", "versus")
+ORDER = ("parallel", "data", "checks", "second_sources", "inference", "judging", "pipeline", "versus")
 """From the bottom to the top."""
-PACKAGES = ("ferryid.diagnose", *(f"ferryid.diagnose.{name}" for name in ("data", "checks", "inference", "judging")))
+PACKAGES = (
+    "ferryid.diagnose",
+    *(f"ferryid.diagnose.{name}" for name in ("data", "checks", "second_sources", "inference", "judging")),
+)
 """What others may import from, and of these no more than their ``__all__``; a check is a module of its own."""
 
 

@@ -20,6 +20,7 @@ ORDER = (
     "compare",
     "diagnose.data",
     "diagnose.checks",
+    "diagnose.second_sources",
     "diagnose.inference",
     "diagnose.judging",
 )

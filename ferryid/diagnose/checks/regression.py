@@ -99,11 +99,7 @@ def step(
         pairs = c * float(known[lag:] @ known[: len(whole) - lag])
         if pairs == 0.0:
             continue
-        covariance = (
-            float(np.sum(all_left[lag:] * all_left[: len(whole) - lag]))
-            / pairs
-            * (1.0 - lag / independent)
-        )
+        covariance = float(np.sum(all_left[lag:] * all_left[: len(whole) - lag])) / pairs * (1.0 - lag / independent)
         product = np.einsum("ncq,ncp->qp", all_Z[lag:], all_Z[: len(whole) - lag])
         even += covariance * (product if lag == 0 else product + product.T)
     prior = variance**2 * np.eye(q)

@@ -15,7 +15,8 @@ from ferryid.effects.measurements import actuator_forces, interpolate_gaps
 from ferryid.errors import FerryIdError, did_you_mean
 from ferryid.signals.align import align
 from ferryid.signals.complementary_filter import MEAN_S, complementary_filter
-from ferryid.signals.data_quality import left_out_sentences
+from ferryid.signals.data_quality import left_out_sentences, repair_sentences
+from ferryid.signals.faults import find_faults
 from ferryid.signals.prepare import doubts_of
 from ferryid.signals.recording import Recording, data_quality, record
 from ferryid.signals.sampling import check_sampling
@@ -53,6 +54,8 @@ class Survey:
         Which rows are not used and why, as sentences.
     t0_ns
         Absolute time of the measurements' first row [ns].
+    repairs
+        What was repaired while the log was read and aligned, as sentences.
     """
 
     recording: Recording
@@ -62,6 +65,7 @@ class Survey:
     hidden: Mapping[str, Floats]
     t0_ns: int
     left_out: tuple[str, ...]
+    repairs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -130,7 +134,8 @@ def read_measurements(
     run.progress(f"reading {Path(path).name}")
     recording = record(path, profile, run.tables, verify=run.verify)
     check_sampling(recording, profile)
-    track = align(recording, profile)
+    faults = find_faults(recording)
+    track = align(recording, profile, faults=faults)
     track, hidden = _without(track, withhold)
     measured = measure(track, profile)
     motion = smooth_measured(measured, window_s)
@@ -142,7 +147,8 @@ def read_measurements(
     )
     motion = replace(motion, left_out=(*measured.left_out, *placeless))
     said = left_out_sentences(recording, motion.left_out, measurements.usable)
-    survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns, said)
+    repairs = repair_sentences(recording, faults.taken_out)
+    survey = Survey(recording, motion, data_quality(recording, motion), doubts, hidden, track.t0_ns, said, repairs)
     return measurements, survey
 
 

@@ -90,7 +90,8 @@ def _with_origin(
     diagnosis: Diagnosis, log: AveragedLog, together: JudgedCampaign | None, copied: str | None
 ) -> Diagnosis:
     """Return a diagnosis with the path of its log, and with what the log teaches as one of a campaign."""
-    diagnosis = replace(diagnosis, path=log.path, copy=copied is not None)
+    repairs = log.screened.measured.survey.repairs
+    diagnosis = replace(diagnosis, path=log.path, copy=copied is not None, repairs=repairs)
     if together is None:
         return diagnosis
     if copied is not None:

@@ -15,6 +15,7 @@ from ferryid.diagnose.judging.likeness import Likeness
 from ferryid.diagnose.judging.locate import Location, plain_location
 from ferryid.diagnose.judging.posterior import Posterior
 from ferryid.diagnose.judging.verdict import Remainder
+from ferryid.diagnose.second_sources import SecondSources
 from ferryid.signals.track import LeftOut
 from ferryid.types import Floats
 
@@ -115,6 +116,10 @@ class Diagnosis:
         True for a log that holds the motion of another one before it.
     likeness
         How alike the effects look in it; None of a log that is too short.
+    repairs
+        What was repaired of the log while it was read, as sentences.
+    sources
+        What topics that the profile does not map show of the sensors; of a campaign, over all logs.
     """
 
     log: str
@@ -138,6 +143,8 @@ class Diagnosis:
     path: str = ""
     copy: bool = False
     likeness: Likeness | None = None
+    repairs: tuple[str, ...] = ()
+    sources: SecondSources = field(default_factory=SecondSources)
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -168,6 +175,8 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         **({} if diagnosis.duration_s is None else {"duration_s": diagnosis.duration_s}),
         "left_out": [asdict(one) for one in diagnosis.left_out],
         **({} if diagnosis.likeness is None else {"likeness": diagnosis.likeness.to_json()}),
+        "repairs": list(diagnosis.repairs),
+        **({"second_sources": diagnosis.sources.to_json()} if diagnosis.sources else {}),
         **({} if diagnosis.learned is None else {"learned": diagnosis.learned.to_json()}),
     }
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from typing import Any
 
@@ -15,13 +15,13 @@ import numpy as np
 
 from ferryid.diagnose.data.measurements import MeasuredLog
 from ferryid.diagnose.second_sources.candidates import Candidate, candidates
-from ferryid.diagnose.second_sources.comparison import Comparison, Difference, compare, label
+from ferryid.diagnose.second_sources.comparison import Comparison, Difference, compare
 from ferryid.diagnose.second_sources.samples import MANY, Samples, mapped_slopes, read_samples
 from ferryid.diagnose.second_sources.thresholds import SECOND
 from ferryid.diagnose.second_sources.witnesses import Witness, witnesses
 from ferryid.effects.force_model import Measurements
 
-__all__ = ["Comparison", "Difference", "SecondSources", "Witness", "compare_second_sources", "label"]
+__all__ = ["Comparison", "Difference", "SecondSources", "Witness", "compare_second_sources"]
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,8 @@ def compare_second_sources(
     skipped[MANY] += max(len(samples) - SECOND.most_signals, 0)
     length_m = logs[0].measurements.profile.hull.length_m
     compared = []
-    for one, values in list(samples.items())[: SECOND.most_signals]:
-        result = compare(one, values, length_m)
+    for one, pairs in list(samples.items())[: SECOND.most_signals]:
+        result = compare(one, pairs, length_m)
         if result is not None:
             compared.append(result)
         elif one.kind != "unknown":
@@ -141,7 +141,7 @@ def _own(logs: Sequence[MeasuredLog], kinds: Collection[str], length_m: float) -
             if one.kind in kinds:
                 found.setdefault(one, []).append((values, log.measurements))
     compared = [compare(one, values, length_m) for one, values in found.items()]
-    return [replace(one, differences=one.differences) for one in compared if one is not None]
+    return [one for one in compared if one is not None]
 
 
 def _senders(samples: Mapping[Candidate, Sequence[tuple[Samples, Measurements]]]) -> dict[str, int]:

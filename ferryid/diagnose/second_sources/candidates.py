@@ -26,9 +26,49 @@ _ORDERS = {
 }
 _OTHER = {
     *("wind", "current", "water", "wave", "waves", "aws", "awa", "tws", "twa", "twd", "stw"),
-    *("accel", "acceleration", "accl", "acc", "force", "torque", "wrench", "magn", "mag", "magnetic", "field", "moment"),
-    *("header", "seq", "stamp", "secs", "nsecs", "sec", "nanosec", "time", "date", "status", "id", "temp", "temperature"),
-    *("rudder", "throttle", "thrust", "thruster", "motor", "rpm", "pwm", "azimuth", "propeller", "prop", "steering", "joint"),
+    *(
+        "accel",
+        "acceleration",
+        "accl",
+        "acc",
+        "force",
+        "torque",
+        "wrench",
+        "magn",
+        "mag",
+        "magnetic",
+        "field",
+        "moment",
+    ),
+    *(
+        "header",
+        "seq",
+        "stamp",
+        "secs",
+        "nsecs",
+        "sec",
+        "nanosec",
+        "time",
+        "date",
+        "status",
+        "id",
+        "temp",
+        "temperature",
+    ),
+    *(
+        "rudder",
+        "throttle",
+        "thrust",
+        "thruster",
+        "motor",
+        "rpm",
+        "pwm",
+        "azimuth",
+        "propeller",
+        "prop",
+        "steering",
+        "joint",
+    ),
     *("dd", "jerk", "altitude", "height", "depth"),
 }
 _QUATERNION = {"orientation", "rotation", "quaternion"}
@@ -38,10 +78,31 @@ _RATES = {"angular", "gyro", "gyroscope", "omega", "rates"}
 _HEADING = {"heading", "hdg", "yaw", "psi", "compass", "hdt"}
 _COURSE = {"course", "cog", "track"}
 _SPEED = {"speed", "sog", "spd", "groundspeed"}
-_YAW_RATE = {"yawrate", "zgyro", "gyroz", "gz", "wz", "rot", "yawd", "psidot", "yawdot", "yawspeed", "rotz", "angularvelocityz"}
+_YAW_RATE = {
+    *(
+        "yawrate",
+        "zgyro",
+        "gyroz",
+        "gz",
+        "wz",
+        "rot",
+        "yawd",
+        "psidot",
+        "yawdot",
+        "yawspeed",
+        "rotz",
+        "angularvelocityz",
+    ),
+}
 _PAIRS = {
-    "position": (("n", "e"), ("north", "east"), ("northing", "easting"), ("xn", "yn"), ("lat", "lon"), ("latitude", "longitude")),
-    "velocity": (("u", "v"), ("vx", "vy"), ("vn", "ve"), ("surge", "sway"), ("xbd", "ybd"), ("velx", "vely"), ("vnorth", "veast")),
+    "position": (
+        *(("n", "e"), ("north", "east"), ("northing", "easting"), ("xn", "yn")),
+        *(("lat", "lon"), ("latitude", "longitude")),
+    ),
+    "velocity": (
+        *(("u", "v"), ("vx", "vy"), ("vn", "ve"), ("surge", "sway"), ("xbd", "ybd")),
+        *(("velx", "vely"), ("vnorth", "veast")),
+    ),
 }
 _SINGLE = "data"
 _NOT_TRIED = {
@@ -76,9 +137,14 @@ class Candidate:
     form: str = ""
 
     @property
-    def name(self) -> str:
-        """Topic, and what its fields have in common."""
-        return f"{self.topic}: {', '.join(self.fields)}"
+    def label(self) -> str:
+        """Topic and fields, of a quaternion what its fields have in common."""
+        if not self.fields:
+            return self.topic
+        first = self.fields[0]
+        fields = first.removesuffix(first[-1]).rstrip("._ ") if self.form == "quaternion" else ""
+        fields = fields or ", ".join(self.fields)
+        return fields if self.topic == "table" else self.topic if fields == _SINGLE else f"{self.topic} {fields}"
 
 
 def words_of(path: str) -> tuple[str, ...]:
@@ -128,7 +194,9 @@ def candidates(profile: Profile, topics: Sequence[Topic], withhold: Collection[s
         known += named
         used = {path for one in named for path in one.fields}
         # Of message types with many fields, what has no telling name is state of a device.
-        if name not in hidden and (table or len(topic.fields) <= 1 or not topic.type.startswith(("sensor_msgs", "nav_msgs"))):
+        if name not in hidden and (
+            table or len(topic.fields) <= 1 or not topic.type.startswith(("sensor_msgs", "nav_msgs"))
+        ):
             rest = [path for path in fields if path not in used and _to_be_tried(topic, path, fields[path])]
             unknown += [Candidate(topic.name, (path,), "unknown") for path in rest]
     return (*known, *unknown)
@@ -136,7 +204,9 @@ def candidates(profile: Profile, topics: Sequence[Topic], withhold: Collection[s
 
 def _to_be_tried(topic: Topic, path: str, words: tuple[str, ...]) -> bool:
     """Return whether a field without a telling name may be a measurement: counters, flags and other axes are not."""
-    other = bool(_NOT_TRIED & set(words)) or (bool(set(words) & (_RATES | _PLACE | _QUATERNION)) and words[-1] in ("x", "y", "w"))
+    other = bool(_NOT_TRIED & set(words)) or (
+        bool(set(words) & (_RATES | _PLACE | _QUATERNION)) and words[-1] in ("x", "y", "w")
+    )
     return topic.fields[path].startswith(("float", "double", "real")) and not other
 
 
@@ -154,7 +224,9 @@ def _named(topic: Topic, fields: Mapping[str, tuple[str, ...]]) -> Iterator[Cand
         groups.setdefault(tuple(kept[:-1]), {}).setdefault(kept[-1], path)
     for stem, axes in groups.items():
         what = set(stem)
-        if {"x", "y", "z", "w"} <= axes.keys() and (what & _QUATERNION or around & _QUATERNION or not stem or what & _HEADING):
+        if {"x", "y", "z", "w"} <= axes.keys() and (
+            what & _QUATERNION or around & _QUATERNION or not stem or what & _HEADING
+        ):
             yield Candidate(topic.name, tuple(axes[axis] for axis in "xyzw"), "heading", "quaternion")
             continue
         if {"x", "y"} <= axes.keys() and what & _PLACE and not what & (_SPEEDS | _RATES):
@@ -187,10 +259,10 @@ def _scalars(topic: Topic, stem: tuple[str, ...], axes: Mapping[str, str], aroun
     alone = len(topic.fields) == 1 or set(axes) == {_SINGLE}
     for last, path in axes.items():
         words = {*stem, last} | (around if alone or last == _SINGLE else set())
-        joined = "".join((*stem, last))
-        if last in _YAW_RATE or joined in _YAW_RATE or (words & _HEADING and words & {"rate", "dot", "d"}):
-            yield Candidate(topic.name, (path,), "yaw_rate")
-        elif last == "r" and {"u", "v"} & axes.keys():
+        turning = bool(words & _HEADING and words & {"rate", "dot", "d"}) or (
+            last == "r" and bool({"u", "v"} & axes.keys())
+        )
+        if last in _YAW_RATE or "".join((*stem, last)) in _YAW_RATE or turning:
             yield Candidate(topic.name, (path,), "yaw_rate")
         elif last in ("x", "y", "z", "w"):
             continue

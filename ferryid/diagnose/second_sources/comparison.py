@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import degrees, isfinite, sqrt
-from os.path import commonprefix
 
 import numpy as np
 from scipy.special import stdtrit
@@ -41,8 +40,8 @@ class Difference:
     Attributes
     ----------
     what
-        ``"scale"``, ``"sign"``, ``"angle"``, ``"place"`` (of two components x and y), ``"delay"``, ``"lag"``, ``"bias"``, ``"drift"``,
-        ``"steps"`` or ``"wraps"``.
+        ``"scale"``, ``"sign"``, ``"angle"``, ``"place"`` (of two components x and y), ``"delay"``, ``"lag"``, ``"bias"``,
+        ``"drift"``, ``"steps"`` or ``"wraps"``.
     parameters
         By name, with 95 % intervals; empty of a sign.
     says
@@ -105,15 +104,13 @@ class Comparison:
         what = explanations.KINDS[self.kind]
         frame = f" ({self.axes})" if self.axes else ""
         if not self.follows:
-            return (
-                f"{label(self.candidate)}: by its name a {what}, and has {100.0 * self.share:.0f} % of its variance in common with "
-                "the mapped one."
-            )
+            common = f"has {100.0 * self.share:.0f} % of its variance in common with the mapped one"
+            return f"{self.candidate.label}: by its name a {what}, and {common}."
         if self.same:
-            return f"{label(self.candidate)}: repeats the mapped {what}{frame}."
+            return f"{self.candidate.label}: repeats the mapped {what}{frame}."
         differences = "; ".join(one.says for one in self.differences) or "agrees with the mapped one"
         left = f"; scatter {self.scatter:.2g} {self.scatter_unit}" if isfinite(self.scatter) else ""
-        return f"{label(self.candidate)}: {what}{frame}, {differences}{left}."
+        return f"{self.candidate.label}: {what}{frame}, {differences}{left}."
 
     @property
     def agrees(self) -> bool:
@@ -121,18 +118,7 @@ class Comparison:
         return self.follows and not self.differences
 
 
-def label(one: Candidate) -> str:
-    """Return topic and fields of a signal, short."""
-    if not one.fields:
-        return one.topic
-    common = commonprefix(one.fields).rstrip("._ ") if len(one.fields) > 2 else ""
-    fields = common or ", ".join(one.fields)
-    return fields if one.topic == "table" else one.topic if fields == "data" else f"{one.topic} {fields}"
-
-
-def compare(
-    one: Candidate, samples: Sequence[tuple[Samples, Measurements]], length_m: float
-) -> Comparison | None:
+def compare(one: Candidate, samples: Sequence[tuple[Samples, Measurements]], length_m: float) -> Comparison | None:
     """Compare a signal, recorded in some logs, with the mapped one of its kind.
 
     Returns
@@ -212,7 +198,7 @@ def _with_lag(guess: Guess, delayed: Fitted, pairs: Sequence[Pair], length_m: fl
     if not delayed.active[LATE] and guess.late_s == 0.0:
         return None
     lagging = fit(replace(guess.setting, filtered=True), pairs, length_m)
-    if lagging is None or not lagging.certain(LATE):
+    if lagging is None or not lagging.certain(LATE) or abs(lagging.values[LATE]) < SECOND.least_lag_s:
         return None
     return lagging if 1.0 - lagging.share < SECOND.better_lag * (1.0 - delayed.share) else None
 
@@ -267,22 +253,26 @@ def _scale(guess: Guess, fitted: Fitted) -> Difference | None:
     if not guess.unit and guess.known and not certain:
         return None
     size = abs(guess.setting.gain)
-    factor = Estimate(*(size * one for one in fitted.interval(SCALE)), "-")
+    factor = _scaled(fitted.interval(SCALE), size, "-")
     rest = Estimate(*fitted.interval(SCALE), "-") if certain and guess.unit else None
     return Difference("scale", {"factor": factor}, explanations.scale(factor, guess.unit, rest))
 
 
+def _scaled(interval: tuple[float, float, float], scale: float, unit: str) -> Estimate:
+    value, low, high = interval
+    return Estimate(scale * value, scale * low, scale * high, unit)
+
+
 def _delay(fitted: Fitted, late: float) -> Difference | None:
-    value, low, high = (late + one for one in fitted.interval(LATE))
-    if late == 0.0 and not fitted.certain(LATE):
+    found = fitted.estimate(LATE)
+    if found is None or (late == 0.0 and not fitted.certain(LATE)):
         return None
-    if not fitted.active[LATE] or min(abs(low), abs(high)) == 0.0 or low * high <= 0.0:
+    value, error = late + found[0], found[1]
+    freedom = fitted.one.freedom
+    if abs(value) <= float(stdtrit(freedom, 1.0 - 0.5 * CHECKS.false_alarm)) * error:
         return None
-    # As certain as any other difference: by as many standard errors.
-    solution = fitted.one
-    if abs(value) <= float(stdtrit(solution.freedom, 1.0 - 0.5 * CHECKS.false_alarm)) * (high - low) / (2.0 * NORMAL_95):
-        return None
-    delay = Estimate(value, low, high, "s")
+    reach = float(stdtrit(freedom, 0.975)) * error
+    delay = Estimate(value, value - reach, value + reach, "s")
     if fitted.filtered:
         return Difference("lag", {"time_constant": delay}, explanations.lag(delay))
     return Difference("delay", {"delay": delay}, explanations.delay(delay))
@@ -296,10 +286,7 @@ def _bias(guess: Guess, fitted: Fitted, unit: float) -> list[Difference]:
     names = (("north", "east") if guess.setting.world else ("forward", "starboard")) if vector else ("bias",)
     what = "drift" if guess.setting.kind == "position" else "bias"
     shown = "deg/s" if guess.setting.kind == "yaw_rate" else "m/s"
-    values = {
-        name: Estimate(*(unit * one for one in fitted.interval(index)), shown)
-        for name, index in zip(names, indices, strict=True)
-    }
+    values = {name: _scaled(fitted.interval(index), unit, shown) for name, index in zip(names, indices, strict=True)}
     return [Difference(what, values, explanations.bias(values, what))]
 
 
@@ -328,14 +315,14 @@ def _heading_bias(guess: Guess, fitted: Fitted, late: float, pairs: Sequence[Pai
         result.append(Difference("sign", {}, explanations.quarter_turn(quarter % 4, sign)))
     if abs(rest) > float(stdtrit(freedom, 1.0 - 0.5 * CHECKS.false_alarm)) * error:
         reach = float(stdtrit(freedom, 0.975)) * error
-        low, value, high = sorted((degrees(sign * (rest + more)) for more in (-reach, 0.0, reach)))
+        low, value, high = sorted(degrees(sign * (rest + more)) for more in (-reach, 0.0, reach))
         bias = Estimate(value, low, high, "deg")
         result.append(Difference("bias", {"bias": bias}, explanations.heading_bias(bias)))
     return result
 
 
 def _mean(parts: Sequence[Floats], step_s: float) -> tuple[float, float, int] | None:
-    """Return mean, standard error and its freedom of a difference that may wander: the largest error over blocks of several lengths."""
+    """Return mean, standard error and freedom of a difference that may wander: the largest over blocks of several lengths."""
     whole = np.concatenate(parts)
     known = np.isfinite(whole)
     if not known.any():
@@ -368,7 +355,5 @@ def _of_values(guess: Guess, fitted: Fitted, samples: Sequence[Samples], unit: f
         found.append(Difference("steps", {"step": Estimate(step, step, step, name)}, explanations.steps(step, name)))
     wraps = sum(one.wraps for one in samples)
     if wraps:
-        found.append(
-            Difference("wraps", {"samples": Estimate(wraps, wraps, wraps, "-")}, explanations.wraps(wraps))
-        )
+        found.append(Difference("wraps", {"samples": Estimate(wraps, wraps, wraps, "-")}, explanations.wraps(wraps)))
     return found

@@ -34,7 +34,9 @@ def digits(one: Estimate) -> int:
     half = 0.5 * (one.high - one.low)
     if not isfinite(half) or half <= 0.0:
         return 3
-    return min(max(1 - int(f"{half:e}".partition("e")[2]), 0), 6) - (1 if f"{half:e}"[0] not in "12" and half < 10.0 else 0)
+    return min(max(1 - int(f"{half:e}".partition("e")[2]), 0), 6) - (
+        1 if f"{half:e}"[0] not in "12" and half < 10.0 else 0
+    )
 
 
 def shown(one: Estimate, scale: float = 1.0, unit: str | None = None) -> str:
@@ -57,7 +59,9 @@ def quarter_turn(quarter: int, sign: float) -> str:
     """Return what a heading is that differs by quarter turns."""
     if sign < 0.0 and quarter == 1:
         return "counted from east (ENU)"
-    return f"{ {1: 90, 2: 180, 3: 270}[quarter] } degrees added" + (": points aft" if quarter == 2 and sign > 0.0 else "")
+    return f"{ {1: 90, 2: 180, 3: 270}[quarter] } degrees added" + (
+        ": points aft" if quarter == 2 and sign > 0.0 else ""
+    )
 
 
 def scale(factor: Estimate, unit: str, rest: Estimate | None) -> str:

@@ -1,4 +1,4 @@
-"""The axes, the unit and the coarse delay of a signal, before anything is fitted: which of them makes it follow the mapped one."""
+"""The axes, the unit and the coarse delay with which a signal follows the mapped one, before anything is fitted."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ferryid.diagnose.checks.spans import RATE_HZ
 from ferryid.diagnose.checks.thresholds import CHECKS
-from ferryid.diagnose.second_sources.fit import Complex, Setting, complex_of, source_of
+from ferryid.diagnose.second_sources.fit import VECTORS, Complex, Setting, complex_of, lever_of, source_of
 from ferryid.diagnose.second_sources.pairs import Pair
 from ferryid.diagnose.second_sources.thresholds import SECOND
-from ferryid.types import Floats
+from ferryid.types import Flags, Floats
 from ferryid.vessel.units import KINDS
 
 UNIT_KIND = {"position": "length", "velocity": "speed", "speed": "speed", "yaw_rate": "rate", "heading": "angle"}
@@ -112,13 +111,16 @@ def _unit(size: float, kind: str) -> tuple[float, str, bool]:
 
 
 def _best_delay(setting: Setting, pairs: Sequence[Pair]) -> tuple[float, float, complex] | None:
-    """Return common share, delay [s] and gain at the delay at which a signal follows the mapped one best."""
+    """Return common share, delay [s] and gain at the delay at which a signal follows the mapped one best.
+
+    The gain of the place of the other sensor is solved for along with the signal's: ahead of the mapped one looks like early.
+    """
     reach = round(SECOND.most_delay_s * RATE_HZ)
     averaged = [_averages(setting, pair) for pair in pairs]
     best: tuple[float, float, complex] | None = None
     for lag in range(-reach, reach + 1):
-        products, powers, others, count = 0.0 + 0.0j, 0.0, 0.0, 0
-        for signal, source, known in averaged:
+        normal, right, power, count = np.zeros((2, 2), dtype=np.complex128), np.zeros(2, dtype=np.complex128), 0.0, 0
+        for signal, sources, known in averaged:
             n = len(signal) - abs(lag)
             if n <= 0:
                 continue
@@ -126,32 +128,34 @@ def _best_delay(setting: Setting, pairs: Sequence[Pair]) -> tuple[float, float, 
             both = known[after] & known[before]
             if not both.any():
                 continue
-            z, m = signal[after][both], source[before][both]
-            z, m = z - z.mean(), m - m.mean()
-            products += complex(np.vdot(m, z))
-            powers += float(np.vdot(m, m).real)
-            others += float(np.vdot(z, z).real)
+            z, M = signal[after][both], sources[before][both]
+            z, M = z - z.mean(), M - M.mean(axis=0)
+            normal += M.conj().T @ M
+            right += M.conj().T @ z
+            power += float(np.vdot(z, z).real)
             count += len(z)
-        if powers <= 0.0 or others <= 0.0 or count < SECOND.fewest_windows:
+        used = 2 if setting.kind in VECTORS and normal[1, 1].real > 0.0 else 1
+        if power <= 0.0 or normal[0, 0].real <= 0.0 or count < SECOND.fewest_windows:
             continue
-        share = abs(products) ** 2 / (powers * others)
+        gain = np.linalg.lstsq(normal[:used, :used], right[:used], rcond=None)[0]
+        share = float(np.vdot(gain, right[:used]).real) / power
         if best is None or share > best[0] + 1e-9:
-            best = (share, lag / RATE_HZ, products / powers)
+            best = (share, lag / RATE_HZ, complex(gain[0]))
     return best
 
 
-def _averages(setting: Setting, pair: Pair) -> tuple[Complex, Complex, NDArray[np.bool_]]:
-    """Return what is compared of both signals about every row, and where it is known."""
+def _averages(setting: Setting, pair: Pair) -> tuple[Complex, Complex, Flags]:
+    """Return what is compared about every row, of the signal and of what it follows, shape (n,) and (n, 2), and where."""
     spans = pair.spans
     weight: Floats = -spans.slope if setting.rates else spans.weight
     signal = complex_of(pair.other)
     if setting.mirrored:
         signal = np.conj(signal)
-    source = source_of(setting, pair.mapped)
+    columns = [signal, source_of(setting, pair.mapped), lever_of(setting, pair.mapped)]
     m = len(weight)
     if len(signal) < m:
-        empty = np.empty(0, dtype=np.complex128)
-        return empty, empty, np.empty(0, dtype=np.bool_)
-    both = [np.convolve(values - values[0], weight[::-1], mode="valid") * spans.step_s for values in (signal, source)]
+        return np.zeros(0, dtype=np.complex128), np.zeros((0, 2), dtype=np.complex128), np.zeros(0, dtype=np.bool_)
+    made = [np.convolve(values - values[0], weight[::-1], mode="valid") * spans.step_s + 0j for values in columns]
     until = np.concatenate([[0], np.cumsum(pair.good)])
-    return both[0], both[1], np.asarray(until[m:] - until[:-m] == m)
+    known: Flags = np.asarray(until[m:] - until[:-m] == m)
+    return made[0], np.column_stack(made[1:]), known

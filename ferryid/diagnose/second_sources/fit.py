@@ -7,15 +7,17 @@ and l the place of the other sensor seen from the mapped one::
     dz/dt = d/dt (k e^(ib) p + e^(i psi) l)(t - T) + c              positions
     z(t) = k r(t - T) + c,    dz/dt = k dpsi/dt (t - T) + c         yaw rates and headings
 
-where a first-order filter of one of the two may stand in the place of the delay T: with time constant T, ``z + T dz/dt`` is what
-z would be without it. All of it is averaged over the windows of the sensor checks, and solved with their regression. Both signals have noise, which makes a factor
-too small in one direction of the regression and too large in the other: the intervals hold both.
+where a first-order filter of one of the two may stand in the place of the delay T: with time constant T, ``z + T dz/dt`` is
+what z would be without it. All of it is averaged over the windows of the sensor checks, and solved with their regression. Both
+signals have noise, which makes a factor too small in one direction of the regression and too large in the other: the intervals
+hold both.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +29,7 @@ from ferryid.diagnose.second_sources.pairs import EAST, NORTH, PSI, Pair, R, U, 
 from ferryid.diagnose.second_sources.thresholds import SECOND
 from ferryid.types import Floats
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 SCALE, ANGLE, X, Y, LATE, BIAS, BIAS_2 = range(7)
 NEUTRAL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 TINY = np.array([1e-4, 1e-4, 1e-2, 1e-2, 1e-2, 1e-3, 1e-3])
@@ -43,7 +45,7 @@ FLOORS = np.array([CHECKS.filtered_scale, SECOND.axis_rad, SECOND.mount_m, SECON
 class Setting:
     """How a signal is taken: its kind, whether it is in the world's axes or the vessel's, mirrored, and its gain.
 
-    ``gain`` has the unit in its size and the axes, quarter turns, in its angle. ``filtered`` takes a lag in the place of a delay.
+    ``gain`` has the unit in its size and the axes, quarter turns, in its angle. ``filtered`` takes a lag in place of a delay.
     """
 
     kind: str
@@ -71,7 +73,7 @@ class Setting:
         if self.kind not in VECTORS:
             return average(np.ascontiguousarray(values.real)) + 0j
         both = average(np.column_stack([values.real, values.imag]))
-        return np.asarray(both[:, 0] + 1j * both[:, 1])
+        return np.asarray(both[:, 0] + 1j * both[:, 1], dtype=np.complex128)
 
     def unfiltered(self, spans: Spans, values: Complex, lag_s: float) -> Complex:
         """Return the same of what a signal would be without a first-order lag, shape (J,)."""
@@ -83,7 +85,7 @@ class Setting:
 
 def complex_of(values: Floats) -> Complex:
     """Return the components of a vector as one complex number."""
-    return np.asarray(values[:, 0] + 1j * values[:, 1] if values.shape[1] == 2 else values[:, 0] + 0j)
+    return values[:, 0] + (1j * values[:, 1] if values.shape[1] == 2 else 0j)
 
 
 def source_of(setting: Setting, mapped: Floats) -> Complex:
@@ -98,14 +100,23 @@ def source_of(setting: Setting, mapped: Floats) -> Complex:
     return mapped[:, PSI if setting.kind == "heading" else R] + 0j
 
 
+def lever_of(setting: Setting, mapped: Floats) -> Complex:
+    """Return what a metre ahead of the mapped sensor adds to it, shape (n,)."""
+    turn = np.exp(1j * mapped[:, PSI])
+    if setting.kind == "position":
+        return np.asarray(turn)
+    if setting.kind == "velocity":
+        return np.asarray(1j * mapped[:, R] * (turn if setting.world else 1.0))
+    return np.zeros(len(mapped), dtype=np.complex128)
+
+
 def _predicted(setting: Setting, mapped: Floats, source: Complex, p: Floats) -> Complex:
     """Return what the signal should be, shape (n,), without bias."""
-    turn, lever = np.exp(1j * mapped[:, PSI]), complex(p[X], p[Y])
-    gain = p[SCALE] * np.exp(1j * p[ANGLE])
+    lever, gain = lever_of(setting, mapped) * complex(p[X], p[Y]), p[SCALE] * np.exp(1j * p[ANGLE])
     if setting.kind == "position":
-        value = gain * source + turn * lever
+        value = gain * source + lever
     elif setting.kind == "velocity":
-        value = gain * (source + 1j * mapped[:, R] * lever * (turn if setting.world else 1.0))
+        value = gain * (source + lever)
     else:
         value = p[SCALE] * source
     if p[LATE] != 0.0 and not setting.filtered:
@@ -116,16 +127,15 @@ def _predicted(setting: Setting, mapped: Floats, source: Complex, p: Floats) -> 
 
 def _inverse(setting: Setting, mapped: Floats, signal: Complex, p: Floats) -> Complex:
     """Return the mapped signal that the other one leads to."""
-    turn, lever = np.exp(1j * mapped[:, PSI]), complex(p[X], p[Y])
-    gain = p[SCALE] * np.exp(1j * p[ANGLE])
+    lever, gain = lever_of(setting, mapped) * complex(p[X], p[Y]), p[SCALE] * np.exp(1j * p[ANGLE])
     if p[LATE] != 0.0 and not setting.filtered:
         row = np.arange(len(signal), dtype=np.float64)
         signal = np.interp(row + p[LATE] * RATE_HZ, row, signal)
     if setting.kind == "position":
-        return np.asarray((signal - turn * lever) / gain)
+        return np.asarray((signal - lever) / gain)
     bias = complex(p[BIAS], p[BIAS_2])
     if setting.kind == "velocity":
-        return np.asarray((signal - bias) / gain - 1j * mapped[:, R] * lever * (turn if setting.world else 1.0))
+        return np.asarray((signal - bias) / gain - lever)
     return np.asarray((signal - (0.0 if setting.rates else bias)) / p[SCALE])
 
 
@@ -247,9 +257,7 @@ class _Problem:
 
     def functionals(self) -> Complex:
         """Return what is compared of the signal, shape (J,)."""
-        return np.concatenate(
-            [self.setting.functional(pair.spans, self.setting.signal(pair)) for pair in self.pairs]
-        )
+        return np.concatenate([self.setting.functional(pair.spans, self.setting.signal(pair)) for pair in self.pairs])
 
     def complex_residual(self, p: Floats, *, reverse: bool = False, at: Floats | None = None) -> Complex:
         """Return the signal less what it should be; `reverse`: where the mapped signal is made of it, with parameters `at`."""
@@ -267,7 +275,9 @@ class _Problem:
     def channels(self, values: Complex) -> Floats:
         """Return real channels, shape (J, c)."""
         vector = self.setting.kind in VECTORS
-        return np.column_stack([values.real, values.imag]) if vector else values.real[:, None]
+        return np.asarray(
+            np.column_stack([values.real, values.imag]) if vector else values.real[:, None], dtype=np.float64
+        )
 
     def derivatives(self, p: Floats, *, reverse: bool = False) -> Floats:
         """Return the residual's derivatives, shape (J, c, 7)."""
@@ -281,7 +291,9 @@ class _Problem:
             more, less = p.copy(), p.copy()
             more[k] += tiny
             less[k] -= tiny
-            change = self.complex_residual(more, reverse=reverse, at=p) - self.complex_residual(less, reverse=reverse, at=p)
+            change = self.complex_residual(more, reverse=reverse, at=p) - self.complex_residual(
+                less, reverse=reverse, at=p
+            )
             columns.append(self.channels(change) / (2.0 * tiny))
         return np.stack(columns, axis=-1)
 

@@ -18,7 +18,7 @@ from ferryid.ingest.clocks import repair_all
 from ferryid.ingest.log import Series
 from ferryid.signals.quality import clean
 from ferryid.signals.stream import Recording
-from ferryid.types import Floats, Nanoseconds
+from ferryid.types import Flags, Floats, Nanoseconds
 from ferryid.vessel.frames import WGS84_A_M, local_north_east, yaw_of_quaternion
 
 NOT_READ, FEW, CONSTANT, BROKEN, APART, MANY = (
@@ -166,7 +166,7 @@ def _samples(
             return BROKEN
         with np.errstate(invalid="ignore"):
             columns.append(np.asarray(column, dtype=np.float64)[rows])
-    finite = np.isfinite(np.column_stack(columns)).all(axis=1)
+    finite: Flags = np.asarray(np.isfinite(np.column_stack(columns)).all(axis=1))
     missing = int(len(finite) - finite.sum())
     time_s = np.asarray((time_ns - t0_ns) * 1e-9, dtype=np.float64)[finite]
     columns = [column[finite] for column in columns]
@@ -208,12 +208,13 @@ def _are_degrees(columns: Sequence[Floats]) -> bool:
     """Return whether what is called a position is latitude and longitude: metres do not stay within a tenth far from zero."""
     spans = [float(np.ptp(column)) for column in columns]
     return all(
-        span < DEGREES and abs(float(np.median(column))) > NEAR * span for span, column in zip(spans, columns, strict=True)
+        span < DEGREES and abs(float(np.median(column))) > NEAR * span
+        for span, column in zip(spans, columns, strict=True)
     )
 
 
 def _placed(columns: Sequence[Floats]) -> tuple[list[Floats], float] | None:
-    """Return metres north and east of latitudes and longitudes, and their unit in rad; None for what is neither degrees nor rad."""
+    """Return metres north and east of latitudes and longitudes, and their unit [rad]; None for what is neither deg nor rad."""
     # A receiver without a fix writes zeros.
     latitude, longitude = (np.where((columns[0] == 0.0) & (columns[1] == 0.0), np.nan, one) for one in columns)
     known = np.isfinite(latitude)

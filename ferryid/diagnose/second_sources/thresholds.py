@@ -21,7 +21,10 @@ class SecondSourceThresholds:
         20, "samples", "a topic with fewer is passed over", "convention: no comparison in less"
     )
     fewest_windows: int = threshold(
-        12, "windows", "of 8 s, 2 s apart, below which nothing is compared", "convention: half a minute of common motion"
+        12,
+        "windows",
+        "of 8 s, 2 s apart, below which nothing is compared",
+        "convention: half a minute of common motion",
     )
     most_delay_s: float = threshold(
         5.0, "s", "largest delay that is searched", "convention: longer than any filter or link delays a signal"
@@ -64,6 +67,9 @@ class SecondSourceThresholds:
         "of the squared difference",
         "what a first-order lag must leave of that beside a delay to be named instead",
         "convention: a fifth less",
+    )
+    least_lag_s: float = threshold(
+        0.5, "s", "least time constant of a lag", "derived: below, windows of 8 s cannot distinguish it from a delay"
     )
     clock_s: float = threshold(
         0.005, "s", "standard deviation of a delay by stamps and sampling", "convention: half a sample at 100 Hz"

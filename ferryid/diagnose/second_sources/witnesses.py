@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from math import hypot
 
-from ferryid.diagnose.second_sources.comparison import Comparison, label
+from ferryid.diagnose.second_sources.comparison import Comparison
 from ferryid.diagnose.second_sources.thresholds import SECOND
 
 WORDS = {"scale": "factor", "delay": "delay", "bias": "bias", "sign": "sign"}
@@ -72,7 +72,7 @@ def _witness(name: str, what: str, sources: Sequence[Comparison]) -> Witness | N
     off = [one for one in sources if _differs(one, what)]
     for one, other in combinations(off, 2):
         if _alike(one, other, what):
-            pair = (label(one.candidate), label(other.candidate))
+            pair = (one.candidate.label, other.candidate.label)
             says = (
                 f"The mapped {name} disagrees with two others that agree with each other in {WORDS[what]}: {pair[0]} "
                 f"({_phrase(one, what)}) and {pair[1]} ({_phrase(other, what)})."
@@ -81,13 +81,13 @@ def _witness(name: str, what: str, sources: Sequence[Comparison]) -> Witness | N
     within = [one for one in sources if one not in off]
     if len(off) == 1 and within:
         odd = off[0]
-        agreeing = tuple(label(one.candidate) for one in within if not _alike(one, odd, what))
+        agreeing = tuple(one.candidate.label for one in within if not _alike(one, odd, what))
         if agreeing:
             says = (
-                f"{label(odd.candidate)} is the odd one in {WORDS[what]} of the {name} ({_phrase(odd, what)}): the mapped one "
+                f"{odd.candidate.label} is the odd one in {WORDS[what]} of the {name} ({_phrase(odd, what)}): the mapped one "
                 f"agrees with {agreeing[0]}."
             )
-            return Witness(name, what, label(odd.candidate), agreeing, says)
+            return Witness(name, what, odd.candidate.label, agreeing, says)
     return None
 
 
