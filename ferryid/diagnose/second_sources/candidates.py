@@ -190,7 +190,7 @@ def candidates(profile: Profile, topics: Sequence[Topic], withhold: Collection[s
             and not path.endswith("]") | _barred(words := words_of(path))
             and path not in mapped.get(name, ())
         }
-        named = list(_named(topic, fields))
+        named = list(dict.fromkeys(_named(topic, fields)))
         known += named
         used = {path for one in named for path in one.fields}
         # Of message types with many fields, what has no telling name is state of a device.

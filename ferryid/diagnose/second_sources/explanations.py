@@ -7,6 +7,7 @@ from math import isfinite
 
 from ferryid.counts import counted, verb
 from ferryid.diagnose.data.estimate import Estimate
+from ferryid.diagnose.second_sources.thresholds import SECOND
 
 KINDS = {
     "position": "position",
@@ -24,8 +25,6 @@ CONSTANTS = {
     3.28 * 0.3048: "feet taken as 1/3.28 m",
 }
 """Factors near one that a wrong constant of a unit makes."""
-NARROW = 0.5
-"""Width of a factor's interval over the distance of such a constant from one: wider ones fit several."""
 NAMES = {"kn": "knots", "deg/s": "deg/s", "ft": "feet", "ft/s": "feet per second"}
 
 
@@ -74,7 +73,7 @@ def scale(factor: Estimate, unit: str, rest: Estimate | None) -> str:
         text += f": {NAMES.get(unit, unit)}"
     else:
         for value, reason in CONSTANTS.items():
-            if abs(factor.value - value) <= 0.5 * (factor.high - factor.low) < NARROW * abs(value - 1.0):
+            if abs(factor.value - value) <= 0.5 * (factor.high - factor.low) < SECOND.constant_width * abs(value - 1.0):
                 return f"{text}: {reason}"
         return text
     return text if rest is None else f"{text}, and {shown(rest)} beside it"

@@ -31,8 +31,6 @@ NOT_READ, FEW, CONSTANT, BROKEN, APART, MANY = (
 )
 """Why a signal is passed over."""
 
-DEGREES, NEAR = 0.1, 20.0
-"""Extent of a trial in degrees at most, and how many extents from zero it is at least."""
 _TURN = 2.0 * np.pi
 _ROUNDING = 1e-6
 
@@ -208,7 +206,7 @@ def _are_degrees(columns: Sequence[Floats]) -> bool:
     """Return whether what is called a position is latitude and longitude: metres do not stay within a tenth far from zero."""
     spans = [float(np.ptp(column)) for column in columns]
     return all(
-        span < DEGREES and abs(float(np.median(column))) > NEAR * span
+        span < SECOND.degrees_extent and abs(float(np.median(column))) > SECOND.degrees_far * span
         for span, column in zip(spans, columns, strict=True)
     )
 

@@ -59,6 +59,21 @@ class SecondSourceThresholds:
         "distance of a factor from that of a unit within which the unit is named",
         "convention: units are a factor of 1.1 and more apart, instruments are better",
     )
+    constant_width: float = threshold(
+        0.5,
+        "of the distance from one",
+        "half width of a factor's interval below which a wrong constant of a unit is named",
+        "convention: wider ones hold several constants",
+    )
+    degrees_extent: float = threshold(
+        0.1,
+        "-",
+        "extent of a trial below which a position may be latitude and longitude",
+        "convention: ten kilometres in degrees; in metres nothing moves",
+    )
+    degrees_far: float = threshold(
+        20.0, "extents", "and its least distance from zero", "convention: a local origin is within a trial's extent"
+    )
     no_unit_ratio: float = threshold(
         1.5, "-", "factors nearer to one are no unit's", "convention: the nearest units are a factor of 1.9 off SI"
     )
