@@ -25,6 +25,8 @@ NO_DECISION = {
         effects.payload WATER WATERPLANE
         diagnose.data.course NORMAL
         identify.adaptive.averaging NORMAL_95
+        diagnose.second_sources.comparison NORMAL_95
+        diagnose.second_sources.samples _TURN
         identify.free_run_checks _DEGREES
         diagnose.judging.group_loads BONFERRONI
         identify.split _GOLDEN
@@ -33,6 +35,8 @@ NO_DECISION = {
         signals.smooth _AXIS_OF
         diagnose.checks.kinematics SCALE ANGLE X Y LATE NORTH EAST NEUTRAL
         diagnose.checks.yaw_rate_scale NEUTRAL SIZE
+        diagnose.second_sources.fit SCALE ANGLE X Y LATE BIAS BIAS_2 NEUTRAL OF_VECTORS OF_SCALARS FLOORS
+        diagnose.second_sources.pairs NORTH EAST PSI U V R
         diagnose.inference.kalman CHANNEL_STATES DIFFUSE
         effects.effect HELD
         effects.equations_of_motion MASSES DAMPED
@@ -51,6 +55,8 @@ NO_DECISION = {
     """,
     "rounding, overflow and division by zero": """
         signals.grid EXACT_S
+        diagnose.second_sources.comparison _SAME
+        diagnose.second_sources.samples _ROUNDING
         diagnose.inference.campaign SAME
         diagnose.inference.coloured_noise LEAST_VARIANCE
         identify.acceptance _ROUNDING _NOTHING
@@ -84,6 +90,8 @@ NO_DECISION = {
         models.prediction.free_run HORIZONS_S STEP_S
     """,
     "steps, starts, grids and bounds of searches and iterations": """
+        diagnose.second_sources.comparison ALIGNMENTS _ALIGNED_S BLOCKS_S
+        diagnose.second_sources.fit TINY STEPS LONGER
         signals.kalman _GRID
         signals.poses _AHEAD
         diagnose.checks.azimuth_resolution TURNS

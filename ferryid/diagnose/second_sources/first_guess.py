@@ -19,7 +19,6 @@ from ferryid.vessel.units import KINDS
 UNIT_KIND = {"position": "length", "velocity": "speed", "speed": "speed", "yaw_rate": "rate", "heading": "angle"}
 _WORLD = {"position": (True,), "velocity": (False, True)}
 _MIRRORED = {"position": (False, True), "velocity": (False, True)}
-_DIRECTIONS = {0: (1, 0), 1: (0, -1), 2: (-1, 0), 3: (0, 1)}
 
 
 @dataclass(frozen=True)
