@@ -64,6 +64,7 @@ def test_two_groups_and_several_logs_after_one_option(ferryid: Command, tmp_path
         (("--versus", "short.bag", "--against", "short.csv"), ("found both --versus and --against",)),
         (("--versus", "short.bag", "--name", "new"), ("--versus stores no model",)),
         (("--versus", "absent.mcap"), ("absent.mcap", "no such file")),
+        (("--versus",), ("--versus: no log follows it",)),
         (("--versus", "short.csv"), ()),
     ],
 )
