@@ -101,7 +101,7 @@ def _scatter(one: Comparison) -> str:
 
 
 def _over(one: Comparison) -> str:
-    logs = f" of {one.logs} logs" if one.logs > 1 else ""
+    logs = f" of {counted(one.logs, 'log')}" if one.logs > 1 else ""
     return f"{counted(one.windows, 'window')}{logs}{', receive times' if one.clock == 'receive' else ''}"
 
 

@@ -11,8 +11,21 @@ from scipy.special import stdtrit
 
 from ferryid.diagnose.checks.thresholds import CHECKS
 from ferryid.diagnose.data.estimate import Estimate
-from ferryid.diagnose.second_sources import explanations
 from ferryid.diagnose.second_sources.candidates import Candidate
+from ferryid.diagnose.second_sources.explanations import (
+    KINDS,
+    describe_angle,
+    describe_bias,
+    describe_delay,
+    describe_heading_bias,
+    describe_lag,
+    describe_place,
+    describe_quarter_turn,
+    describe_reversed_sign,
+    describe_scale,
+    describe_steps,
+    describe_wraps,
+)
 from ferryid.diagnose.second_sources.first_guess import Guess, axes_of, first_guess
 from ferryid.diagnose.second_sources.fit import ANGLE, BIAS, BIAS_2, LATE, SCALE, Fitted, X, Y, fit
 from ferryid.diagnose.second_sources.pairs import PSI, Pair, pair_of
@@ -101,7 +114,7 @@ class Comparison:
     @property
     def says(self) -> str:
         """All of it in one sentence."""
-        what = explanations.KINDS[self.kind]
+        what = KINDS[self.kind]
         frame = f" ({self.axes})" if self.axes else ""
         if not self.follows:
             common = f"has {100.0 * self.share:.0f} % of its variance in common with the mapped one"
@@ -226,17 +239,17 @@ def _differences(
     found = []
     kind = guess.setting.kind
     if kind in ("yaw_rate", "heading") and guess.setting.gain.real < 0.0:
-        found.append(Difference("sign", {}, explanations.reversed_sign(kind)))
+        found.append(Difference("sign", {}, describe_reversed_sign(kind)))
     scale = _scale(guess, fitted)
     if scale is not None:
         found.append(scale)
     if fitted.certain(ANGLE):
         value, low, high = (degrees(one) for one in fitted.interval(ANGLE))
         angle = Estimate(value, low, high, "deg")
-        found.append(Difference("angle", {"angle": angle}, explanations.angle(angle)))
+        found.append(Difference("angle", {"angle": angle}, describe_angle(angle)))
     if fitted.certain(X) or fitted.certain(Y):
         x, y = (Estimate(*fitted.interval(index), "m") for index in (X, Y))
-        found.append(Difference("place", {"x": x, "y": y}, explanations.place(x, y)))
+        found.append(Difference("place", {"x": x, "y": y}, describe_place(x, y)))
     delay = _delay(fitted, late)
     if delay is not None:
         found.append(delay)
@@ -255,7 +268,7 @@ def _scale(guess: Guess, fitted: Fitted) -> Difference | None:
     size = abs(guess.setting.gain)
     factor = _scaled(fitted.interval(SCALE), size, "-")
     rest = Estimate(*fitted.interval(SCALE), "-") if certain and guess.unit else None
-    return Difference("scale", {"factor": factor}, explanations.scale(factor, guess.unit, rest))
+    return Difference("scale", {"factor": factor}, describe_scale(factor, guess.unit, rest))
 
 
 def _scaled(interval: tuple[float, float, float], scale: float, unit: str) -> Estimate:
@@ -274,8 +287,8 @@ def _delay(fitted: Fitted, late: float) -> Difference | None:
     reach = float(stdtrit(freedom, 0.975)) * error
     delay = Estimate(value, value - reach, value + reach, "s")
     if fitted.filtered:
-        return Difference("lag", {"time_constant": delay}, explanations.lag(delay))
-    return Difference("delay", {"delay": delay}, explanations.delay(delay))
+        return Difference("lag", {"time_constant": delay}, describe_lag(delay))
+    return Difference("delay", {"delay": delay}, describe_delay(delay))
 
 
 def _bias(guess: Guess, fitted: Fitted, unit: float) -> list[Difference]:
@@ -287,7 +300,7 @@ def _bias(guess: Guess, fitted: Fitted, unit: float) -> list[Difference]:
     what = "drift" if guess.setting.kind == "position" else "bias"
     shown = "deg/s" if guess.setting.kind == "yaw_rate" else "m/s"
     values = {name: _scaled(fitted.interval(index), unit, shown) for name, index in zip(names, indices, strict=True)}
-    return [Difference(what, values, explanations.bias(values, what))]
+    return [Difference(what, values, describe_bias(values, what))]
 
 
 def _heading_bias(guess: Guess, fitted: Fitted, late: float, pairs: Sequence[Pair]) -> list[Difference]:
@@ -312,12 +325,12 @@ def _heading_bias(guess: Guess, fitted: Fitted, late: float, pairs: Sequence[Pai
         quarter, rest = 0, float(wrap(np.array([middle + value]))[0])
     result = []
     if quarter % 4:
-        result.append(Difference("sign", {}, explanations.quarter_turn(quarter % 4, sign)))
+        result.append(Difference("sign", {}, describe_quarter_turn(quarter % 4, sign)))
     if abs(rest) > float(stdtrit(freedom, 1.0 - 0.5 * CHECKS.false_alarm)) * error:
         reach = float(stdtrit(freedom, 0.975)) * error
         low, value, high = sorted(degrees(sign * (rest + more)) for more in (-reach, 0.0, reach))
         bias = Estimate(value, low, high, "deg")
-        result.append(Difference("bias", {"bias": bias}, explanations.heading_bias(bias)))
+        result.append(Difference("bias", {"bias": bias}, describe_heading_bias(bias)))
     return result
 
 
@@ -352,8 +365,8 @@ def _of_values(guess: Guess, fitted: Fitted, samples: Sequence[Samples], unit: f
     if quantum / sqrt(12.0) > SECOND.coarse * fitted.scatter and quantum > 0.0:
         step = unit * quantum
         name = UNITS[guess.setting.kind]
-        found.append(Difference("steps", {"step": Estimate(step, step, step, name)}, explanations.steps(step, name)))
+        found.append(Difference("steps", {"step": Estimate(step, step, step, name)}, describe_steps(step, name)))
     wraps = sum(one.wraps for one in samples)
     if wraps:
-        found.append(Difference("wraps", {"samples": Estimate(wraps, wraps, wraps, "-")}, explanations.wraps(wraps)))
+        found.append(Difference("wraps", {"samples": Estimate(wraps, wraps, wraps, "-")}, describe_wraps(wraps)))
     return found

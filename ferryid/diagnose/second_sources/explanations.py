@@ -47,14 +47,14 @@ def shown(one: Estimate, scale: float = 1.0, unit: str | None = None) -> str:
     return text if scaled.unit in ("-", "") else f"{text} {scaled.unit}"
 
 
-def reversed_sign(kind: str) -> str:
+def describe_reversed_sign(kind: str) -> str:
     """Return what an angle or rate of the other sign is."""
     if kind == "yaw_rate":
         return "sign reversed: z axis up, positive to port"
     return "sign reversed: anticlockwise"
 
 
-def quarter_turn(quarter: int, sign: float) -> str:
+def describe_quarter_turn(quarter: int, sign: float) -> str:
     """Return what a heading is that differs by quarter turns."""
     if sign < 0.0 and quarter == 1:
         return "counted from east (ENU)"
@@ -63,7 +63,7 @@ def quarter_turn(quarter: int, sign: float) -> str:
     )
 
 
-def scale(factor: Estimate, unit: str, rest: Estimate | None) -> str:
+def describe_scale(factor: Estimate, unit: str, rest: Estimate | None) -> str:
     """Return a factor, the unit that explains it, and what is left beside that."""
     text = f"factor {shown(factor)}"
     if unit.startswith("1/"):
@@ -79,12 +79,12 @@ def scale(factor: Estimate, unit: str, rest: Estimate | None) -> str:
     return text if rest is None else f"{text}, and {shown(rest)} beside it"
 
 
-def angle(one: Estimate) -> str:
+def describe_angle(one: Estimate) -> str:
     """Return by how much axes are turned."""
     return f"axes turned by {shown(one)}"
 
 
-def place(x: Estimate, y: Estimate) -> str:
+def describe_place(x: Estimate, y: Estimate) -> str:
     """Return where one sensor is, seen from the other."""
     ends = ("ahead" if x.value >= 0.0 else "astern", "to starboard" if y.value >= 0.0 else "to port")
     across, along = (shown(_positive(one)) for one in (y, x))
@@ -95,34 +95,34 @@ def _positive(one: Estimate) -> Estimate:
     return one if one.value >= 0.0 else Estimate(-one.value, -one.high, -one.low, one.unit)
 
 
-def delay(one: Estimate) -> str:
+def describe_delay(one: Estimate) -> str:
     """Return how late or early a signal is."""
     text = shown(_positive(one), 1000.0, "ms")
     return f"{text} {'later' if one.value > 0.0 else 'earlier'}"
 
 
-def lag(one: Estimate) -> str:
+def describe_lag(one: Estimate) -> str:
     """Return which of the two is filtered."""
     which = "it lags the mapped signal" if one.value > 0.0 else "the mapped signal lags it"
     return f"{which} as by a first-order filter with a time constant of {shown(_positive(one))}"
 
 
-def bias(values: Mapping[str, Estimate], what: str) -> str:
+def describe_bias(values: Mapping[str, Estimate], what: str) -> str:
     """Return a constant difference, or a drift."""
     parts = [shown(one) if name == "bias" else f"{shown(one)} {name}" for name, one in values.items()]
     return f"{what} {', '.join(parts)}"
 
 
-def heading_bias(one: Estimate) -> str:
+def describe_heading_bias(one: Estimate) -> str:
     """Return a constant difference of headings."""
     return f"{shown(_positive(one))} {'clockwise' if one.value > 0.0 else 'anticlockwise'}"
 
 
-def steps(step: float, unit: str) -> str:
+def describe_steps(step: float, unit: str) -> str:
     """Return a resolution."""
     return f"steps of {step:.3g} {unit}"
 
 
-def wraps(count: int) -> str:
+def describe_wraps(count: int) -> str:
     """Return how many samples lie inside a wrap."""
     return f"{counted(count, 'sample')} {verb(count, 'was')} interpolated through a full turn, left out"

@@ -32,6 +32,7 @@ from ferryid.types import Floats
 Complex = NDArray[np.complexfloating[Any, Any]]
 SCALE, ANGLE, X, Y, LATE, BIAS, BIAS_2 = range(7)
 NEUTRAL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+PAIRS = ((X, Y), (BIAS, BIAS_2))
 TINY = np.array([1e-4, 1e-4, 1e-2, 1e-2, 1e-2, 1e-3, 1e-3])
 STEPS = 10
 LONGER = (2, 4, 8)
@@ -204,7 +205,8 @@ def fit(setting: Setting, pairs: Sequence[Pair], length_m: float) -> Fitted | No
     usable = usable & (np.arange(7) != SCALE) if setting.kind == "heading" else usable
     problem = _Problem(setting, tuple(pairs), usable, size)
     always = np.zeros(7, dtype=np.bool_)
-    always[BIAS:] = True
+    # Slow wander of a position or heading is no news; a bias of a velocity has to compete with its factor.
+    always[BIAS:] = setting.rates
     start = problem.search(always & usable)
     if start is None:
         return None
@@ -319,6 +321,9 @@ class _Problem:
         self, start: Floats, active: NDArray[np.bool_], *, reverse: bool = False, long: bool = False
     ) -> Solution | None:
         """Return values and errors of the active parameters."""
+        if not active.any():
+            blocks = len(np.unique(self.place // CHECKS.independent_strides))
+            return Solution(start.copy(), np.zeros(len(start)), blocks) if blocks > len(NEUTRAL) else None
         p, solution = start.copy(), None
         for _ in range(STEPS):
             e, J = self.channels(self.complex_residual(p)), self.derivatives(p)
@@ -338,22 +343,23 @@ class _Problem:
         """Let parameters in, the most certain first, until none of the others is certain."""
         p, active = NEUTRAL.copy(), active.copy()
         while True:
-            solved = self.solve(p, active)
-            if solved is None:
-                return None
-            p = solved.values
+            if active.any():
+                solved = self.solve(p, active)
+                if solved is None:
+                    return None
+                p = solved.values
             e, J = self.channels(self.complex_residual(p)), self.derivatives(p)
             scores = []
             for k in np.flatnonzero(self.usable & ~active).tolist():
                 more = active.copy()
-                more[[X, Y] if k in (X, Y) else k] = True
+                more[self.together(k)] = True
                 change = self.step(p, more, e, J, J)
                 if change is not None and change.certain(k):
                     scores.append((change.score(k), k))
             if not scores:
                 return p, active
             chosen = max(scores)[1]
-            active[[X, Y] if chosen in (X, Y) else chosen] = True
+            active[self.together(chosen)] = True
 
     def apart(self, p: Floats, active: NDArray[np.bool_]) -> tuple[Solution | None, ...]:
         """Return the step of each parameter that was not let in, beside all that were."""
@@ -361,9 +367,14 @@ class _Problem:
         found: list[Solution | None] = []
         for k in range(len(NEUTRAL)):
             more = active.copy()
-            more[k] = True
+            more[self.together(k)] = True
             found.append(self.step(p, more, e, J, J, long=True) if self.usable[k] and not active[k] else None)
         return tuple(found)
+
+    def together(self, k: int) -> list[int]:
+        """Return which parameters are let in with one: both components of a vector."""
+        pair = next((pair for pair in PAIRS if k in pair), (k,))
+        return [one for one in pair if self.usable[one]]
 
     def scatter(self, p: Floats) -> float:
         """Return the robust standard deviation of what is left row by row, about the middle of each log."""

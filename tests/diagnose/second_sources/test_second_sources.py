@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ferryid.diagnose import second_sources
 from ferryid.diagnose.data.measurements import MeasuredLog, measure_log
-from ferryid.diagnose.second_sources import SecondSources, compare_second_sources, samples
+from ferryid.diagnose.second_sources import SecondSources, compare_second_sources, samples, sources
 from ferryid.diagnose.second_sources.candidates import Candidate, candidates, words_of
 from ferryid.ingest.log import Topic
 from ferryid.types import IN_MEMORY, Floats, no_progress
@@ -94,7 +93,7 @@ def differences(found: SecondSources) -> dict[str, list[str]]:
 def test_a_log_without_another_topic_is_not_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = recorded(tmp_path)
     monkeypatch.setattr(samples, "open_log", lambda *_: pytest.fail("the log is opened"))
-    monkeypatch.setattr(second_sources, "compare", lambda *_: pytest.fail("something is compared"))
+    monkeypatch.setattr(sources, "compare", lambda *_: pytest.fail("something is compared"))
     found = compare_second_sources([log], (), pytest.fail)
     assert not found
     assert not found.compared
