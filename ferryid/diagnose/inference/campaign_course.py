@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_triangular
 from scipy.sparse import csr_array
 
 from ferryid.diagnose.data.course import Course
@@ -80,22 +80,23 @@ def estimate_courses(fit: CampaignFit, k: int, turbulence: Turbulence) -> tuple[
     rows = [j for j, (of, _) in enumerate(campaign.own) if of == k]
     speed = float(np.mean([np.hypot(*fit.condition(i, k)[0]) for i in places]))
     logs = over(lambda i: _eliminated(fit, i, rows, turbulence, speed), places)
-    covariance = np.linalg.inv(np.eye(campaign.g) + np.sum([one.matrix for one in logs], axis=0))
-    step = -covariance @ (fit.common + np.sum([one.slope for one in logs], axis=0))
-    return tuple(_course(fit, i, rows, logs[i], step, covariance) for i in places)
+    whole = np.column_stack([np.eye(campaign.g), fit.common])
+    R = _triangular([whole, *(one.left for one in logs)])
+    step = -solve_triangular(R[: campaign.g, : campaign.g], R[: campaign.g, -1])
+    root = solve_triangular(R[: campaign.g, : campaign.g], np.eye(campaign.g))
+    return tuple(_course(fit, i, rows, logs[i], step, root @ root.T) for i in places)
 
 
 @dataclass(frozen=True)
 class _Log:
     """One log with its own vector and its departures eliminated.
 
-    `matrix` and `slope` are what it has of the common vector, shapes (g, g) and (g,); `covariance` is that of its own and its
-    departures if the common vector stays, `alone` where they go then, and `back` how they follow the common vector.
+    `left` are equations that it leaves for the common vector, with their errors, shape (r, g + 1); `covariance` is that of its
+    own and its departures if the common vector stays, `alone` where they go then, `back` how they follow the common vector.
     """
 
     knots: _Knots
-    matrix: Floats
-    slope: Floats
+    left: Floats
     covariance: Floats
     alone: Floats
     back: Floats
@@ -109,14 +110,22 @@ def _eliminated(fit: CampaignFit, i: int, rows: list[int], turbulence: Turbulenc
     departures = fit.noise.white(i, windows.along_vessel(_changes(fit, i, rows, knots)), windows.runs)
     J = np.concatenate([fit.parts[i].slopes, departures], axis=2)
     J = J.reshape(-1, J.shape[2])
-    steady = campaign.own_precision(fit.spreads)
-    prior = block_diag(np.diag(steady), np.kron(knots.precision(time_constant_s), np.diag((size / std) ** 2)))
-    normal, gradient = J.T @ J, J.T @ fit.parts[i].gaps.ravel()
-    gradient[g : g + campaign.l] += steady * fit.own[i]
-    covariance = np.linalg.inv(normal[g:, g:] + prior)
-    back = covariance @ normal[g:, :g]
-    slope = gradient[:g] - back.T @ gradient[g:]
-    return _Log(knots, normal[:g, :g] - normal[:g, g:] @ back, slope, covariance, -covariance @ gradient[g:], back)
+    steady = np.sqrt(campaign.own_precision(fit.spreads))
+    process = np.kron(np.linalg.cholesky(knots.precision(time_constant_s)).T, np.diag(size / std))
+    # Orthogonal elimination: on all but noiseless logs, normal equations of so many knots lose their digits.
+    own = J.shape[1] - g
+    measured = np.column_stack([J[:, g:], J[:, :g], fit.parts[i].gaps.ravel()])
+    believed = np.zeros((own, J.shape[1] + 1))
+    believed[:, :own] = block_diag(np.diag(steady), process)
+    believed[: campaign.l, -1] = steady * fit.own[i]
+    R = _triangular([measured, believed])
+    root = solve_triangular(R[:own, :own], np.eye(own))
+    return _Log(knots, R[own:, own:], root @ root.T, -root @ R[:own, -1], root @ R[:own, own:-1])
+
+
+def _triangular(equations: list[Floats]) -> Floats:
+    """Return the triangular factor of stacked equations: they have the same sums of squares as the factor's."""
+    return np.asarray(np.linalg.qr(np.vstack(equations))[1], dtype=np.float64)
 
 
 def _changes(fit: CampaignFit, i: int, rows: list[int], knots: _Knots) -> Floats:

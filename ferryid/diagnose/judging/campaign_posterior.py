@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import nan
 
+import numpy as np
+
 from ferryid.diagnose.data.measurements import Survey
 from ferryid.diagnose.inference.estimation import Candidate
 from ferryid.diagnose.judging.campaign import JudgedCampaign
@@ -82,5 +84,9 @@ def _stored(candidate: Candidate, values: Floats, finding: Finding, survey: Surv
         dict(finding.improvement),
         finding.unresolved_with,
     )
-    # What is reported brings its own interval, the rest has none.
+    # What is reported brings its own value and interval, such as the mean of a flow's course; the rest has no interval.
+    own = [
+        finding.parameters[one.name].value if one.name in finding.parameters else None for one in candidate.parameters
+    ]
+    values = np.array([value if mine is None else mine for value, mine in zip(values.tolist(), own, strict=True)])
     return stored_effect(candidate, values, [nan] * len(candidate.parameters), finding.parameters, source)

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import combinations
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,7 @@ def _plain(one: Comparison, senders: Mapping[str, int]) -> dict[str, Any]:
         "axes": one.axes,
         "unit": one.unit,
         "share": one.share,
-        "scatter": one.scatter,
+        "scatter": one.scatter if isfinite(one.scatter) else None,
         "scatter_unit": one.scatter_unit,
         "follows": one.follows,
         "agrees": one.agrees,

@@ -35,22 +35,26 @@ def campaign() -> JudgedCampaign:
 def survey() -> Survey:
     rows = np.ones(4, dtype=bool)
     motion = SimpleNamespace(log="log", valid=rows, rate_hz=2.0, nu=np.ones((4, 3)), nu_dot=np.ones((4, 3)))
-    return cast(Survey, SimpleNamespace(motion=motion, recording=SimpleNamespace(sha256="ab", files=("log.mcap",))))
+    return cast(
+        Survey, SimpleNamespace(motion=motion, repairs=(), recording=SimpleNamespace(sha256="ab", files=("log.mcap",)))
+    )
 
 
-def wind(probability: float = 0.99) -> Any:
-    told = {name: Estimate(1.0, 0.5, 1.5, "m/s") for name in ("north", "east")}
+def wind(probability: float = 0.99, at: tuple[float, float] = (1.0, 1.0)) -> Any:
+    told = {name: Estimate(one, one - 0.5, one + 0.5, "m/s") for name, one in zip(("north", "east"), at, strict=True)}
     return replace(found("wind", probability), parameters=told)
 
 
 def test_a_log_has_its_own_wind_and_the_hull_of_all() -> None:
     together = campaign()
     for i, true in enumerate(WINDS):
-        made = campaign_posterior(together, f"log{i}", None, [wind()], survey())
+        reported = (true[0] + 0.1, true[1])
+        made = campaign_posterior(together, f"log{i}", None, [wind(at=reported)], survey())
         assert made is not None
         (stored,) = made.conditions
-        assert [stored.parameters[name].value for name in ("north", "east")] == pytest.approx(true, abs=0.35)
-        # Factors on the load are not reported and have no interval.
+        assert [stored.parameters[name].value for name in ("north", "east")] == pytest.approx(reported)
+        # Factors on the load are not reported, come from the estimate and have no interval.
+        assert stored.parameters["C_X"].value == pytest.approx(1.0, abs=0.35)
         assert isnan(stored.parameters["C_X"].low)
         assert made.vessel == ()
         assert made.hull is together.hull_posterior
