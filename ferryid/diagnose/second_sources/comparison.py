@@ -179,7 +179,7 @@ def _compare(
     late, fitted = guess.late_s, None
     for _ in range(ALIGNMENTS):
         pairs = _pairs(samples, kind, late)
-        fitted = fit(guess.setting, pairs, length_m) if pairs else None
+        fitted = fit(guess.setting, pairs, length_m, delayed=late != 0.0) if pairs else None
         if fitted is None:
             return replace(base, follows=guess.share >= SECOND.follows, axes=axes_of(guess.setting), unit=guess.unit)
         if abs(fitted.values[LATE]) < _ALIGNED_S:

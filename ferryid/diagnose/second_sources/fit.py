@@ -197,8 +197,12 @@ class Fitted:
         return float(self.values[index]), min(one.low for one in both), max(one.high for one in both)
 
 
-def fit(setting: Setting, pairs: Sequence[Pair], length_m: float) -> Fitted | None:
-    """Fit what lies between a signal and the mapped one over some logs; None where there is too little of both."""
+def fit(setting: Setting, pairs: Sequence[Pair], length_m: float, *, delayed: bool = False) -> Fitted | None:
+    """Fit what lies between a signal and the mapped one over some logs; None where there is too little of both.
+
+    `delayed`: signals were moved by a delay already, so that what is left of it has to be let in, however small: else the place
+    of the sensor would take it.
+    """
     size = np.array([0.5, 0.5, max(10.0, length_m), max(10.0, length_m), 2.0, 1.0, 1.0])
     usable = OF_VECTORS if setting.kind in VECTORS else OF_SCALARS.copy()
     # A turn is a turn: headings have no factor.
@@ -207,6 +211,7 @@ def fit(setting: Setting, pairs: Sequence[Pair], length_m: float) -> Fitted | No
     always = np.zeros(7, dtype=np.bool_)
     # Slow wander of a position or heading is no news; a bias of a velocity has to compete with its factor.
     always[BIAS:] = setting.rates
+    always[LATE] = delayed
     start = problem.search(always & usable)
     if start is None:
         return None

@@ -134,6 +134,12 @@ def test_a_second_position_at_a_lever_arm_that_is_late(rate_hz: float) -> None:
     assert "later" in found.says
 
 
+def test_noise_does_not_move_the_place_by_what_is_left_of_the_delay() -> None:
+    found = other("position", lambda m: world(m, 2.1, 0.3), late_s=0.24, noise=0.05)
+    x = next(one for one in found.differences if one.what == "place").parameters["x"]
+    assert x.value == pytest.approx(2.1, abs=0.03)
+
+
 def test_a_velocity_of_another_place() -> None:
     place = only(other("velocity", lambda m: body(m, -1.5, 0.8)), "place")
     holds(place["x"], -1.5, 0.4)
