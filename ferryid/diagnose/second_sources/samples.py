@@ -170,7 +170,9 @@ def _samples(
     columns = [column[finite] for column in columns]
     if len(time_s) < SECOND.fewest_samples:
         return BROKEN if missing else FEW
-    if all(np.ptp(column) == 0.0 for column in columns):
+    still = [np.ptp(column) == 0.0 for column in columns]
+    # A component that nobody measured would turn and stretch the whole vector.
+    if all(still) or (any(still) and one.form != "quaternion"):
         return CONSTANT
     period = float(np.median(np.diff(time_s)))
     quantum = [_quantum(column) for column in columns]

@@ -228,6 +228,14 @@ def test_an_order_that_the_vessel_follows_is_no_sensor() -> None:
     assert compare(Candidate("/order", ("a",), "unknown"), [(samples, measured())], 5.0) is None
 
 
+def test_a_column_that_follows_in_part_is_no_sensor() -> None:
+    t = np.arange(0.0, LENGTH_S, 0.1)
+    rudder = at(t)[:, 5:] + coloured(np.random.default_rng(7), len(t), 0.03, 0.1, 20.0)[:, None]
+    samples = Samples(t, rudder, 0.1, "stamp", np.arange(len(t)), np.zeros(1))
+    assert compare(Candidate("/state", ("a",), "yaw_rate"), [(samples, measured())], 5.0) is not None
+    assert compare(Candidate("/state", ("a",), "unknown"), [(samples, measured())], 5.0) is None
+
+
 def test_short_logs_of_a_campaign_count_together() -> None:
     parts = []
     for first in range(0, 600, 60):

@@ -110,6 +110,13 @@ def test_what_is_broken_is_passed_over_and_counted(tmp_path: Path) -> None:
     assert found.to_json()["compared"][0]["agrees"] is True
 
 
+def test_a_velocity_without_sway_is_no_vector(tmp_path: Path) -> None:
+    t = np.arange(0.0, 400.0, 0.2)
+    found = compare_second_sources([recorded(tmp_path, {"vx": at(t)[:, 3], "vy": 0.0 * t})], (), no_progress)
+    assert not found.compared
+    assert dict(found.passed_over) == {samples.CONSTANT: 1}
+
+
 def test_a_log_that_cannot_be_read_again_stops_nothing(tmp_path: Path) -> None:
     log = recorded(tmp_path, {"gyro_z": gyro(1.0, 5)})
     found = compare_second_sources([replace(log, path=str(tmp_path / "gone.csv"))], (), no_progress)
